@@ -40,6 +40,9 @@ class SensorConfig(Strict):
     """Place in the ring's frame, to the left, m."""
     angle_deg: float = Field(ge=-360.0, le=360.0)
     """Direction of its axis, degrees counter-clockwise from forward."""
+    turns_with_wheels: bool = False
+    """On a synchro drive: the sensor is on a part that turns with the wheels, above a base that does not, as the
+    upper ring of a B21r. Its place and direction are those at the start, where the wheels point forward."""
 
 
 class FiringConfig(Strict):
@@ -115,6 +118,11 @@ class RingConfig(Strict):
         return tuple(Mount(radius * math.cos(a), radius * math.sin(a), a) for a in angles)
 
     @property
+    def turning(self) -> tuple[int, ...]:
+        """The sensors that turn with the wheels of a synchro drive, by index."""
+        return tuple(i for i, sensor in enumerate(self.sensors or ()) if sensor.turns_with_wheels)
+
+    @property
     def window_m(self) -> float:
         """Range up to which a firing listens, m."""
         return self.range_max_m if self.firing.window_m is None else self.firing.window_m
@@ -134,7 +142,7 @@ class BodyConfig(Strict):
     turn_acceleration_max_rad_s2: float = Field(default=2.0, gt=0.0, le=100.0)
     """Largest angular acceleration, rad/s²."""
     synchro: bool = False
-    """Synchro drive: the wheels turn, the body with its ring does not."""
+    """Synchro drive: the wheels turn, the body with its ring does not, but for sensors with `turns_with_wheels`."""
 
 
 class LinkConfig(Strict):

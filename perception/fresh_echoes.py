@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.kernel import Floats, kernel
+from perception.sensor_mounts import mounts_at
 
 LOOKS: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
@@ -79,10 +80,12 @@ class FreshEchoes:
         x, y (m), direction (rad) of each sensor in the ring's frame.
     half_angle : float
         Half the width of a beam, rad. A look within half of it of an older one is in the same direction.
+    turning : tuple of int
+        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
     """
 
-    def __init__(self, mounts: Floats, half_angle: float) -> None:
-        self._mounts = mounts
+    def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
+        self._mounts, self._turning = mounts, turning
         self._half_angle = half_angle
         self._points = np.zeros((len(mounts), LOOKS, 2))
         self._bearings = np.zeros((len(mounts), LOOKS))
@@ -92,8 +95,9 @@ class FreshEchoes:
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
         pose = firing.pose
+        mounts = mounts_at(firing, self._mounts, self._turning)
         record_echoes(
-            firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
+            firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
             float(firing.robot_s), 0.5 * self._half_angle, self._points, self._bearings, self._times, self._heard,
         )  # fmt: skip
 

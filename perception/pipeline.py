@@ -75,9 +75,9 @@ class Perception:
         self.grid = EvidenceGrid(ring, config.grid) if has_grid else None
         """The evidence grid in the odometry's frame, where the settings have one."""
         mounts = mounts_array(ring.mounts)
-        self._axes = mounts[:, 2].copy()
+        self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
-        self._echoes = FreshEchoes(mounts, self._half_angle)
+        self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning)
         self._reach_m = reach_m(ring)
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
@@ -223,7 +223,7 @@ class Perception:
         """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
         return self._echoes.points(robot_s, age_max_s)
 
-    def field_of_view(self, robot_s: float, ring_yaw: float, age_max_s: float) -> FieldOfView:
+    def field_of_view(self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float) -> FieldOfView:
         """Return where the ring has looked.
 
         Parameters
@@ -232,14 +232,18 @@ class Perception:
             The robot's time now, s.
         ring_yaw : float
             Direction of the ring now, rad.
+        travel : float
+            Direction of travel now, rad: that of the sensors that turn with the wheels.
         age_max_s : float
             Longest age at which a direction counts as seen, s.
         """
         bearings, ages = self._echoes.looks(robot_s, age_max_s)
+        axes = ring_yaw + self._axes
+        axes[self._turning] += travel - ring_yaw
         return FieldOfView(
             bearings,
             ages,
-            ring_yaw + self._axes,
+            axes,
             self._echoes.ages(robot_s),
             self._half_angle,
             self._reach_m,

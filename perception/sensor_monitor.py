@@ -50,13 +50,15 @@ TOLERANCE_STEPS: Final = 1.1
 """Tolerance for equal readings in steps of the ring's quantisation: one step and some rounding."""
 
 
-def neighbours_of(axes: Floats) -> Ints:
+def neighbours_of(axes: Floats, turning: tuple[int, ...] = ()) -> Ints:
     """Return the sensors that look next to each one on the left and on the right.
 
     Parameters
     ----------
     axes : (n,) float
         Direction of each sensor in the ring, rad.
+    turning : tuple of int
+        The sensors that turn with the wheels: none of them is the neighbour of one that does not.
 
     Returns
     -------
@@ -64,8 +66,9 @@ def neighbours_of(axes: Floats) -> Ints:
         Indices of the neighbours, −1 twice for a sensor that has not two.
     """
     neighbours: Ints = np.full((len(axes), 2), -1, np.int64)
+    turns = np.isin(np.arange(len(axes)), turning)
     for i, axis in enumerate(axes):
-        bearings = np.remainder(axes - axis, 2.0 * math.pi)
+        bearings = np.where(turns == turns[i], np.remainder(axes - axis, 2.0 * math.pi), 0.0)
         left = [k for k in np.argsort(bearings) if SAME_AXIS_RAD < bearings[k] <= NEIGHBOUR_MAX_RAD]
         right = [
             k
@@ -103,7 +106,7 @@ class SensorMonitor:
         How often a sensor's faults have changed.
     """
 
-    SCRATCH: Final = ("_trusted", "_possible", "_sensor_records", "_ring_records")
+    SCRATCH: Final = ("_trusted", "_possible", "_turns", "_sensor_records", "_ring_records")
     """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
 
     def __init__(self, ring: RingConfig) -> None:
@@ -111,7 +114,9 @@ class SensorMonitor:
         count = len(mounts)
         self.changes = 0
         self._axes = np.ascontiguousarray(mounts[:, 2])
-        self._neighbours = neighbours_of(self._axes)
+        self._turns = np.zeros(count)
+        self._turning = list(ring.turning)
+        self._neighbours = neighbours_of(self._axes, ring.turning)
         self._expected = fires(ring)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
@@ -131,10 +136,11 @@ class SensorMonitor:
         had not fired.
         """
         pose, trusted, possible = firing.pose, self._trusted, self._possible
+        self._turns[self._turning] = pose.theta - firing.ring_yaw
         changed = check_firing(
-            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._axes, self._neighbours,
-            self._expected, self._half_angle, self._tolerance, self._near, self._sensor_records, self._ring_records,
-            self._sets, trusted, possible,
+            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._axes, self._turns,
+            self._neighbours, self._expected, self._half_angle, self._tolerance, self._near, self._sensor_records,
+            self._ring_records, self._sets, trusted, possible,
         )  # fmt: skip
         self.changes += changed & FAULTS_CHANGED
         return (

@@ -1,4 +1,8 @@
-"""The mounts of the ring's sensors as an array, as the kernels take them, and how far the ring reaches."""
+"""The mounts of the ring's sensors as an array, as the kernels take them, and how far the ring reaches.
+
+A ring has one direction. Sensors of a part that turns otherwise, as the upper ring of a B21r does with the wheels,
+have mounts that turn in the ring's frame, by the angle between the direction of travel and the ring's.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,39 @@ from collections.abc import Sequence
 import numpy as np
 
 from config.robot import RingConfig
+from drivers.messages import Firing
 from perception.kernel import Floats
 
 
 def mounts_array(mounts: Sequence[tuple[float, float, float]]) -> Floats:
     """Return the mounts of all sensors in the ring's frame, shape (n, 3): x, y (m), direction (rad)."""
     return np.array(mounts, dtype=np.float64).reshape(len(mounts), 3)
+
+
+def turned_mounts(mounts: Floats, turning: tuple[int, ...], turn: float) -> Floats:
+    """Return the mounts with those of some sensors turned about the ring's centre; the same array if there are none.
+
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor.
+    turning : tuple of int
+        The sensors that turn.
+    turn : float
+        By how much, rad: direction of travel less that of the ring.
+    """
+    if not turning:
+        return mounts
+    rows, turned = list(turning), mounts.copy()
+    x, y, axis = mounts[rows].T
+    c, s = math.cos(turn), math.sin(turn)
+    turned[rows] = np.column_stack([c * x - s * y, s * x + c * y, axis + turn])
+    return turned
+
+
+def mounts_at(firing: Firing, mounts: Floats, turning: tuple[int, ...]) -> Floats:
+    """Return the mounts in the ring's frame at a firing, as `turned_mounts`."""
+    return turned_mounts(mounts, turning, firing.pose.theta - firing.ring_yaw)
 
 
 def reach_m(ring: RingConfig) -> float:

@@ -259,7 +259,8 @@ def update_run_faults(
 
 @kernel
 def check_firing(
-    ranges: Floats, x: float, y: float, yaw: float, axes: Floats, neighbours: Ints, expected: NDArray[np.bool_],
+    ranges: Floats, x: float, y: float, yaw: float, axes: Floats, turns: Floats, neighbours: Ints,
+    expected: NDArray[np.bool_],
     half_angle: float, tolerance: float, near: float, sensors: Records[SensorMemory], ring: Records[RingMemory],
     sets: NDArray[np.uint8], trusted: Floats, possible: Floats,
 ) -> int:  # fmt: skip
@@ -273,6 +274,8 @@ def check_firing(
         Place (m) and direction (rad) of the ring.
     axes : (n,) float
         Direction of each sensor in the ring, rad.
+    turns : (n,) float
+        By how much each sensor's part has turned in the ring, rad.
     neighbours : (n, 2) int
         Each sensor's neighbours, −1 for a sensor that has not two.
     expected : (n,) bool
@@ -309,6 +312,7 @@ def check_firing(
             c.run_length = 0
         before = c.faults
         r = ranges[i]
+        own_yaw = yaw + turns[i]
         if math.isnan(r):
             c.missed += 1
             if expected[i] and c.missed >= MISSED_FIRINGS_MAX:
@@ -325,12 +329,12 @@ def check_firing(
         if c.run_length == 0 or not (r == c.run_m or abs(r - c.run_m) <= tolerance):
             c.run_firing = ring[0].firings
             c.counts.changes += 1
-            begin_run(i, r, x, y, yaw, neighbours, sensors)
-        elif abs(yaw - c.run_yaw) > 0.5 * half_angle:
-            begin_run(i, c.run_m, x, y, yaw, neighbours, sensors)
+            begin_run(i, r, x, y, own_yaw, neighbours, sensors)
+        elif abs(own_yaw - c.run_yaw) > 0.5 * half_angle:
+            begin_run(i, c.run_m, x, y, own_yaw, neighbours, sensors)
         else:
             c.run_length += 1
-        update_run_faults(i, r, x, y, yaw + axes[i], half_angle, tolerance, neighbours, sensors)
+        update_run_faults(i, r, x, y, own_yaw + axes[i], half_angle, tolerance, neighbours, sensors)
         if ring[0].regularity >= REGULARITY_MIN:
             count_short_readings(c, r, fired_set)
             if is_doubtful(c, r, x, y, fired_set):

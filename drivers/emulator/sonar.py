@@ -55,6 +55,8 @@ class Sonar:
         self._rng = rng
         self._mount_poses = [Pose(*mount) for mount in ring.mounts]
         self._mounts: Records = np.array(list(ring.mounts), dtype=MOUNT)
+        self._turning = ring.turning
+        self._turning_poses = [self._mount_poses[i] for i in ring.turning]
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._is_clean = not (
             acoustics.noise_relative or acoustics.noise_m or acoustics.dropout or acoustics.outliers
@@ -126,6 +128,7 @@ class Sonar:
         Records
             `acoustics.ECHO`, shape (sensors,); the next call overwrites it.
         """
+        self._turn_mounts(pose.theta - ring_yaw)
         first_echoes(
             pose.x,
             pose.y,
@@ -142,6 +145,13 @@ class Sonar:
             self._echoes,
         )
         return self._echoes
+
+    def _turn_mounts(self, turn: float) -> None:
+        """Turn the sensors of the part that follows the wheels by an angle in the ring's frame, rad."""
+        part = Pose(0.0, 0.0, turn)
+        for i, straight in zip(self._turning, self._turning_poses, strict=True):
+            mount = self._mount_poses[i] = part.compose(straight)
+            self._mounts[i] = (mount.x, mount.y, mount.theta)
 
     def _with_errors(self, ranges: Floats, window: float) -> Floats:
         """Return ranges with noise, dropouts and outliers; draws four numbers a sensor whatever the settings."""

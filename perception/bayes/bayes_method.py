@@ -55,7 +55,7 @@ from perception.edits import (
 )
 from perception.kernel import Floats
 from perception.records import records, zeros
-from perception.sensor_mounts import mounts_array
+from perception.sensor_mounts import mounts_array, mounts_at
 
 UNKNOWN: Final = -1
 """In place of a number of segments made: those in the map are to be counted."""
@@ -78,7 +78,7 @@ class BayesPerception:
     """Attributes that are derived from the rest; they are not in a snapshot."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
-        self._mounts = mounts_array(ring.mounts)
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self._config = config
         self.settings = make_settings(ring, models, config)
         """The settings that kernels read."""
@@ -132,8 +132,9 @@ class BayesPerception:
         """Process one firing; return the number of outline segments that it completed."""
         s, tracks, settings = self.memory.s, self.memory.tracks, self.settings
         pose, time_s = firing.pose, float(firing.robot_s)
+        mounts = mounts_at(firing, self._mounts, self._turning)
         readings = associate(
-            s, tracks, settings, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), time_s,
+            s, tracks, settings, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), time_s,
             firing.ranges_m,
         )  # fmt: skip
         self._readings = readings

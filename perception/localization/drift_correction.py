@@ -99,7 +99,7 @@ class DriftCorrection:
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)
         self._map_heading = MapHeading(ring)
-        self._mounts = mounts_array(ring.mounts)
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._range_min_m = ring.range_min_m + 0.5 * ring.resolution_m
         self._waiting = np.zeros((WAITING_MAX, POSE + len(ring.mounts)))
@@ -273,7 +273,12 @@ class DriftCorrection:
         self._checked = self._arrived
         newest = np.arange(self._arrived - 1, max(-1, self._arrived - 1 - CYCLE_FIRINGS_MAX), -1) % WAITING_MAX
         echoes = echoes_of_cycle(
-            self._waiting[newest], self._mounts, self._range_min_m, self._tracker.range_max_m, self.e[0].range_scale
+            self._waiting[newest],
+            self._mounts,
+            self._turning,
+            self._range_min_m,
+            self._tracker.range_max_m,
+            self.e[0].range_scale,
         )
         found = find_slip(self._tracker, echoes, self._half_angle, self._tracker.range_max_m)
         self._stands_firm = found is not None and found.pose == Pose(0.0, 0.0, 0.0)

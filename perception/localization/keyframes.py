@@ -49,10 +49,11 @@ class Keyframes:
     SCRATCH: Final = ("_axes",)
     """What the settings give."""
 
-    def __init__(self, mounts: Floats) -> None:
+    def __init__(self, mounts: Floats, turning: tuple[int, ...] = ()) -> None:
+        self._turning = list(turning)
         self._axes = np.column_stack([mounts[:, :2], np.cos(mounts[:, 2]), np.sin(mounts[:, 2])])
         self._latest = np.zeros((len(mounts), 4))
-        """The ring's pose by odometry when each sensor last fired, and its range."""
+        """The pose by odometry of each sensor's part of the ring when it last fired, and its range."""
         self._has_fired = np.zeros(len(mounts), dtype=np.bool_)
         """Since the last keyframe."""
         self._firings = 0
@@ -70,6 +71,9 @@ class Keyframes:
         fired = ~np.isnan(firing.ranges_m)
         self._latest[fired, :3] = x, y, yaw
         self._latest[fired, 3] = firing.ranges_m[fired]
+        if self._turning:
+            turned = [i for i in self._turning if fired[i]]
+            self._latest[turned, 2] = firing.pose.theta
         self._has_fired |= fired
         self._firings += 1
         if not self._is_started:

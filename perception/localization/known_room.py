@@ -97,7 +97,7 @@ class KnownRoom:
         self._tracked = PoseTrack(surroundings, self._background, noise)
         self._candidates = PoseTrack(surroundings, self._background, noise)
         """Hypotheses of a search, until they have entered all keyframes."""
-        self._mounts = mounts_array(ring.mounts)
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self.shares = LearnedShares()
         self._odometry = np.zeros(3)
         """Of the ring at the last firing."""
@@ -105,7 +105,7 @@ class KnownRoom:
 
     def reset(self) -> None:
         """Start again with an unknown place, as after a reset of the odometry."""
-        self._keyframes = Keyframes(self._mounts)
+        self._keyframes = Keyframes(self._mounts, self._turning)
         self._tracked.clear()
         self._candidates.clear()
         self._grid.cancel()

@@ -24,7 +24,7 @@ from perception.localization.landmark_state import (
     Y,
 )
 from perception.records import records, zeros
-from perception.sensor_mounts import mounts_array
+from perception.sensor_mounts import mounts_array, turned_mounts
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
 ODOMETER_SIGMA: Final = 0.03
@@ -88,7 +88,7 @@ class LandmarkTracker:
     """A view of the same memory, left out of snapshots."""
 
     def __init__(self, ring: RingConfig) -> None:
-        self._mounts = mounts_array(ring.mounts)
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         half_step_m = 0.5 * ring.resolution_m
         self._ring = np.array([
             half_step_m**2 / 3.0 + RANGE_NOISE_M**2, RANGE_NOISE**2, math.radians(ring.beam_half_angle_deg),
@@ -146,7 +146,8 @@ class LandmarkTracker:
             self._move(x, y, theta, yaw)
         self.entered_at[:] = x, y, theta, yaw
         self.entered += 1
-        update_with_firing(self.e, self.covariance, self._mounts, row[POSE:], x, y, yaw, *self._ring.tolist())
+        mounts = turned_mounts(self._mounts, self._turning, theta - yaw)
+        update_with_firing(self.e, self.covariance, mounts, row[POSE:], x, y, yaw, *self._ring.tolist())
 
     @property
     def is_doubtful(self) -> bool:

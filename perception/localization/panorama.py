@@ -11,6 +11,7 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
 from perception.kernel import Floats
+from perception.sensor_mounts import mounts_at
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +54,7 @@ def panoramas(firings: Sequence[Firing], ring: RingConfig) -> tuple[Panorama, ..
             done.append(Panorama(*np.full((4, len(mounts)), np.nan)))
         at = last.compose(Pose(firing.pose.x, firing.pose.y, firing.ring_yaw))
         cos, sin = math.cos(at.theta), math.sin(at.theta)
-        x, y, angle = mounts[fired].T
+        x, y, angle = mounts_at(firing, mounts, ring.turning)[fired].T
         done[-1].x[fired] = at.x + cos * x - sin * y
         done[-1].y[fired] = at.y + sin * x + cos * y
         done[-1].axis[fired] = at.theta + angle

@@ -21,6 +21,7 @@ from perception.localization.joint_compatibility import (
     share_improved,
 )
 from perception.localization.landmark_tracker import POSE, LandmarkTracker
+from perception.sensor_mounts import turned_mounts
 
 CYCLE_M: Final = 0.3
 """Echoes from farther back than this are not of the same place."""
@@ -28,7 +29,9 @@ SLIPPED_SHARE: Final = 0.4
 """Where fewer of the landmarks fit clearly better after a displacement, some landmarks moved, and not the robot."""
 
 
-def echoes_of_cycle(rows: Floats, mounts: Floats, range_min_m: float, range_max_m: float, scale: float) -> list[Echo]:
+def echoes_of_cycle(
+    rows: Floats, mounts: Floats, turning: tuple[int, ...], range_min_m: float, range_max_m: float, scale: float
+) -> list[Echo]:
     """Return each sensor's last echo of the last cycle, as seen from the ring at the last firing.
 
     Parameters
@@ -37,6 +40,8 @@ def echoes_of_cycle(rows: Floats, mounts: Floats, range_min_m: float, range_max_
         The last firings, the newest first, as `LandmarkTracker` takes them.
     mounts : (sensors, 3) float
         Place (m) and direction (rad) of each sensor in the ring's frame.
+    turning : tuple of int
+        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
     range_min_m, range_max_m : float
         Ranges of the ring; one at either end is no echo.
     scale : float
@@ -47,15 +52,18 @@ def echoes_of_cycle(rows: Floats, mounts: Floats, range_min_m: float, range_max_
     heard: set[int] = set()
     echoes = []
     for row in rows:
-        row_x, row_y, _, row_yaw = row[:POSE].tolist()
+        row_x, row_y, row_theta, row_yaw = row[:POSE].tolist()
         fired = np.flatnonzero(row[POSE:] > 0.0).tolist()
         if math.hypot(row_x - x, row_y - y) > CYCLE_M or not heard.isdisjoint(fired):
             break
         heard.update(fired)
-        at = here.compose(Pose(row_x, row_y, row_yaw))
+        at, row_mounts = (
+            here.compose(Pose(row_x, row_y, row_yaw)),
+            turned_mounts(mounts, turning, row_theta - row_yaw),
+        )
         for i in fired:
             if range_min_m < row[POSE + i] < range_max_m:
-                sensor = at.compose(Pose(*mounts[i].tolist()))
+                sensor = at.compose(Pose(*row_mounts[i].tolist()))
                 echoes.append(Echo(sensor.x, sensor.y, sensor.theta, float(row[POSE + i]) / scale))
     return echoes
 

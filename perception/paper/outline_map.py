@@ -16,6 +16,7 @@ from drivers.messages import Firing
 from perception.edits import Segments
 from perception.kernel import Floats, Ints, kernel
 from perception.paper.parameters import PINNED_SHARE_MAX
+from perception.sensor_mounts import mounts_at
 
 EMPTY, PRESENT, PINNED = range(3)
 """Values of `OutlineMap.status`."""
@@ -104,6 +105,8 @@ class OutlineMap:
         x, y (m), direction (rad) of each sensor in the ring's frame, for contradictions.
     half_angle : float
         Half the beam's width, rad.
+    turning : tuple of int
+        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
 
     Attributes
     ----------
@@ -123,9 +126,11 @@ class OutlineMap:
         Segments ever added.
     """
 
-    def __init__(self, config: MapConfig, mounts: Floats, half_angle: float) -> None:
+    def __init__(
+        self, config: MapConfig, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()
+    ) -> None:  # fmt: skip
         self._config = config
-        self._mounts = mounts
+        self._mounts, self._turning = mounts, turning
         self._half_angle = half_angle
         self.segments = np.zeros((config.capacity, 5))
         self.times = np.zeros(config.capacity)
@@ -196,8 +201,9 @@ class OutlineMap:
     def remove_contradicted(self, firing: Firing) -> int:
         """Remove segments behind which `firing` heard an echo; return how many."""
         return erase_contradicted(
-            self.segments, self.status, self.start, self.count, firing.ranges_m, self._mounts,
-            firing.pose.x, firing.pose.y, firing.ring_yaw, self._half_angle, self._config.contradiction_margin_m,
+            self.segments, self.status, self.start, self.count, firing.ranges_m,
+            mounts_at(firing, self._mounts, self._turning), firing.pose.x, firing.pose.y, firing.ring_yaw,
+            self._half_angle, self._config.contradiction_margin_m,
         )  # fmt: skip
 
     def clear(self) -> None:

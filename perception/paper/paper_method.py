@@ -66,7 +66,7 @@ class PaperPerception:
         self._models = tuple(ObjectModel.from_config(m) for m in models)
         self._scratch = np.zeros(max(len(m.sides) for m in self._models), dtype=np.int64)
         self._extractor = SegmentExtractor(ring, config.segments)
-        self.outline = OutlineMap(config.map, mounts, math.radians(ring.beam_half_angle_deg))
+        self.outline = OutlineMap(config.map, mounts, math.radians(ring.beam_half_angle_deg), ring.turning)
         self.clusters = Clusters(config.clusters, config.map.capacity)
         self._numbers = NumberSource()
         self.candidates = Candidates(

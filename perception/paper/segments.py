@@ -17,7 +17,7 @@ from drivers.messages import Firing
 from perception.kernel import Floats, kernel
 from perception.paper.parameters import READING_SPACING, READINGS_KEPT
 from perception.records import Record, Records, records, zeros
-from perception.sensor_mounts import mounts_array
+from perception.sensor_mounts import mounts_array, mounts_at
 
 
 class KeptReading(Record):
@@ -186,7 +186,7 @@ class SegmentExtractor:
 
     def __init__(self, ring: RingConfig, config: SegmentsConfig) -> None:
         count = len(ring.mounts)
-        self._mounts = mounts_array(ring.mounts)
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._config = config
         self._sensors = zeros(SensorReadings, count)
@@ -200,7 +200,8 @@ class SegmentExtractor:
         """
         config = self._config
         count = pair_readings(
-            firing.ranges_m, self._mounts, firing.pose.x, firing.pose.y, firing.ring_yaw, firing.robot_s,
+            firing.ranges_m, mounts_at(firing, self._mounts, self._turning), firing.pose.x, firing.pose.y,
+            firing.ring_yaw, firing.robot_s,
             self._sensor_records, self._half_angle, config.baseline_min_m, config.baseline_max_m, config.gap_max_s,
             READING_SPACING * config.baseline_min_m, self._out,
         )  # fmt: skip

@@ -16,7 +16,7 @@ from perception.detected_object import DetectedObject
 from perception.localization.map_frame import turned_object
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
-from perception.sensor_mounts import mounts_array
+from perception.sensor_mounts import mounts_array, mounts_at
 from runtime.analysis.timeline import ECHO, Cluster, Echoes, MapView, RunSnapshot, Timeline
 
 SNAPSHOTS_MAX: Final = 240
@@ -39,7 +39,7 @@ class TimelineBuilder:
     def __init__(self, timeline: Timeline) -> None:
         settings = timeline.settings
         self._timeline = timeline
-        self._mounts = mounts_array(settings.ring.mounts)
+        self._mounts, self._turning = mounts_array(settings.ring.mounts), settings.ring.turning
         self._interval_s = FIRST_INTERVAL_S
         self._next_s = 0.0
         self._rows: list[Echoes] = []
@@ -69,7 +69,7 @@ class TimelineBuilder:
         """Add the echoes of a firing received at `t_s`."""
         c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))
-        mounts = self._mounts[fired]
+        mounts = mounts_at(firing, self._mounts, self._turning)[fired]
         rows = np.empty(len(fired), ECHO)
         rows["t_s"], rows["sensor"], rows["robot_s"] = t_s, fired, firing.robot_s
         rows["x"] = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]

@@ -277,7 +277,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
-    view = state.perception.field_of_view(odometry.robot_s, odometry.ring_yaw, age_max_s)
+    view = state.perception.field_of_view(odometry.robot_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)
     blind_s = min(float(view.sensor_ages_s.min()), odometry.robot_s)
     if blind_s > age_max_s:
         likely = inputs.line_problem or "check the ring's power and cable"

@@ -97,7 +97,8 @@ def oldest_percept(settings: Settings, course_rad: float) -> Percept:
     ring = settings.ring
     pattern, mounts = firing_pattern(ring), mounts_array(ring.mounts)
     late_s = time_of_flight_s(pattern.window_m) + 1.0 / settings.cycle.rate_hz
-    axes, ages_s = mounts[:, 2], longest_gaps_s(pattern, len(mounts)) + late_s
+    axes, ages_s = mounts[:, 2].copy(), longest_gaps_s(pattern, len(mounts)) + late_s
+    axes[list(ring.turning)] += course_rad
     view = FieldOfView(
         axes,
         ages_s,

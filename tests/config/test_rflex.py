@@ -19,6 +19,7 @@ def test_bounds(value: dict[str, object]) -> None:
     ("name", "banks", "distance", "angle", "range_factor", "first_deg"),
     [
         ("b21r", (4,) * 6, 101230.0, 35343.888, 1476.0, 172.5),
+        ("b21r-both", (4,) * 6 + (3,) * 8, 101230.0, 35343.888, 1476.0, 172.5),
         ("b21r-base", (3,) * 8, 101230.0, 35343.888, 1476.0, -120.0),
         ("atrvjr", (5, 8, 5, 8), 87462.73, 36277.67, 1476.0, -150.0),
         ("magellan", (8, 8), 44509.7, 5818.0204, 1474.0, -112.5),
@@ -34,4 +35,12 @@ def test_the_shipped_robots(
     assert rflex.range_factor == range_factor
     assert len(robot.ring.mounts) == sum(banks)
     assert robot.ring.mounts[0].angle_rad * 180.0 / 3.141592653589793 == pytest.approx(first_deg)
-    assert robot.body.synchro == (name == "b21r-base")
+    assert robot.body.synchro == (name in {"b21r-base", "b21r-both"})
+
+
+def test_both_rings_of_a_b21r_are_its_two_rings_and_only_the_upper_one_turns_with_the_wheels() -> None:
+    upper, base, both = (load_robot(name) for name in ("b21r", "b21r-base", "b21r-both"))
+    assert both.ring.mounts == upper.ring.mounts + base.ring.mounts
+    assert both.ring.turning == tuple(range(24))
+    assert (upper.ring.turning, base.ring.turning) == ((), ())
+    assert both.body == base.body

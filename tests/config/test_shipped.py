@@ -23,6 +23,7 @@ def test_the_names_of_shipped_files() -> None:
         "atrvjr",
         "b21r",
         "b21r-base",
+        "b21r-both",
         "denning",
         "magellan",
         "p3at",

@@ -157,8 +157,8 @@ class Checker:
 
     def __call__(self, ranges: Floats, x: float = 0.0, yaw: float = 0.0) -> int:
         return check_firing(
-            ranges, x, 0.0, yaw, AXES, NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors, self.ring, self.sets,
-            self.trusted, self.possible,
+            ranges, x, 0.0, yaw, AXES, np.zeros(COUNT), NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors,
+            self.ring, self.sets, self.trusted, self.possible,
         )  # fmt: skip
 
 

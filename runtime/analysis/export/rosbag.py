@@ -121,8 +121,9 @@ class _RunExporter:
 
     def _write_static(self, at: int) -> None:
         """Write what never moves: the sensors on the ring, the start of the odometry, the true world."""
-        mounts = enumerate(self._timeline.settings.ring.mounts)
-        sensors = [("ring", f"sonar_{i:02d}", Pose(x, y, angle)) for i, (x, y, angle) in mounts]
+        ring = self._timeline.settings.ring
+        mounts = ((i, mount) for i, mount in enumerate(ring.mounts) if i not in ring.turning)
+        sensors = [("ring", f"sonar_{i:02d}", Pose(*mount)) for i, mount in mounts]
         self._frames("/tf_static", [("world", "odom", self._timeline.start), *sensors], at)
         if self._timeline.world is not None:
             closed, lines = world_outlines(self._timeline.world)
@@ -151,7 +152,12 @@ class _RunExporter:
 
     def _write_scan(self, scan: FiringScan, at: int) -> None:
         ring = self._timeline.settings.ring
-        self._frames("/tf", [("odom", "ring", Pose(scan.x, scan.y, scan.yaw))], at)
+        turned = [
+            ("odom", f"sonar_{int(row['sensor']):02d}", Pose(float(row["x"]), float(row["y"]), float(row["bearing"])))
+            for row in scan.rows
+            if int(row["sensor"]) in ring.turning
+        ]
+        self._frames("/tf", [("odom", "ring", Pose(scan.x, scan.y, scan.yaw)), *turned], at)
         for row in scan.rows:
             name = f"s{int(row['sensor']):02d}"
             # Without an echo the range is inf, as REP 117 defines.

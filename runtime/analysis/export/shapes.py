@@ -47,12 +47,13 @@ class FiringScan:
 
 def firing_scans(timeline: Timeline) -> Iterator[FiringScan]:
     """Yield the firings of a run, each with the pose of the ring, computed from the positions of its sensors."""
-    rows, mounts = timeline.echoes, timeline.settings.ring.mounts
+    rows, ring = timeline.echoes, timeline.settings.ring
+    mounts, turning = ring.mounts, frozenset(ring.turning)
     if not len(rows):
         return
     cuts = np.flatnonzero((np.diff(rows["robot_s"]) != 0.0) | (np.diff(rows["t_s"]) != 0.0)) + 1
     for part in np.split(rows, cuts):
-        first = part[0]
+        first = next((row for row in part if int(row["sensor"]) not in turning), part[0])
         mx, my, angle = mounts[int(first["sensor"])]
         yaw = float(first["bearing"]) - angle
         c, s = math.cos(yaw), math.sin(yaw)

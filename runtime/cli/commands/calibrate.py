@@ -47,6 +47,9 @@ def calibrate_robot(
     settings, firings = _drive(file, robot, lambda: check_outputs({"--out": out}, (file,), force=force))
     if len(firings) < FIRINGS_MIN:
         raise UserError(f"{file}: holds only {len(firings)} firings; record the whole drive and try again", FAILED)
+    if settings.ring.turning:
+        which = f"{robot or file}: only some of its sensors turn with the wheels"
+        raise UserError(f"{which}; calibrate each of its rings by a robot file of its own", WRONG_CALL)
     found = calibrate(firings, settings.ring, radii_m, way_m, synchro=settings.body.synchro)
     if found is None:
         raise UserError(

@@ -36,6 +36,7 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
         "units": units,
         "ring": {
             "mounts": [[mount.x_m, mount.y_m, mount.angle_rad] for mount in ring.mounts],
+            "turning": ring.turning,
             "half_angle": math.radians(ring.beam_half_angle_deg),
             "range_min": ring.range_min_m,
             "range_max": ring.range_max_m,

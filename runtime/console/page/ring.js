@@ -24,7 +24,7 @@ export class Ring {
     const { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
     if (!ring || !run.fresh) return;
-    const { ranges, age, firing, sensors, ring_yaw, pose } = run.state;
+    const { ranges, age, firing, sensors, pose } = run.state;
     const cx = width / 2, cy = height / 2;
     const rim = Math.min(width, height) / 2 - 15;
     // What is near matters most: along a radius goes the square root of the range.
@@ -46,7 +46,7 @@ export class Ring {
     ctx.textAlign = "center";
     ctx.textBaseline = "middle";
     ring.mounts.forEach(([, , angle], index) => {
-      const at = -(ring_yaw + angle); // the screen's y looks down
+      const at = -(run.yaw(index) + angle); // the screen's y looks down
       const range = ranges[index];
       if (fires.has(index)) {
         firesNow.moveTo(cx, cy);

@@ -59,9 +59,14 @@ export class RunState extends Emitter {
   sensor(index) {
     const mount = this.session?.ring?.mounts?.[index];
     if (mount === undefined) return null;
-    const [x, y] = this.state.pose;
-    const c = Math.cos(this.state.ring_yaw), s = Math.sin(this.state.ring_yaw);
-    return { x: x + c * mount[0] - s * mount[1], y: y + s * mount[0] + c * mount[1], angle: this.state.ring_yaw + mount[2] };
+    const [x, y] = this.state.pose, yaw = this.yaw(index);
+    const c = Math.cos(yaw), s = Math.sin(yaw);
+    return { x: x + c * mount[0] - s * mount[1], y: y + s * mount[0] + c * mount[1], angle: yaw + mount[2] };
+  }
+
+  // The direction of the part of the ring on which a sensor is: some turn with the wheels of a synchro drive.
+  yaw(index) {
+    return this.session?.ring?.turning?.includes(index) ? this.state.pose[2] : this.state.ring_yaw;
   }
 
   apply(frame, now_ms) {

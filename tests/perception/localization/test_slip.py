@@ -88,6 +88,6 @@ def test_each_sensors_last_echo_of_the_cycle_is_taken_where_the_ring_was() -> No
         row[:POSE] = 1.0 - 0.1 * k, 0.0, 0.0, 0.0
         row[POSE + k % 3] = 1.0 + 0.1 * k
     rows[2, POSE + 2] = 99.0
-    echoes = echoes_of_cycle(rows, MOUNTS, 0.15, 7.0, 2.0)
+    echoes = echoes_of_cycle(rows, MOUNTS, (), 0.15, 7.0, 2.0)
     assert [echo.range_m for echo in echoes] == pytest.approx([0.5, 0.55])
     assert [echo.x for echo in echoes] == pytest.approx([MOUNTS[0, 0], MOUNTS[1, 0] - 0.1])
