@@ -24,7 +24,7 @@ from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
 from runtime.support.kernel_cache import compiled_signatures, prepare_kernels
 from runtime.timing.footprint import own_mb
-from runtime.timing.memory_policy import MemoryPolicy
+from runtime.timing.memory_policy import OLD_EVERY_CYCLES, MemoryPolicy
 
 SETTLED_CYCLES: Final = 1000
 """A minute: one pass down the hall, after which everything allocated on first use is there."""
@@ -117,7 +117,7 @@ def grow(
         growth_mb < hours * GROWTH_MAX_MB
         and monitor.slope_mb_h < GROWTH_MAX_MB
         and not compilations
-        and not memory.collections[-1]
+        and memory.collections[-1] <= last / OLD_EVERY_CYCLES
     )
     return DONE if within_limits and monitor.modes == {Mode.DRIVE} else FAILED
 

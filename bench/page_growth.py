@@ -22,6 +22,7 @@ from rich.table import Table
 
 from bench.console import start_url
 from bench.timing import DRIVE_ON, TIMEOUT_S, emulating, finish, start
+from config.errors import FAILED, UserError
 from tests.rawpage import RawPage
 
 SAMPLES: Final = 200
@@ -92,9 +93,21 @@ def sample(pid: int, at_s: float) -> Sample:
     return Sample(at_s, resident_pages * os.sysconf("SC_PAGE_SIZE") / 1e6, descriptors, threads)
 
 
+def opened(url: str, receive_bytes: int | None) -> RawPage:
+    """Return an open page; wait while the run still counts pages that have gone without a word."""
+    end_s = time.monotonic() + TIMEOUT_S
+    while True:
+        try:
+            return RawPage(url, receive_bytes)
+        except ConnectionError as error:
+            if "503" not in str(error) or time.monotonic() > end_s:
+                raise UserError(f"the run accepts no page: {error}", FAILED) from error
+            time.sleep(0.2)
+
+
 def visit(url: str, number: int, open_s: float) -> None:
     """Open a page, read some of what it gets, and leave in one of four ways."""
-    page = RawPage(url, receive_bytes=4096 if number % 8 == 5 else None)
+    page = opened(url, receive_bytes=4096 if number % 8 == 5 else None)
     end_s = time.monotonic() + open_s
     if number % 8 != 5:
         page.next("state")

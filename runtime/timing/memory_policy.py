@@ -1,8 +1,9 @@
-"""The policy of garbage collection: while the robot drives, only the young generation is collected, between cycles.
+"""The policy of garbage collection: while the robot drives, only what is recent is collected, between cycles.
 
-A full collection visits every object, which takes longer than a cycle may. So all objects alive when the drive begins
-are excluded (`gc.freeze`), automatic collection is off, and the few young objects are collected when a cycle has just
-ended and the next one is far enough away.
+A collection of all objects takes longer than a cycle may. So automatic collection is off, and two sets of objects
+are excluded for the whole drive (`gc.freeze`): those alive when it begins, and those that its first minute leaves.
+What is made after that is collected when a cycle has just ended and the next one is far enough away: the youngest
+objects each second, and once a minute the others, such as those of a page of the console that was closed.
 """
 
 from __future__ import annotations
@@ -14,15 +15,13 @@ from typing import Final, Literal
 
 EVERY_CYCLES: Final = 20
 """Cycles from one collection to the next: garbage is rare, as reference counts free most objects at once."""
+OLD_EVERY_CYCLES: Final = 1200
+"""Cycles until what the drive has made is excluded, and then from one collection of older objects to the next."""
 SLACK_MIN_S: Final = 0.01
 """Least time until the next cycle for a collection, which takes well below a millisecond, s."""
 GENERATIONS: Final = 3
 _YOUNG: Final = 1
-
-
-def collect_young() -> None:
-    """Collect the objects made since the last collection."""
-    gc.collect(_YOUNG)
+_OLD: Final = 2
 
 
 class MemoryPolicy:
@@ -31,7 +30,7 @@ class MemoryPolicy:
     Parameters
     ----------
     collect : callable
-        Collects the young generation.
+        Collects up to a generation, as `gc.collect` does.
 
     Attributes
     ----------
@@ -39,16 +38,19 @@ class MemoryPolicy:
         Collections while driving, of each generation, also those that others requested.
     """
 
-    def __init__(self, collect: Callable[[], object] = collect_young) -> None:
+    def __init__(self, collect: Callable[[int], object] = gc.collect) -> None:
         self._collect = collect
         self.collections = [0] * GENERATIONS
         self._cycles = 0
+        self._old_cycles = 0
+        self._settled = False
 
     @contextlib.contextmanager
     def driving(self) -> Iterator[None]:
         """Exclude what is alive now, and collect only in `cycle_done` inside this context."""
         gc.collect()
         gc.freeze()
+        self._old_cycles, self._settled = 0, False
         was_enabled = gc.isenabled()
         gc.disable()
         gc.callbacks.append(self._count)
@@ -61,11 +63,21 @@ class MemoryPolicy:
             gc.unfreeze()
 
     def cycle_done(self, slack_s: float) -> None:
-        """Collect the young generation where it is due and the next cycle is `SLACK_MIN_S` away or more."""
+        """Collect what is due if the next cycle is `SLACK_MIN_S` away or more."""
         self._cycles += 1
-        if self._cycles >= EVERY_CYCLES and slack_s >= SLACK_MIN_S:
-            self._cycles = 0
-            self._collect()
+        self._old_cycles += 1
+        if self._cycles < EVERY_CYCLES or slack_s < SLACK_MIN_S:
+            return
+        self._cycles = 0
+        if self._old_cycles < OLD_EVERY_CYCLES:
+            self._collect(_YOUNG)
+            return
+        self._old_cycles = 0
+        if self._settled:
+            self._collect(_OLD)
+        else:
+            self._settled = True
+            gc.freeze()
 
     def _count(self, phase: Literal["start", "stop"], info: dict[str, int]) -> None:
         if phase == "start":
