@@ -30,6 +30,16 @@ class PinSegments:
 
 
 @dataclass(frozen=True, slots=True)
+class RestoreSegments:
+    """Put segments back that were deleted, with their numbers."""
+
+    rows: tuple[tuple[float, float, float, float, float, float, float, float], ...]
+    """Of each: number; ends x1, y1, x2, y2 (m, odometry's frame); direction of the normal (rad); time (s of the
+    robot's clock); 1 if it was pinned, else 0."""
+    kind: Literal["restore_segments"] = "restore_segments"
+
+
+@dataclass(frozen=True, slots=True)
 class PlaceModel:
     """Place a model (m, rad, odometry's frame) as a new object; refinement starts from there."""
 
@@ -52,11 +62,37 @@ class MoveObject:
 
 
 @dataclass(frozen=True, slots=True)
-class RejectObject:
+class RemoveObject:
     """Remove an object; readings taken so far do not bring it back."""
 
     object: int
+    kind: Literal["remove_object"] = "remove_object"
+
+
+@dataclass(frozen=True, slots=True)
+class RejectObject:
+    """Say that nothing stands where an object is reported: its place becomes a vacant area."""
+
+    object: int
     kind: Literal["reject_object"] = "reject_object"
+
+
+@dataclass(frozen=True, slots=True)
+class MarkVacant:
+    """Say that nothing stands in a circle (m, odometry's frame); nothing in it is reported until it is lifted."""
+
+    x: float
+    y: float
+    radius: float
+    kind: Literal["mark_vacant"] = "mark_vacant"
+
+
+@dataclass(frozen=True, slots=True)
+class LiftArea:
+    """Lift a vacant area: what is recognised there is reported again."""
+
+    area: int
+    kind: Literal["lift_area"] = "lift_area"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +104,16 @@ class ConfirmObject:
 
 
 @dataclass(frozen=True, slots=True)
+class WithdrawConfirmation:
+    """Let the readings decide again whether a confirmed object is reported."""
+
+    object: int
+    kind: Literal["withdraw_confirmation"] = "withdraw_confirmation"
+
+
+@dataclass(frozen=True, slots=True)
 class ClearMap:
-    """Remove all segments and objects; fresh echoes, which the robot avoids, stay."""
+    """Remove all segments and objects; vacant areas and fresh echoes, which the robot avoids, stay."""
 
     kind: Literal["clear_map"] = "clear_map"
 
@@ -85,15 +129,29 @@ class PlaceRobot:
     kind: Literal["place_robot"] = "place_robot"
 
 
-MapEdit: TypeAlias = DeleteSegments | PinSegments | PlaceModel | MoveObject | RejectObject | ConfirmObject | ClearMap
-"""An edit of what was recognised."""
+MapEdit: TypeAlias = (
+    DeleteSegments
+    | PinSegments
+    | RestoreSegments
+    | PlaceModel
+    | MoveObject
+    | RemoveObject
+    | ConfirmObject
+    | WithdrawConfirmation
+    | ClearMap
+)
+"""An edit of what a method has recognised."""
 
-Edit: TypeAlias = MapEdit | PlaceRobot
+Edit: TypeAlias = MapEdit | RejectObject | MarkVacant | LiftArea | PlaceRobot
 
 NUMBER_MAX: Final = 2**53
 """Numbers of objects and segments are below this: a browser stores them as floats."""
 COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate accepted, m; a larger one is a mistake."""
+TIME_MAX_S: Final = 1e9
+"""Latest time of a segment that is put back, s."""
+SEGMENT_ROW: Final = ("number", "x1", "y1", "x2", "y2", "normal", "time_s", "pinned")
+"""The columns of `RestoreSegments.rows`."""
 NAMED_MAX: Final = 5
 """Segments that a message lists by number; further ones are counted."""
 
@@ -174,14 +232,30 @@ def invalid_pose(x: float, y: float, theta: float) -> str | None:
     )
 
 
-def invalid_number(edit: MapEdit) -> str | None:
+def invalid_rows(edit: RestoreSegments) -> str | None:
+    """Return why segments cannot be put back, None if each row is one that a map can have held."""
+    for row in edit.rows:
+        if len(row) != len(SEGMENT_ROW) or not all(abs(value) <= COORDINATE_MAX_M for value in row[1:6]):
+            return "invalid segment: expected a number, four coordinates in m, a direction, a time and a pin"
+        if not (0 < row[0] < NUMBER_MAX and row[0] == int(row[0]) and abs(row[6]) < TIME_MAX_S):
+            return f"invalid segment {row[0]:g} of {row[6]:g} s"
+    return None
+
+
+def invalid_number(edit: MapEdit | RejectObject) -> str | None:
     """Return why a number in an edit cannot belong to any segment or object, None if all can."""
     match edit:
         case DeleteSegments(numbers) | PinSegments(numbers):
             named: tuple[int, ...] = tuple(numbers)
-        case MoveObject(number) | RejectObject(number) | ConfirmObject(number):
+        case (
+            MoveObject(number)
+            | RemoveObject(number)
+            | RejectObject(number)
+            | ConfirmObject(number)
+            | WithdrawConfirmation(number)
+        ):
             named = (number,)
-        case PlaceModel() | ClearMap():
+        case PlaceModel() | ClearMap() | RestoreSegments():
             return None
     wrong = next((n for n in named if not 0 < n < NUMBER_MAX), None)
     return None if wrong is None else f"invalid number {wrong}: expected an integer above 0 and below 2^53"

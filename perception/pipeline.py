@@ -15,14 +15,21 @@ from config.settings import PerceptionConfig
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
+    COORDINATE_MAX_M,
     Edit,
     Evidence,
+    LiftArea,
+    MarkVacant,
     MoveObject,
     PlaceModel,
     PlaceRobot,
+    RejectObject,
+    RestoreSegments,
     Segments,
     invalid_number,
     invalid_pose,
+    invalid_rows,
+    no_such_object,
 )
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
@@ -37,8 +44,9 @@ from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
+from perception.vacant_areas import VacantArea, VacantAreas, invalid_area, radius_of
 
-__all__ = ["DetectedObject", "Method", "Perception", "make_method"]
+__all__ = ["DetectedObject", "Perception"]
 
 
 class Perception:
@@ -81,6 +89,8 @@ class Perception:
         self._reach_m = reach_m(ring)
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
+        self.vacant = VacantAreas()
+        """In the frame of `method`."""
 
     @property
     def can_refine(self) -> bool:
@@ -117,7 +127,7 @@ class Perception:
             self.known_room.observe(trusted)
         placed = trusted
         if self.map_frame is not None:
-            placed = self.map_frame.follow(trusted, self.method.near_objects())
+            placed = self.map_frame.follow(trusted, self.vacant.outside(self.method.near_objects()))
             for number, dx, dy in self.map_frame.shifts():
                 self.method.shift_object(number, dx, dy)
         made = self.method.observe(placed)
@@ -140,11 +150,11 @@ class Perception:
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
-        return self._in_odometry(self.method.objects())
+        return self._in_odometry(self.vacant.outside(self.method.objects()))
 
     def mapped_objects(self) -> tuple[DetectedObject, ...]:
         """Return the same objects in the map frame; without correction of drift that is odometry's."""
-        seen = self.method.objects()
+        seen = self.vacant.outside(self.method.objects())
         return seen if self.map_frame is None else self.map_frame.in_map(seen)
 
     def localized(self) -> LocalizedPose | None:
@@ -166,15 +176,24 @@ class Perception:
 
     def near_objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
-        return self._in_odometry(self.method.near_objects())
+        return self._in_odometry(self.vacant.outside(self.method.near_objects()))
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label near the robot: models, walls, corners, posts, unknowns."""
-        return self._in_odometry(self.method.labelled_objects())
+        return self._in_odometry(self.vacant.outside(self.method.labelled_objects()))
 
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label and was left behind; without correction the same tuple until it changes."""
-        return self._in_odometry(self.method.archived_objects())
+        return self._in_odometry(self.vacant.archived_outside(self.method.archived_objects()))
+
+    def vacant_areas(self) -> tuple[VacantArea, ...]:
+        """Return the areas in which nothing stands, in odometry's frame."""
+        held = self.vacant.listed()
+        if self.map_frame is None or not held:
+            return held
+        to = self.map_frame.drift.odometry_from_filter()
+        places = [to.compose(Pose(area.x, area.y, 0.0)) for area in held]
+        return tuple(area._replace(x=at.x, y=at.y) for area, at in zip(held, places, strict=True))
 
     def _in_odometry(self, seen: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return what the method holds in odometry's frame."""
@@ -199,12 +218,35 @@ class Perception:
         """
         if isinstance(edit, PlaceRobot):
             return self._place_robot(edit)
+        if isinstance(edit, RejectObject | MarkVacant | LiftArea):
+            return self._edit_areas(edit)
         refused = invalid_number(edit)
-        if refused is None and isinstance(edit, PlaceModel | MoveObject):
-            refused = invalid_pose(edit.x, edit.y, edit.theta)
+        if isinstance(edit, PlaceModel | MoveObject):
+            refused = refused or invalid_pose(edit.x, edit.y, edit.theta)
+        if isinstance(edit, RestoreSegments):
+            refused = invalid_rows(edit)
         if refused is not None:
             return refused
-        return self.method.edit(edit if self.map_frame is None else self.map_frame.edit_in_filter(edit))
+        inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
+        refused = self.method.edit(inside)
+        if refused is None and isinstance(inside, PlaceModel | MoveObject):
+            self.vacant.lift_at(inside.x, inside.y)
+        return refused
+
+    def _edit_areas(self, edit: RejectObject | MarkVacant | LiftArea) -> str | None:
+        if isinstance(edit, LiftArea):
+            return None if self.vacant.lift(edit.area) else f"no vacant area {edit.area}: look at the list again"
+        if isinstance(edit, MarkVacant):
+            refused = invalid_area(edit.x, edit.y, edit.radius, COORDINATE_MAX_M)
+            inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
+            return refused or self.vacant.mark(inside.x, inside.y, inside.radius)
+        known = (*self.method.labelled_objects(), *self.method.archived_objects())
+        found = next((o for o in known if o.number == edit.object and not self.vacant.hides(o)), None)
+        if found is None:
+            return invalid_number(edit) or no_such_object(edit.object)
+        model = next((m for m in self._models if m.name == found.model), None)
+        reach_m = 0.0 if model is None else max(math.hypot(x, y) for x, y in model.vertices_m)
+        return self.vacant.mark(found.x, found.y, radius_of(reach_m), edit.object)
 
     def _place_robot(self, edit: PlaceRobot) -> str | None:
         if self.known_room is None:
@@ -259,6 +301,7 @@ class Perception:
         self.method.reset()
         if self.grid is not None:
             self.grid.clear()
+        self.vacant.clear()
         if self.map_frame is not None:
             self.map_frame.reset()
         if self.known_room is not None:
@@ -301,5 +344,6 @@ class Perception:
         """
         put_back(self, snapshot)
         self.method.drop_caches()
+        self.vacant.drop_caches()
         if self.known_room is not None:
             self.known_room.drop_caches()

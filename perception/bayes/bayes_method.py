@@ -50,8 +50,9 @@ from perception.edits import (
     MapEdit,
     MoveObject,
     PlaceModel,
-    RejectObject,
+    RemoveObject,
     Segments,
+    WithdrawConfirmation,
 )
 from perception.kernel import Floats
 from perception.records import records, zeros
@@ -245,7 +246,7 @@ class BayesPerception:
         self._objects = self._archived = self._archived_labels = None
         self._counted_at = UNKNOWN
         match edit:
-            case MoveObject(number) | ConfirmObject(number) | RejectObject(number):
+            case MoveObject(number) | ConfirmObject(number) | WithdrawConfirmation(number) | RemoveObject(number):
                 self._archive.take_up(self.memory, self.settings, self._sure_polygon, number)
             case PlaceModel(name) if name in {*self._round, *self._outlines}:
                 self._archive.make_room(self.memory, self.settings, self._sure_polygon)

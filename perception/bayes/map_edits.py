@@ -14,7 +14,7 @@ import numpy as np
 from perception.bayes.elements import HISTORY, REJECTIONS_MAX
 from perception.bayes.manual_tracks import leave_job, move_circle, move_polygon, place_circle, place_polygon
 from perception.bayes.parameters import CIRCLE_EVIDENCE_MIN_NAT, REJECTED_MAX_NAT
-from perception.bayes.pinned_segments import Pins, delete
+from perception.bayes.pinned_segments import Pins, delete, restore
 from perception.bayes.scratch import POLYGON
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, FREE, Memory
@@ -26,7 +26,9 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
-    RejectObject,
+    RemoveObject,
+    RestoreSegments,
+    WithdrawConfirmation,
     no_such_object,
     no_such_segments,
 )
@@ -57,6 +59,8 @@ def edit_memory(
         case DeleteSegments(numbers):
             missing = delete(memory, pins, numbers)
             return no_such_segments(missing) if missing else None
+        case RestoreSegments(rows):
+            return restore(memory, pins, rows)
         case PinSegments(numbers, pinned):
             return _pin(memory, pins, numbers, pinned=pinned)
         case PlaceModel():
@@ -79,7 +83,9 @@ def edit_memory(
             if t < 0 and memory.circles["kind"][row] >= p[0].model_count:
                 return f"object {number} matches no model: place the right model there instead"
             (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] |= CONFIRMED
-        case RejectObject():
+        case WithdrawConfirmation():
+            (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] &= ~CONFIRMED
+        case RemoveObject():
             _reject(memory, p, row)
     return None
 

@@ -7,7 +7,9 @@ of each bucket are never pinned, so that the map can still take new segments.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import math
+from collections.abc import Collection, Sequence
+from operator import itemgetter
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.parameters import CELL_M
+from perception.bayes.segment_list import mapped_segments
 from perception.bayes.segment_pairs import add_to_map
 from perception.bayes.state import Memory, StateRecord
 from perception.kernel import Ints, kernel
@@ -138,3 +141,29 @@ def delete(memory: Memory, pins: Pins, numbers: Collection[int]) -> set[int]:
         buckets["count"][k] = len(left)
     pins.remove(gone)
     return set(numbers) - gone
+
+
+def restore(memory: Memory, pins: Pins, rows: Sequence[Sequence[float]]) -> str | None:
+    """Put deleted segments back; return None, or why some were left out.
+
+    Those that are in the map are left as they are. Where a bucket has filled since, the oldest of it give way.
+
+    Parameters
+    ----------
+    memory, pins
+        Updated.
+    rows : sequence of sequence of float
+        As of `edits.RestoreSegments`; finite.
+    """
+    never = [row[0] for row in rows if row[0] > int(memory.state["segments_numbered"][0])]
+    if never:
+        return f"no segment ever had the number {never[0]:.0f}"
+    numbers = {int(row[0]) for row in rows}
+    present = {int(n) for n in mapped_segments(memory)["number"] if int(n) in numbers}
+    for number, x1, y1, x2, y2, normal, time_s, _ in sorted(rows, key=itemgetter(0)):
+        if int(number) not in present:
+            restore_segment(
+                memory.s, 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.cos(normal), math.sin(normal), int(number), time_s
+            )
+    _, full = pins.add(memory, [int(row[0]) for row in rows if row[7] == 1.0])
+    return f"{len(full)} segments are back, but too many are pinned to pin them again" if full else None

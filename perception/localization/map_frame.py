@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Final, TypeVar
+from typing import Final, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -19,13 +19,13 @@ from config.robot import RingConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.object_report import worst_sigma
 from perception.detected_object import DetectedObject
-from perception.edits import Evidence, MapEdit, MoveObject, PlaceModel
+from perception.edits import Evidence, MapEdit, MarkVacant, MoveObject, PlaceModel, RestoreSegments
 from perception.kernel import Floats
 from perception.localization.drift_correction import DriftCorrection, LandmarkPlace, LocalizedPose, SeenObject
 
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
-AnyEdit = TypeVar("AnyEdit", bound=MapEdit)
+AnyEdit = TypeVar("AnyEdit", bound=MapEdit | MarkVacant)
 
 
 class MapFrame:
@@ -131,10 +131,26 @@ class MapFrame:
 
     def edit_in_filter(self, edit: AnyEdit) -> AnyEdit:
         """Return an operator's edit, whose places are in odometry's frame, in the filter's frame."""
+        to = self.drift.odometry_from_filter().inverse()
+        if isinstance(edit, RestoreSegments):
+            return replace(edit, rows=tuple(_turned_row(to, row) for row in edit.rows))
+        if isinstance(edit, MarkVacant):
+            centre = to.compose(Pose(edit.x, edit.y, 0.0))
+            return replace(edit, x=centre.x, y=centre.y)
         if not isinstance(edit, PlaceModel | MoveObject):
             return edit
-        place = self.drift.odometry_from_filter().inverse().compose(Pose(edit.x, edit.y, edit.theta))
+        place = to.compose(Pose(edit.x, edit.y, edit.theta))
         return replace(edit, x=place.x, y=place.y, theta=place.theta)
+
+
+SegmentRow: TypeAlias = tuple[float, float, float, float, float, float, float, float]
+
+
+def _turned_row(to: Pose, row: SegmentRow) -> SegmentRow:
+    """Return a row of `RestoreSegments` in another frame, in which the present origin lies at `to`."""
+    number, x1, y1, x2, y2, normal, time_s, pinned = row
+    a, b = to.compose(Pose(x1, y1, normal)), to.compose(Pose(x2, y2, normal))
+    return number, a.x, a.y, b.x, b.y, a.theta, time_s, pinned
 
 
 def _placed(seen: DetectedObject, place: LandmarkPlace | None) -> DetectedObject:

@@ -7,7 +7,7 @@ segment always costs the same. A pinned segment does not leave: when it reaches 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -183,6 +183,29 @@ class OutlineMap:
         if not pinned:
             self._sort()
         return missing
+
+    def restore(self, rows: Sequence[Sequence[float]]) -> str | None:
+        """Put deleted segments back in the order of their arrival; return None, or why that is impossible.
+
+        Parameters
+        ----------
+        rows : sequence of sequence of float
+            As of `edits.RestoreSegments`; finite. Those that are in the map are left as they are.
+        """
+        present = set(self.numbers[self.status > EMPTY].tolist())
+        back = list({int(row[0]): row for row in rows if int(row[0]) not in present}.values())
+        if any(row[0] > self.total for row in back):
+            return "no segment ever had such a number"
+        pins = sum(row[7] == 1.0 for row in back)
+        if self.size + len(back) > len(self.times) or self.pinned + pins > int(PINNED_SHARE_MAX * len(self.times)):
+            return f"the map has no room for {len(back)} further segments"
+        self._sort()
+        for number, x1, y1, x2, y2, normal, time_s, pinned in back:
+            status = PINNED if pinned == 1.0 else PRESENT
+            self._append(np.array([x1, y1, x2, y2, normal]), time_s, status, int(number))
+        self.pinned += pins
+        self._sort()
+        return None
 
     def listed(self) -> Segments:
         """Return the segments in the map."""

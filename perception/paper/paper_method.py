@@ -27,8 +27,10 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
-    RejectObject,
+    RemoveObject,
+    RestoreSegments,
     Segments,
+    WithdrawConfirmation,
     no_such_object,
     no_such_segments,
 )
@@ -196,6 +198,11 @@ class PaperPerception:
                 if not_pinned is None:
                     return "too many pinned segments: they would fill half of the map; unpin some first"
                 missing = not_pinned
+            case RestoreSegments(rows):
+                refused = self.outline.restore(rows)
+                if refused is not None:
+                    return refused
+                missing = set()
             case PlaceModel(model, x, y, theta):
                 m = next((m for m, known in enumerate(self._models) if known.name == model), None)
                 if m is None:
@@ -205,7 +212,9 @@ class PaperPerception:
                 return self._make_placement(number, (x, y, theta), confirmed=None)
             case ConfirmObject(number):
                 return self._make_placement(number, None, confirmed=True)
-            case RejectObject(number):
+            case WithdrawConfirmation(number):
+                return self._make_placement(number, None, confirmed=False)
+            case RemoveObject(number):
                 return self._reject(number)
             case ClearMap():
                 self.reset()

@@ -140,6 +140,8 @@ class Console:
         if self._publisher.failure is not None:
             return
         try:
+            if record.inputs.received.rebooted:
+                self._commands.history.clear()
             if record.inputs.edits:
                 refused = {one.edit: one.why for one in record.refused}
                 self.dispatcher.edits_done([refused.get(k) for k in range(len(record.inputs.edits))])

@@ -48,6 +48,7 @@ from perception.paper.parameters import PINNED_SHARE_MAX, PLACEMENTS_MAX, READIN
 from perception.sensor_memory import SETS_MAX
 from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
 from perception.snapshot import GROWING, Snapshot
+from perception.vacant_areas import AREAS_MAX
 
 
 class Bound(NamedTuple):
@@ -94,6 +95,7 @@ MAY_BE_INFINITE: Final = frozenset({
 """Floats for which an infinity stands for no echo, for no evidence yet, or for no place or time yet."""
 
 _COUNTS: Final = (
+    "vacant.last vacant.rows.object "
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "names_withdrawn near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total "
@@ -178,6 +180,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "archived_rows.radius": Bound(0.0, 1e3),
         "archived_rows.sides": Bound(0, BEARING_BINS),
         "archived_rows.status": Bound(FREE, ESTABLISHED),
+        "vacant.count": Bound(0, AREAS_MAX),
         "placements.count": Bound(0, PLACEMENTS_MAX),
         "range_m": Bound(0.0, 1e7),
         "recent.is_free": Bound(IS_KNOWN, IS_TAKEN),

@@ -97,7 +97,7 @@ def _edit(settings: Settings, perception: Perception, models: Sequence[ModelConf
         MoveObject,
         PinSegments,
         PlaceModel,
-        RejectObject,
+        RemoveObject,
     )
     from perception.paper.cluster_view import ClusterView
 
@@ -113,7 +113,7 @@ def _edit(settings: Settings, perception: Perception, models: Sequence[ModelConf
             perception.edit(MoveObject(seen.number, 1.1, 2.5, 0.0))
             perception.edit(MoveObject(seen.number, 9.0, 9.0, 0.0))
             perception.edit(ConfirmObject(seen.number))
-            perception.edit(RejectObject(seen.number))
+            perception.edit(RemoveObject(seen.number))
     perception.edit(DeleteSegments(numbers))
     perception.edit(ClearMap())
 

@@ -72,6 +72,7 @@ class FakeServer:
     cycle: int = 40
     session: dict[str, Any] = field(default_factory=dict)
     changed: list[tuple[str, Any]] = field(default_factory=list)
+    areas: list[list[float]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     silent: bool = False
     """Send no state, like a process that hangs."""
@@ -147,8 +148,9 @@ class FakeServer:
         client.gone |= set(removed)
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
         frame = self.hall.frame(self.cycle) | stopped | self.robot() | {
-            "type": "state", "flags": self.flags, "segments": segments, "drive_request": self.drive_request,
-            "dropped": 0, "controller": self.controller == client.number, "playback": self.playback,
+            "type": "state", "flags": self.flags, "areas": self.areas, "segments": segments,
+            "drive_request": self.drive_request, "dropped": 0,
+            "controller": self.controller == client.number, "playback": self.playback,
         }  # fmt: skip
         return frame if self.playback is None else frame | RECORDED
 
@@ -273,6 +275,8 @@ class FakeServer:
                 return self._evidence(message["object"])
             case "set_parameter":
                 self.changed.append((message["path"], message["value"]))
+            case "undo_edit":
+                return "reject_object"
             case "undo_parameter":
                 return {"path": self.changed.pop()[0], "value": 1.0} if self.changed else None
             case "save_toml":

@@ -134,6 +134,12 @@ async def test_objects_are_placed_dragged_and_rotated_with_the_pointer(server: F
     await page.mouse.up()
     turned = await server.wait("move_object", 2)
     assert (turned["x"], turned["y"], turned["theta"]) == pytest.approx((cx, cy, math.pi / 2), abs=0.03)
+    await page.locator("#map-front").focus()
+    await page.keyboard.press("Shift+ArrowUp")
+    await server.wait("move_object", 3)
+    await opened.sync()
+    await opened.run_for(1600)
+    await opened.says("#toasts", "The readings put object 5 ")
 
 
 async def test_a_drag_says_where_the_robot_is_in_the_known_room(server: FakeServer, opener: Opener) -> None:
@@ -178,6 +184,17 @@ async def test_objects_are_confirmed_and_rejected_and_the_map_cleared(server: Fa
     assert await server.wait("confirm_object") == {"object": 3}
     await page.get_by_role("button", name="Reject").click()
     assert await server.wait("reject_object") == {"object": 3}
+
+    await expect(page.locator("#areas-part")).to_be_hidden()
+    server.areas = [[4, 1.5, -0.5, 0.3]]
+    await opened.sync()
+    await opened.says("#areas", "4  ")
+    await page.get_by_role("button", name="Lift area 4").click()
+    assert await server.wait("lift_area") == {"area": 4}
+    await page.locator("#map-front").focus()
+    await page.keyboard.press("Control+z")
+    assert await server.wait("undo_edit") == {}
+    await opened.says("#toasts", "The object is reported again")
 
     server.refusals["reject_object"] = ("object 3 left the map before", None)
     await page.locator("#objects li").nth(2).click()

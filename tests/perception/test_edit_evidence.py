@@ -18,7 +18,7 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
-    RejectObject,
+    RemoveObject,
 )
 from perception.pipeline import DetectedObject, Perception
 from tests.perception.edited import (
@@ -36,9 +36,9 @@ from tests.perception.edited import (
 NOWHERE = 999_999
 REFUSED: list[tuple[Edit, str]] = [
     (MoveObject(NOWHERE, 0.0, 0.0, 0.0), "no object 999999"),
-    (RejectObject(NOWHERE), "no object 999999"),
+    (RemoveObject(NOWHERE), "no object 999999"),
     (ConfirmObject(NOWHERE), "no object 999999"),
-    (RejectObject(0), "invalid number 0"),
+    (RemoveObject(0), "invalid number 0"),
     (ConfirmObject(-3), "invalid number -3"),
     (MoveObject(2**80, 0.0, 0.0, 0.0), "invalid number"),
     (DeleteSegments((1, 2**80)), "invalid number"),
@@ -146,7 +146,7 @@ def test_a_snapshot_holds_the_edited_state(seen: Perception, firings: list[Firin
         DeleteSegments(tuple(listed[:4])), PinSegments(tuple(listed[5:9]), pinned=True),
         PlaceModel("semicircle", 0.5, 0.2, 0.0), PlaceModel("box", -0.5, 0.3, 0.2),
         MoveObject(number_of(objects[0]), objects[0].x + 0.05, objects[0].y, 0.0),
-        ConfirmObject(number_of(objects[1])), RejectObject(number_of(objects[2])),
+        ConfirmObject(number_of(objects[1])), RemoveObject(number_of(objects[2])),
     ]  # fmt: skip
     assert [seen.edit(edit) for edit in edits] == [None] * len(edits)
     method = "bayes" if is_bayes(seen) else "paper"
@@ -223,8 +223,8 @@ def test_every_edit_in_turn_on_the_first_objects(reached_drums: Perception, firi
     post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
     reached_drums.set_models((*SETTINGS["bayes"].models, post))
     assert {o.number for o in reached_drums.objects()} >= {placed_drum, box}
-    assert reached_drums.edit(RejectObject(box)) is None
-    assert reached_drums.edit(RejectObject(placed_drum)) is None
+    assert reached_drums.edit(RemoveObject(box)) is None
+    assert reached_drums.edit(RemoveObject(placed_drum)) is None
     assert {o.number for o in reached_drums.objects()}.isdisjoint({placed_drum, box})
     assert set(pins) <= set(reached_drums.segments().numbers.tolist())
     assert set(doomed).isdisjoint(reached_drums.segments().numbers.tolist())

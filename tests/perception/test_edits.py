@@ -16,7 +16,7 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
-    RejectObject,
+    RemoveObject,
 )
 from perception.pipeline import Perception
 from tests.perception.edited import (
@@ -131,7 +131,7 @@ def test_segments_that_are_not_in_the_map_cannot_be_pinned(seen: Perception) -> 
 def test_a_placed_model_relaxes_onto_the_readings(seen: Perception, off_x: float, off_y: float) -> None:
     """The paper's method relaxes it onto segments, the Bayesian method onto readings."""
     rested = there(seen)
-    assert seen.edit(RejectObject(number_of(rested))) is None
+    assert seen.edit(RemoveObject(number_of(rested))) is None
     settle(seen)
     assert at(seen, DRUM) is None
     if is_bayes(seen):
@@ -168,7 +168,7 @@ def test_a_placed_model_is_reported_at_once_and_stays(seen: Perception, firings:
         assert evidence.opposing < -10.0
         assert still.probability is not None
         assert still.probability < 0.1
-    assert seen.edit(RejectObject(number_of(new))) is None
+    assert seen.edit(RemoveObject(number_of(new))) is None
     assert new.number not in {o.number for o in seen.objects()}
 
 
@@ -207,7 +207,7 @@ def test_an_object_moved_far_away_is_judged_by_the_readings_there(seen: Percepti
 def test_only_new_readings_bring_a_rejected_object_back(seen: Perception, firings: list[Firing]) -> None:
     number = number_of(there(seen))
     others = {o.number for o in seen.objects()} - {number}
-    assert seen.edit(RejectObject(number)) is None
+    assert seen.edit(RemoveObject(number)) is None
     assert at(seen, DRUM, 0.3) is None
     assert {o.number for o in seen.objects()} >= others
     settle(seen)
@@ -221,7 +221,7 @@ def test_only_new_readings_bring_a_rejected_object_back(seen: Perception, firing
         hear(seen, firing)
         back = back or at(seen, DRUM)
     assert back is not None, "it is there, and is heard again"
-    assert seen.edit(RejectObject(number)) is not None
+    assert seen.edit(RemoveObject(number)) is not None
     if is_bayes(seen):
         assert back.number != number
 
@@ -247,7 +247,7 @@ def test_a_confirmed_object_is_reported_whatever_its_evidence(
     assert found.confirmed
     assert found.probability is not None
     assert found.probability < 0.5, "all is silent since: nothing speaks for it any more"
-    assert seen.edit(RejectObject(number)) is None
+    assert seen.edit(RemoveObject(number)) is None
     assert number not in {o.number for o in seen.objects()}
 
 
@@ -268,7 +268,7 @@ def test_a_confirmed_object_of_the_papers_method_outlasts_its_segments(seen: Per
     assert seen.edit(moved) is None
     (found,) = seen.objects()
     assert (found.x, found.y, found.confirmed) == (1.0, 1.0, True)
-    assert seen.edit(RejectObject(number)) is None
+    assert seen.edit(RemoveObject(number)) is None
     assert seen.objects() == ()
 
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
+from perception.edits import Edit
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
+from runtime.console.commands.edit_history import EditHistory, Undo
 from runtime.console.commands.tuning import Tuning
-from runtime.console.protocols import RecordingControl, ReplayControl, Robot
+from runtime.console.protocols import RecordingControl, ReplayControl, Run
 from runtime.timing.time_control import TimeControl
 
 Arguments = TypeVar("Arguments")
@@ -32,15 +34,21 @@ class Permission(Enum):
 class PendingEdit(NamedTuple):
     """An edit that the next cycle carries out, and the message to answer then."""
 
+    edit: Edit
     client: Client
-    id: int
+    id: int | None
+    """None for the first edits of an undo: its last one is answered."""
+    data: object = None
+    """Of the answer."""
+    undo: Callable[[], Undo] | None = None
+    """Returns, once it is done, what takes it back; None where the edit is an undo itself."""
 
 
 @dataclass(slots=True)
 class CommandContext:
     """The parts of the run that commands act on."""
 
-    robot: Robot
+    robot: Run
     hub: ClientHub
     tuning: Tuning
     clock: Callable[[], float]
@@ -50,6 +58,8 @@ class CommandContext:
     replay: ReplayControl | None = None
     pending_edits: deque[PendingEdit] = field(default_factory=deque)
     """In the order in which the cycle carries them out."""
+    history: EditHistory = field(default_factory=EditHistory)
+    """The edits that can be undone."""
     is_teleoperated: bool = False
     """Whether the last drive request was a velocity from a client's teleoperation."""
     armed_by: Client | None = None

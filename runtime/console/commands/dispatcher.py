@@ -72,11 +72,14 @@ class CommandDispatcher:
         for reason in outcomes:
             if not self._context.pending_edits:
                 return
-            client, number = self._context.pending_edits.popleft()
-            if reason is None:
-                _answer(client, number, None)
-            else:
-                self._refuse(client, number, CommandError(reason))
+            done = self._context.pending_edits.popleft()
+            if reason is not None:
+                self._refuse(done.client, done.id, CommandError(reason))
+                continue
+            if done.undo is not None:
+                self._context.history.add(done.edit, done.undo())
+            if done.id is not None:
+                _answer(done.client, done.id, done.data)
 
     def end_teleoperation(self) -> None:
         """End teleoperation, if it is under way: the client that had control has lost it."""

@@ -15,6 +15,7 @@ from config.reload import Difference
 from perception.edits import Edit
 from runtime.console.commands.command import ANSWERED_LATER, Call, PendingEdit
 from runtime.console.commands.command_error import CommandError
+from runtime.console.commands.edit_history import prepare_undo
 from runtime.console.commands.messages import GetEvidence, GrantControl, NoArguments, SetParameter
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
@@ -80,10 +81,33 @@ def edit(call: Call, edit: Edit) -> object:
     CommandError
         Too many edits are queued.
     """
+    undo = prepare_undo(edit, call.context.robot.state.perception)
+    _queue(call, edit, PendingEdit(edit, call.client, call.id, undo=undo))
+    return ANSWERED_LATER
+
+
+def undo_edit(call: Call, _: NoArguments) -> object:
+    """Take back the newest edit of the map that is not taken back yet; the answer names its kind.
+
+    Raises
+    ------
+    CommandError
+        There is none, or too many edits are queued.
+    """
+    newest = call.context.history.take()
+    if newest is None:
+        raise CommandError("there is no edit of the map to undo")
+    edited, undo = newest
+    for edit in undo[:-1]:
+        _queue(call, edit, PendingEdit(edit, call.client, None))
+    _queue(call, undo[-1], PendingEdit(undo[-1], call.client, call.id, edited.kind))
+    return ANSWERED_LATER
+
+
+def _queue(call: Call, edit: Edit, pending: PendingEdit) -> None:
     if not call.context.robot.edit(edit):
         raise CommandError("too many edits are waiting for the next cycle: try again")
-    call.context.pending_edits.append(PendingEdit(call.client, call.id))
-    return ANSWERED_LATER
+    call.context.pending_edits.append(pending)
 
 
 def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:

@@ -41,6 +41,7 @@ BOUNDS: Final[Mapping[str, Any]] = MappingProxyType({
     "y": Coordinate,
     "theta": Angle,
     "object": Number,
+    "area": Number,
     "numbers": Annotated[tuple[Number, ...], Field(min_length=1, max_length=SELECTION_MAX)],
     "model": Annotated[str, Field(min_length=1, max_length=100)],
     "v": Annotated[float, Field(ge=-10.0, le=10.0)],

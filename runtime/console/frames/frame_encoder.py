@@ -172,6 +172,7 @@ class FrameEncoder:
             "age": _json_numbers([robot_s - fired_s for fired_s in self._fired_s], 3),
             "clusters": self._cluster_boxes,
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
+            "areas": [[a.number, round(a.x, 3), round(a.y, 3), a.radius] for a in state.perception.vacant_areas()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": _drive_request(state.drive_request, state.goal_place),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},

@@ -68,6 +68,27 @@ export function ellipseOf(covariance) {
 
 export const percent = (share) => `${share > 0.995 && share < 1 ? "> 99" : Math.round(100 * share)} %`;
 
+// What an operator has said counts more than a number.
+export function certainty(object) {
+  if (object.placed && !object.confirmed) return "placed";
+  return `${object.confirmed ? "✓ " : ""}${percent(object.probability ?? object.score)}`;
+}
+
+export function drawAreas(f) {
+  const { ctx, run, theme, px } = f;
+  const path = new Path2D();
+  for (const [, x, y, radius] of run.state.areas) {
+    path.moveTo(x + radius, y);
+    path.arc(x, y, radius, 0, 2 * Math.PI);
+    cross(path, x, y, radius * Math.SQRT1_2);
+  }
+  f.inWorld();
+  ctx.strokeStyle = theme.muted;
+  ctx.lineWidth = 1.2 * px;
+  ctx.setLineDash([2 * px, 4 * px]);
+  ctx.stroke(path);
+}
+
 export function drawModels(f) {
   const { ctx, run, theme, px, selection } = f;
   const sure = new Path2D(), unsure = new Path2D(), picked = new Path2D();
@@ -137,8 +158,7 @@ export function drawLabels(f) {
   for (const spot of spots) {
     const { object, x, y, r } = spot;
     const numbered = object.number !== null && object.number !== undefined;
-    const chance = percent(object.probability ?? object.score);
-    const text = `${numbered ? `${object.number} ` : ""}${object.model}  ${chance}`;
+    const text = `${numbered ? `${object.number} ` : ""}${object.model}  ${certainty(object)}`;
     ctx.font = theme.font(12, 650);
     const half = ctx.measureText(text).width / 2;
     const inside = Math.hypot(half, 0.45 * r + 8) < r ? [[x, y - 0.45 * r]] : [];

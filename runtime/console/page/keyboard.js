@@ -20,12 +20,12 @@ const WORDS = [
   ["arrows, Shift+arrows", "with the move tool: nudge the selected object by 1 cm or 10 cm"],
   ["W A S D", "drive while held, if enabled; arrows on the driving pad"],
   ["K", "pause or resume the emulator"],
-  ["Ctrl+Z", "undo the last parameter"],
+  ["Ctrl+Z", "undo the last edit of the map; in Tune, the last parameter"],
   ["Escape", "cancel; clear the selection"],
   ["?", "this list"],
 ];
 
-export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, parameters, notifications, drivingByKeys }) {
+export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, undo, notifications, drivingByKeys }) {
   const help = () => notifications.confirm("Keys", el("dl", { class: "keys" }, ...WORDS.flatMap(([key, text]) =>
     [el("dt", {}, el("kbd", {}, key)), el("dd", {}, text)])), [["Close", null]]);
   byId("keys").addEventListener("click", help);
@@ -53,7 +53,7 @@ export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, pa
     const { target, key } = event;
     if ((event.ctrlKey || event.metaKey) && key.toLowerCase() === "z") {
       event.preventDefault();
-      parameters.undo();
+      undo();
       return;
     }
     if (event.ctrlKey || event.metaKey || event.altKey) return;

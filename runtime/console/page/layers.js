@@ -4,7 +4,7 @@ import { el, svg } from "./dom.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
 import { drawMapFrame, drawRobot, drawVectors, drawGoal, trailDrawer } from "./draw_motion.js";
-import { drawClusters, drawEllipses, drawEvidence, drawLabels, drawModels } from "./draw_objects.js";
+import { drawAreas, drawClusters, drawEllipses, drawEvidence, drawLabels, drawModels } from "./draw_objects.js";
 import { AGE_LEGEND, segmentsDrawer } from "./draw_segments.js";
 import { prefer, preferred } from "./preferences.js";
 
@@ -19,6 +19,7 @@ const TABLE = [
   ["evidence", "front", "readings of the selected object", drawEvidence, true, "M5 14c6-8 14-8 18 0M29 6l7 7m0-7-7 7", "stop"],
   ["models", "front", "models (dashed: uncertain)", drawModels, true, "M20 3a7 7 0 1 1-.1 0Z", "model"],
   ["ellipses", "front", "95 % ellipses of their positions", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
+  ["areas", "front", "vacant areas: nothing stands here", drawAreas, true, "M20 2a8 8 0 1 1-.1 0ZM14 4l12 12M26 4 14 16", "muted", "2 3"],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],
   ["map_frame", "front", "map frame, known room, and where the robot is: 95 % ellipse", drawMapFrame, true, "M8 17V4m0 13h13M24 10a6 4 0 1 1-.1 0Z", "drive"],

@@ -7,6 +7,7 @@ import { Drive } from "./drive.js";
 import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
 import { Log } from "./log.js";
+import { MapEdits } from "./map_edits.js";
 import { Notifications } from "./notifications.js";
 import { describeMap, Objects } from "./objects.js";
 import { Parameters } from "./parameters.js";
@@ -59,6 +60,7 @@ const theme = new Theme(() => {
   drawInstruments();
 });
 
+const mapEdits = new MapEdits({ run, units, connection, notifications });
 const drive = {}; // filled in below: the goal tool and the drive panel need each other
 const announce = (text) => setText(byId("announce"), text);
 const tools = new Toolbox({
@@ -66,7 +68,7 @@ const tools = new Toolbox({
   tools: [
     panTool(view),
     selectTool({ run, view, selection, redraw }),
-    moveTool({ run, view, selection, connection, notifications, redraw }),
+    moveTool({ run, view, selection, mapEdits, redraw }),
     placeTool({ run, view, connection, notifications, redraw }),
     goalTool({ sendGoal: (x, y) => drive.panel.goal(x, y).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan") }),
     tapeTool({ units, announce, redraw }),
@@ -192,11 +194,11 @@ connection.on("parameters", (message) => parameters.show(message.parameters));
 connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
 byId("report").href = `/report${query}`;
-byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again."), [
+byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings the segments back, and vacant areas stay."), [
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, units, chosen, time, parameters, notifications, drivingByKeys: () => byId("teleop-keys").checked });
+watchKeyboard({ drive: drive.panel, tools, view, fit, units, chosen, time, undo: () => (tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 
 export { connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };

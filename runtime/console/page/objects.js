@@ -2,7 +2,7 @@
 // of the map.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
-import { ellipseOf, percent } from "./draw_objects.js";
+import { certainty, ellipseOf, percent } from "./draw_objects.js";
 import { degrees } from "./units.js";
 
 const EVIDENCE_EVERY_MS = 1000;
@@ -20,10 +20,12 @@ export class Objects {
     units.on("changed", () => this.refresh());
     selection.on("object", () => this.#onSelected());
     this.#list.addEventListener("keydown", (event) => this.#key(event));
-    const act = (type) => () => connection.request({ type, object: selection.object }).then(
-      () => notifications.toast(`Object ${selection.object}: ${type === "confirm_object" ? "confirmed" : "rejected"}`), notifications.showError);
-    byId("object-confirm").addEventListener("click", act("confirm_object"));
-    byId("object-reject").addEventListener("click", act("reject_object"));
+    const act = (type, done) => () => {
+      const { object } = selection;
+      connection.request({ type, object }).then(() => notifications.toast(`Object ${object}: ${done}`), notifications.showError);
+    };
+    byId("object-confirm").addEventListener("click", act("confirm_object", "confirmed; it is reported whatever the readings say"));
+    byId("object-reject").addEventListener("click", act("reject_object", "rejected; nothing is reported there until you lift the area"));
     byId("object-move").addEventListener("click", () => tools.choose("move", { focus: true }));
   }
 
@@ -39,7 +41,7 @@ export class Objects {
       const row = this.#rows.get(key);
       setText(row.number, object.number === null || object.number === undefined ? "–" : `${object.number}`);
       setText(row.name, object.model);
-      setText(row.sure, percent(object.probability ?? object.score));
+      setText(row.sure, certainty(object));
       setText(row.where, `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
       setText(row.off, `± ${this.units.length(object.sigma, 3)}`);
       const picked = object.number !== null && object.number === this.selection.object;
@@ -97,6 +99,7 @@ export class Objects {
     }
     setText(byId("object-name"), `${object.number} ${object.model}`);
     const facts = [
+      ["state", object.confirmed ? "confirmed by an operator" : object.placed ? "placed by an operator; no reading supports it yet" : "recognised"],
       ["certainty", object.probability === null || object.probability === undefined
         ? `fit ${percent(object.score)}` : `probability ${percent(object.probability)}`],
       ["place", this.units.place(object.x, object.y, 3)],
@@ -119,7 +122,7 @@ export class Objects {
   #askEvidence() {
     const now = performance.now();
     const { object } = this.selection;
-    if (object === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
+    if (object === null || this.run.object(object) === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
     this.#asking = true;
     this.#asked_ms = now;
     this.connection.request({ type: "evidence", object }).then((data) => {

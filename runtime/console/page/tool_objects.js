@@ -20,10 +20,10 @@ function handleOf(view, model, { x, y, theta }) {
   return { x: x + reach * Math.cos(theta), y: y + reach * Math.sin(theta) };
 }
 
-export function moveTool({ run, view, selection, connection, notifications, redraw }) {
+export function moveTool({ run, view, selection, mapEdits, redraw }) {
   let held = null; // {pose, dx, dy, turning}
 
-  const send = (number, { x, y, theta }) => connection.request({ type: "move_object", object: number, x, y, theta }).catch(notifications.showError);
+  const send = (number, pose) => mapEdits.move(number, pose);
   const picked = () => (selection.object === null ? null : run.object(selection.object));
   const poseOf = ({ x, y, theta }) => ({ x, y, theta });
   const drop = () => {

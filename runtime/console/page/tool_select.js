@@ -131,7 +131,13 @@ export function selectionBar({ run, selection, connection, notifications }) {
     connection.request({ ...message, numbers: numbers() }).then(done, notifications.showError);
   };
   const actions = {
-    delete: () => act({ type: "delete_segments" }, () => selection.choose([])),
+    delete: () => {
+      const count = selection.segments.size;
+      act({ type: "delete_segments" }, () => {
+        selection.choose([]);
+        notifications.toast(`${count} segment${count === 1 ? " is" : "s are"} deleted; Ctrl+Z undoes it`);
+      });
+    },
     pin: () => act({ type: "pin_segments", pinned: true }),
     unpin: () => act({ type: "pin_segments", pinned: false }),
     none: () => selection.choose([]),

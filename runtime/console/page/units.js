@@ -38,4 +38,5 @@ export class Units extends Emitter {
   }
 }
 
-export const degrees = (radians) => `${Math.round((radians * 180) / Math.PI)}°`.replace("-", "−");
+// From −180° to 180°, however often the robot has turned.
+export const degrees = (radians) => `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−");

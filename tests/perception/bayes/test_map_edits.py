@@ -22,7 +22,7 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
-    RejectObject,
+    RemoveObject,
 )
 from tests.perception.bayes import box_readings
 from tests.perception.bayes.tracks import (
@@ -66,7 +66,7 @@ def test_placed_moved_confirmed_and_rejected_objects_are_found_by_their_number()
     for number, track in ((1, circle), (2, box)):
         assert edit(memory, ConfirmObject(number)) is None
         assert track.marks == CONFIRMED | PLACED
-        assert edit(memory, RejectObject(number)) is None
+        assert edit(memory, RemoveObject(number)) is None
         assert (track.status, track.marks) == (FREE, 0)
         assert row_of(memory, number) is None
     rejected = memory.state["rejections"][0, :2]
@@ -80,7 +80,7 @@ def test_a_rejection_keeps_the_evidence_within_bounds(evidence_nat: float, kept_
     memory = new_memory()
     track = memory.tracks[0]
     track.status, track.number, track.radius, track.log_likelihood_ratio = ESTABLISHED, 1, RADII[0], evidence_nat
-    assert edit(memory, RejectObject(1)) is None
+    assert edit(memory, RemoveObject(1)) is None
     assert memory.state["rejections"][0, 0].item()[2:] == (max(RADII[0], P[0].merge_m), 0, kept_nat)
 
 
@@ -88,7 +88,7 @@ def test_what_cannot_be_edited_is_refused_with_a_reason() -> None:
     memory = new_memory()
     refused: dict[str, MapEdit] = {
         "no model is called keg": PlaceModel("keg", 0.0, 0.0, 0.0),
-        "7": RejectObject(7),
+        "7": RemoveObject(7),
         "9": DeleteSegments((9,)),
         "8": PinSegments((8,), pinned=True),
         "5": PinSegments((5,), pinned=False),

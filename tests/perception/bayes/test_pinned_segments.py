@@ -6,8 +6,8 @@ import numpy as np
 
 from perception.bayes.elements import BUCKET_CAPACITY, BUCKETS
 from perception.bayes.parameters import CELL_M
-from perception.bayes.pinned_segments import Pins, delete, places_of
-from perception.bayes.segment_list import mapped_segments
+from perception.bayes.pinned_segments import Pins, delete, places_of, restore
+from perception.bayes.segment_list import drawn, mapped_segments
 from perception.bayes.segment_pairs import bucket_index
 from perception.bayes.state import Memory
 from tests.perception.bayes.tracks import TRACKS, add_segment, examples
@@ -69,3 +69,26 @@ def test_a_bucket_drops_its_oldest_segment_first_and_pinned_segments_are_restore
     assert np.count_nonzero(buckets["count"]) <= 8
     pins.clear()
     assert pins.count == 0
+
+
+def test_deleted_segments_are_put_back_with_their_numbers_and_pins() -> None:
+    memory, pins = Memory(4, TRACKS), Pins()
+    places = np.random.default_rng(3).uniform(-20.0, 20.0, (60, 2))
+    for n, (x, y) in enumerate(places, start=1):
+        add_segment(memory, np.array([x, y, 0.6, 0.8]), n)
+    memory.state["segments_numbered"] = len(places)
+    assert pins.add(memory, (4, 9)) == (set(), set())
+    before, held = listed(memory), mapped_segments(memory)
+    rows = [
+        (float(one["number"]), *ends, float(one["time_s"]), float(one["number"] in (4, 9)))
+        for one, ends in zip(held, drawn(held).tolist(), strict=True)
+    ]
+    assert delete(memory, pins, range(1, 31)) == set()
+    assert restore(memory, pins, rows) is None
+    after = listed(memory)
+    assert after.keys() == before.keys()
+    assert all(np.allclose(after[n], before[n]) for n in before)
+    assert sorted(pins.numbers.tolist()) == [4, 9]
+    assert restore(memory, pins, rows) is None
+    assert len(mapped_segments(memory)) == len(before), "none is there twice"
+    assert "no segment ever had" in str(restore(memory, pins, [(61.0, *rows[0][1:])]))

@@ -16,7 +16,7 @@ from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.state import FREE
 from perception.bayes.track_archive import HELD_SHARE, LOOK_M
 from perception.detected_object import DetectedObject
-from perception.edits import ClearMap, ConfirmObject, MoveObject, PlaceModel, RejectObject
+from perception.edits import ClearMap, ConfirmObject, MoveObject, PlaceModel, RemoveObject
 from perception.snapshot import put_back, snapshot_of
 from tests.naive_tracks import FT
 from tests.perception.bayes.tracks import SETTINGS
@@ -146,7 +146,7 @@ def test_what_was_left_behind_can_be_looked_at_and_edited(there: tuple[BayesPerc
     assert found.supporting > 0.0
     assert all(before[name].tobytes() == array.tobytes() for name, array in snapshot_of(perception).items())
     assert perception.edit(ConfirmObject(first.number)) is None
-    assert perception.edit(RejectObject(second.number)) is None
+    assert perception.edit(RemoveObject(second.number)) is None
     assert perception.edit(MoveObject(third.number, third.x + 1.0, third.y, 0.0)) is None
     see(perception, drive(drums, way(LENGTH_M, LENGTH_M + 2.0 * LOOK_M), 100.0))
     now = {seen.number: seen for seen in perception.objects()}

@@ -10,6 +10,7 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
+    LiftArea,
     MoveObject,
     PinSegments,
     PlaceModel,
@@ -39,6 +40,7 @@ EDITS: list[tuple[dict[str, Any], object]] = [
     ({"type": "move_object", "object": 4, "x": 1.0, "y": 2.0, "theta": 0}, MoveObject(4, 1.0, 2.0, 0.0)),
     ({"type": "place_robot", "x": 1.0, "y": 2.0, "theta": 0.5}, PlaceRobot(1.0, 2.0, 0.5)),
     ({"type": "reject_object", "object": 4}, RejectObject(4)),
+    ({"type": "lift_area", "area": 2}, LiftArea(2)),
     ({"type": "confirm_object", "object": 4}, ConfirmObject(4)),
 ]
 """With the edit that the next cycle carries out."""
@@ -65,6 +67,7 @@ OTHERS: list[dict[str, Any]] = [
     {"type": "load_model", "toml": "name = 1"},
     {"type": "set_parameter", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4},
     {"type": "undo_parameter"},
+    {"type": "undo_edit"},
     {"type": "save_toml"},
 ]
 ALL: list[dict[str, Any]] = [

@@ -13,10 +13,15 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
+    LiftArea,
+    MarkVacant,
     MoveObject,
     PinSegments,
     PlaceModel,
     RejectObject,
+    RemoveObject,
+    RestoreSegments,
+    WithdrawConfirmation,
 )
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
@@ -62,6 +67,15 @@ class Operator:
             yield RejectObject(objects[1].number or 0)
             yield PinSegments(tuple(numbers[:2]), pinned=False)
             yield RejectObject(999_999)
+        elif cycle == 340 and seen.vacant_areas():
+            yield LiftArea(seen.vacant_areas()[0].number)
+            yield MarkVacant(3.0, 0.0, 0.5)
+        elif cycle == 345:
+            listed = zip(numbers[:4], seen.segments().geometry[:4].tolist(), strict=True)
+            yield RestoreSegments(tuple((float(n), *ends, 1.0, 0.0) for n, ends in listed))
+            yield WithdrawConfirmation(objects[-1].number or 0)
+        elif cycle == 360:
+            yield RemoveObject(objects[0].number or 0)
         elif cycle == 500:
             yield ClearMap()
 
@@ -75,5 +89,8 @@ def record_edited(path: Path, method: str) -> None:
     person = Operator()
     status = record(before, path, SECONDS, operator=person, reloads={RELOAD_CYCLE: more})
     assert status.dropped == 0
-    kinds = "delete_segments pin_segments place_model move_object reject_object confirm_object clear_map"
+    kinds = (
+        "delete_segments pin_segments restore_segments place_model move_object remove_object reject_object "
+        "mark_vacant lift_area confirm_object withdraw_confirmation clear_map"
+    )
     assert set(person.done) == set(kinds.split()), "every kind of edit was tried"

@@ -16,10 +16,15 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
+    LiftArea,
+    MarkVacant,
     MoveObject,
     PinSegments,
     PlaceModel,
     RejectObject,
+    RemoveObject,
+    RestoreSegments,
+    WithdrawConfirmation,
 )
 from runtime.cli.app import run_command
 from runtime.cycle.modes import Mode
@@ -58,7 +63,8 @@ def test_the_record_holds_what_was_done_and_what_was_refused(edited: Path) -> No
     refused = {(r.cycle, note.edit): note.why for r in records for note in r.refused}
     done = {type(edit) for r, i, edit in asked if (r.cycle, i) not in refused}
     assert done == {
-        DeleteSegments, PinSegments, PlaceModel, MoveObject, RejectObject, ConfirmObject, ClearMap,
+        DeleteSegments, PinSegments, RestoreSegments, PlaceModel, MoveObject, RemoveObject, RejectObject, MarkVacant,
+        LiftArea, ConfirmObject, WithdrawConfirmation, ClearMap,
     }  # fmt: skip
     assert "no object 999999" in refused[330, 2]
     assert "invalid goal" in refused[460, None]

@@ -262,7 +262,7 @@ class Listener(event.Listener):
     def on_end(self, e): pass
 from config.load import load_model
 from perception.edits import (
-    ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
+    ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RemoveObject,
 )
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
 from runtime.cycle.inputs import Request
@@ -290,7 +290,7 @@ def by_hand(cycle, state):
         [PlaceModel(m.name, *pose) for m in further.models[: None if cycle > 100 else -1]],
         [PinSegments(tuple(first), True)], [DeleteSegments(tuple(first[:2]))],
         [MoveObject(o.number, o.x + 0.2, o.y, 0.1) for o in seen], [ConfirmObject(o.number) for o in seen],
-        [RejectObject(o.number) for o in seen], [ClearMap()] if cycle > 200 else [],
+        [RemoveObject(o.number) for o in seen], [ClearMap()] if cycle > 200 else [],
     )
     return OperatorInput(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
 

@@ -100,5 +100,5 @@ def test_a_warm_up_observes_refines_and_edits(part: str, monkeypatch: pytest.Mon
         monkeypatch.setattr(Perception, name, note(name, getattr(Perception, name)))
     settings = load_settings("hallway")
     kernel_warmup.RUN_ONCE[part](settings)
-    edits = {"PinSegments", "PlaceModel", "MoveObject", "ConfirmObject", "RejectObject", "DeleteSegments", "ClearMap"}
+    edits = {"PinSegments", "PlaceModel", "MoveObject", "ConfirmObject", "RemoveObject", "DeleteSegments", "ClearMap"}
     assert done == {"observe", "refine", "edit", "evidence", *edits}

@@ -1,0 +1,145 @@
+"""Vacant areas: places of which the operator said that nothing stands there.
+
+Nothing in such a place is reported, whatever it resembles and however much speaks for it, until the operator lifts
+the area. The methods go on underneath: an object that was rejected by mistake is back at once, with its number.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from perception.detected_object import DetectedObject
+
+AREAS_MAX: Final = 64
+"""Greatest number of areas."""
+RADIUS_MIN_M: Final = 0.3
+"""Least radius of an area around a rejected object: another fit of the same readings lies a decimetre beside it."""
+RADIUS_MAX_M: Final = 10.0
+NO_OBJECT: Final = 0
+
+AREA: Final = np.dtype(
+    [("x", np.float64), ("y", np.float64), ("radius", np.float64), ("number", np.int64), ("object", np.int64)]
+)
+"""An area: its circle, m; its number; number of the object that was rejected there, or `NO_OBJECT`."""
+
+
+class VacantArea(NamedTuple):
+    """A circle in which nothing stands."""
+
+    number: int
+    """Never given twice."""
+    x: float
+    """m"""
+    y: float
+    """m"""
+    radius: float
+    """m"""
+
+
+class VacantAreas:
+    """The areas of one map.
+
+    Attributes
+    ----------
+    rows : (AREAS_MAX,) AREA
+        The first `count` are valid.
+    count, last : int
+        Number of areas, and the number that was given last.
+    """
+
+    def __init__(self) -> None:
+        self.rows = np.zeros(AREAS_MAX, AREA)
+        self.count = 0
+        self.last = 0
+        self._archived: tuple[DetectedObject, ...] = ()
+        self._archived_seen: tuple[DetectedObject, ...] = ()
+
+    def mark(self, x: float, y: float, radius: float, detected: int = NO_OBJECT) -> str | None:
+        """Add an area; return None, or why there is no room for it.
+
+        Parameters
+        ----------
+        x, y, radius : float
+            m.
+        detected : int
+            Number of the object that was rejected: it stays hidden although its place is refined.
+        """
+        if self.count == AREAS_MAX:
+            return f"{AREAS_MAX} areas are marked as vacant, the most there is room for: lift one first"
+        self.last += 1
+        self.rows[self.count] = (x, y, radius, self.last, detected)
+        self.count += 1
+        self.drop_caches()
+        return None
+
+    def lift(self, number: int) -> bool:
+        """Remove the area of this number; return whether there is one."""
+        found = np.flatnonzero(self.rows["number"][: self.count] == number)
+        self._keep(np.delete(np.arange(self.count), found))
+        return len(found) > 0
+
+    def lift_at(self, x: float, y: float) -> None:
+        """Remove the areas that contain a place (m): the operator put an object there."""
+        self._keep(np.flatnonzero(~self._contain(x, y)))
+
+    def listed(self) -> tuple[VacantArea, ...]:
+        """Return the areas, oldest first."""
+        return tuple(VacantArea(number, x, y, radius) for x, y, radius, number, _ in self.rows[: self.count].tolist())
+
+    def containing(self, x: float, y: float) -> tuple[VacantArea, ...]:
+        """Return the areas that contain a place, m."""
+        return tuple(area for area, inside in zip(self.listed(), self._contain(x, y), strict=True) if inside)
+
+    def hides(self, seen: DetectedObject) -> bool:
+        """Return whether an object is in an area. Walls have places, but no number to reject; they stay."""
+        if seen.number is None:
+            return False
+        by_number = seen.number in self.rows["object"][: self.count]
+        return bool(by_number or self._contain(seen.x, seen.y).any())
+
+    def outside(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return the objects that are in no area; the same tuple where there is no area."""
+        return objects if self.count == 0 else tuple(seen for seen in objects if not self.hides(seen))
+
+    def archived_outside(self, archived: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return the same of the objects left behind, which may be many; the same tuple until they change."""
+        if self.count == 0:
+            return archived
+        if archived is not self._archived:
+            self._archived, self._archived_seen = archived, self.outside(archived)
+        return self._archived_seen
+
+    def clear(self) -> None:
+        """Remove all areas; their numbers are not given again."""
+        self._keep(np.zeros(0, np.int64))
+
+    def drop_caches(self) -> None:
+        """Discard what was derived from the areas."""
+        self._archived = self._archived_seen = ()
+
+    def _contain(self, x: float, y: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        rows = self.rows[: self.count]
+        return np.hypot(rows["x"] - x, rows["y"] - y) <= rows["radius"]
+
+    def _keep(self, kept: np.ndarray[tuple[int], np.dtype[np.int64]]) -> None:
+        self.rows[: len(kept)] = self.rows[kept]
+        self.rows[len(kept) :] = 0
+        self.count = len(kept)
+        self.drop_caches()
+
+
+def invalid_area(x: float, y: float, radius: float, coordinate_max_m: float) -> str | None:
+    """Return why a circle (m) cannot be an area, None if it can."""
+    if abs(x) <= coordinate_max_m and abs(y) <= coordinate_max_m and 0.0 < radius <= RADIUS_MAX_M:
+        return None
+    return (
+        f"invalid area ({x:g} m, {y:g} m, radius {radius:g} m): the radius is above 0 and at most {RADIUS_MAX_M:g} m"
+    )
+
+
+def radius_of(reach_m: float) -> float:
+    """Return the radius of the area that a rejected object leaves, whose model reaches this far, m."""
+    return min(RADIUS_MAX_M, max(RADIUS_MIN_M, reach_m)) if math.isfinite(reach_m) else RADIUS_MIN_M

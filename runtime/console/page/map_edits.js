@@ -1,0 +1,59 @@
+// Undo of map edits, and the list of vacant areas: places of which the operator said that nothing stands there.
+
+import { byId, el, setText } from "./dom.js";
+
+const DONE = {
+  delete_segments: "The deleted segments are back", pin_segments: "The pins are as before", place_model: "The placed object is gone",
+  move_object: "The object is back where it was", confirm_object: "The object is not confirmed any more", reject_object: "The object is reported again",
+  lift_area: "The area is vacant again", clear_map: "The segments are back; objects are recognised anew",
+};
+const SETTLED_MS = 1500; // by then the readings have moved an object that was placed badly
+const STRAYED_M = 0.03;
+
+export class MapEdits {
+  #list = byId("areas");
+  #shown = "";
+
+  constructor({ run, units, connection, notifications }) {
+    Object.assign(this, { run, units, connection, notifications });
+    byId("undo-edit").addEventListener("click", () => this.undo());
+    run.on("state", () => this.#refresh());
+    units.on("changed", () => this.#refresh());
+  }
+
+  undo() {
+    return this.connection.request({ type: "undo_edit" }).then((kind) => this.notifications.toast(DONE[kind] ?? "The last edit is undone"), this.notifications.showError);
+  }
+
+  // Moves an object, and says so if the readings have moved it away again.
+  async move(number, { x, y, theta }) {
+    try {
+      await this.connection.request({ type: "move_object", object: number, x, y, theta });
+    } catch (error) {
+      this.notifications.showError(error);
+      return;
+    }
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => {
+      const object = this.run.object(number);
+      const off = object === null ? 0 : Math.hypot(object.x - x, object.y - y);
+      if (off > STRAYED_M) this.notifications.toast(`The readings put object ${number} ${this.units.length(off)} from where you moved it`);
+    }, SETTLED_MS);
+  }
+
+  #refresh() {
+    const { areas } = this.run.state;
+    const enabled = this.run.state.controller && !this.run.watchesRecording;
+    const shown = JSON.stringify([areas, this.units.name, enabled]);
+    if (shown === this.#shown) return;
+    this.#shown = shown;
+    byId("areas-part").hidden = areas.length === 0;
+    setText(byId("areas-count"), `${areas.length}`);
+    this.#list.replaceChildren(...areas.map(([number, x, y, radius]) => {
+      const lift = el("button", { type: "button", class: "control", "aria-label": `Lift area ${number}`,
+        onclick: () => this.connection.request({ type: "lift_area", area: number }).catch(this.notifications.showError) }, "Lift");
+      lift.disabled = !enabled;
+      return el("li", { class: "line" }, el("span", {}, `${number}  ${this.units.place(x, y)}, radius ${this.units.length(radius)}`), lift);
+    }));
+  }
+}
