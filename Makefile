@@ -1,5 +1,5 @@
 # `make run` starts the robot with the emulator, `make test` runs all checks and tests, `make check` the quick ones.
-# `make bench` measures accuracy and timing, `make soak` runs the long forms of the tests.
+# `make bench` measures accuracy and timing, `make soak` runs the long forms of the tests, `make docs` builds the site.
 
 PYTHON ?= python3.11
 VENV   := .venv
@@ -15,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # As pip does; a company's registry may have a certificate of its own.
 export UV_SYSTEM_CERTS ?= 1
 
-.PHONY: run test check lint kernels tests compiled interpreted coverage boundscheck promises mutants soak bench clean
+.PHONY: run test check lint kernels tests compiled interpreted coverage boundscheck promises mutants soak bench docs clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -91,6 +91,10 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench console
 	$(BIN)/python -m pytest -q bench/wallclock
 
+# The documentation as a site in build/site; a link that leads nowhere is an error.
+docs: $(VENV)/docs.stamp
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
 
@@ -132,3 +136,6 @@ $(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
 	$(call install,.[dev$(COMMA)bench])
+
+$(VENV)/docs.stamp: pyproject.toml | $(VENV)/bin/python
+	$(call install,.[docs])

@@ -53,6 +53,11 @@ def test_the_walk_names_functions_that_exist() -> None:
         assert not unknown, f"{module} does not define {sorted(unknown)}"
 
 
+def test_the_site_lists_every_document() -> None:
+    listed = re.findall(r": ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    assert sorted(listed) == sorted(path.name for path in (ROOT / "docs").glob("*.md"))
+
+
 def test_the_page_of_settings_is_that_of_the_models() -> None:
     """Renew it with `echolocate settings --out docs/settings.md --force`."""
     assert (ROOT / "docs" / "settings.md").read_text("utf-8") == markdown()
