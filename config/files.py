@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 from config.errors import WRONG_CALL, UserError
 from config.layers import Source
 
-Kind: TypeAlias = Literal["robots", "worlds", "models", "runs"]
+Kind: TypeAlias = Literal["robots", "worlds", "models", "runs", "missions"]
 """Kind of a file, and the folder of the shipped files of that kind."""
 
 SIZE_MAX = 1 << 18

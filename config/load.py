@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from config.files import ConfigError, Kind, dotted, list_shipped, one_line, parse_document, read_document
 from config.layers import Layers, Location, PathError, Source
+from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.overrides import apply_overrides, parse_override
 from config.problems import describe_errors, given_type, shown, unknown_key
@@ -26,6 +27,7 @@ __all__ = [
     "ConfigError",
     "list_shipped",
     "load_any",
+    "load_mission",
     "load_model",
     "load_robot",
     "load_settings",
@@ -33,6 +35,7 @@ __all__ = [
     "override_settings",
     "parse_model",
     "with_known_room",
+    "with_mission",
     "with_value",
 ]
 
@@ -45,7 +48,7 @@ MODELS_MAX = 64
 """Largest number of model files of one run."""
 
 COMMAND_LINE = Source("command line")
-NAMES = ("robot", "world", "models")
+NAMES = ("robot", "world", "models", "mission")
 """Keys of a run file that name other files; `robot` may also be a section."""
 
 M = TypeVar("M", bound=BaseModel)
@@ -84,10 +87,21 @@ def load_model(name_or_path: str | os.PathLike[str]) -> ModelConfig:
     return _load("models", name_or_path, ModelConfig)
 
 
+def load_mission(name_or_path: str | os.PathLike[str]) -> MissionConfig:
+    """Return the mission of a shipped name or a file.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is invalid.
+    """
+    return _load("missions", name_or_path, MissionConfig)
+
+
 def load_any(
     name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()
-) -> Settings | WorldConfig | ModelConfig:
-    """Return the settings, world or model of a file, whose kind follows from its top-level keys.
+) -> Settings | WorldConfig | ModelConfig | MissionConfig:
+    """Return the settings, world, model or mission of a file, whose kind follows from its top-level keys.
 
     A robot file is loaded as a run with that robot.
 
@@ -98,10 +112,12 @@ def load_any(
     """
     table = read_document("runs", name_or_path).table
     if not overrides:
-        of_run, of_world, of_model = (
+        of_run, of_world, of_model, of_mission = (
             sum(key in schema.model_fields or key in also for key in table)
-            for schema, also in ((Settings, NAMES), (WorldConfig, ()), (ModelConfig, ()))
+            for schema, also in ((Settings, NAMES), (WorldConfig, ()), (ModelConfig, ()), (MissionConfig, ()))
         )
+        if of_mission > max(of_run, of_world, of_model):
+            return load_mission(Path(name_or_path))
         if of_world > max(of_run, of_model):
             return load_world(Path(name_or_path))
         if of_model > of_run:
@@ -116,6 +132,7 @@ def load_settings(
     robot: str | None = None,
     world: str | None = None,
     models: Sequence[str] = (),
+    mission: str | None = None,
 ) -> Settings:
     """Return all settings of a run.
 
@@ -125,7 +142,7 @@ def load_settings(
         Name or path of a run file; by default the shipped hallway run.
     overrides
         Texts of the form ``dotted.path=value``, each on top of the ones before it.
-    robot, world, models
+    robot, world, models, mission
         Names or paths, instead of those in the run file.
 
     Raises
@@ -146,7 +163,7 @@ def load_settings(
     names.lay({"world": DEFAULT_WORLD, "models": [DEFAULT_MODEL]}, run.source)
     section = ("robot",) if isinstance(run.table.get("robot"), dict) else ()
     names.lay({key: run.table[key] for key in NAMES if key in run.table and key not in section}, run.source)
-    asked = {"robot": robot, "world": world, "models": list(models) or None}
+    asked = {"robot": robot, "world": world, "models": list(models) or None, "mission": mission}
     names.lay({key: value for key, value in asked.items() if value is not None}, COMMAND_LINE)
     if isinstance(names.tree["models"], str):
         names.lay({"models": [names.tree["models"]]}, names.source_of(("models",)))
@@ -160,8 +177,10 @@ def load_settings(
         known = ", ".join(list_shipped("robots"))
         problems.append(f"{run.source.name}: robot: missing; name a robot or a robot file; known robots: {known}")
     settings.lay({key: value for key, value in run.table.items() if key not in NAMES or key in section}, run.source)
-    problems += _lay_world(names, settings)
+    problems += _lay_named("worlds", "world", names, settings)
     problems += _lay_models(names, settings)
+    if "mission" in names.tree:
+        problems += _lay_named("missions", "mission", names, settings)
     problems += apply_overrides([c for c in changes if not c.names_files], settings)
     if problems:
         raise ConfigError(*problems)
@@ -209,6 +228,18 @@ def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) ->
     surfaces = load_world(name_or_path).model_dump(mode="json", include={"drum", "wall", "box", "polygon"})
     location = ("perception", "localization", "known_room")
     return with_value(settings, f"map {os.fspath(name_or_path)}", location, surfaces)
+
+
+def with_mission(settings: Settings, mission: MissionConfig) -> Settings:
+    """Return the settings with a mission in place of their own goal or mission.
+
+    Raises
+    ------
+    ConfigError
+        It looks for an object that these settings do not recognise.
+    """
+    free = settings.model_copy(update={"goal": None, "mission": None})
+    return with_value(free, f"mission {mission.name}", ("mission",), mission.model_dump(mode="json"))
 
 
 def with_value(settings: Settings, name: str, location: Location, value: object) -> Settings:
@@ -287,11 +318,12 @@ def _robot_layer(names: Layers) -> tuple[Layers, list[str]]:
     return layers, [f"{source.name}: {dotted((key,))}: {unknown_key((key,), RobotConfig)}" for key in stray]
 
 
-def _lay_world(names: Layers, settings: Layers) -> list[str]:
-    named_by, world = names.source_of(("world",)), names.tree["world"]
-    table, source, problems = _named_table("worlds", "world", world, named_by)
+def _lay_named(kind: Kind, key: str, names: Layers, settings: Layers) -> list[str]:
+    """Lay the table of a world or a mission, and return its problems."""
+    named_by, name = names.source_of((key,)), names.tree[key]
+    table, source, problems = _named_table(kind, key, name, named_by)
     if not problems:
-        settings.put(("world",), table, source if source is named_by else source.mounted(("world",)))
+        settings.put((key,), table, source if source is named_by else source.mounted((key,)))
     return problems
 
 

@@ -35,6 +35,11 @@ class ModelConfig(Strict):
     arc_radius_m: float | None = Field(default=None, gt=0.0, le=100.0)
     """True radius about the origin if the vertices approximate an arc."""
 
+    @property
+    def reach_m(self) -> float:
+        """Radius about the origin that holds the outline, m."""
+        return self.arc_radius_m or max(math.hypot(x, y) for x, y in self.vertices_m)
+
     @model_validator(mode="after")
     def _proper_outline(self) -> ModelConfig:
         vertices = self.vertices_m

@@ -22,7 +22,7 @@ class Override:
     def names_files(self) -> bool:
         """Whether the value names a file to read, so that it must be applied before files are read."""
         head, depth = self.location[0], len(self.location)
-        return (head in ("robot", "world", "models") and depth == 1) or (head == "models" and depth == 2)
+        return (head in ("robot", "world", "models", "mission") and depth == 1) or (head == "models" and depth == 2)
 
 
 def parse_override(text: str) -> Override:

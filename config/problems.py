@@ -130,9 +130,16 @@ def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> 
     location, kind, value = details["loc"], details["type"], details["input"]
     context = details.get("ctx", {})
     if kind == "value_error":
-        return _describe_whole(location, str(context.get("error", details["msg"])), value, layers)
+        return _describe_whole(location, str(context.get("error", details["msg"])), value, layers, model)
     source = layers.source_of(location)
-    path = dotted(source.local(location))
+    path = dotted(source.local(_written(location, model)))
+    tags = [tag for member in _members(_unwrapped(_annotation_at(model, location))) for tag in _tags(member)]
+    if kind == "union_tag_not_found":
+        return f"{source.name}: {path}.{_tag_key(context)}: missing; must be one of {', '.join(tags)}"
+    if kind == "union_tag_invalid":
+        tag = shown(value[_tag_key(context)])
+        near = did_you_mean(str(context["tag"]), tags)
+        return f"{source.name}: {path}.{_tag_key(context)} = {tag}: must be one of {', '.join(tags)}{near}"
     if kind == "missing":
         return f"{source.name}: {path}: missing"
     if kind == "extra_forbidden" and location in RENAMED_KEYS:
@@ -169,13 +176,14 @@ def _message(details: ErrorDetails, model: type[BaseModel]) -> str:
     return details["msg"][:1].lower() + details["msg"][1:]
 
 
-def _describe_whole(location: Location, text: str, table: object, layers: Layers) -> str:
+def _describe_whole(location: Location, text: str, table: object, layers: Layers, model: type[BaseModel]) -> str:
     """Return the line for a conflict among the values of one table, with the sources of the values that it names."""
     keys = table.keys() if isinstance(table, dict) else ()
     named = [(*location, k) for k in keys if re.search(rf"\b{re.escape(k)}\b", text)]
     sources = [s for where in named for s in [layers.source_of(where)]] or layers.sources_within(location)
     names = layers.newest_first(sources)
-    path = dotted(sources[0].local(location) if len(names) == 1 else location)
+    written = _written(location, model)
+    path = dotted(sources[0].local(written) if len(names) == 1 else written)
     return f"{' over '.join(names)}: {path + ': ' if path else ''}{text}"
 
 
@@ -208,10 +216,39 @@ def _unwrapped(annotation: object) -> object:
         origin, arguments = get_origin(annotation), get_args(annotation)
         if origin is Annotated:
             annotation = arguments[0]
-        elif origin in (Union, types.UnionType):
+        elif origin in (Union, types.UnionType) and len(_members(annotation)) < 2:
             annotation = next(a for a in arguments if a is not type(None))
         else:
             return annotation
+
+
+def _members(annotation: object) -> list[type[BaseModel]]:
+    """Return the tables of which a value may be any, if its first key says which one."""
+    return [a for a in get_args(annotation) if isinstance(a, type) and issubclass(a, BaseModel)]
+
+
+def _tagged(annotation: object, tag: str | int) -> object:
+    """Return the table of a union that has this value of its first key."""
+    return next((member for member in _members(annotation) if tag in _tags(member)), None)
+
+
+def _tag_key(context: Mapping[str, object]) -> str:
+    """Return the key whose value says which table it is."""
+    return str(context["discriminator"]).strip("'")
+
+
+def _tags(member: type[BaseModel]) -> tuple[str, ...]:
+    """Return the values of a table's first key that say that it is this one."""
+    return get_args(next(iter(member.model_fields.values())).annotation)
+
+
+def _written(location: Location, model: type[BaseModel]) -> Location:
+    """Return a location as a file has it: pydantic's also names which table of a union was meant."""
+    return tuple(
+        key
+        for n, key in enumerate(location)
+        if isinstance(key, int) or len(_members(_unwrapped(_annotation_at(model, location[:n])))) < 2
+    )
 
 
 def _annotation_at(model: object, location: Location) -> object:
@@ -224,6 +261,8 @@ def _annotation_at(model: object, location: Location) -> object:
             annotation = items[min(key, len(items) - 1)] if items else None
             if annotation is Ellipsis:
                 annotation = items[0]
+        elif len(_members(annotation)) > 1:
+            annotation = _tagged(annotation, key)
         else:
             field = _fields(annotation).get(key)
             annotation = None if field is None else field.annotation

@@ -12,6 +12,7 @@ import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.settings import Settings
@@ -22,6 +23,7 @@ FILES: Final = (
     ("robot", RobotConfig, "robot file, `--robot FILE`"),
     ("world", WorldConfig, "world file, `--world FILE`, `--map FILE`"),
     ("model", ModelConfig, "object model, `--model FILE`"),
+    ("mission", MissionConfig, "mission file, `--mission FILE`"),
 )
 """The kinds of files: name, model, and what each is for."""
 PLAIN: Final = ((bool, "true or false"), (int, "integer"), (float, "number"), (str, "text"))
@@ -58,7 +60,7 @@ def settings_of(file: str) -> Iterator[Setting]:
     """
     model = next(model for name, model, _ in FILES if name == file)
     # A run file names these files, whose keys are listed with them.
-    others = {*RobotConfig.model_fields, "models", "world", "known_room"}
+    others = {*RobotConfig.model_fields, "models", "world", "known_room", "mission"}
     yield from _settings(file, model, "", others if model is Settings else set())
 
 
@@ -66,7 +68,9 @@ def table_help(file: str, table: str) -> str:
     """Return what a table is for: the first paragraph of its model's documentation."""
     model: type[BaseModel] = next(model for name, model, _ in FILES if name == file)
     for name in table.removesuffix("[]").split(".") if table else ():
-        model = next(_models(model.model_fields[name.removesuffix("[]")].annotation))
+        key, _, kind = name.removesuffix("]").partition("[")
+        options = list(_models(model.model_fields[key].annotation))
+        model = next((option for option in options if kind == _kind(option)), options[0])
     if not table:
         return ""
     return " ".join((model.__doc__ or "").split("\n\n")[0].split())
@@ -86,10 +90,17 @@ def _settings(file: str, model: type[BaseModel], table: str, leave_out: set[str]
             file, table, name, type_of(field.annotation), bounds_of(field), default_of(field), described[name]
         )
     for name, field in fields.items():
-        for inner in _models(field.annotation):
+        inners = list(_models(field.annotation))
+        for inner in inners:
             is_list = get_origin(_without_none(field.annotation)[0]) in (tuple, Annotated)
-            inner_table = f"{table}.{name}".lstrip(".") + ("[]" if is_list else "")
+            kind = _kind(inner) if len(inners) > 1 else ""
+            inner_table = f"{table}.{name}".lstrip(".") + (f"[{kind}]" if is_list else "")
             yield from _settings(file, inner, inner_table, leave_out)
+
+
+def _kind(model: type[BaseModel]) -> str:
+    """Return the value of a table's first key that says which of several tables it is."""
+    return str(next(iter(get_args(next(iter(model.model_fields.values())).annotation)), ""))
 
 
 def _without_none(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation can be anything
@@ -173,6 +184,8 @@ def markdown() -> str:
             if setting.table != table:
                 table = setting.table
                 name = f"[[{table.removesuffix('[]')}]]" if table.endswith("[]") else f"[{table}]"
+                if table.endswith("]") and not table.endswith("[]"):  # one of several tables in a list
+                    name = "[[{}]] {}".format(*table.replace("[]", "").removesuffix("]").split("["))
                 title = f"`{name}`" if table else "Top of the file"
                 lines += ["", f"### {title}", ""]
                 lines += [text, ""] if (text := table_help(file, table)) else []

@@ -11,6 +11,9 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from config.behaviors import BehaviorsConfig
+from config.files import did_you_mean
+from config.mission import MissionConfig
+from config.mission_step import LABELS
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.strict import Strict, TomlList
@@ -258,6 +261,8 @@ class Settings(RobotConfig):
     behaviors: BehaviorsConfig = BehaviorsConfig()
     goal: GoalConfig | None = None
     """Where to drive at the start; by default the robot follows the configured legs."""
+    mission: MissionConfig | None = None
+    """What to do at the start, step by step: the name of a mission, its file, or the mission itself."""
     realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()
@@ -269,4 +274,19 @@ class Settings(RobotConfig):
         twice = next((n for n in names if names.count(n) > 1), None)
         if twice is not None:
             raise ValueError(f"two models are named {twice}: give each model a name of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _mission_can_be_driven(self) -> Settings:
+        if self.mission is None:
+            return self
+        if self.goal is not None:
+            raise ValueError("goal and mission exclude each other: leave one of them out")
+        known = [*(m.name for m in self.models), *LABELS]
+        for name in sorted(self.mission.objects()):
+            if name not in known:
+                hint = did_you_mean(name, known) or f"; it recognises {', '.join(known)}"
+                raise ValueError(
+                    f"mission {self.mission.name} looks for {name}, which no model is named{hint}; add it to models"
+                )
         return self

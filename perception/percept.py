@@ -8,8 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Floats, Pose, Twist, wrap_angle
+from perception.detected_object import DetectedObject
 
-__all__ = ["Canyon", "FieldOfView", "Floats", "OccupancyWindow", "Percept", "Pose", "Twist", "wrap_angle"]
+__all__ = [
+    "Canyon",
+    "DetectedObject",
+    "FieldOfView",
+    "Floats",
+    "OccupancyWindow",
+    "Percept",
+    "Pose",
+    "Twist",
+    "wrap_angle",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +116,7 @@ class Percept:
     field_of_view : FieldOfView
         Where the ring has looked.
     objects : tuple of DetectedObject
-        The objects recognised so far, for schemas that approach one.
+        The objects recognised near the robot, for missions that look for one; empty if none does.
     occupancy : OccupancyWindow or None
         The evidence grid around the robot; None where no schema needs it.
     canyons : tuple of Canyon
@@ -115,6 +126,6 @@ class Percept:
     pose: Pose
     obstacles: Floats
     field_of_view: FieldOfView
-    objects: tuple[object, ...] = ()
+    objects: tuple[DetectedObject, ...] = ()
     occupancy: OccupancyWindow | None = None
     canyons: tuple[Canyon, ...] = ()

@@ -43,6 +43,7 @@ MODULES: Final = {
 WITHOUT_TEST: Final = MappingProxyType(
     {
         "behaviors/response.py": "one dataclass",
+        "behaviors/schema_call.py": "dataclasses",
         "config/units.py": "one constant",
         "drivers/arcos/frames.py": "dataclasses and constants",
         "drivers/rflex/diagnostics.py": "messages",

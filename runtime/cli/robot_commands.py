@@ -25,6 +25,7 @@ def run(
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
     robot: RobotFile = None,
     world: str | None = None,
+    mission: str | None = None,
     seed: Count = 0,
     trace: str | None = None,
     faults: str | None = None,
@@ -57,6 +58,8 @@ def run(
         Robot file, or the name of a shipped one; None for that of the run file.
     world
         Emulated robot: world file, or the name of a shipped one.
+    mission
+        What to do once armed: a mission file, or the name of a shipped one; None for that of the run file.
     seed
         Emulated robot: seed of everything random.
     trace
@@ -79,7 +82,7 @@ def run(
     emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults, force=force)
     return run_robot(
         config, sets, robot=robot, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
-        map_file=map_file, no_record=no_record, no_console=no_console, json_file=json, force=force,
+        map_file=map_file, mission=mission, no_record=no_record, no_console=no_console, json_file=json, force=force,
         emulator=emulator, units=units,
     )  # fmt: skip
 
@@ -150,7 +153,7 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     Parameters
     ----------
     config
-        Run, robot, world or model file, or the name of a shipped run.
+        Run, robot, world, model or mission file, or the name of a shipped run.
     """
     from runtime.cli.commands.check import check_config
 

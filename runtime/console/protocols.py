@@ -11,7 +11,7 @@ from typing import Any, Final, Protocol
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
-from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.step import State
@@ -27,7 +27,7 @@ class Robot(Protocol):
     def request(self, request: Request, is_valid: Callable[[], bool] = ..., /) -> None:
         """Pass a change of mode to the next cycle, which drops it if it is no longer valid; HALT is sent at once."""
 
-    def drive_request(self, drive_request: DriveRequest, is_valid: Callable[[], bool] = ..., /) -> None:
+    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = ..., /) -> None:
         """Pass a drive request to the next cycle, which drops it if it is not valid any more; the newest counts."""
 
     def edit(self, edit: Edit) -> bool:

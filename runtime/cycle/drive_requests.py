@@ -1,8 +1,8 @@
-"""Drive requests: the configured legs, a goal, or an operator's velocity (`runtime.cycle.driving` carries them out).
+"""Drive requests: the configured legs, a goal, a mission, or a velocity (`runtime.cycle.driving` carries them out).
 
 A drive request alone moves nothing: it takes effect in DRIVE only. Leaving DRIVE drops a goal and an operator's
-velocity, so that the robot does not resume them after a re-arm. Without a request the robot follows the configured
-legs.
+velocity and holds a mission, so that the robot does not resume them after a re-arm. Without a request the robot
+follows the configured legs.
 """
 
 from __future__ import annotations
@@ -11,17 +11,36 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
+from behaviors.goal_place import GOAL_SLEW_M_S, GoalPlace, goal_place
+from behaviors.missions.mission import Mission, MissionEdit, continued, edit_refusal, edited, progress_problem
+from behaviors.missions.mission import after_stop as mission_after_stop
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
 from config.settings import Settings
-from drivers.messages import Pose, Twist
+from drivers.messages import Twist
+
+__all__ = [
+    "COORDINATE_MAX_M",
+    "GOAL_SLEW_M_S",
+    "STANDSTILL",
+    "DriveInput",
+    "DriveRequest",
+    "GoalPlace",
+    "Legs",
+    "after_reboot",
+    "after_stop",
+    "first_request",
+    "goal_place",
+    "needs_map",
+    "needs_objects",
+    "refusal",
+    "requested",
+    "validate",
+]
 
 STANDSTILL: Final = Twist(0.0, 0.0)
 COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate of a goal, m: one beyond it is taken for a typing error."""
-
-GOAL_SLEW_M_S: Final = 0.2
-"""So fast may a goal in the map move in odometry's frame, where the robot drives, when its place is corrected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,55 +50,53 @@ class Legs:
     kind: Literal["legs"] = "legs"
 
 
-DriveRequest: TypeAlias = Legs | Goal | Teleoperate
+DriveRequest: TypeAlias = Legs | Goal | Teleoperate | Mission
+"""What is driven in DRIVE."""
+DriveInput: TypeAlias = DriveRequest | MissionEdit
+"""What an operator asks for: something else to drive, or a change of the mission under way."""
 
 
 def first_request(settings: Settings) -> DriveRequest:
-    """Return what is driven at the start of a run: to the configured goal, otherwise the legs."""
+    """Return what is driven at the start of a run: the configured mission or goal, otherwise the legs."""
+    if settings.mission is not None:
+        return Mission(settings.mission)
     goal = settings.goal
     return Legs() if goal is None else Goal(goal.x_m, goal.y_m, frame=goal.frame)
 
 
-@dataclass(frozen=True, slots=True)
-class GoalPlace:
-    """Where a goal lies in odometry's frame, m, as the robot drives to it; and whether it truly lies there."""
-
-    x: float
-    y: float
-    is_exact: bool = True
+def needs_map(asked: DriveInput) -> bool:
+    """Return whether a request names a place in the map, or waits for the robot's place there to be known."""
+    if isinstance(asked, Mission):
+        return asked.plan.needs_map
+    return isinstance(asked, Goal) and asked.frame == "map"
 
 
-def goal_place(goal: Goal, before: GoalPlace | None, map_frame: Pose | None, step_s: float) -> GoalPlace | None:
-    """Return where a goal lies in odometry's frame; a corrected map moves it smoothly, so that the drive never jumps.
+def needs_objects(drive_request: DriveRequest) -> bool:
+    """Return whether a request depends on the objects that are recognised."""
+    return isinstance(drive_request, Mission) and drive_request.plan.needs_objects
+
+
+def requested(before: DriveRequest, asked: DriveInput) -> DriveRequest:
+    """Return what is driven after an operator's request that `refusal` allows.
 
     Parameters
     ----------
-    goal : Goal
-        In either frame.
-    before : GoalPlace or None
-        In the cycle before; None if the goal is new, or its place was not known.
-    map_frame : Pose or None
-        The map frame in odometry's; None while the robot's place in the map is not known.
-    step_s : float
-        Time since the cycle before, s.
-
-    Returns
-    -------
-    GoalPlace or None
-        None while the place is not known.
+    before
+        What has been driven so far.
+    asked
+        The request.
     """
-    if goal.frame == "odom":
-        return GoalPlace(goal.x, goal.y)
-    if map_frame is None:
-        return None
-    there = map_frame.compose(Pose(goal.x, goal.y, 0.0))
-    if before is None:
-        return GoalPlace(there.x, there.y)
-    dx, dy = there.x - before.x, there.y - before.y
-    away, most = math.hypot(dx, dy), GOAL_SLEW_M_S * step_s
-    if away <= most:
-        return GoalPlace(there.x, there.y)
-    return GoalPlace(before.x + dx * most / away, before.y + dy * most / away, is_exact=False)
+    mission = before if isinstance(before, Mission) else None
+    if isinstance(asked, MissionEdit):
+        return before if mission is None else edited(mission, asked)
+    return continued(mission, asked) if mission is not None and isinstance(asked, Mission) else asked
+
+
+def refusal(before: DriveRequest, asked: DriveInput) -> str | None:
+    """Return why a request cannot be carried out, None if it can."""
+    if isinstance(asked, MissionEdit):
+        return edit_refusal(before if isinstance(before, Mission) else None, asked)
+    return validate(asked)
 
 
 def validate(drive_request: DriveRequest) -> str | None:
@@ -94,9 +111,26 @@ def validate(drive_request: DriveRequest) -> str | None:
                     f"invalid velocity ({v:g}, {w:g}) for {valid_s:g} s: "
                     "expected finite m/s and rad/s, duration ≥ 0 s"
                 )
+        case Mission():
+            return progress_problem(drive_request)
     return None
 
 
-def after_stop(drive_request: DriveRequest) -> DriveRequest:
-    """Return what remains of a drive request once the robot has left DRIVE: the legs, or nothing."""
+def after_stop(drive_request: DriveRequest, *, bumper: bool = False) -> DriveRequest:
+    """Return what remains of a drive request once the robot has left DRIVE: the legs, a mission held, or nothing.
+
+    Parameters
+    ----------
+    drive_request
+        What was driven.
+    bumper
+        Whether a contact stopped the robot.
+    """
+    if isinstance(drive_request, Mission):
+        return mission_after_stop(drive_request, bumper=bumper)
+    return drive_request if isinstance(drive_request, Legs) else TELEOPERATION_ENDED
+
+
+def after_reboot(drive_request: DriveRequest) -> DriveRequest:
+    """Return what remains of a drive request when the odometry has restarted: the legs, or nothing."""
     return drive_request if isinstance(drive_request, Legs) else TELEOPERATION_ENDED

@@ -10,15 +10,18 @@ from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.field_of_view import unseen_way
+from behaviors.missions.drive_mission import drive_mission
+from behaviors.missions.mission import Mission
 from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_ahead import Leg, move_ahead
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
+from behaviors.schema_call import ODOM_FRAME, Scene
 from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
 from config.settings import Settings
-from drivers.messages import Twist
-from perception.percept import Percept
+from drivers.messages import Pose, Twist
+from perception.percept import Percept, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
 from runtime.cycle.goal_drive import GoalDrive, drive_to_goal
 
@@ -30,6 +33,10 @@ NO_PLACE: Final = (
     "or set a goal in odometry's frame"
 )
 LEG_DONE: Final = "the leg is done"
+NO_WAY: Final = (
+    "step {} finds no way: something is too near ahead, or the schemas cancel one another; if that lasts, the step "
+    "is stuck"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +57,8 @@ class DriveResult:
 
 def drive(
     drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
-    place: GoalPlace | None = None, goal_drive: GoalDrive | None = None,
+    place: GoalPlace | None = None, goal_drive: GoalDrive | None = None, map_frame: Pose | None = None,
+    cycle_s: float = 0.0,
 ) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
@@ -70,6 +78,10 @@ def drive(
         Where a goal lies, from `goal_place`.
     goal_drive : GoalDrive, optional
         Of the cycle before, for a goal.
+    map_frame : Pose, optional
+        The map frame in odometry's, while a mission needs it and the robot's place there is known.
+    cycle_s : float
+        Time since the cycle before, s.
     """
     away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     match drive_request:
@@ -77,6 +89,8 @@ def drive(
             return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings, away)
         case Goal():
             return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away)
+        case Mission():
+            return _on_mission(drive_request, leg, percept, settings, map_frame, cycle_s)
         case _:
             return _along_legs(drive_request, leg, percept, settings, away)
 
@@ -132,6 +146,32 @@ def _along_legs(
     decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, (AHEAD, AVOID))
     hold_reason = LEG_DONE if leg.done else None
     return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
+
+
+def _on_mission(
+    mission: Mission, leg: Leg, percept: Percept, settings: Settings, map_frame: Pose | None, cycle_s: float
+) -> DriveResult:
+    """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
+    behaviors, body = settings.behaviors, settings.body
+    radii_m = {model.name: model.reach_m for model in settings.models}
+    scene = Scene(percept, body, behaviors, ODOM_FRAME, 0.0, cycle_s, map_frame, radii_m=radii_m)
+    asked = drive_mission(mission, scene)
+    if asked.hold_reason is not None:
+        return DriveResult(Drive(STANDSTILL), (), asked.mission, leg, asked.hold_reason)
+    if asked.turn_to_rad is not None:
+        angle = wrap_angle(asked.turn_to_rad - percept.pose.theta)
+        turning = Twist(0.0, behaviors.arbiter.turn_gain_per_s * angle)
+        decision = limit_velocity(turning, asked.responses, percept, body, behaviors.arbiter, asked.schemas)
+        return DriveResult(decision, with_sum(asked.responses, decision), asked.mission, leg)
+    others = percept if asked.own_echoes is None else replace(percept, obstacles=percept.obstacles[~asked.own_echoes])
+    away = avoid_static_obstacle(others, body.radius_m, behaviors.avoid_static_obstacle)
+    gain = asked.mission.step.avoid_gain
+    responses = (*asked.responses, replace(away, x=gain * away.x, y=gain * away.y))
+    decision = arbitrate(responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID))
+    hold_reason = None
+    if isinstance(decision, Drive) and decision.twist == STANDSTILL:
+        hold_reason = NO_WAY.format(asked.mission.step.name)
+    return DriveResult(decision, with_sum(responses, decision), asked.mission, leg, hold_reason)
 
 
 def with_sum(responses: tuple[Response, ...], decision: Decision) -> tuple[Response, ...]:

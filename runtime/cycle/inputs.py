@@ -8,7 +8,7 @@ from typing import Final
 
 from drivers.driver import LineState, Received, RobotDriver
 from perception.edits import Edit
-from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.drive_requests import DriveInput
 
 GAP_SHARE: Final = 0.9
 """Largest time between two commands as a share of the base's deadman, which stops a base that waits longer."""
@@ -54,8 +54,8 @@ class Inputs:
     """Why the cycle can no longer keep its period; None while it can."""
     fault: str | None = None
     """Which part of the program has failed; None while all work."""
-    drive_request: DriveRequest | None = None
-    """The new drive request; None keeps the one in force."""
+    drive_request: DriveInput | None = None
+    """The new drive request, or a change of the mission in force; None keeps the one in force."""
     edits: tuple[Edit, ...] = ()
     """The operator's edits of the map, in this order."""
     host_s: float | None = None
@@ -71,7 +71,7 @@ def gather_inputs(
     overrun: str | None = None,
     fault: str | None = None,
     edits: tuple[Edit, ...] = (),
-    drive_request: DriveRequest | None = None,
+    drive_request: DriveInput | None = None,
     host_s: float | None = None,
 ) -> Inputs:
     """Return the inputs of a cycle, among them everything that the driver has received.

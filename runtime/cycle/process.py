@@ -22,7 +22,8 @@ from perception.edits import Edit, Evidence
 from runtime.cycle.alerts import Alerts
 from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINK_RECEIVE
 from runtime.cycle.connection import Connection
-from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.drive_inputs import DriveInputs
+from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.mode_log import ModeLog
@@ -137,9 +138,9 @@ class RobotProcess:
         self._mode_log = ModeLog(log, self._notifier)
         self._alerts = Alerts()
         self._request: Request | None = None
-        self._is_request_valid = self._is_drive_request_valid = always_valid
+        self._is_request_valid = always_valid
         self._edits: list[Edit] = []
-        self._drive_request: DriveRequest | None = None
+        self._drive_inputs = DriveInputs()
         self._arm_when_ready = False
         self._stop = asyncio.Event()
 
@@ -154,9 +155,9 @@ class RobotProcess:
         if request is Request.HALT:
             self._halt()
 
-    def drive_request(self, drive_request: DriveRequest, is_valid: Callable[[], bool] = always_valid) -> None:
+    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = always_valid) -> None:
         """Pass a drive request to the next cycle, which drops it if `is_valid` is False; a later one replaces it."""
-        self._drive_request, self._is_drive_request_valid = drive_request, is_valid
+        self._drive_inputs.put(drive_request, is_valid)
 
     def edit(self, edit: Edit) -> bool:
         """Pass an edit of the map to the next cycle; return False where too many wait already."""
@@ -295,8 +296,7 @@ class RobotProcess:
             self._arm_when_ready = False
             self.request(Request.ARM)
         request = self._request if self._is_request_valid() else None
-        drive_request = self._drive_request if self._is_drive_request_valid() else None
-        self._request = self._drive_request = None
+        self._request = None
         edits, self._edits = tuple(self._edits[:EDITS_PER_CYCLE]), self._edits[EDITS_PER_CYCLE:]
         return gather_inputs(
             self._driver,
@@ -306,7 +306,7 @@ class RobotProcess:
             overrun=self._scheduler.overrun,
             fault=self.health.fault(),
             edits=edits,
-            drive_request=drive_request,
+            drive_request=self._drive_inputs.take(),
             host_s=host_s,
         )
 

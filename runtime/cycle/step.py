@@ -18,18 +18,23 @@ from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from config.settings import Settings
 from drivers.driver import LineState, RobotDriver
-from drivers.messages import Flags, Odometry, Twist
+from drivers.messages import Flags, Odometry, Pose, Twist
 from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.cycle.drive_requests import (
     STANDSTILL,
+    DriveInput,
     DriveRequest,
     GoalPlace,
     Legs,
+    after_reboot,
     after_stop,
     goal_place,
-    validate,
+    needs_map,
+    needs_objects,
+    refusal,
+    requested,
 )
 from runtime.cycle.driving import drive
 from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
@@ -42,6 +47,7 @@ __all__ = [
     "STANDSTILL",
     "Command",
     "CycleRecord",
+    "DriveInput",
     "DriveRequest",
     "Edit",
     "Inputs",
@@ -160,11 +166,12 @@ def step(
     """
     new_segments = _perceive(state, inputs)
     mark(Phase.PERCEIVE)
-    command = _decide(state, inputs, settings)
+    problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request)
+    command = _decide(state, inputs, settings, accepts=problem is None)
     mark(Phase.DECIDE)
     carry_out(command)
     mark(Phase.COMMAND)
-    refused = _edit(state, inputs)
+    refused = _edit(state, inputs, problem)
     quanta, iterations, refinement = _refine(state, settings, may_refine)
     mark(Phase.REFINE)
     state.cycle += 1
@@ -200,7 +207,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
         state.odometry = None
         state.motion_monitor = MotionMonitor()
         state.leg = None
-        state.drive_request = after_stop(state.drive_request)  # a goal is a place in the odometry before the reboot
+        state.drive_request = after_reboot(state.drive_request)  # a goal is a place in the odometry before the reboot
         state.last_firing_robot_s = 0.0
     if inputs.received.odometry is not None:
         state.odometry = inputs.received.odometry
@@ -211,11 +218,12 @@ def _perceive(state: State, inputs: Inputs) -> int:
     return new_segments
 
 
-def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
+def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) -> Command:
     """Return the command; any stop, also one from another mode, drops a goal and an operator's velocity."""
     before = state.mode
     state.vectors, state.hold_reason, state.percept = (), None, None
-    _accept_drive_request(state, inputs)
+    if accepts:
+        _accept_drive_request(state, inputs)
     state.motion_monitor = state.motion_monitor.observe(inputs.received.odometry, inputs.run_s, settings.body)
     command = _command(state, inputs, settings)
     if inputs.line is LineState.READY:  # no other command reaches the base
@@ -224,27 +232,28 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     after = state.mode
     stopped = after.mode in {Mode.SAFE_STOP, Mode.FAULT} and after.entered_since(before)
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
-        state.drive_request = after_stop(state.drive_request)
+        bumper = bool((inputs.received.flags | state.odometry.flags) & Flags.BUMPER) if state.odometry else False
+        state.drive_request = after_stop(state.drive_request, bumper=bumper)
     if not isinstance(state.drive_request, Goal):
         state.goal_drive = None
     return command
 
 
 def _accept_drive_request(state: State, inputs: Inputs) -> None:
-    """Take over the operator's drive request where it is valid; legs that were done begin again."""
-    if inputs.drive_request is None or _refusal(state, inputs.drive_request) is not None:
+    """Take over the operator's drive request; legs that were done begin again."""
+    if inputs.drive_request is None:
         return
-    state.drive_request, state.requested_run_s, state.goal_place = inputs.drive_request, inputs.run_s, None
-    state.goal_drive = None
+    state.drive_request = requested(state.drive_request, inputs.drive_request)
+    state.requested_run_s, state.goal_place, state.goal_drive = inputs.run_s, None, None
     if isinstance(inputs.drive_request, Legs) and state.leg is not None and state.leg.done:
         state.leg = None
 
 
-def _refusal(state: State, drive_request: DriveRequest) -> str | None:
+def _refusal(state: State, drive_request: DriveInput) -> str | None:
     """Return why a drive request cannot be carried out, None if it can."""
-    if isinstance(drive_request, Goal) and drive_request.frame == "map" and state.perception.localized() is None:
+    if needs_map(drive_request) and state.perception.localized() is None:
         return NO_MAP
-    return validate(drive_request)
+    return refusal(state.drive_request, drive_request)
 
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
@@ -254,12 +263,13 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
     state.run_s = inputs.run_s
     goal = state.drive_request if isinstance(state.drive_request, Goal) else None
-    map_frame = state.perception.known_map_frame() if goal is not None and goal.frame == "map" else None
-    state.goal_place = None if goal is None else goal_place(goal, state.goal_place, map_frame, max(0.0, gap_s))
+    gap_s = max(0.0, gap_s)
+    map_frame = state.perception.known_map_frame() if needs_map(state.drive_request) else None
+    state.goal_place = None if goal is None else goal_place(goal, state.goal_place, map_frame, gap_s)
     movement = state.motion_monitor.movement
     state.mode = advance(before, inputs, flags, gap_s, movement)
     if state.mode.mode is Mode.DRIVE:
-        decision = _drive(state, inputs, settings)
+        decision = _drive(state, inputs, settings, map_frame, gap_s)
         if isinstance(decision, Drive):
             return decision.twist
         state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.run_s, decision.reason)
@@ -271,7 +281,7 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     return STANDSTILL if state.mode.mode is Mode.READY else None
 
 
-def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
+def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | None, gap_s: float) -> Drive | Stop:
     """Return the arbiter's decision, or a stop where odometry or echoes are missing."""
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
@@ -289,13 +299,14 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
         )
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
+    objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
     percept = Percept(
-        odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view,
-        occupancy=state.perception.occupancy(),
+        odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects,
+        state.perception.occupancy(),
     )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
-        state.goal_drive,
+        state.goal_drive, map_frame, gap_s,
     )  # fmt: skip
     state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
     state.percept = percept
@@ -309,9 +320,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     return result.decision
 
 
-def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
+def _edit(state: State, inputs: Inputs, problem: str | None) -> tuple[Refused, ...]:
     """Apply the operator's edits of the map; return what was refused, the drive request included."""
-    problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request)
     refused = [] if problem is None else [Refused(None, problem)]
     for i, edit in enumerate(inputs.edits):
         problem = state.perception.edit(edit)

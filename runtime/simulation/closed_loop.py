@@ -22,7 +22,7 @@ from perception.pipeline import Perception
 from runtime.cycle.drive_requests import first_request
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import CycleRecord, DriveRequest, Edit, State, apply_command, apply_settings, step
+from runtime.cycle.step import CycleRecord, DriveInput, Edit, State, apply_command, apply_settings, step
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget, RefinementBudget
 
@@ -35,7 +35,7 @@ class OperatorInput:
     """What an operator requests in a cycle."""
 
     request: Request | None = None
-    drive_request: DriveRequest | None = None
+    drive_request: DriveInput | None = None
     edits: tuple[Edit, ...] = ()
 
 

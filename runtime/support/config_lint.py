@@ -27,6 +27,13 @@ def lint_settings(settings: Settings) -> list[str]:
             f"cycle.rate_hz = {settings.cycle.rate_hz:g} is less than half of {firing_hz:g} firings a second: "
             "several firings wait for each cycle"
         )
+    localization = settings.perception.localization
+    has_map = localization.correct_drift or localization.known_room is not None
+    if settings.mission is not None and settings.mission.needs_map and not has_map:
+        warnings.append(
+            f"mission {settings.mission.name} names places in the map, but the run has none, so it stands: run with "
+            "--map FILE or with perception.localization.correct_drift = true, or name places in odom"
+        )
     speed_m_s = pattern_speed_m_s(settings)
     if speed_m_s < min(arbiter.base_velocity_m_s, settings.body.speed_max_m_s):
         warnings.append(

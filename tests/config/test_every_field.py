@@ -17,13 +17,14 @@ import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from config.load import ConfigError, load_model, load_robot, load_settings, load_world
+from config.load import ConfigError, load_mission, load_model, load_robot, load_settings, load_world
+from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.settings import Settings
 from config.strict import Strict
 from config.world import WorldConfig
-from tests.config.toml_text import MODEL, ROBOT, RUN, WORLD, document, irregular, toml
+from tests.config.toml_text import MISSION, MODEL, ROBOT, RUN, WORLD, document, irregular, toml
 
 ROOTS: dict[str, tuple[type[BaseModel], dict[str, Any], Callable[[Path], BaseModel]]] = {
     "run": (Settings, RUN, load_settings),
@@ -31,6 +32,7 @@ ROOTS: dict[str, tuple[type[BaseModel], dict[str, Any], Callable[[Path], BaseMod
     "robot": (RobotConfig, ROBOT, load_robot),
     "world": (WorldConfig, WORLD, load_world),
     "model": (ModelConfig, MODEL, load_model),
+    "mission": (MissionConfig, MISSION, load_mission),
 }
 WRONG_TYPES = {"text": "oddly", "flag": True, "list": [1.5], "table": {"a": 1}, "number": 1.5, "integer": 7}
 WRONG: dict[Any, tuple[str, ...]] = {
@@ -77,6 +79,16 @@ def inner(annotation: Any) -> Any:
         annotation = arguments[0]
 
 
+def models_within(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield every settings model within an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+        for field in annotation.model_fields.values():
+            yield from models_within(field.annotation)
+    for argument in get_args(annotation):
+        yield from models_within(argument)
+
+
 def settings_of(root: str, model: type[BaseModel], table: Any, at: tuple[str | int, ...] = ()) -> Iterator[Setting]:
     for key, field in model.model_fields.items():
         annotation = inner(field.annotation)
@@ -89,20 +101,33 @@ def settings_of(root: str, model: type[BaseModel], table: Any, at: tuple[str | i
             yield Setting(root, location, field, "name")
         elif issubclass(annotation, BaseModel):
             yield Setting(root, location, field, "table")
+            if field.default is None and key not in table:
+                continue  # a table that may be left out, and is
             yield from settings_of(root, annotation, table.get(key, {}), location)
         else:
             yield Setting(root, location, field, annotation)
 
 
+def member(entry: Any, table: Any) -> type[BaseModel]:
+    """Return the model of a table in a list, which may be one of several that its first key names."""
+    for model in models_within(entry):
+        first = next(iter(model.model_fields.items()))
+        if table.get(first[0]) in get_args(first[1].annotation):
+            return model
+    return next(models_within(entry))
+
+
 def entries_of(root: str, annotation: Any, table: Any, at: tuple[str | int, ...]) -> Iterator[Setting]:
-    """Yield the settings of the first entry of a list."""
+    """Yield the settings of every table in a list, or of the first entry."""
     entry, location = get_args(annotation)[0], (*at, 0)
     kind = inner(entry)
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        for i, one in enumerate(table):
+            yield from settings_of(root, member(entry, one), one, (*at, i))
+        return
     if get_origin(kind) is tuple:
         yield Setting(root, location, FieldInfo.from_annotation(entry), "list")
         yield from entries_of(root, kind, table[0], location)
-    elif issubclass(kind, BaseModel):
-        yield from settings_of(root, kind, table[0], location)
     else:
         yield Setting(root, location, FieldInfo.from_annotation(entry), kind)
 
@@ -124,7 +149,7 @@ def distinct(every: list[Setting]) -> Iterator[Setting]:
 SETTINGS = list(distinct(EVERY))
 NAMED = [s for s in SETTINGS if isinstance(s.location[-1], str)]
 """Settings with a name; entries of lists have numbers."""
-NAMES_FILES = (("models",), ("world",))
+NAMES_FILES = (("models",), ("world",), ("mission",))
 """Settings of a run that may also be names, and have defaults: see test_layers."""
 
 
@@ -155,16 +180,6 @@ def test_every_section_is_reached() -> None:
     assert {"world.drum.0.x_m", "world.polygon.0.vertices_m", "models.0.arc_radius_m", "log.level"} <= paths
     assert {"perception.relaxation.gamma", "behaviors.arbiter.turn_gain_per_s", "cycle.rate_hz"} <= paths
     assert len(paths) > 90
-
-
-def models_within(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield every settings model within an annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-        for field in annotation.model_fields.values():
-            yield from models_within(field.annotation)
-    for argument in get_args(annotation):
-        yield from models_within(argument)
 
 
 def strict_models(base: type[Strict] = Strict) -> Iterator[type[Strict]]:
@@ -234,7 +249,8 @@ def test_missing(root: str, tmp_path: Path) -> None:
     for setting in (s for s in REQUIRED if s.root == root):
         table = copy.deepcopy(ROOTS[setting.root][1])
         del holder(table, setting.location)[setting.location[-1]]
-        assert refused(setting, table, tmp_path) == [f"{setting.path}: missing"]
+        (line,) = refused(setting, table, tmp_path)
+        assert line.partition("; must be one of ")[0] == f"{setting.path}: missing"
 
 
 @pytest.mark.compiled

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import config.load
-from config.load import list_shipped, load_any, load_model, load_robot, load_settings, load_world
+from config.load import list_shipped, load_any, load_mission, load_model, load_robot, load_settings, load_world
 from config.robot import SOUND_SPEED_M_S
 
 FT = 0.3048
@@ -32,9 +32,10 @@ def test_the_names_of_shipped_files() -> None:
         "peoplebot",
         "powerbot",
     )
-    assert list_shipped("worlds") == ("hallway", "irregular")
+    assert list_shipped("worlds") == ("hallway", "irregular", "room")
     assert list_shipped("models") == ("box", "drum", "semicircle")
-    assert list_shipped("runs") == ("hallway", "irregular")
+    assert list_shipped("runs") == ("hallway", "irregular", "room")
+    assert len(list_shipped("missions")) == 10
 
 
 def test_every_shipped_file_loads() -> None:
@@ -44,6 +45,8 @@ def test_every_shipped_file_loads() -> None:
         load_world(name)
     for name in list_shipped("models"):
         assert load_model(name).name == name
+    for name in list_shipped("missions"):
+        assert load_mission(name).name == name
     for name in list_shipped("runs"):
         assert load_any(name) == load_settings(name)
 

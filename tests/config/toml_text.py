@@ -67,6 +67,36 @@ WORLD: dict[str, Any] = {
     "acoustics": {"model": "cone", "noise_relative": 0.01},
     "odometry": {"scale": 1.0},
 }
+MISSION: dict[str, Any] = {
+    "name": "errand",
+    "about": "Goes there and back.",
+    "endless": False,
+    "step": [
+        {
+            "name": "out",
+            "schemas": [
+                {"name": "move_to_goal", "x_m": 1.0, "y_m": 2.0},
+                {"name": "wander"},
+                {"name": "follow_wall"},
+            ],
+            "until": [
+                {"when": "reached", "go": "next"},
+                {"when": "seen", "object": "wall"},
+                {"when": "unseen", "object": "wall"},
+                {"when": "time", "after_s": 9.0},
+                {"when": "way", "after_m": 9.0},
+                {"when": "bumper"},
+                {"when": "lost"},
+                {"when": "stuck"},
+            ],
+        },
+        {"name": "round", "schemas": [{"name": "turn", "heading_deg": 90.0}]},
+        {"name": "along", "schemas": [{"name": "stay_on_path", "points_m": [[0.0, 0.0], [1.0, 0.0]]}]},
+        {"name": "dock", "schemas": [{"name": "approach_object", "object": "wall"}]},
+        {"name": "look", "schemas": [{"name": "search"}]},
+        {"name": "on", "schemas": [{"name": "move_ahead", "distance_m": 1.0}]},
+    ],
+}
 RUN: dict[str, Any] = {
     **ROBOT,
     "models": [MODEL],

@@ -87,6 +87,7 @@ def run_robot(
     headless: bool,
     record: str | None,
     map_file: str | None,
+    mission: str | None,
     no_record: bool,
     no_console: bool,
     json_file: str | None,
@@ -98,9 +99,9 @@ def run_robot(
 
     Parameters
     ----------
-    config, sets, robot, port, arm, seconds, headless, record, map_file, no_record, no_console, json_file, units
+    config, sets, robot, port, arm, seconds, headless, record, map_file, mission, no_record, no_console, json_file
         As of `runtime.cli.robot_commands.run`.
-    force : bool
+    force, units
         As of `runtime.cli.robot_commands.run`.
     emulator : EmulatorOptions
         Used without a port.
@@ -112,7 +113,7 @@ def run_robot(
     """
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
-    settings = settings_of_files(config, sets, emulator.world, robot, map_file, no_console=no_console)
+    settings = settings_of_files(config, sets, emulator.world, robot, map_file, mission, no_console=no_console)
     console = EscapingConsole(stderr=True)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     plugged = [] if (port or settings.link.port) is not None else plugged_in()
@@ -122,7 +123,9 @@ def run_robot(
         found = ask_for_robot(plugged, None if config is None and robot is None else settings, console, sys.stdin)
         if found is not None:
             port, robot, arm = found.port, found.robot or robot, False
-            settings = settings_of_files(config, sets, emulator.world, robot, map_file, no_console=no_console)
+            settings = settings_of_files(
+                config, sets, emulator.world, robot, map_file, mission, no_console=no_console
+            )
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = with_port(settings, port)
@@ -174,7 +177,7 @@ def run_robot(
                     emulated=port is None, preparation=preparation,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
-                        robot=robot, map_file=map_file, no_console=no_console,
+                        robot=robot, map_file=map_file, mission=mission, no_console=no_console,
                     ),
                 )  # fmt: skip
 

@@ -17,6 +17,7 @@ def settings_of_files(
     world: str | None,
     robot: str | None,
     map_file: str | None,
+    mission: str | None,
     *,
     no_console: bool,
 ) -> Settings:
@@ -24,7 +25,7 @@ def settings_of_files(
 
     Parameters
     ----------
-    config, sets, world, robot, map_file, no_console
+    config, sets, world, robot, map_file, mission, no_console
         As of `runtime.cli.robot_commands.run`.
 
     Raises
@@ -34,7 +35,7 @@ def settings_of_files(
     UserError
         No robot can carry them out.
     """
-    settings = load_settings(config, sets, robot=robot, world=world)
+    settings = load_settings(config, sets, robot=robot, world=world, mission=mission)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     refuse_undrivable(settings)
@@ -50,13 +51,14 @@ def reload_settings(
     *,
     robot: str | None = None,
     map_file: str | None = None,
+    mission: str | None = None,
     no_console: bool = False,
 ) -> Settings:
     """Return the settings as the files are now, for a run on the same port as before.
 
     Parameters
     ----------
-    config, sets, world, port, robot, map_file, no_console
+    config, sets, world, port, robot, map_file, mission, no_console
         As of `runtime.cli.robot_commands.run`.
     emulator_port : str, optional
         Port of the emulator, which is used if the settings name none.
@@ -67,7 +69,7 @@ def reload_settings(
         The settings are wrong, or no robot can carry them out.
     """
     try:
-        settings = settings_of_files(config, sets, world, robot, map_file, no_console=no_console)
+        settings = settings_of_files(config, sets, world, robot, map_file, mission, no_console=no_console)
     except ConfigError:
         raise
     except UserError as error:

@@ -26,7 +26,7 @@ from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
 from runtime.console.protocols import RecordingControl, ReplayControl
 from runtime.cycle.callbacks import CALLBACKS
-from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.modes import Mode, ModeState
@@ -75,7 +75,7 @@ class StubRun:
         self.asked.append(request)
         self.validity.append(is_valid)
 
-    def drive_request(self, drive_request: DriveRequest, is_valid: Callable[[], bool] = lambda: True) -> None:
+    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = lambda: True) -> None:
         self.asked.append(drive_request)
         self.validity.append(is_valid)
 

@@ -16,7 +16,7 @@ BACKWARDS = "ring.firing={sets=[[10, 12, 14]]}"
 @pytest.mark.promise("P24")
 def test_a_pattern_with_which_it_could_not_drive_is_refused_in_a_reload_too() -> None:
     with pytest.raises(UserError, match="the pattern does not look ahead"):
-        settings_of_files(None, [BACKWARDS], None, None, None, no_console=False)
+        settings_of_files(None, [BACKWARDS], None, None, None, None, no_console=False)
     with pytest.raises(ConfigError, match="the pattern does not look ahead"):
         reload_settings(None, [BACKWARDS], None, None, None)
     with pytest.raises(ConfigError, match="p3xd"):
@@ -27,7 +27,7 @@ def test_a_reload_keeps_robot_room_and_port_of_the_command_line() -> None:
     settings = reload_settings(None, [], None, "socket://localhost:8101", None, robot="p3dx")
     assert (settings.robot.driver, settings.link.port) == ("arcos", "socket://localhost:8101")
     assert settings == settings_of_files(
-        None, ["link.port=socket://localhost:8101"], None, "p3dx", None, no_console=False
+        None, ["link.port=socket://localhost:8101"], None, "p3dx", None, None, no_console=False
     )
     emulated = reload_settings(None, [], None, None, "/dev/pts/7", map_file="hallway", no_console=True)
     assert emulated.link.port == "/dev/pts/7"

@@ -1,0 +1,1 @@
+"""Missions: chains of schemas with conditions, as a finite state machine. Pure functions."""

@@ -1,0 +1,242 @@
+"""A mission under way: what is to be done, how far it has come, and what an operator or a stop does to it.
+
+A mission is a value. It moves nothing by itself: each cycle in which the robot may drive passes it through
+`behaviors.missions.drive_mission`. A stop holds it, and only a resume lets it go on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal, TypeAlias
+
+from behaviors.schema_call import Memory, Visited
+from config.mission import MissionConfig, StepConfig
+from config.mission_step import DONE, FAILED, HOLD, NEXT, MoveToGoalUse, ReachedCondition
+from perception.percept import Pose
+
+VISITED_MAX: Final = 256
+"""Objects at which a mission remembers to have arrived; beyond that it forgets the first ones."""
+NUMBER_MAX: Final = 1e9
+"""Greatest number in a mission's progress: m, rad, s, or a count."""
+ROUTE: Final = "route"
+"""Name of the mission that the waypoints of an operator are."""
+
+HELD_BY_OPERATOR: Final = "the mission is held by the operator: resume it, or skip the step"
+HELD_BY_STOP: Final = "the robot was stopped, so the mission is held: resume it once the robot is armed"
+HELD_BY_CONDITION: Final = "the mission waits for the operator, as its step {} says: resume it, or skip the step"
+
+Status: TypeAlias = Literal["running", "held", "done", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a mission has come."""
+
+    step: int = 0
+    """Number of the step; of the last one that was driven, once the mission has ended."""
+    status: Status = "running"
+    reason: str | None = None
+    """Why it is held or has ended, for the operator; None while it runs."""
+    start: Pose | None = None
+    """The robot's pose as the step began, in odometry's frame; None until it is driven."""
+    last: Pose | None = None
+    """The pose in the last cycle that drove it."""
+    step_s: float = 0.0
+    """How long the step has been driven, s."""
+    way_m: float = 0.0
+    """Way that the robot has come in the step, m."""
+    best_m: float | None = None
+    """Least distance left to where the schemas lead, m; None if they lead nowhere in particular."""
+    best_s: float = 0.0
+    """Time in the step when that last shrank, or when the robot last got away from `anchor`."""
+    anchor: Pose | None = None
+    """Where it was then."""
+    lost_s: float = 0.0
+    """How long the robot has not known its place in the map, s."""
+    seen_s: tuple[float, ...] = ()
+    """Time in the step at which each condition's object was last seen, by the condition's number."""
+    memories: tuple[Memory, ...] = ()
+    """Of the step's schemas, in their order."""
+    visited: tuple[Visited, ...] = ()
+    """Objects at which steps have arrived, oldest first."""
+    changes: int = 0
+    """Steps that have ended so far."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """A mission as a drive request."""
+
+    plan: MissionConfig
+    progress: Progress = field(default_factory=Progress)
+    kind: Literal["mission"] = "mission"
+
+    @property
+    def step(self) -> StepConfig:
+        """The step that is driven, or was last."""
+        return self.plan.step[self.progress.step]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionEdit:
+    """A change of the mission under way that an operator asks for."""
+
+    action: Literal["hold", "resume", "skip"]
+    kind: Literal["mission_edit"] = "mission_edit"
+
+
+def goes_to(mission: Mission, target: str, why: str) -> Mission:
+    """Return the mission after a condition has led to a target.
+
+    Parameters
+    ----------
+    mission
+        The mission so far.
+    target
+        A step's name, or one of `config.mission_step.TARGETS`.
+    why
+        What led there, for the operator.
+    """
+    progress, plan = mission.progress, mission.plan
+    if target == HOLD:
+        reason = HELD_BY_CONDITION.format(mission.step.name)
+        # Resumed, it goes on with the next step: the condition that led here would hold again at once.
+        following = plan.index(NEXT, progress.step)
+        if following is None:
+            return _ended(mission, DONE, why)
+        return replace(mission, progress=replace(_begin(progress, following), status="held", reason=reason))
+    index = plan.index(target, progress.step)
+    if index is None:
+        return _ended(mission, FAILED if target == FAILED else DONE, why)
+    return replace(mission, progress=_begin(progress, index))
+
+
+def held(mission: Mission, reason: str) -> Mission:
+    """Return a mission that waits for the operator, if it runs."""
+    if mission.progress.status != "running":
+        return mission
+    return replace(mission, progress=replace(mission.progress, status="held", reason=reason))
+
+
+def after_stop(mission: Mission, *, bumper: bool) -> Mission:
+    """Return what remains of a mission when the robot leaves DRIVE: it is held, at the step that a contact leads to.
+
+    Parameters
+    ----------
+    mission
+        The mission so far.
+    bumper
+        Whether a contact stopped the robot.
+    """
+    if mission.progress.status != "running":
+        return mission
+    led_to = next((c.go for c in mission.step.conditions if c.when == "bumper"), None) if bumper else None
+    if led_to is not None:
+        mission = goes_to(mission, led_to, "a contact stopped the robot")
+    return held(mission, HELD_BY_STOP)
+
+
+def edited(mission: Mission, edit: MissionEdit) -> Mission:
+    """Return the mission after an operator's edit that `edit_refusal` allows."""
+    progress = mission.progress
+    if edit.action == "hold":
+        return held(mission, HELD_BY_OPERATOR)
+    if edit.action == "resume":
+        # The time without progress counts anew, and what was driven meanwhile is no way of the step.
+        progress = replace(progress, status="running", reason=None, last=None, best_s=progress.step_s, best_m=None)
+        return replace(mission, progress=replace(progress, anchor=None))
+    reached = next((c.go for c in mission.step.conditions if isinstance(c, ReachedCondition)), NEXT)
+    after = goes_to(mission, reached, "the operator skipped the last step")
+    if progress.status == "held" and after.progress.status == "running":
+        return replace(after, progress=replace(after.progress, status="held", reason=progress.reason))
+    return after
+
+
+def edit_refusal(mission: Mission | None, edit: MissionEdit) -> str | None:
+    """Return why an edit is impossible, None if it can be carried out."""
+    if mission is None:
+        return f"there is no mission to {edit.action}: start one, or set waypoints"
+    progress = mission.progress
+    if progress.status in {"done", "failed"}:
+        return f"the mission {mission.plan.name} has ended ({progress.status}): start it again"
+    if edit.action == "resume" and progress.status == "running":
+        return f"the mission {mission.plan.name} is not held"
+    return None
+
+
+def continued(before: Mission, after: Mission) -> Mission:
+    """Return a new mission with the progress of the one before, if that is the same as far as it has come.
+
+    So a route whose further waypoints an operator adds, moves or removes goes on without a stop.
+    """
+    progress, steps = before.progress, before.progress.step + 1
+    if progress.status == "failed" or before.plan.name != after.plan.name:
+        return after
+    if len(after.plan.step) < steps or after.plan.step[:steps] != before.plan.step[:steps]:
+        return after
+    if progress.status != "done":
+        return replace(after, progress=progress)
+    if len(after.plan.step) == steps:
+        return after
+    return replace(after, progress=_begin(replace(progress, status="running", reason=None), steps))
+
+
+def route(waypoints: tuple[tuple[float, float, float | None], ...], frame: Literal["odom", "map"]) -> Mission:
+    """Return the mission of driving to places in turn.
+
+    Parameters
+    ----------
+    waypoints
+        Each place x, y, m, and the final heading there in degrees, None for any.
+    frame
+        The frame of all of them.
+    """
+    steps = tuple(
+        StepConfig(
+            name=f"waypoint-{number}",
+            schemas=(MoveToGoalUse(name="move_to_goal", x_m=x, y_m=y, frame=frame, heading_deg=heading),),
+        )
+        for number, (x, y, heading) in enumerate(waypoints, 1)
+    )
+    return Mission(MissionConfig(name=ROUTE, about="The waypoints that the operator set.", step=steps))
+
+
+def progress_problem(mission: Mission) -> str | None:
+    """Return why a mission's progress does not belong to its plan, None if it does; a recording may hold anything."""
+    progress = mission.progress
+    if not 0 <= progress.step < len(mission.plan.step):
+        return f"invalid mission: its step is {progress.step}, expected one of {len(mission.plan.step)}"
+    poses = [pose for pose in (progress.start, progress.last, progress.anchor) if pose is not None]
+    numbers = [
+        *(n for pose in poses for n in (pose.x, pose.y, pose.theta)),
+        *(n for memory in progress.memories for n in (memory.index, memory.x, memory.y, memory.since_s)),
+        *(n for visited in progress.visited for n in (visited.x, visited.y)),
+        *(
+            progress.step_s,
+            progress.way_m,
+            progress.best_m or 0.0,
+            progress.best_s,
+            progress.lost_s,
+            *progress.seen_s,
+        ),
+    ]
+    if not all(abs(number) <= NUMBER_MAX for number in numbers):  # also refuses NaN
+        return f"invalid mission: a number of its progress is not within ±{NUMBER_MAX:g}"
+    if min((memory.index for memory in progress.memories), default=0) < 0 or len(progress.visited) > VISITED_MAX:
+        return "invalid mission: a count of its progress is out of range"
+    step = mission.step
+    has_started = (len(progress.memories), len(progress.seen_s)) == (len(step.schemas), len(step.conditions))
+    if progress.start is not None and not has_started:
+        return f"invalid mission: its progress is not that of its step {step.name}"
+    return None
+
+
+def _begin(progress: Progress, step: int) -> Progress:
+    """Return the progress at the beginning of a step; what has been visited is kept."""
+    return Progress(step, visited=progress.visited, lost_s=progress.lost_s, changes=progress.changes + 1)
+
+
+def _ended(mission: Mission, status: Literal["done", "failed"], why: str) -> Mission:
+    reason = f"the mission {mission.plan.name} " + (f"is done: {why}" if status == DONE else f"has failed: {why}")
+    progress = replace(mission.progress, status=status, reason=reason, changes=mission.progress.changes + 1)
+    return replace(mission, progress=progress)

@@ -1,0 +1,92 @@
+"""The schemas that a mission's step can name: the one list of them.
+
+A further schema is a file of its own, its settings in `config.mission_step.SchemaUse`, and a line here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final, TypeAlias
+
+from behaviors.approach_object import approach_object
+from behaviors.follow_wall import follow_wall
+from behaviors.goal_place import GoalPlace, goal_place
+from behaviors.move_ahead import SCHEMA as AHEAD
+from behaviors.move_to_goal import SCHEMA as TO_GOAL
+from behaviors.move_to_goal import Goal, move_to_goal
+from behaviors.response import Response
+from behaviors.schema_call import Answer, Memory, Scene
+from behaviors.search import search
+from behaviors.stay_on_path import stay_on_path
+from behaviors.turn import UNKNOWN_FRAME, is_aligned, turn
+from behaviors.wander import wander
+from config.mission_step import MoveAheadUse, MoveToGoalUse
+
+Schema: TypeAlias = Callable[[Scene, Memory, Any], Answer]
+"""A schema: what it sees, what it has kept, and its settings in the step, of the type that has its name."""
+
+
+def ahead_in_step(scene: Scene, memory: Memory, use: MoveAheadUse) -> Answer:
+    """Return the vector along a direction, and whether the step's distance along it is behind the robot.
+
+    Parameters
+    ----------
+    scene, memory
+        The pose now and as the step began; the memory is not used.
+    use
+        Direction, distance and gain.
+    """
+    turned = scene.start.theta if use.relative_to == "robot" else 0.0
+    direction = turned + math.radians(use.direction_deg)
+    ux, uy = math.cos(direction), math.sin(direction)
+    along = (scene.percept.pose.x - scene.start.x) * ux + (scene.percept.pose.y - scene.start.y) * uy
+    rest_m = None if use.distance_m is None else max(0.0, use.distance_m - along)
+    gain = 0.0 if rest_m == 0.0 else use.gain
+    return Answer(Response(AHEAD, gain * ux, gain * uy), memory, has_arrived=rest_m == 0.0, remaining_m=rest_m)
+
+
+def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
+    """Return the vector to a place, and then the turn to its final heading.
+
+    Parameters
+    ----------
+    scene
+        Pose and map frame; a place in the map moves smoothly as that is corrected.
+    memory
+        `x`, `y`: where the place lies in odometry's frame as the robot drives to it; `index` is 1 once it was there.
+    use
+        The place, its frame, the final heading and the gain.
+    """
+    frame, still = scene.frame(use.frame), Response(TO_GOAL, 0.0, 0.0)
+    before = GoalPlace(memory.x, memory.y) if memory.is_set else None
+    goal = Goal(use.x_m, use.y_m, frame=use.frame, reached=memory.index == 1)
+    place = goal_place(goal, before, frame, scene.cycle_s)
+    if frame is None or place is None:
+        return Answer(still, Memory(memory.index), waits_for=UNKNOWN_FRAME)
+    there = Goal(place.x, place.y, reached=goal.reached)
+    response, there = move_to_goal(scene.percept, there, scene.behaviors.move_to_goal)
+    is_there = goal.reached or (there.reached and place.is_exact)
+    memory = Memory(int(is_there), place.x, place.y, is_set=True)
+    remaining_m = math.hypot(place.x - scene.percept.pose.x, place.y - scene.percept.pose.y)
+    if not is_there:
+        vector = Response(TO_GOAL, use.gain * response.x, use.gain * response.y)
+        return Answer(vector, memory, remaining_m=remaining_m)
+    if use.heading_deg is None:
+        return Answer(still, memory, has_arrived=True, remaining_m=0.0)
+    direction = frame.theta + math.radians(use.heading_deg)
+    return Answer(still, memory, is_aligned(scene, direction), 0.0, direction)
+
+
+SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType({
+    "move_ahead": ahead_in_step,
+    "move_to_goal": to_goal_in_step,
+    "turn": turn,
+    "wander": wander,
+    "follow_wall": follow_wall,
+    "stay_on_path": stay_on_path,
+    "approach_object": approach_object,
+    "search": search,
+})  # fmt: skip
+"""Every schema by its name in a step."""

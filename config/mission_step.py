@@ -1,0 +1,289 @@
+"""The parts of a mission's step: the schemas that it can name, with their settings, and its conditions."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final, Literal, TypeAlias
+
+from pydantic import Field, model_validator
+
+from config.strict import Coordinate, Point, Strict, TomlList
+
+STEPS_MAX: Final = 64
+"""Most steps of a mission, and most waypoints of a route."""
+POINTS_MAX: Final = 256
+"""Most corners of a path."""
+
+NEXT: Final = "next"
+DONE: Final = "done"
+FAILED: Final = "failed"
+HOLD: Final = "hold"
+TARGETS: Final = (NEXT, DONE, FAILED, HOLD)
+"""What a condition may name besides a step: the next one in the file, the two ends, or waiting for the operator."""
+
+LABELS: Final = ("wall", "inside corner", "edge", "post", "barrel", "unknown")
+"""Objects that are recognised without a model."""
+
+Name: TypeAlias = Annotated[
+    str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,39}$", description="Small letters, digits, - and _.")
+]
+"""Name of a mission or a step."""
+Target: TypeAlias = Annotated[
+    str, Field(max_length=40, description="The step that follows, or `next`, `done`, `failed`, `hold`.")
+]
+"""Where a condition leads."""
+ObjectName: TypeAlias = Annotated[
+    str, Field(min_length=1, max_length=100, description="Name of the object's model, or another label, as `post`.")
+]
+"""What an object is recognised as."""
+Frame: TypeAlias = Annotated[
+    Literal["odom", "map"],
+    Field(
+        description="`odom`: fixed in the robot's odometry. `map`: in the map (`run --map`, or correction of drift)."
+    ),
+]
+"""The frame of places."""
+Degrees: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
+Length: TypeAlias = Annotated[float, Field(gt=0.0, le=1000.0)]
+Gain: TypeAlias = Annotated[
+    float, Field(ge=0.0, le=100.0, description="Factor on the schema's vector; 1 asks for the base velocity.")
+]
+
+
+class MoveAheadUse(Strict):
+    """`move_ahead`: a vector along a direction; arrives after `distance_m`, if that is given."""
+
+    name: Literal["move_ahead"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    direction_deg: Degrees = 0.0
+    """Degrees counter-clockwise, from the robot's heading as the step begins or from the x axis of odometry."""
+    relative_to: Literal["robot", "odom"] = "robot"
+    """What the direction counts from."""
+    distance_m: float | None = Field(default=None, gt=0.0, le=1000.0)
+    """Distance along the direction from where the step begins, m."""
+
+
+class MoveToGoalUse(Strict):
+    """`move_to_goal`: a vector towards a place; arrives there, and turns to the final heading if one is given."""
+
+    name: Literal["move_to_goal"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    x_m: Coordinate
+    y_m: Coordinate
+    """The place, m."""
+    frame: Frame = "odom"
+    heading_deg: float | None = Field(default=None, ge=-360.0, le=360.0)
+    """Heading at the goal, in its frame, degrees counter-clockwise from x."""
+
+
+class TurnUse(Strict):
+    """`turn`: turns on the spot; arrives when the robot looks that way."""
+
+    name: Literal["turn"]
+    """Of the schema."""
+    heading_deg: Degrees
+    """Degrees counter-clockwise, from the robot's heading as the step begins or from the x axis of the frame."""
+    relative_to: Literal["robot", "odom", "map"] = "robot"
+    """What the heading counts from."""
+
+
+class WanderUse(Strict):
+    """`wander`: drives in a random direction in which the way is free, then in another; does not arrive."""
+
+    name: Literal["wander"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    seed: int = Field(default=0, ge=0, le=2**31)
+    """Of the random directions: the same seed in the same room gives the same drive."""
+    persistence_s: float = Field(default=6.0, ge=0.5, le=600.0)
+    """Longest time in one direction, s."""
+    free_m: Length = 1.0
+    """Free way beyond the rim that a new direction should have, m."""
+
+
+class FollowWallUse(Strict):
+    """`follow_wall`: drives along a wall with one side to it; does not arrive."""
+
+    name: Literal["follow_wall"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    side: Literal["left", "right"] = "left"
+    """The robot's side on which the wall is kept."""
+    distance_m: Length = 0.5
+    """Distance kept from rim to wall, m. Gaps narrower than about twice this and the robot's radius are passed."""
+    search_m: Length = 1.5
+    """A wall farther than this from the rim is not followed: the robot drives ahead until it finds one, m."""
+
+
+class StayOnPathUse(Strict):
+    """`stay_on_path`: follows a chain of straight lines; arrives at its end."""
+
+    name: Literal["stay_on_path"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    points_m: TomlList[Point] = Field(min_length=2, max_length=POINTS_MAX)
+    """The path's corners in order, m."""
+    frame: Frame = "odom"
+    lookahead_m: Length = 0.6
+    """The robot steers for a point this far ahead of it on the path, m."""
+
+    @model_validator(mode="after")
+    def _has_length(self) -> StayOnPathUse:
+        for i, (a, b) in enumerate(zip(self.points_m, self.points_m[1:], strict=False)):
+            if math.dist(a, b) < 1e-3:
+                raise ValueError(f"points_m {i} and {i + 1} are the same place: leave one of them out")
+        return self
+
+
+class ApproachObjectUse(Strict):
+    """`approach_object`: drives to an object, stops before it and looks at it; arrives there (docking)."""
+
+    name: Literal["approach_object"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    object: ObjectName
+    probability_min: float = Field(default=0.9, ge=0.0, le=1.0)
+    """Least probability of the object."""
+    choose: Literal["nearest", "unvisited"] = "nearest"
+    """`unvisited`: the nearest one at which no step of this mission has arrived."""
+    distance_m: float = Field(default=0.5, ge=0.0, le=100.0)
+    """Distance from the robot's rim to the object's outline in which it stops, m."""
+    side_deg: float | None = Field(default=None, ge=-360.0, le=360.0)
+    """Side of the object on which it stops, degrees counter-clockwise from x of `frame`; by default the near side."""
+    frame: Frame = "odom"
+
+
+class SearchUse(Strict):
+    """`search`: covers an area line by line or in a growing square; arrives when it has covered all of it."""
+
+    name: Literal["search"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    pattern: Literal["spiral", "lawn_mower"] = "spiral"
+    """`spiral`: in a square from the middle outwards; `lawn_mower`: to and fro ahead of the robot."""
+    width_m: Length = 4.0
+    """Width of the area, m. It lies about the robot for a spiral, otherwise to the left of it and ahead."""
+    depth_m: Length = 4.0
+    """Length of the area along the robot's heading as the step begins, m."""
+    spacing_m: Annotated[float, Field(ge=0.2, le=100.0)] = 1.0
+    """Distance between two lines, m: at most twice the distance from which the objects are recognised."""
+
+    @model_validator(mode="after")
+    def _has_few_lines(self) -> SearchUse:
+        if max(self.width_m, self.depth_m) / self.spacing_m > POINTS_MAX:
+            raise ValueError(f"spacing_m gives more than {POINTS_MAX} lines: make it larger")
+        return self
+
+
+SchemaUse: TypeAlias = Annotated[
+    MoveAheadUse
+    | MoveToGoalUse
+    | TurnUse
+    | WanderUse
+    | FollowWallUse
+    | StayOnPathUse
+    | ApproachObjectUse
+    | SearchUse,
+    Field(discriminator="name"),
+]
+"""A schema of a step with its settings; `behaviors.schema_registry` has a function for each."""
+
+
+class ReachedCondition(Strict):
+    """`reached`: the step's schema has arrived."""
+
+    when: Literal["reached"]
+    """The condition."""
+    go: Target = NEXT
+
+
+class SeenCondition(Strict):
+    """`seen`: an object is recognised."""
+
+    when: Literal["seen"]
+    """The condition."""
+    go: Target = NEXT
+    object: ObjectName
+    probability_min: float = Field(default=0.9, ge=0.0, le=1.0)
+    """Least probability of the object."""
+    within_m: float | None = Field(default=None, gt=0.0, le=1000.0)
+    """Largest distance from the robot's centre to the object's, m."""
+    unvisited: bool = False
+    """Only an object counts at which no step of this mission has arrived."""
+
+
+class UnseenCondition(Strict):
+    """`unseen`: no such object has been recognised for some time."""
+
+    when: Literal["unseen"]
+    """The condition."""
+    go: Target = NEXT
+    object: ObjectName
+    probability_min: float = Field(default=0.9, ge=0.0, le=1.0)
+    """Least probability of the object."""
+    unvisited: bool = False
+    """Only an object counts at which no step of this mission has arrived."""
+    after_s: float = Field(default=2.0, ge=0.0, le=1e5)
+    """For so long none has been, s."""
+
+
+class TimeCondition(Strict):
+    """`time`: the step has been driven for some time; time in which the robot may not drive does not count."""
+
+    when: Literal["time"]
+    """The condition."""
+    go: Target = NEXT
+    after_s: float = Field(gt=0.0, le=1e5)
+    """That time, s."""
+
+
+class WayCondition(Strict):
+    """`way`: the robot has come some way in this step."""
+
+    when: Literal["way"]
+    """The condition."""
+    go: Target = NEXT
+    after_m: float = Field(gt=0.0, le=1e5)
+    """That way, m."""
+
+
+class BumperCondition(Strict):
+    """`bumper`: a contact stopped the robot. It goes on there once it is armed again and the mission resumed."""
+
+    when: Literal["bumper"]
+    """The condition."""
+    go: Target = NEXT
+
+
+class LostCondition(Strict):
+    """`lost`: the robot has not known its place in the map for some time."""
+
+    when: Literal["lost"]
+    """The condition."""
+    go: Target = NEXT
+    after_s: float = Field(default=2.0, ge=0.0, le=1e5)
+    """That time, s."""
+
+
+class StuckCondition(Strict):
+    """`stuck`: the step has come no nearer to its end for `stuck_after_s`; without this the mission is held."""
+
+    when: Literal["stuck"]
+    """The condition."""
+    go: Target = NEXT
+
+
+Condition: TypeAlias = Annotated[
+    ReachedCondition
+    | SeenCondition
+    | UnseenCondition
+    | TimeCondition
+    | WayCondition
+    | BumperCondition
+    | LostCondition
+    | StuckCondition,
+    Field(discriminator="when"),
+]
+"""A condition and where it leads."""
