@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -17,10 +17,19 @@ SOUND_SPEED_M_S = 343.0
 SENSORS_MAX = 255
 """Largest number of sensors in a ring, and of sets in a firing pattern; bounds the memory for a faulty file."""
 
+_WITHOUT_LISTENERS: Final = ("arcos", "rflex")
+"""Shipped drivers of rings whose sensors hear only their own echoes."""
+
 SensorSet: TypeAlias = Annotated[TomlList[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
 """Indices of sensors that fire together."""
 
+ListenerSet: TypeAlias = Annotated[
+    TomlList[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)
+]
+"""Indices of sensors that listen in one step; may be empty."""
+
 Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets", "alternating"]
+ListenPreset = Literal["neighbours", "second"]
 
 
 class Mount(NamedTuple):
@@ -55,6 +64,12 @@ class FiringConfig(Strict):
     """Sets of sensor indices, fired in turn, instead of a preset."""
     rotations: int = Field(default=1, ge=1, le=255)
     """Repeat `sets` this many times, each time shifted by one sensor around the ring."""
+    listen_preset: ListenPreset | None = None
+    """Which sensors listen without firing, on a ring that can, by name: the `neighbours` of those that fire, or the
+    `second` ones, two places on."""
+    listen: Annotated[TomlList[ListenerSet], Field(max_length=SENSORS_MAX)] | None = None
+    """Sets of sensor indices that listen, instead of a listen_preset: one for each of `sets`, rotated with them, or
+    one for each step of a preset."""
     step_period_s: float = Field(default=0.05, ge=0.001, le=60.0)
     """Time from one firing to the next, s."""
     window_m: float | None = Field(default=None, gt=0.0, le=100.0)
@@ -68,7 +83,30 @@ class FiringConfig(Strict):
             raise ValueError("sets is empty: give at least one set of sensors")
         if self.sets is not None and any(len(s) == 0 or len(set(s)) != len(s) for s in self.sets):
             raise ValueError("each set needs at least one sensor, and each sensor once only")
+        if self.listen_preset is not None and self.listen is not None:
+            raise ValueError("give either listen_preset or listen, not both")
+        if self.listen is not None:
+            self._check_listeners(self.listen)
         return self
+
+    @property
+    def has_listeners(self) -> bool:
+        """Whether the pattern asks sensors to listen without firing."""
+        return self.listen_preset is not None or self.listen is not None
+
+    def _check_listeners(self, listen: tuple[tuple[int, ...], ...]) -> None:
+        if any(len(set(s)) != len(s) for s in listen):
+            raise ValueError("each set of listen may name each sensor once only")
+        if self.sets is None:
+            return
+        if len(listen) != len(self.sets):
+            raise ValueError(f"listen has {len(listen)} sets for the {len(self.sets)} of sets: give one for each")
+        for number, (fired, heard) in enumerate(zip(self.sets, listen, strict=True)):
+            if both := sorted(set(fired) & set(heard)):
+                raise ValueError(
+                    f"listen[{number}] names sensor {', '.join(map(str, both))}, which fires in that set: a sensor "
+                    f"that fires hears its own echo, so leave it out"
+                )
 
 
 def _preset_as_table(value: object) -> object:
@@ -206,3 +244,19 @@ class RobotConfig(Strict):
     """Of the driver "arcos", for the Pioneer family."""
     rflex: RflexConfig = RflexConfig()
     """Of the driver "rflex", for the B21r, ATRV-Jr and Magellan."""
+
+    @model_validator(mode="after")
+    def _can_listen(self) -> RobotConfig:
+        if not self.ring.firing.has_listeners:
+            return self
+        if self.robot.driver in _WITHOUT_LISTENERS:
+            raise ValueError(
+                f'ring.firing.listen_preset or listen: a ring with the driver "{self.robot.driver}" cannot listen '
+                f"without firing; remove it"
+            )
+        if self.robot.protocol == 1:
+            raise ValueError(
+                "ring.firing.listen_preset or listen: version 1 of the protocol has no listeners; remove it, or set "
+                "robot.protocol = 2 if the robot speaks it"
+            )
+        return self

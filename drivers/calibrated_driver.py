@@ -84,4 +84,4 @@ class CalibratedDriver:
     def _firing(self, firing: Firing) -> Firing:
         pose = self._at(firing.pose)
         yaw = self._ring_yaw(firing.ring_yaw, firing.pose.theta, pose.theta)
-        return replace(firing, pose=pose, ring_yaw=yaw, ranges_m=firing.ranges_m / self._calibration.range_scale)
+        return replace(firing.over_scale(self._calibration.range_scale), pose=pose, ring_yaw=yaw)

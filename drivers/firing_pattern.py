@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 from config.errors import WRONG_CALL, UserError
-from config.robot import SOUND_SPEED_M_S, Preset, RingConfig
+from config.robot import SOUND_SPEED_M_S, ListenPreset, Preset, RingConfig
 
 _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
     {
@@ -25,6 +26,9 @@ _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
         "alternating": (8, 3),
     }
 )
+_PLACES_AWAY: Mapping[ListenPreset, int] = MappingProxyType({"neighbours": 1, "second": 2})
+_SAME_ANGLE_RAD = 1e-6
+"""Angles that differ by less are equal but for rounding."""
 _TOLERANCE_S = 1e-9
 """Slack for the rounding of decimal fractions."""
 
@@ -37,11 +41,15 @@ class FiringError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class FiringPattern:
-    """A cyclic schedule: every `step_period_s` the sensors of the next mask fire; bit i of a mask is sensor i."""
+    """A cyclic schedule: every `step_period_s` the sensors of the next mask fire; bit i of a mask is sensor i.
+
+    `listeners` has a mask for each step, of the sensors that listen in it without firing; it is empty if none do.
+    """
 
     masks: tuple[int, ...]
     step_period_s: float
     window_m: float
+    listeners: tuple[int, ...] = ()
 
 
 def time_of_flight_s(window_m: float) -> float:
@@ -60,17 +68,91 @@ def firing_pattern(ring: RingConfig) -> FiringPattern:
     Raises
     ------
     FiringError
-        The preset does not divide the ring, a set names a missing sensor, or a step is shorter than the
-        time sound needs to the end of its window and back.
+        The preset does not divide the ring, a set names a missing sensor, a step is shorter than the time sound needs
+        to the end of its window and back, or a sensor listens where it fires or midway between two that fire.
     """
     count = len(ring.mounts)
     firing = ring.firing
     if firing.preset is not None:
         masks = _preset_masks(firing.preset, count)
     else:
-        masks = _rotated_masks(firing.sets or (), firing.rotations, count)
+        masks = _rotated_masks("sets", firing.sets or (), firing.rotations, count)
     _check_step(firing.step_period_s, ring.window_m)
-    return FiringPattern(masks, firing.step_period_s, ring.window_m)
+    return FiringPattern(masks, firing.step_period_s, ring.window_m, _listeners(ring, masks))
+
+
+def _listeners(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the masks of those that listen, one a step; none if no sensor ever listens."""
+    firing, count = ring.firing, len(ring.mounts)
+    if not firing.has_listeners:
+        return ()
+    if firing.listen_preset is not None:
+        away = _PLACES_AWAY[firing.listen_preset]
+        heard = tuple(
+            _mask((i + turn) % count for i in sensors(mask) for turn in (-away, away)) & ~mask for mask in masks
+        )
+    else:
+        heard = _rotated_masks("listen", firing.listen or (), firing.rotations, count)
+    if len(heard) != len(masks):
+        raise FiringError(
+            f"ring.firing.listen has {len(heard)} sets, and the pattern {len(masks)} steps before it repeats; give "
+            f"one for each step"
+        )
+    axes = tuple(mount.angle_rad for mount in ring.mounts)
+    for step, (fired, mask) in enumerate(zip(masks, heard, strict=True)):
+        if fired & mask:
+            raise FiringError(
+                f"ring.firing.listen: sensor {sensors(fired & mask)[0]} would listen in step {step}, in which it "
+                f"fires; leave it out of that step"
+            )
+        for sensor in sensors(mask):
+            near = _nearest(axes, sensor, fired)
+            if len(near) > 1:
+                raise FiringError(
+                    f"ring.firing.listen: sensor {sensor} would listen midway between {near[0]} and {near[1]}, which "
+                    f"both fire in step {step}, so that it could not be said whose pulse it hears; leave it out, or "
+                    f"fire fewer sensors together"
+                )
+    return heard if any(heard) else ()
+
+
+def _nearest(axes: tuple[float, ...], sensor: int, fired: int) -> tuple[int, ...]:
+    """Return those of the sensors that fire whose axes are nearest to that of `sensor`."""
+    between = {j: abs(math.remainder(axes[j] - axes[sensor], 2.0 * math.pi)) for j in sensors(fired)}
+    least = min(between.values(), default=0.0)
+    return tuple(j for j, angle in between.items() if angle <= least + _SAME_ANGLE_RAD)
+
+
+@lru_cache(maxsize=256)
+def cross_pairs(axes: tuple[float, ...], fired: int, listeners: int) -> tuple[tuple[int, int], ...]:
+    """Return each listener of a firing with the sensor whose pulse it hears: (transmitter, listener).
+
+    A listener reports the first pulse to arrive, of any sensor. Beams are narrow, so that is the pulse of the
+    sensor that looks most nearly the same way; of two that look equally near, the one of the lower index.
+
+    Parameters
+    ----------
+    axes
+        Directions of the ring's sensors, rad; sensors beyond them are ignored.
+    fired, listeners
+        Masks of the sensors that fired and listened.
+    """
+    ours = (1 << len(axes)) - 1
+    fired &= ours
+    return tuple((_nearest(axes, i, fired)[0], i) for i in sensors(listeners & ours)) if fired else ()
+
+
+def pattern_pairs(ring: RingConfig) -> tuple[tuple[int, int], ...]:
+    """Return the cross paths that the ring's pattern measures, (transmitter, listener), sorted.
+
+    Raises
+    ------
+    FiringError
+        As by `firing_pattern`.
+    """
+    pattern, axes = firing_pattern(ring), tuple(mount.angle_rad for mount in ring.mounts)
+    steps = zip(pattern.masks, pattern.listeners, strict=True) if pattern.listeners else ()
+    return tuple(sorted({pair for fired, heard in steps for pair in cross_pairs(axes, fired, heard)}))
 
 
 def _mask(numbers: Iterable[int]) -> int:
@@ -91,12 +173,12 @@ def _preset_masks(preset: Preset, count: int) -> tuple[int, ...]:
     )
 
 
-def _rotated_masks(sets: tuple[tuple[int, ...], ...], rotations: int, count: int) -> tuple[int, ...]:
+def _rotated_masks(field: str, sets: tuple[tuple[int, ...], ...], rotations: int, count: int) -> tuple[int, ...]:
     missing = sorted({i for numbers in sets for i in numbers if i >= count})
     if missing:
         raise FiringError(
-            f"ring.firing.sets names sensor {', '.join(map(str, missing))}, and this ring has sensors 0 to "
-            f"{count - 1}: numbers start at 0; correct the sets or the ring"
+            f"ring.firing.{field} names sensor {', '.join(map(str, missing))}, and this ring has sensors 0 to "
+            f"{count - 1}: numbers start at 0; correct {field} or the ring"
         )
     return tuple(_mask((i + turn) % count for i in numbers) for turn in range(rotations) for numbers in sets)
 

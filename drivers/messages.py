@@ -7,9 +7,9 @@ them. Units are SI and radians; counter-clockwise is positive, x points forward.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,26 +17,31 @@ from pydantic import GetPydanticSchema
 from pydantic_core import CoreSchema, core_schema
 
 
-def _array_schema(_source: object, _handler: object) -> CoreSchema:
+def _array_schema(entry: CoreSchema, dtype: type[np.generic]) -> GetPydanticSchema:
     """Return how pydantic writes and reads an array of shape (n,): as a list of numbers, exact to the bit."""
-    numbers = core_schema.list_schema(core_schema.float_schema())
-    return core_schema.no_info_before_validator_function(
-        _as_list,
-        core_schema.no_info_after_validator_function(_as_array, numbers),
-        serialization=core_schema.plain_serializer_function_ser_schema(_as_list, return_schema=numbers),
-    )
+
+    def as_array(values: list[Any]) -> NDArray[Any]:
+        return np.array(values, dtype=dtype)
+
+    def schema(_source: object, _handler: object) -> CoreSchema:
+        numbers = core_schema.list_schema(entry)
+        return core_schema.no_info_before_validator_function(
+            _as_list,
+            core_schema.no_info_after_validator_function(as_array, numbers),
+            serialization=core_schema.plain_serializer_function_ser_schema(_as_list, return_schema=numbers),
+        )
+
+    return GetPydanticSchema(schema)
 
 
 def _as_list(value: object) -> object:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _as_array(values: list[float]) -> NDArray[np.float64]:
-    return np.array(values, dtype=np.float64)
-
-
-Floats: TypeAlias = Annotated[NDArray[np.float64], GetPydanticSchema(_array_schema)]
+Floats: TypeAlias = Annotated[NDArray[np.float64], _array_schema(core_schema.float_schema(), np.float64)]
 """An array of float64; pydantic records one of shape (n,) as a list."""
+Indices: TypeAlias = Annotated[NDArray[np.int64], _array_schema(core_schema.int_schema(ge=0, le=255), np.int64)]
+"""An array of indices of sensors; recorded likewise."""
 
 
 def wrap_angle(angle_rad: float) -> float:
@@ -124,6 +129,24 @@ class Odometry:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CrossPaths:
+    """What the sensors that listened without firing heard of the others' pulses: one entry for each, shape (n,).
+
+    Attributes
+    ----------
+    transmitters, listeners
+        Indices of the sensor whose pulse was heard, and of the one that listened.
+    half_paths_m
+        Half the whole path from the transmitter over a surface to the listener, m; +inf if nothing was heard inside
+        the window.
+    """
+
+    transmitters: Indices
+    listeners: Indices
+    half_paths_m: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Firing:
     """One firing of a set of sensors, and the pose of the base when they fired.
 
@@ -136,12 +159,23 @@ class Firing:
     ranges_m
         Shape (sensors,), one entry for each sensor of the ring: the range in metres, +inf for a sensor that fired and
         heard no echo inside its window, NaN for one that did not fire or reported a fault.
+    cross_paths
+        What the listeners heard, in the order of their indices, without those that reported a fault; None if there
+        is none, as always on a ring that cannot listen.
     """
 
     robot_s: float
     pose: Pose
     ring_yaw: float
     ranges_m: Floats
+    cross_paths: CrossPaths | None = None
+
+    def over_scale(self, range_scale: float) -> Firing:
+        """Return this firing with all distances divided by `range_scale`: reported over true."""
+        heard = self.cross_paths
+        if heard is not None:
+            heard = replace(heard, half_paths_m=heard.half_paths_m / range_scale)
+        return replace(self, ranges_m=self.ranges_m / range_scale, cross_paths=heard)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ Masked sensors are still tested and return to use when they behave.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -173,4 +174,4 @@ class SensorMonitor:
 
 
 def _with_ranges(firing: Firing, ranges: Floats) -> Firing:
-    return Firing(firing.robot_s, firing.pose, firing.ring_yaw, ranges.copy())
+    return replace(firing, ranges_m=ranges.copy())

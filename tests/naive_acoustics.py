@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,3 +146,203 @@ def specular(
         ),
         default=math.inf,
     )
+
+
+# From one sensor over a surface to another: the least way, by searching along each surface.
+
+Ear = tuple[complex, float, float]
+"""A sensor: its place, the direction of its axis, and half the width of its beam, rad."""
+Curve = Callable[[np.ndarray], np.ndarray]
+"""A surface's points for shares of its length from 0 to 1."""
+_SAMPLES = 4001
+
+
+def _way(points: np.ndarray, emitter: complex, listener: complex) -> np.ndarray:
+    return np.asarray(abs(points - emitter) + abs(points - listener))
+
+
+def _golden(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function that has one valley is least."""
+    ratio = (math.sqrt(5) - 1) / 2
+    while high - low > 1e-12:
+        left, right = high - ratio * (high - low), low + ratio * (high - low)
+        if function(left) < function(right):
+            high = right
+        else:
+            low = left
+    return (low + high) / 2
+
+
+def _bisect(is_allowed: Callable[[float], bool], inside: float, outside: float) -> float:
+    for _ in range(60):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if is_allowed(middle) else (inside, middle)
+    return inside
+
+
+def _least_on(curve: Curve, allowed: Curve, emitter: complex, listener: complex) -> tuple[complex, float, bool]:
+    """Return the allowed point with the shortest way over it, that way, and whether it is a valley of the way."""
+    shares = np.linspace(0.0, 1.0, _SAMPLES)
+    possible = allowed(curve(shares)).astype(bool)
+    best = (complex("nan"), math.inf, False)
+
+    def way(share: float) -> float:
+        return float(_way(curve(np.array([share])), emitter, listener)[0])
+
+    def is_allowed(share: float) -> bool:
+        return bool(allowed(curve(np.array([share])))[0])
+
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], possible, [False]]).astype(int)))
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        low = shares[first] if first == 0 else _bisect(is_allowed, shares[first], shares[first - 1])
+        high = shares[last] if last == _SAMPLES - 1 else _bisect(is_allowed, shares[last], shares[last + 1])
+        share = _golden(way, low, high)
+        if way(share) < best[1]:
+            is_valley = low + 1e-9 < share < high - 1e-9
+            best = (complex(curve(np.array([share]))[0]), way(share), is_valley)
+    return best
+
+
+def _curves(shapes: Shapes, emitter: complex, listener: complex) -> list[tuple[Curve, Curve]]:
+    """Return every surface with the test of which of its points both sensors face."""
+    curves: list[tuple[Curve, Curve]] = []
+    for centre, radius in shapes.circles:
+
+        def circle(share: np.ndarray, centre: complex = centre, radius: float = radius) -> np.ndarray:
+            start = cmath.phase(centre - emitter)  # behind, as seen from the emitter
+            return np.asarray(centre + radius * np.exp(1j * (start + 2 * math.pi * share)))
+
+        def faces(points: np.ndarray, centre: complex = centre) -> np.ndarray:
+            outward = np.conj(points - centre)
+            return np.asarray(
+                (((emitter - points) * outward).real >= 0) & (((listener - points) * outward).real >= 0)
+            )
+
+        curves.append((circle, faces))
+    for a, b in shapes.sides:
+        same = ((emitter - a) / (b - a)).imag * ((listener - a) / (b - a)).imag > 0
+
+        def side(share: np.ndarray, a: complex = a, b: complex = b) -> np.ndarray:
+            return np.asarray(a + share * (b - a))
+
+        def is_same_side(points: np.ndarray, same: bool = same) -> np.ndarray:
+            return np.full(points.shape, same)
+
+        curves.append((side, is_same_side))
+    return curves
+
+
+def least_over_circle(radius: float, emitter: complex, listener: complex) -> tuple[complex, float]:
+    """Return the reflecting point of a circle round the origin, and the way over it; +inf if it hides one sensor."""
+    ((curve, faces),) = _curves(Shapes([(0j, radius)], []), emitter, listener)
+    point, way, _ = _least_on(curve, faces, emitter, listener)
+    return point, way
+
+
+def _hears(ear: Ear, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+    return np.asarray(np.abs(np.angle((points - ear[0]) * cmath.exp(-1j * ear[1]))) <= ear[2] + margin)
+
+
+def _is_free(shapes: Shapes, a: complex, b: complex, slack: float) -> bool:
+    """Return whether nothing lies between two points of surfaces."""
+    apart = abs(b - a)
+    return apart <= 2 * slack or in_sight(shapes, a + slack * (b - a) / apart, b, slack)
+
+
+def cross_cone(shapes: Shapes, emitter: Ear, listener: Ear, slack: float) -> float:
+    """Return half the shortest way over a point in both beams, of all surfaces on which that point is in sight."""
+    found = []
+    for curve, faces in _curves(shapes, emitter[0], listener[0]):
+
+        def allowed(points: np.ndarray, faces: Curve = faces) -> np.ndarray:
+            return np.asarray(faces(points) & _hears(emitter, points) & _hears(listener, points))
+
+        point, way, _ = _least_on(curve, allowed, emitter[0], listener[0])
+        if math.isfinite(way) and all(in_sight(shapes, ear[0], point, slack) for ear in (emitter, listener)):
+            found.append(way / 2)
+    return min(found, default=math.inf)
+
+
+def _walls_towards(vertex: complex, sensor: complex, sides: list[tuple[complex, complex]]) -> tuple[complex, complex]:
+    """Return the directions of the surfaces at `vertex` that face the sensor, on its left and on its right."""
+    turns = []
+    for a, b in sides:
+        share = min(1.0, max(0.0, foot_on_line(vertex, a, b)[1]))
+        if abs(a + share * (b - a) - vertex) < 1e-4:
+            ends = [end for end in (a, b) if abs(end - vertex) > 1e-4]
+            turns += [cmath.phase((end - vertex) / (sensor - vertex)) % (2 * math.pi) for end in ends]
+    towards = (sensor - vertex) / abs(sensor - vertex)
+    return towards * cmath.exp(1j * min(turns)), towards * cmath.exp(1j * max(turns))
+
+
+def _least_over_two(
+    emitter: complex, listener: complex, vertex: complex, first: complex, second: complex
+) -> tuple[float, float, float]:
+    """Return the shortest way over a point of each of two walls from a corner, and the points' distances from it."""
+    reach = 4 * (abs(emitter - vertex) + abs(listener - vertex))
+
+    def rest(p: complex) -> float:
+        from_p, from_l = (p - vertex) / second, (listener - vertex) / second
+        weights = abs(from_l.imag), abs(from_p.imag)
+        return max(0.0, (from_p.real * weights[0] + from_l.real * weights[1]) / max(sum(weights), 1e-300))
+
+    def way(d: float) -> float:
+        p = vertex + d * first
+        q = vertex + rest(p) * second
+        return abs(p - emitter) + abs(q - p) + abs(q - listener)
+
+    d = _golden(way, 0.0, reach)
+    return way(d), d, rest(vertex + d * first)
+
+
+def cross_specular(shapes: Shapes, emitter: Ear, listener: Ear, edge_reach: float, slack: float) -> float:
+    """Return half the shortest way that obeys Fermat: over one surface, over both walls of a corner, over an edge."""
+    t, l = emitter[0], listener[0]  # noqa: E741
+    found = []
+
+    def add(way: float, out: complex, back: complex) -> None:
+        if (
+            bool(_hears(emitter, np.array([out]))[0])
+            and bool(_hears(listener, np.array([back]))[0])
+            and in_sight(shapes, t, out, slack)
+            and in_sight(shapes, l, back, slack)
+        ):
+            found.append(way / 2)
+
+    for curve, faces in _curves(shapes, t, l):
+        point, way, is_valley = _least_on(curve, faces, t, l)
+        if is_valley:
+            add(way, point, point)
+    vertices = [end for side in shapes.sides for end in side]
+    for i, (a, b) in enumerate(shapes.sides):
+        for c, d in shapes.sides[:i]:
+            along = _line_hits_side(a, b - a, c, d)
+            vertices += [a + along * (b - a)] if along is not None and 0 <= along <= 1 else []
+    for vertex in vertices:
+        opening = _opening_towards(vertex, t, shapes.sides)
+        left, right = _walls_towards(vertex, t, shapes.sides)
+        past = cmath.phase((l - vertex) / right) % (2 * math.pi)  # from the clockwise wall, as is the opening
+        if abs(opening - math.pi) <= 1e-3 or past >= opening:
+            continue
+        direct = abs(t - vertex) + abs(l - vertex)
+        if opening > math.pi:
+            if direct / 2 <= edge_reach:
+                add(direct, vertex, vertex)
+            continue
+        ways = [(*_least_over_two(t, l, vertex, one, two), one, two) for one, two in ((left, right), (right, left))]
+        bounces = [way for way in ways if way[1] > 1e-7 and way[2] > 1e-7]
+        if not bounces:
+            add(direct, vertex, vertex)
+        for way, d, e, one, two in bounces:
+            p, q = vertex + d * one, vertex + e * two
+            on_sides = all(
+                any(abs(foot_clipped(point, *side) - point) < slack for side in shapes.sides) for point in (p, q)
+            )
+            if on_sides and _is_free(shapes, p, q, slack):
+                add(way, p, q)
+    return min(found, default=math.inf)
+
+
+def foot_clipped(point: complex, a: complex, b: complex) -> complex:
+    """Return the nearest point of a side."""
+    return a + min(1.0, max(0.0, foot_on_line(point, a, b)[1])) * (b - a)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 
 from config.robot import RobotConfig
-from drivers.denning.frames import TENTH_FT_M, VERSION, Ident, NakCode
+from drivers.denning.frames import CAN_LISTEN, TENTH_FT_M, VERSION, Ident, NakCode
 from drivers.line_diagnostics import deadman_refused
 
 _RADIUS_TOLERANCE_MM = 1.0
@@ -49,6 +49,17 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
             f"file says {radius_m:.3f} m; correct ring.radius_m, or choose the robot's own file"
         )
     return deadman_refused(ident.name, ident.deadman_ms * 1e-3, config.link)
+
+
+def cannot_listen(ident: Ident, listeners: tuple[int, ...]) -> str | None:
+    """Return the message for a robot whose sensors cannot listen as the firing pattern asks; None if they can."""
+    if not any(listeners) or (ident.version > 1 and ident.capabilities & CAN_LISTEN):
+        return None
+    why = "cannot listen" if ident.version > 1 else "speaks version 1 of the protocol, which has no listeners"
+    return (
+        f"the firing pattern asks sensors to listen while others fire, and the robot '{ident.name}' {why}; remove "
+        f"ring.firing.listen_preset or listen, or choose the robot's own file"
+    )
 
 
 def coarse_ranges(ident: Ident, resolution_m: float) -> str | None:
@@ -113,6 +124,8 @@ def refusal(command: str, code: int) -> str:
             "make ring.firing.step_period_s longer or ring.firing.window_m shorter, or fire only sensors together "
             "that the robot's wiring can"
         )
+    elif command == "LISTEN":
+        action = "remove ring.firing.listen_preset or listen, or let only sensors listen that the robot's wiring can"
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "DRIVE":
         action = "lower body.speed_max_m_s and body.turn_max_rad_s to what the robot can do"
     return f"the robot refuses {command} (NAK {code}): {meaning}; {action}"

@@ -15,6 +15,7 @@ from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
 from drivers.denning.wire_units import identity_of, newest_version, to_wire, wire_pattern
 from drivers.driver import LineState
+from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.messages import Flags, LinkCounts
 from drivers.robot_clock import Jump
 from drivers.session import Session
@@ -25,7 +26,7 @@ _MISSED_STEPS_MAX = 2
 """Firings that the ring may miss, beyond the longest silence, before the robot must identify itself again."""
 _SETTLING_STEPS = 3
 """Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
-_SEND_ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
+_SEND_ORDER = ("HALT", "HELLO", "PATTERN", "LISTEN", "RELEASE")
 """Commands in the order in which they are sent."""
 
 
@@ -47,11 +48,12 @@ class DenningDriver(Session[PoseStamper]):
 
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
-        self._pattern = wire_pattern(config.ring)
-        super().__init__(PoseStamper(len(config.ring.mounts), config.body))
+        self._pattern, self._listeners = wire_pattern(config.ring), firing_pattern(config.ring).listeners
+        super().__init__(PoseStamper(tuple(mount.angle_rad for mount in config.ring.mounts), config.body))
         self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
         self._newest = self._version = newest_version(config)  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
+        self._ident: Ident | None = None
         self._jump: Jump | None = None
         self._decoder = Decoder("robot", midway=True)
         self._odometry_s = self._last_frame_s = 0.0
@@ -141,15 +143,19 @@ class DenningDriver(Session[PoseStamper]):
         drivers.firing_pattern.FiringError
             The ring cannot carry out the pattern, or the protocol cannot express it; the current one stays.
         """
-        pattern = wire_pattern(ring)
-        if pattern == self._pattern:
+        pattern, listeners = wire_pattern(ring), firing_pattern(ring).listeners
+        if (pattern, listeners) == (self._pattern, self._listeners):
             return
+        deaf = None if self._ident is None else diagnostics.cannot_listen(self._ident, listeners)
+        if deaf is not None:
+            raise FiringError(deaf)
         # Until the robot uses the new pattern, echoes may belong to either; an echo names its own sensors.
         step_ms = min(self._pattern.step_period_ms, pattern.step_period_ms)
         self.stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
         self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
-        self._pattern = pattern
+        self._pattern, self._listeners = pattern, listeners
         if self._state is LineState.READY or "PATTERN" in self._commands:
+            self._commands.pop("LISTEN", None)  # of the pattern before
             self._queue("PATTERN")
 
     def end_session(self) -> None:
@@ -207,7 +213,9 @@ class DenningDriver(Session[PoseStamper]):
         """Queue a command; with the usual number of tries, or without limit if the robot does not answer anyway."""
         without_limit = self._state in (LineState.DOWN, LineState.CLOSED)
         link = self._config.link
-        self._commands[name] = pending_command(name, self._pattern, link, self._version, without_limit=without_limit)
+        self._commands[name] = pending_command(
+            name, self._pattern, link, self._version, without_limit=without_limit, listeners=self._listeners
+        )
 
     def _queue_hello(self) -> None:
         self._version = self._newest
@@ -257,9 +265,13 @@ class DenningDriver(Session[PoseStamper]):
 
     def _take_ident(self, ident: Ident) -> None:
         ident = replace(ident, name=one_line(ident.name))  # it goes to terminals and logs
-        if (wrong := diagnostics.wrong_robot(ident, self._config)) is not None:
+        wrong = diagnostics.wrong_robot(ident, self._config)
+        if wrong is None:
+            wrong = diagnostics.cannot_listen(ident, self._listeners)
+        if wrong is not None:
             self._go_down(wrong)
             return
+        self._ident = ident
         known, self._identity = self._identity, identity_of(ident)
         self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um
         if known is None and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:
@@ -286,6 +298,8 @@ class DenningDriver(Session[PoseStamper]):
             return
         del self._commands[name]
         if name == "PATTERN":
+            if self._listeners:
+                self._queue("LISTEN")
             self._state = LineState.READY
             self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
             self._echo_timeout.restart(self._run_s, self._decoder.bad)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from config.robot import LinkConfig
-from drivers.denning.frames import Halt, Hello, HostFrame, Pattern, Release
+from drivers.denning.frames import Halt, Hello, HostFrame, Listen, Pattern, Release
 from drivers.denning.wire_units import WirePattern
 
 _HELLO_PERIOD_S = 0.5
@@ -62,14 +62,20 @@ class PendingCommand:
 
 
 def pending_command(
-    name: str, pattern: WirePattern, link: LinkConfig, version: int, *, without_limit: bool
+    name: str,
+    pattern: WirePattern,
+    link: LinkConfig,
+    version: int,
+    *,
+    without_limit: bool,
+    listeners: tuple[int, ...] = (),
 ) -> PendingCommand:
     """Return the command of a name, not yet sent.
 
     Parameters
     ----------
     name : str
-        HALT, RELEASE, HELLO or PATTERN.
+        HALT, RELEASE, HELLO, PATTERN or LISTEN.
     pattern : WirePattern
         The firing pattern that PATTERN sets.
     link : LinkConfig
@@ -78,6 +84,8 @@ def pending_command(
         The version of the protocol that HELLO asks for.
     without_limit : bool
         Never give up; for a robot that does not answer anyway.
+    listeners : tuple of int
+        The masks that LISTEN sets, one for each step of the pattern.
     """
     tries_max = None if without_limit else link.tries
     match name:
@@ -88,5 +96,7 @@ def pending_command(
         case "HELLO":
             every_s = _HELLO_PERIOD_S if without_limit else link.reply_timeout_s
             return PendingCommand(lambda seq: Hello(seq, version), every_s, tries_max)
+        case "LISTEN":
+            return PendingCommand(lambda seq: Listen(seq, listeners), link.reply_timeout_s, tries_max)
         case _:
             return PendingCommand(lambda seq: Pattern(seq, *pattern), link.reply_timeout_s, tries_max)

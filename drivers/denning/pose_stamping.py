@@ -16,8 +16,8 @@ import numpy as np
 from config.robot import BodyConfig
 from drivers.denning import diagnostics
 from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
-from drivers.denning.wire_units import odometry_of, ranges_of
-from drivers.messages import Firing, Floats, Odometry, Pose
+from drivers.denning.wire_units import cross_paths_of, odometry_of, ranges_of
+from drivers.messages import CrossPaths, Firing, Floats, Odometry, Pose
 from drivers.odometry_history import OdometryHistory
 from drivers.odometry_jumps import OdometryJumps
 from drivers.robot_clock import Jump, RobotClock
@@ -51,8 +51,8 @@ class PoseStamper:
 
     Parameters
     ----------
-    sensors
-        Number of sensors in the ring.
+    axes
+        Directions of the ring's sensors, rad.
     body
         The base's limits, which distinguish a motion from a jump.
 
@@ -61,21 +61,21 @@ class PoseStamper:
     late_echoes
         Firings dropped: without odometry around them, duplicated, or older than one before.
     out_of_window
-        Ranges dropped because they lie beyond the window of their firing.
+        Ranges and cross paths dropped because they lie beyond the window of their firing.
     excess_echoes
         Firings dropped because the ring sends many more than its pattern has.
     """
 
-    def __init__(self, sensors: int, body: BodyConfig) -> None:
+    def __init__(self, axes: tuple[float, ...], body: BodyConfig) -> None:
         self.late_echoes = 0
         self.out_of_window = 0
         self.excess_echoes = 0
-        self._sensors = sensors
+        self._axes = axes
         self._jumps = OdometryJumps(body)
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY_MIN)
         self._gap_max_s = _GAP_MIN_S
-        self._held: deque[tuple[int, Floats]] = deque()
+        self._held: deque[tuple[int, Floats, CrossPaths | None]] = deque()
         self._last_firing_us: int | None = None
         self._window = WINDOW_MAX
         self._firing_limit = TokenBucket(math.inf, math.inf)
@@ -170,16 +170,19 @@ class PoseStamper:
 
         A range beyond the window belongs to an earlier firing or is noise, and is treated like a sensor's fault.
         """
-        ranges = ranges_of(echo, self._sensors, unit_m)
+        ranges, heard = ranges_of(echo, len(self._axes), unit_m), cross_paths_of(echo, self._axes, unit_m)
         slack_m = 0.0 if isinstance(echo, Echo) else unit_m  # a range at the window's end is rounded to a count
-        beyond = np.isfinite(ranges) & (ranges > self._window * TENTH_FT_M + slack_m)
+        window_m = self._window * TENTH_FT_M + slack_m
+        beyond = np.isfinite(ranges) & (ranges > window_m)
         if beyond.any():
             self.out_of_window += int(np.count_nonzero(beyond))
             ranges[beyond] = math.nan
+        if heard is not None:
+            heard = self._within(heard, window_m)
         if len(self._held) >= _HELD_MAX:
             self._held.popleft()
             self.late_echoes += 1
-        self._held.append((echo.t_us, ranges))
+        self._held.append((echo.t_us, ranges, heard))
 
     def firings(self, run_s: float) -> list[Firing]:
         """Return the waiting echoes whose pose is known at `run_s`, in the order of their firing; remove them."""
@@ -194,7 +197,7 @@ class PoseStamper:
             ahead_us = t_us - round(newest.robot_s * 1e6)
             if 0 < ahead_us <= _FUTURE_MAX_US:
                 break
-            _, ranges = self._held.popleft()
+            _, ranges, heard = self._held.popleft()
             # Times passed on only grow: this drops firings older than the last one, and copies of it.
             if self._last_firing_us is not None and t_us <= self._last_firing_us:
                 self.late_echoes += 1
@@ -208,8 +211,19 @@ class PoseStamper:
                 continue
             self._last_firing_us = t_us
             pose, ring_yaw = place
-            ready.append(Firing(t_us * 1e-6, pose, ring_yaw, ranges))
+            ready.append(Firing(t_us * 1e-6, pose, ring_yaw, ranges, heard))
         return ready
+
+    def _within(self, heard: CrossPaths, window_m: float) -> CrossPaths | None:
+        """Return the cross paths without those beyond the window; None if none is left."""
+        beyond = np.isfinite(heard.half_paths_m) & (heard.half_paths_m > window_m)
+        if not beyond.any():
+            return heard
+        self.out_of_window += int(np.count_nonzero(beyond))
+        if beyond.all():
+            return None
+        kept = ~beyond
+        return CrossPaths(heard.transmitters[kept], heard.listeners[kept], heard.half_paths_m[kept])
 
     def _drop_excess(self, run_s: float) -> None:
         """Count a firing that is dropped because there are too many; note it for the operator now and then."""

@@ -25,8 +25,8 @@ from drivers.denning.frames import (
     Odom,
 )
 from drivers.driver import DriverError
-from drivers.firing_pattern import FiringError, firing_pattern, sensors
-from drivers.messages import Flags, Floats, Identity, Odometry, Pose, Twist
+from drivers.firing_pattern import FiringError, cross_pairs, firing_pattern, sensors
+from drivers.messages import CrossPaths, Flags, Floats, Identity, Odometry, Pose, Twist
 
 _ROUNDING = 1e-6
 """Slack before rounding up or down, in units of the protocol, for decimal fractions that float64 cannot hold."""
@@ -98,7 +98,7 @@ def newest_version(config: RobotConfig) -> int:
 def emulated_version(config: RobotConfig) -> int:
     """Return the newest version of the protocol that the emulated robot speaks.
 
-    It is the one that the robot file names, or else 1 if that can express the ring.
+    It is the one that the robot file names, or else 1 if that can express the ring and its firing pattern.
 
     Raises
     ------
@@ -107,7 +107,8 @@ def emulated_version(config: RobotConfig) -> int:
     """
     version, ring = newest_version(config), config.ring
     in_tenths = ring.resolution_m >= TENTH_FT_M - _ROUNDING
-    return 1 if config.robot.protocol is None and in_tenths and len(ring.mounts) == SENSORS_MAX else version
+    is_plain = in_tenths and len(ring.mounts) == SENSORS_MAX and not ring.firing.has_listeners
+    return 1 if config.robot.protocol is None and is_plain else version
 
 
 def range_unit_um(ring: RingConfig) -> int:
@@ -151,7 +152,7 @@ def ranges_of(echo: Echo | Echo2, count: int, unit_m: float = TENTH_FT_M) -> Flo
     """Return the ranges of a firing, shape (count,), m: NaN not fired or faulty, +inf no echo.
 
     Bits of the mask beyond the ring's sensors are ignored, and so are the readings of sensors that only listened:
-    their paths are not from a sensor and back.
+    see `cross_paths_of`.
 
     Parameters
     ----------
@@ -172,6 +173,32 @@ def ranges_of(echo: Echo | Echo2, count: int, unit_m: float = TENTH_FT_M) -> Flo
         if sensor < count and value != FAULT:
             ranges[sensor] = math.inf if value == no_echo else value * unit_m
     return np.array(ranges)
+
+
+def cross_paths_of(echo: Echo | Echo2, axes: tuple[float, ...], unit_m: float) -> CrossPaths | None:
+    """Return what the listeners of a firing heard; None if no sensor listened.
+
+    Parameters
+    ----------
+    echo
+        The frame.
+    axes
+        Directions of the ring's sensors, rad.
+    unit_m
+        What a count of an ECHO2 stands for, m.
+    """
+    if isinstance(echo, Echo) or not echo.heard:
+        return None
+    counts = dict(zip(sensors(echo.heard), echo.counts[echo.fired.bit_count() :], strict=True))
+    heard = [
+        (transmitter, listener, math.inf if counts[listener] == NO_ECHO_COUNT else counts[listener] * unit_m)
+        for transmitter, listener in cross_pairs(axes, echo.fired, echo.heard)
+        if counts[listener] != FAULT
+    ]
+    if not heard:
+        return None
+    transmitters, listeners, half_paths_m = zip(*heard, strict=True)
+    return CrossPaths(np.array(transmitters), np.array(listeners), np.array(half_paths_m))
 
 
 def echo_byte(range_m: float | None) -> int:

@@ -21,10 +21,10 @@ from drivers.emulator.acoustics import (
     SIGHT_SLACK_M,
     Records,
     first_echoes,
-    hidden,
 )
+from drivers.emulator.cross_paths import first_cross_paths
 from drivers.emulator.scene import Scene
-from drivers.messages import Floats, Pose, wrap_angle
+from drivers.messages import Floats, Pose
 
 LISTENING_LOBE = 2.0
 """How far off its axis a sensor hears another sensor's pulse, in beam half-angles. At the beam's edge the losses of
@@ -53,10 +53,9 @@ class Sonar:
         self._scene = scene
         self._acoustics = acoustics
         self._rng = rng
-        self._mount_poses = [Pose(*mount) for mount in ring.mounts]
         self._mounts: Records = np.array(list(ring.mounts), dtype=MOUNT)
         self._turning = ring.turning
-        self._turning_poses = [self._mount_poses[i] for i in ring.turning]
+        self._turning_poses = [Pose(*ring.mounts[i]) for i in ring.turning]
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._is_clean = not (
             acoustics.noise_relative or acoustics.noise_m or acoustics.dropout or acoustics.outliers
@@ -95,14 +94,17 @@ class Sonar:
         window = self._ring.window_m if window_m is None else window_m
         fired = np.zeros(len(self._mounts), dtype=np.bool_)
         fired[slice(None) if sensors is None else list(sensors)] = True
-        echoes = self.true_echoes(pose, ring_yaw, fired)
-        distances = echoes["distance"].copy()
-        ring_pose, active = Pose(pose.x, pose.y, ring_yaw), fired.copy()
+        distances = self.true_echoes(pose, ring_yaw, fired)["distance"].copy()
+        active = fired.copy()
         for i in listeners:
             active[i] = True
-            distances[i] = self._foreign_distance(ring_pose, i, np.flatnonzero(fired), echoes, math.inf)
+        heard = fired[:, np.newaxis] & (active & ~fired)
         if self._acoustics.crosstalk > 0.0:
-            self._mix_in_crosstalk(ring_pose, fired, echoes, distances)
+            # [listener, transmitter]: who hears a pulse that is not its own, if that arrives first
+            chance = self._rng.random((len(fired), len(fired))) < self._acoustics.crosstalk
+            heard |= fired[:, np.newaxis] & fired & ~np.eye(len(fired), dtype=np.bool_) & chance.T
+        if heard.any():
+            np.minimum(distances, self.true_cross_paths(pose, ring_yaw, heard), out=distances)
         ranges = self._with_errors(distances / self._acoustics.sound_speed_scale, window)
         ranges[ranges > window] = math.inf
         if self._ring.resolution_m > 0.0:
@@ -150,8 +152,45 @@ class Sonar:
         """Turn the sensors of the part that follows the wheels by an angle in the ring's frame, rad."""
         part = Pose(0.0, 0.0, turn)
         for i, straight in zip(self._turning, self._turning_poses, strict=True):
-            mount = self._mount_poses[i] = part.compose(straight)
+            mount = part.compose(straight)
             self._mounts[i] = (mount.x, mount.y, mount.theta)
+
+    def true_cross_paths(self, pose: Pose, ring_yaw: float, heard: NDArray[np.bool_]) -> Floats:
+        """Return half the shortest path to each sensor from the others that it hears, without errors.
+
+        Parameters
+        ----------
+        pose
+            The body's true pose.
+        ring_yaw
+            The true direction of the ring, rad.
+        heard
+            Whose pulse is heard by whom: [transmitter, listener], shape (sensors, sensors).
+
+        Returns
+        -------
+        Floats
+            Shape (sensors,), m; +inf where nothing is heard.
+        """
+        self._turn_mounts(pose.theta - ring_yaw)
+        out = np.empty(len(self._mounts))
+        first_cross_paths(
+            pose.x,
+            pose.y,
+            ring_yaw,
+            self._mounts,
+            heard,
+            self._half_angle,
+            LISTENING_LOBE * self._half_angle,
+            self._acoustics.model == "specular",
+            CONVEX_EDGE_REACH_M,
+            SIGHT_SLACK_M,
+            self._scene.circles,
+            self._scene.segments,
+            self._scene.corners,
+            out,
+        )
+        return out
 
     def _with_errors(self, ranges: Floats, window: float) -> Floats:
         """Return ranges with noise, dropouts and outliers; draws four numbers a sensor whatever the settings."""
@@ -170,33 +209,3 @@ class Sonar:
         nearest = min(self._ring.range_min_m, farthest)
         reported[wild] = nearest + anywhere[wild] * (farthest - nearest)
         return reported
-
-    def _mix_in_crosstalk(
-        self, ring_pose: Pose, fired: NDArray[np.bool_], echoes: Records, distances: Floats
-    ) -> None:
-        """Replace the distance of each sensor that first hears another one's pulse by half of that pulse's path."""
-        count = len(self._mounts)
-        chance = self._rng.random((count, count)) < self._acoustics.crosstalk
-        for i in map(int, np.flatnonzero(fired)):
-            others = np.flatnonzero(fired & chance[i] & (np.arange(count) != i))
-            distances[i] = self._foreign_distance(ring_pose, i, others, echoes, float(distances[i]))
-
-    def _foreign_distance(
-        self, ring_pose: Pose, sensor: int, others: NDArray[np.intp], echoes: Records, at_most_m: float
-    ) -> float:
-        """Return half the shortest path of the others' pulses to a sensor, m; `at_most_m` if none is shorter."""
-        lobe = LISTENING_LOBE * self._half_angle
-        place = ring_pose.compose(self._mount_poses[sensor])
-        for j in others:
-            if not math.isfinite(echoes["distance"][j]):
-                continue
-            out, px, py = map(float, echoes[j])
-            back = math.hypot(px - place.x, py - place.y)
-            off_axis = abs(wrap_angle(math.atan2(py - place.y, px - place.x) - place.theta))
-            if (
-                0.5 * (out + back) < at_most_m
-                and off_axis <= lobe
-                and not hidden(place.x, place.y, px, py, SIGHT_SLACK_M, self._scene.circles, self._scene.segments)
-            ):
-                at_most_m = 0.5 * (out + back)
-        return at_most_m

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable
+from dataclasses import replace
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -188,7 +189,7 @@ class DriftCorrection:
     def corrected(self, firing: Firing) -> Firing:
         """Return the firing that was observed last, at its pose in the filter's frame, with ranges in true metres."""
         pose, ring_yaw = self._pose_of(firing.pose, firing.ring_yaw)
-        return Firing(firing.robot_s, pose, ring_yaw, firing.ranges_m / self.e[0].range_scale)
+        return replace(firing.over_scale(self.e[0].range_scale), pose=pose, ring_yaw=ring_yaw)
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""

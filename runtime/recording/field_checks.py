@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from behaviors.valley.polar_histogram import SECTORS
-from drivers.messages import Firing, Floats, Odometry, Pose, Twist
+from drivers.messages import CrossPaths, Firing, Floats, Odometry, Pose, Twist
 from runtime.cycle.drive_requests import validate
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.modes import ModeState
@@ -71,6 +71,27 @@ def _firing(what: str, firing: Firing) -> None:
     _pose(f"{what}.pose", firing.pose)
     _bounded(f"{what}.ring_yaw", firing.ring_yaw, PLACE_MAX_M)
     _ranges(f"{what}.ranges_m", firing.ranges_m)
+    if firing.cross_paths is not None:
+        check_cross_paths(f"{what}.cross_paths", firing.cross_paths, len(firing.ranges_m))
+
+
+def check_cross_paths(what: str, heard: CrossPaths, sensors: int) -> None:
+    """Check that cross paths name sensors of a ring, and that there is a distance for each.
+
+    Raises
+    ------
+    ValueError
+        They do not belong to a ring of so many sensors, or a distance is impossible.
+    """
+    lengths = [len(heard.transmitters), len(heard.listeners), len(heard.half_paths_m)]
+    if not 1 <= lengths[0] <= sensors or len(set(lengths)) > 1:
+        raise ValueError(f"{what} has arrays of {lengths} entries, expected 1 to {sensors} in each")
+    highest = int(max(heard.transmitters.max(), heard.listeners.max()))
+    if highest >= sensors or (heard.transmitters == heard.listeners).any():
+        raise ValueError(f"{what} names sensor {highest} of {sensors}, or one that hears itself")
+    if np.isnan(heard.half_paths_m).any():
+        raise ValueError(f"{what} has a path that is no number")
+    _ranges(f"{what}.half_paths_m", heard.half_paths_m)
 
 
 def _odometry(what: str, odometry: Odometry | None) -> None:

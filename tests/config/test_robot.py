@@ -52,9 +52,30 @@ def test_a_firing_listens_up_to_the_largest_range_by_default() -> None:
         ({"firing": {"sets": []}}, "sets is empty"),
         ({"firing": {"sets": [[0], []]}}, "at least one sensor"),
         ({"firing": {"sets": [[3, 3]]}}, "each sensor once only"),
+        ({"firing": {"sets": [[3]], "listen": [[2, 2]]}}, "each set of listen may name each sensor once only"),
+        ({"firing": {"sets": [[3]], "listen": [[2]], "listen_preset": "second"}}, "give either listen_preset or"),
+        ({"firing": {"sets": [[3]], "listen": []}}, "listen has 0 sets for the 1 of sets: give one for each"),
+        ({"firing": {"sets": [[0], [3]], "listen": [[1], [2, 3]]}}, r"listen\[1\] names sensor 3, which fires"),
     ],
     ids=str,
 )
 def test_contradictions_are_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         ring(**changes)
+
+
+@pytest.mark.parametrize(
+    ("robot", "message"),
+    [
+        ({"driver": "rflex"}, 'the driver "rflex" cannot listen without firing; remove it'),
+        ({"driver": "arcos"}, 'the driver "arcos" cannot listen without firing; remove it'),
+        ({"protocol": 1}, "version 1 of the protocol has no listeners; remove it, or set robot.protocol = 2"),
+    ],
+)
+def test_listeners_are_refused_where_the_ring_cannot_have_any(robot: dict[str, Any], message: str) -> None:
+    table = copy.deepcopy(ROBOT) | {"robot": robot}
+    RobotConfig.model_validate(table)
+    table["ring"]["firing"] = {"preset": "octets", "listen_preset": "neighbours"}
+    with pytest.raises(ValidationError, match=message):
+        RobotConfig.model_validate(table)
+    RobotConfig.model_validate(table | {"robot": {"protocol": 2}})

@@ -25,6 +25,7 @@ def test_the_names_of_shipped_files() -> None:
         "b21r-base",
         "b21r-both",
         "denning",
+        "ears",
         "magellan",
         "p3at",
         "p3dx",

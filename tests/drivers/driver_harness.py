@@ -13,6 +13,7 @@ from drivers.denning.frames import (
     Halt,
     Hello,
     Ident,
+    Listen,
     Odom,
     Pattern,
     Release,
@@ -76,7 +77,7 @@ class DriverHarness:
             match frame:
                 case Hello():
                     self.send(self.ident)
-                case Pattern() | Halt() | Release():
+                case Pattern() | Listen() | Halt() | Release():
                     self.send(Ack(0, frame.seq))
                 case _:
                     pass

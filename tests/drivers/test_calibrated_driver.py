@@ -15,7 +15,7 @@ from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import LineState, Received
 from drivers.emulator.body import Body
 from drivers.emulator.scene import compile_scene
-from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from drivers.messages import CrossPaths, Firing, Flags, Odometry, Pose, Twist
 from drivers.registry import make_device, make_driver
 
 SCALES = CalibrationConfig(distance_scale=1.05, turn_scale=0.96, range_scale=1.02)
@@ -65,7 +65,8 @@ def test_the_corrected_path_is_the_true_one(synchro: bool) -> None:
     for k in range(500):
         body.step(0.01, Twist(0.4, 1.0 if k % 100 < 60 else -0.7))
         ranges = np.array([1.02, math.inf, math.nan])
-        firing = Firing(0.01 * k, body.odometry_pose, body.odometry_ring_yaw, ranges)
+        heard = CrossPaths(np.array([0]), np.array([2]), np.array([2.04]))
+        firing = Firing(0.01 * k, body.odometry_pose, body.odometry_ring_yaw, ranges, heard)
         body.step(0.01, Twist(0.4, 1.0))
         odometry = replace(sample(body.odometry_pose), ring_yaw=body.odometry_ring_yaw)
         scripted.next = Received((firing,), odometry, rebooted=False)
@@ -76,6 +77,8 @@ def test_the_corrected_path_is_the_true_one(synchro: bool) -> None:
         assert found.pose.theta == pytest.approx(true.theta, abs=1e-9)
         assert found.ring_yaw == pytest.approx(body.ring_yaw, abs=1e-9)
         near = received.firings[0]
+        assert near.cross_paths is not None
+        assert near.cross_paths.half_paths_m[0] == pytest.approx(2.0)
         assert math.hypot(near.pose.x - true.x, near.pose.y - true.y) < 0.01
         np.testing.assert_allclose(near.ranges_m, [1.0, math.inf, math.nan])
 

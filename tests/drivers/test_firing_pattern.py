@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 
 from config.robot import FiringConfig, Preset, RingConfig
 from drivers.denning.wire_units import wire_pattern
-from drivers.firing_pattern import FiringError, firing_pattern, sensors, time_of_flight_s
+from drivers.firing_pattern import (
+    FiringError,
+    cross_pairs,
+    firing_pattern,
+    pattern_pairs,
+    sensors,
+    time_of_flight_s,
+)
 from tests.drivers.vectors import OCTETS, THIRDS
 
 
@@ -106,3 +114,51 @@ def test_a_step_exactly_as_long_as_its_window_is_accepted() -> None:
     assert firing_pattern(ring(firing)).window_m == 2.0
     wire = wire_pattern(ring(firing))
     assert wire.step_period_ms * 1e-3 >= time_of_flight_s(wire.window * 0.03048)
+
+
+# Listeners.
+
+
+def listening(listen: object, **firing: Any) -> RingConfig:
+    key = "listen_preset" if isinstance(listen, str) else "listen"
+    return ring(FiringConfig.model_validate(firing | {key: listen}))
+
+
+def test_presets_listen_beside_those_that_fire() -> None:
+    pattern = firing_pattern(listening("neighbours", preset="octets"))
+    assert pattern.masks == OCTETS
+    assert all(fired ^ heard == (1 << 24) - 1 for fired, heard in zip(pattern.masks, pattern.listeners, strict=True))
+    second = firing_pattern(listening("second", preset="quadrants"))
+    assert sensors(second.listeners[0]) == (2, 4, 8, 10, 14, 16, 20, 22)
+    assert firing_pattern(ring(FiringConfig(preset="octets"))).listeners == ()
+
+
+def test_own_listeners_rotate_with_their_sets() -> None:
+    pattern = firing_pattern(listening([[1, 23], []], sets=[[0], [12]], rotations=2))
+    assert pattern.masks == (1, 1 << 12, 2, 1 << 13)
+    assert [sensors(mask) for mask in pattern.listeners] == [(1, 23), (), (0, 2), ()]
+    assert firing_pattern(listening([[], []], sets=[[0], [12]])).listeners == ()
+
+
+def test_each_listener_hears_the_sensor_that_looks_most_nearly_its_way() -> None:
+    assert pattern_pairs(listening([[1, 23, 11]], sets=[[0, 12]])) == ((0, 1), (0, 23), (12, 11))
+    assert pattern_pairs(listening("second", preset="octets"))[:3] == ((0, 1), (0, 23), (1, 0))
+    assert pattern_pairs(ring(FiringConfig(preset="octets"))) == ()
+    axes = tuple(mount.angle_rad for mount in ring(FiringConfig(preset="octets")).mounts)
+    assert cross_pairs(axes, 0b1, 0b10 | 1 << 30) == ((0, 1),), "a bit beyond the ring"
+    assert cross_pairs(axes, 1 << 30, 0b10) == ()
+    assert cross_pairs(axes, 0b101, 0b10) == ((0, 1),), "of two that are equally near, the lower one"
+
+
+@pytest.mark.parametrize(
+    ("listen", "firing", "said"),
+    [
+        ([[24]], {"sets": [[0]]}, r"ring\.firing\.listen names sensor 24.*0 to 23"),
+        ([[1]], {"preset": "octets"}, r"listen has 1 sets, and the pattern 3 steps"),
+        ([[0], [0], [0]], {"preset": "octets"}, r"sensor 0 would listen in step 0, in which it fires"),
+        ([[1]], {"sets": [[0, 2]]}, r"sensor 1 would listen midway between 0 and 2, which both fire in step 0"),
+    ],
+)
+def test_listeners_that_the_ring_cannot_have_are_refused(listen: object, firing: dict[str, Any], said: str) -> None:
+    with pytest.raises(FiringError, match=said):
+        firing_pattern(listening(listen, **firing))

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from config.load import load_robot
 from config.robot import BodyConfig, DriverConfig, RingConfig, RobotConfig
 from config.world import AcousticsConfig, WallConfig, WorldConfig
 from drivers.denning.device import DenningDevice
 from drivers.denning.driver import DenningDriver
 from drivers.denning.frames import (
+    CAN_LISTEN,
     Ack,
     Echo,
     Echo2,
@@ -25,6 +27,8 @@ from drivers.denning.frames import (
     Pattern,
 )
 from drivers.driver import DriverError, LineState
+from drivers.firing_pattern import FiringError
+from drivers.messages import CrossPaths
 from tests.drivers.cable import Cable
 from tests.drivers.device_host import Host
 from tests.drivers.driver_harness import IDENT, DriverHarness
@@ -129,7 +133,7 @@ def test_a_resolution_finer_than_the_line_is_said_once(resolution_m: float, iden
 # The host reads version 2.
 
 
-def test_ranges_are_counts_of_the_robots_unit_and_listeners_are_left_out() -> None:
+def test_ranges_are_counts_of_the_robots_unit_and_listeners_are_kept_apart() -> None:
     harness = greeted(robot(), FINE_IDENT)
     harness.odom(100_000)
     harness.send(Echo2(0, 110_000, 0, 0b10011, 0b100, (10_000, 0, 65535, 5000)))
@@ -138,6 +142,102 @@ def test_ranges_are_counts_of_the_robots_unit_and_listeners_are_left_out() -> No
     np.testing.assert_array_equal(
         firing.ranges_m, [10_000 * (1e-6 * 172), *[math.nan] * 3, math.inf, *[math.nan] * 3]
     )
+    assert firing.cross_paths is not None
+    assert firing.cross_paths.transmitters.tolist() == [1]
+    assert firing.cross_paths.listeners.tolist() == [2]
+    assert firing.cross_paths.half_paths_m.tolist() == [5000 * (1e-6 * 172)]
+
+
+def test_a_listener_with_a_fault_or_beyond_the_window_is_left_out() -> None:
+    harness = greeted(robot(), FINE_IDENT)
+    beyond = math.ceil(131 * 0.03048 / 172e-6) + 1
+    heard: list[CrossPaths | None] = []
+    for k, counts in enumerate([(900, 0, 65535), (900, 0, beyond), (900, 900, beyond)]):
+        harness.odom(100_000 + 100_000 * k)
+        harness.send(Echo2(0, 110_000 + 100_000 * k, 0, 0b1, 0b110, counts))
+        harness.odom(120_000 + 100_000 * k)
+        heard += [firing.cross_paths for firing in harness.robot.take_received().firings]
+    first, second, third = heard
+    assert first is not None
+    assert (first.listeners.tolist(), first.half_paths_m.tolist()) == ([2], [math.inf])
+    assert second is None
+    assert third is not None
+    assert third.listeners.tolist() == [1]
+    assert harness.robot.stamper.out_of_window == 2
+
+
+# The host asks sensors to listen.
+
+LISTENING = {"sets": [[0], [4]], "listen": [[1, 7], []]}
+EARS_IDENT = Ident(0, 2, 8, 100, 500, 20, 0xB001, "ring", 172, CAN_LISTEN)
+
+
+def test_listen_follows_each_pattern_that_the_robot_accepts() -> None:
+    harness = DriverHarness(robot(firing=LISTENING))
+    harness.ident = EARS_IDENT
+    harness.open()
+    assert harness.answer() == [Hello(0, 2)]
+    assert [type(frame) for frame in harness.answer()] == [Pattern]
+    assert harness.answer() == [Listen(2, (0b1000_0010, 0))]
+    assert harness.state() is LineState.READY
+    harness.robot.set_firing(robot(firing=LISTENING | {"listen": [[1], []]}).ring)
+    assert [type(frame) for frame in harness.answer()] == [Pattern]
+    assert harness.answer() == [Listen(4, (0b10, 0))]
+    harness.robot.set_firing(robot(firing={"sets": [[0], [4]]}).ring)
+    assert [type(frame) for frame in harness.answer()] == [Pattern]
+    assert harness.answer() == [], "a new PATTERN clears what listens"
+
+
+@pytest.mark.parametrize(
+    ("ident", "said"),
+    [
+        (Ident(0, 1, 8, 100, 500, 20, 1, "old"), "'old' speaks version 1 of the protocol, which has no listeners"),
+        (FINE_IDENT, "'ring' cannot listen; remove ring.firing.listen_preset"),
+    ],
+)
+def test_a_robot_that_cannot_listen_is_refused(ident: Ident, said: str) -> None:
+    harness = DriverHarness(robot(firing=LISTENING))
+    harness.ident = ident
+    harness.open()
+    harness.answer()
+    assert harness.state() is LineState.DOWN
+    assert said in (harness.robot.problem or "")
+    plain = greeted(robot(), ident)
+    with pytest.raises(FiringError, match="asks sensors to listen"):
+        plain.robot.set_firing(robot(firing=LISTENING).ring)
+    assert plain.received() == [], "the pattern in force stays"
+
+
+def test_a_robot_that_refuses_listen_is_down_with_the_remedy() -> None:
+    harness = DriverHarness(robot(firing=LISTENING))
+    harness.ident = EARS_IDENT
+    harness.open()
+    harness.answer()
+    harness.answer()
+    (listen,) = harness.received()
+    harness.send(Nak(0, listen.seq, NakCode.VALUE_OUT_OF_RANGE))
+    assert harness.state() is LineState.DOWN
+    assert "refuses LISTEN" in (harness.robot.problem or "")
+    assert "remove ring.firing.listen_preset" in (harness.robot.problem or "")
+
+
+def test_the_shipped_robot_with_ears_hears_cross_paths_of_a_wall() -> None:
+    cable = Cable(config=load_robot("ears"), world=WALL, twist=None)
+    cable.plug()
+    cable.run(1.0)
+    heard = [firing.cross_paths for firing in cable.firings if firing.cross_paths is not None]
+    assert len(heard) >= 10
+    # The image of sensor 0 behind the wall at 2 m, seen from sensor 1; sensor 0 looks straight at the wall.
+    step = 2.0 * math.pi / 24
+    x, y = 0.381 * math.cos(step), 0.381 * math.sin(step)
+    half_path_m = 0.5 * math.hypot(4.0 - 0.381 - x, y)
+    found = {
+        half
+        for paths in heard
+        for pair, half in zip(zip(paths.transmitters, paths.listeners, strict=True), paths.half_paths_m, strict=True)
+        if pair == (0, 1)
+    }
+    assert found == {round(1e3 * half_path_m) * 1e-3}
 
 
 def test_a_range_beyond_the_window_is_dropped_but_for_the_rounding_of_a_count() -> None:
@@ -220,8 +320,7 @@ def test_listen_is_obeyed_and_cleared_by_the_next_pattern() -> None:
     assert {(echo.step, echo.fired, echo.heard) for echo in heard} == {(0, 1, 2)}
     assert all(echo.counts[0] == 1900 for echo in heard)
     assert {echo.step for echo in h.of(Echo2)} == {0, 1}
-    # The emulator's first echo is of the nearest surface point, so the path is out to it and from it to the listener.
-    assert {echo.counts[1] for echo in heard} == {round(500 * (1.9 + math.hypot(2.0 - x, y)))}
+    assert {echo.counts[1] for echo in heard} == {round(500 * math.hypot(4.0 - 0.1 - x, y))}
     h.send(Pattern, 50, 100, (0b1, 0b10))
     h.run(0.1)
     h.heard.clear()

@@ -132,7 +132,9 @@ def crosstalk_ranges(probability: float, sensors: list[int], angle_deg: float = 
 def test_crosstalk_measures_half_of_the_path_between_two_sensors() -> None:
     got = crosstalk_ranges(1.0, [0, 1], angle_deg=17.0)
     np.testing.assert_allclose(got[:, 0], 2.0)
-    np.testing.assert_allclose(got[:, 1], 0.5 * (2.0 + math.hypot(2.0, 0.2)))
+    angles = np.linspace(0.9 * math.pi, 1.1 * math.pi, 100_001)
+    points = 2.5 + 0.5 * np.exp(1j * angles)
+    np.testing.assert_allclose(got[:, 1], 0.5 * (abs(points) + abs(points - 0.2j)).min(), atol=1e-9)
 
 
 def test_crosstalk_comes_as_often_as_asked_and_only_between_those_that_fire_together() -> None:

@@ -8,15 +8,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import orjson
 import pytest
 import zstandard
 from pydantic import ValidationError
 
 from config.errors import WRONG_CALL
+from drivers.messages import CrossPaths
 from runtime.cli.app import run_command
 from runtime.recording.channels import CHANNELS, CYCLE, KEYFRAME, LOG, MESSAGE_MAX, RawMessage, decode, encode
-from runtime.recording.field_checks import check_object, check_pieces, check_segments
+from runtime.recording.field_checks import check_cross_paths, check_object, check_pieces, check_segments
 from runtime.recording.mcap_scanner import CONTENT_MAX
 from runtime.recording.reader import RecordingError, cycle_head, open_recording
 from runtime.recording.replayer import Replayer
@@ -218,3 +220,23 @@ def test_serial_data_objects_and_segments_belong_together() -> None:
         check_object({name: value for name, value in good.items() if name != "score"})
     with pytest.raises(ValueError, match="a segment's"):
         check_segments([(0.0, 0.0, 0.0, math.inf, 0.0)])
+
+
+@pytest.mark.parametrize(
+    ("heard", "message"),
+    [
+        (([0], [1, 2], [1.0]), "arrays of"),
+        (([], [], []), "arrays of"),
+        (([0] * 4, [1] * 4, [1.0] * 4), "arrays of"),
+        (([0], [3], [1.0]), "names sensor 3 of 3"),
+        (([1], [1], [1.0]), "hears itself"),
+        (([0], [1], [math.nan]), "no number"),
+        (([0], [1], [-1.0]), "a range of -1"),
+    ],
+)
+def test_cross_paths_belong_to_the_ring(heard: tuple[list[int], list[int], list[float]], message: str) -> None:
+    transmitters, listeners, half_paths_m = heard
+    paths = CrossPaths(np.array(transmitters, np.int64), np.array(listeners, np.int64), np.array(half_paths_m))
+    check_cross_paths("heard", CrossPaths(np.array([0]), np.array([2]), np.array([math.inf])), 3)
+    with pytest.raises(ValueError, match=message):
+        check_cross_paths("heard", paths, 3)

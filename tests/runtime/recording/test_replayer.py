@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from config.load import load_settings, with_known_room
@@ -80,6 +81,19 @@ def test_a_run_in_a_known_room_is_replayed_to_the_bit_and_drives_as_without_the_
             statuses.append(repr(replayer.state.perception.localized()))
     assert len(set(statuses)) == 1
     assert "status='tracking'" in statuses[0]
+
+
+def test_cross_paths_are_recorded_and_replayed_to_the_bit(tmp_path: Path) -> None:
+    path = tmp_path / "ears.mcap"
+    record(load_settings("hallway", ["perception.method=paper"], robot="ears"), path, 2.0)
+    with open_recording(path) as recording:
+        found = cycles(Replayer(recording))
+    assert all(is_equal(step) for step in found)
+    firings = [f for s in found if s.recorded is not None for f in s.recorded.inputs.received.firings]
+    heard = [firing.cross_paths for firing in firings if firing.cross_paths is not None]
+    assert len(heard) > 20
+    assert all(paths.listeners.dtype == np.int64 for paths in heard)
+    assert sum(int(np.isfinite(paths.half_paths_m).sum()) for paths in heard) > 20
 
 
 def test_a_replay_continues_from_a_checkpoint_and_from_a_keyframe(paper_run: Path) -> None:
