@@ -13,7 +13,6 @@ from cyclopts import App, CycloptsError, Group
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import noting_files_read, one_line
-from runtime import VERSION
 from runtime.cli.board_commands import firmware, probe_command, ring_test_command
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.first_signals import EXIT_CODE_BASE
@@ -21,13 +20,21 @@ from runtime.cli.recording_commands import calibrate, export, figures, map_comma
 from runtime.cli.robot_commands import check, emulate, run, service, settings_command
 from runtime.cli.start_signals import ending_in_order
 
+
+def version() -> str:
+    """Return the version and the build."""
+    from runtime.support.build import describe_build
+
+    return describe_build()
+
+
 app = App(
     name="echolocate",
     help="A robot's main process that recognises and locates objects by sonar alone.",
     help_epilogue=(
         "Exit status: 0 done, 1 the work failed, 2 the call or the configuration wrong, 128 + n ended by signal n."
     ),
-    version=VERSION,
+    version=version,
     group_parameters=Group("Options"),
 )
 for title, commands in (
@@ -40,7 +47,10 @@ for title, commands in (
     for command in commands:
         app.command(command, name=command.__name__.removesuffix("_command").replace("_", "-"), group=group)
 general = Group.create_ordered("General")
-for flag in ("--help", "--version"):
+app.register_install_completion_command(
+    help="Complete commands and options in this shell (bash, zsh, fish); adds a line to its start-up file."
+)
+for flag in ("--help", "--version", "--install-completion"):
     app[flag].group = general
 
 

@@ -7,7 +7,6 @@ are made in `runtime.cycle.step` and in the functions that it calls.
 from __future__ import annotations
 
 import asyncio
-import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,7 +42,7 @@ from runtime.timing.clock_sampler import ClockSample
 from runtime.timing.cycle_scheduler import CycleScheduler
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.footprint import Footprint
-from runtime.timing.memory_policy import MemoryPolicy
+from runtime.timing.memory_policy import MemoryPolicy, collect_garbage
 from runtime.timing.phases import Phase
 from runtime.timing.realtime import apply_realtime
 from runtime.timing.run_clock import run_clock
@@ -134,7 +133,7 @@ class RobotProcess:
         )
         self._clock.on_change(self._link.release)
         self._connection = Connection(self._link, self._driver, self._send, self._clock)
-        self._memory = MemoryPolicy(timed(COLLECTION, gc.collect))
+        self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
         self._mode_log = ModeLog(log, self._notifier)
         self._alerts = Alerts()
         self._request: Request | None = None

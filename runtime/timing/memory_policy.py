@@ -24,13 +24,18 @@ _YOUNG: Final = 1
 _OLD: Final = 2
 
 
+def collect_garbage(generation: int) -> None:
+    """Collect the objects of a generation and of the younger ones."""
+    gc.collect(generation)
+
+
 class MemoryPolicy:
     """Decides when garbage is collected, and counts collections.
 
     Parameters
     ----------
     collect : callable
-        Collects up to a generation, as `gc.collect` does.
+        Collects up to a generation.
 
     Attributes
     ----------
@@ -38,7 +43,7 @@ class MemoryPolicy:
         Collections while driving, of each generation, also those that others requested.
     """
 
-    def __init__(self, collect: Callable[[int], object] = gc.collect) -> None:
+    def __init__(self, collect: Callable[[int], object] = collect_garbage) -> None:
         self._collect = collect
         self.collections = [0] * GENERATIONS
         self._cycles = 0

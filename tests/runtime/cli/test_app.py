@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import re
 import signal
+from typing import Literal
 
 import pytest
 
 from config.errors import DONE, WRONG_CALL
-from runtime.cli.app import main, print_error, run_command
+from runtime.cli.app import app, main, print_error, run_command
+from runtime.support.build import describe_build
 from tests.runtime.cli.user_errors import error_lines
 
 
@@ -63,7 +64,13 @@ def test_help_describes_every_option_of_the_public_surface(capsys: pytest.Captur
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["--version"]) == DONE
-    assert re.fullmatch(r"\d+\.\d+\.\d+\n", capsys.readouterr().out)
+    assert capsys.readouterr().out == f"{describe_build()}\n"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_completion_of_a_shell_has_every_command(shell: Literal["bash", "zsh", "fish"]) -> None:
+    script = app.generate_completion(prog_name="echolocate", shell=shell)
+    assert all(name in script for name in app if not name.startswith("-"))
 
 
 def test_main_exits_with_the_code(capsys: pytest.CaptureFixture[str]) -> None:
