@@ -17,7 +17,7 @@ from typing import BinaryIO, Final, TextIO
 import numpy as np
 
 from config.errors import WRONG_CALL, UserError
-from drivers.messages import Firing, Pose
+from drivers.messages import CrossPaths, Firing, Pose
 
 REQUIRED: Final = ("t", "x", "y", "theta")
 RING_YAW: Final = "ring_yaw"
@@ -25,9 +25,12 @@ RING_YAW: Final = "ring_yaw"
 LINE_MAX_BYTES: Final = 65_536
 """Longest line: ten times the row of the largest ring. Limits the memory that a file without line ends takes."""
 
-_FORM: Final = "the header is t,x,y,theta[,ring_yaw],r00,r01,… separated by commas"
+_FORM: Final = "the header is t,x,y,theta[,ring_yaw],r00,r01,…[,x00_01,…] separated by commas"
 _FINITE: Final = "a finite number"
 _RANGE: Final = "metres ≥ 0, 'inf' (fired, no echo) or an empty cell (did not fire)"
+_CROSS: Final = re.compile(r"x(\d{2,3})_(\d{2,3})")
+"""A column of half paths: transmitter, listener."""
+_NAME_PAIRS: Final = "name the pairs of all its cross paths"
 _SPELT_INF: Final = re.compile(r"\s*\+?inf(inity)?\s*", re.IGNORECASE)
 
 
@@ -59,7 +62,7 @@ def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
         raise RingLogError(f"{path}: cannot be read: {error.strerror or error}; check the path") from error
 
 
-def write_ring_log(path: Path, firings: Iterable[Firing]) -> None:
+def write_ring_log(path: Path, firings: Iterable[Firing], pairs: Sequence[tuple[int, int]] = ()) -> None:
     """Write firings as a ring log from which `read_ring_log` returns exactly the same values.
 
     Parameters
@@ -68,6 +71,8 @@ def write_ring_log(path: Path, firings: Iterable[Firing]) -> None:
         Replaced if it exists.
     firings : iterable of Firing
         At least one, all of one ring, in order of time.
+    pairs : sequence of tuple
+        The cross paths that occur in them, (transmitter, listener); see `drivers.firing_pattern.pattern_pairs`.
 
     Raises
     ------
@@ -76,9 +81,11 @@ def write_ring_log(path: Path, firings: Iterable[Firing]) -> None:
     """
     try:
         with path.open("w", encoding="utf-8", newline="\n") as file:
-            rows = RingLogRows(file, path)
+            rows = RingLogRows(file, path, pairs)
             for firing in firings:
                 rows.write(firing)
+                if rows.dropped:
+                    raise _error(path, rows.count + 1, "would have a cross path without a column", _NAME_PAIRS)
             rows.check_not_empty()
     except OSError as error:
         raise cannot_write(path, error) from error
@@ -124,12 +131,12 @@ def _firings(rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | N
     if header is None:
         raise RingLogError(f"{path}: is empty; {_FORM}")
     names = [name.strip() for name in header]
-    first_range = _check_header(names, path, header_row)
-    count = len(names) - first_range
+    first_range, first_cross, pairs = _check_header(names, path, header_row)
+    count = first_cross - first_range
     if sensors is not None and count != sensors:
         raise RingLogError(
-            f"{path}: has {count} sensor columns (r00 to {names[-1]}), but the robot's ring has {sensors} sensors; "
-            "name the robot file of the robot that recorded the log"
+            f"{path}: has {count} sensor columns (r00 to {names[first_cross - 1]}), but the robot's ring has "
+            f"{sensors} sensors; name the robot file of the robot that recorded the log"
         )
     last_t, empty = -math.inf, True
     for row, cells in rows:
@@ -137,21 +144,35 @@ def _firings(rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | N
             raise _error(path, row, f"has {len(cells)} cells where the header has {len(names)}", _cells_hint(cells))
         try:
             stamp = [_finite(cell) for cell in cells[:first_range]]
-            ranges = np.array([_range(cell) for cell in cells[first_range:]], dtype=np.float64)
+            ranges = np.array([_range(cell) for cell in cells[first_range:first_cross]], dtype=np.float64)
+            heard = _cross_paths(pairs, cells[first_cross:]) if pairs else None
         except ValueError as error:
             raise _cell_error(path, row, names, cells, first_range) from error
         t, x, y, theta = stamp[:4]
         if t < last_t:
             hint = "t never decreases; sort the rows by t, or split the file where the clock restarted"
             raise _error(path, row, f"column 't' is {t!r}, earlier than {last_t!r} before it", hint)
-        yield Firing(t, Pose(x, y, theta), stamp[-1], ranges)
+        yield Firing(t, Pose(x, y, theta), stamp[-1], ranges, heard)
         last_t, empty = t, False
     if empty:
         raise RingLogError(f"{path}: holds no firing, only a header; add a row for each firing")
 
 
-def _check_header(names: Sequence[str], path: Path, row: int) -> int:
-    """Return how many columns come before the ranges."""
+def _cross_paths(pairs: Sequence[tuple[int, int]], cells: Sequence[str]) -> CrossPaths | None:
+    """Return what a row's listeners heard, in the order of their indices; None if none listened."""
+    heard = sorted(
+        (listener, transmitter, half_path_m)
+        for (transmitter, listener), half_path_m in zip(pairs, map(_range, cells), strict=True)
+        if not math.isnan(half_path_m)
+    )
+    if not heard:
+        return None
+    listeners, transmitters, half_paths_m = zip(*heard, strict=True)
+    return CrossPaths(np.array(transmitters), np.array(listeners), np.array(half_paths_m))
+
+
+def _check_header(names: Sequence[str], path: Path, row: int) -> tuple[int, int, list[tuple[int, int]]]:
+    """Return the columns at which ranges and half paths begin, and the pair of sensors of each of the latter."""
     for name, times in Counter(names).items():
         if times > 1:
             raise _error(path, row, f"names the column {_shown(name)} {times} times", f"each name once; {_FORM}")
@@ -159,13 +180,34 @@ def _check_header(names: Sequence[str], path: Path, row: int) -> int:
         if name not in names:
             raise _error(path, row, f"lacks the column {name!r}", _FORM)
     lead = [*REQUIRED, RING_YAW] if RING_YAW in names else [*REQUIRED]
-    if len(names) == len(lead):
+    first_cross = next((i for i, name in enumerate(names) if i > len(lead) and name.startswith("x")), len(names))
+    count = first_cross - len(lead)
+    if count == 0:
         raise _error(path, row, "has no sensor column", _FORM)
-    wanted = lead + [f"r{i:02d}" for i in range(len(names) - len(lead))]
-    for i, (name, want) in enumerate(zip(names, wanted, strict=True)):
+    wanted = lead + [f"r{i:02d}" for i in range(count)]
+    pairs = []
+    for name in names[first_cross:]:
+        found = _CROSS.fullmatch(name)
+        transmitter, listener = (int(found[1]), int(found[2])) if found else (0, 0)
+        if (
+            transmitter == listener
+            or max(transmitter, listener) >= count
+            or name != cross_column(transmitter, listener)
+        ):
+            hint = (
+                f"half paths come last, x00_01 for that of sensor 0's pulse to sensor 1, of sensors 0 to {count - 1}"
+            )
+            raise _error(path, row, f"has the column {_shown(name)}", f"{hint}; {_FORM}")
+        pairs.append((transmitter, listener))
+    for i, (name, want) in enumerate(zip(names[:first_cross], wanted, strict=True)):
         if name != want:
             raise _error(path, row, f"has {_shown(name)} as column {i + 1} where {want!r} belongs", _FORM)
-    return len(lead)
+    return len(lead), first_cross, pairs
+
+
+def cross_column(transmitter: int, listener: int) -> str:
+    """Return the name of the column of half the path from one sensor to another."""
+    return f"x{transmitter:02d}_{listener:02d}"
 
 
 def _number(cell: str) -> float:
@@ -233,17 +275,23 @@ class RingLogRows:
         Opened for UTF-8 and LF.
     path : Path
         Its name, for messages.
+    pairs : sequence of tuple
+        The cross paths that get a column, (transmitter, listener).
 
     Attributes
     ----------
     count : int
         Firings written so far.
+    dropped : int
+        Cross paths left out because they have no column.
     """
 
-    def __init__(self, file: TextIO, path: Path) -> None:
+    def __init__(self, file: TextIO, path: Path, pairs: Sequence[tuple[int, int]] = ()) -> None:
         self._file = file
         self._path = path
+        self._pairs = tuple(pairs)
         self.count = 0
+        self.dropped = 0
         self._sensors = 0
         self._last_t = -math.inf
 
@@ -261,7 +309,8 @@ class RingLogRows:
         ranges = firing.ranges_m.tolist()
         if self.count == 0:
             self._sensors = len(ranges)
-            self._file.write(",".join([*REQUIRED, RING_YAW, *(f"r{i:02d}" for i in range(self._sensors))]) + "\n")
+            columns = [*(f"r{i:02d}" for i in range(self._sensors)), *(cross_column(*pair) for pair in self._pairs)]
+            self._file.write(",".join([*REQUIRED, RING_YAW, *columns]) + "\n")
         stamp = [firing.robot_s, firing.pose.x, firing.pose.y, firing.pose.theta, firing.ring_yaw]
         if len(ranges) != self._sensors or not ranges:
             expected = f"the first firing has {self._sensors}, at least 1"
@@ -271,10 +320,20 @@ class RingLogRows:
             raise _error(path, row, f"would have t, pose and ring yaw {stamp}", expected)
         if any(r < 0.0 for r in ranges):
             raise _error(path, row, f"would have the range {min(ranges)}", f"allowed is {_RANGE}")
+        ranges += self._half_paths(firing.cross_paths)
         cells = [repr(float(value)) for value in stamp] + ["" if math.isnan(r) else repr(r) for r in ranges]
         self._file.write(",".join(cells) + "\n")
         self._last_t = firing.robot_s
         self.count += 1
+
+    def _half_paths(self, heard: CrossPaths | None) -> list[float]:
+        """Return a number for each column of half paths, NaN where the sensor did not listen."""
+        if heard is None:
+            return [math.nan] * len(self._pairs)
+        pairs = zip(heard.transmitters.tolist(), heard.listeners.tolist(), strict=True)
+        found = dict(zip(pairs, heard.half_paths_m.tolist(), strict=True))
+        self.dropped += len(found.keys() - set(self._pairs))
+        return [found.get(pair, math.nan) for pair in self._pairs]
 
     def check_not_empty(self) -> None:
         """Refuse a ring log without a firing.

@@ -6,6 +6,7 @@ Firings that a slow disk cannot accept in time are dropped and counted. A file t
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, TextIO
 
@@ -25,10 +26,13 @@ class RingLogWriter:
     ----------
     path : Path
         Replaced if it exists.
+    pairs : sequence of tuple
+        The cross paths of the firing pattern, (transmitter, listener): those of a later one have no column.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, pairs: Sequence[tuple[int, int]] = ()) -> None:
         self._path = path
+        self._pairs = pairs
         self._file: TextIO | None = None
         self._rows: RingLogRows | None = None
         self._bytes = 0
@@ -69,7 +73,7 @@ class RingLogWriter:
     def _begin(self) -> None:
         try:
             self._file = self._path.open("w", encoding="utf-8", newline="\n")
-            self._rows = RingLogRows(self._file, self._path)
+            self._rows = RingLogRows(self._file, self._path, self._pairs)
         except OSError as error:
             self._fail(str(cannot_write(self._path, error)))
 
@@ -78,6 +82,8 @@ class RingLogWriter:
             raise OSError(self.last_error)  # counted as lost
         try:
             self._rows.write(firing)
+            if self._rows.dropped:
+                self._note(f"{self._path}: a later firing pattern has cross paths without a column; start a new log")
         except (OSError, RingLogError) as error:
             self._fail(str(error if isinstance(error, RingLogError) else cannot_write(self._path, error)))
             raise OSError(self.last_error) from error

@@ -20,7 +20,11 @@ def write_log(recording: Recording, path: Path) -> int:
         The file cannot be written.
     """
     firings = recorded_firings(recording)
-    write_ring_log(path, firings)
+    heard = [firing.cross_paths for firing in firings if firing.cross_paths is not None]
+    pairs = {
+        pair for paths in heard for pair in zip(paths.transmitters.tolist(), paths.listeners.tolist(), strict=True)
+    }
+    write_ring_log(path, firings, sorted(pairs))
     return len(firings)
 
 

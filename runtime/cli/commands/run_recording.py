@@ -173,6 +173,7 @@ def open_run_recording(
     clock : callable
         The run's clock, s.
     """
+    from drivers.firing_pattern import pattern_pairs
     from runtime.recording.recorder import Recorder
     from runtime.recording.ring_log_writer import RingLogWriter
     from runtime.recording.storage import RecordingTarget, RotatingFolder, SingleFile, recordings_folder
@@ -182,7 +183,7 @@ def open_run_recording(
     with contextlib.ExitStack() as stack:
         ring_log: RingLogWriter | None = None
         if record is not None and Path(record).suffix.lower() == RING_LOG:
-            on, ring_log = False, stack.enter_context(RingLogWriter(Path(record)))
+            on, ring_log = False, stack.enter_context(RingLogWriter(Path(record), pattern_pairs(settings.ring)))
         elif record is not None:
             on, target = True, SingleFile(Path(record))
         else:

@@ -6,6 +6,7 @@ import math
 import os
 import tracemalloc
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from drivers.messages import Firing, Pose
+from drivers.messages import CrossPaths, Firing, Pose
 from runtime.recording.ring_log import LINE_MAX_BYTES, RingLogError, read_ring_log, write_ring_log
 from tests.examples import examples
 
@@ -307,3 +308,55 @@ def test_line_limit_leaves_room_for_the_largest_ring(tmp_path: Path) -> None:
     write_ring_log(path, [firing(0.0, [1.2345678901234567e-300] * 255)])
     assert max(map(len, path.read_bytes().splitlines())) * 5 < LINE_MAX_BYTES
     assert len(next(read_ring_log(path, sensors=255)).ranges_m) == 255
+
+
+# Cross paths.
+
+CROSS = "t,x,y,theta,ring_yaw,r00,r01,r02,x01_00,x00_02\n"
+
+
+def heard(*paths: tuple[int, int, float]) -> CrossPaths:
+    transmitters, listeners, half_paths_m = zip(*paths, strict=True)
+    return CrossPaths(np.array(transmitters), np.array(listeners), np.array(half_paths_m))
+
+
+def test_cross_paths_come_back_exactly(tmp_path: Path) -> None:
+    path, ranges = tmp_path / "log.csv", [math.nan] * 3
+    written = [
+        replace(firing(0.0, ranges), cross_paths=heard((1, 0, 1.1), (0, 2, math.inf))),
+        firing(1.0, ranges),
+        replace(firing(2.0, ranges), cross_paths=heard((0, 2, 0.1 + 0.2))),
+    ]
+    write_ring_log(path, written, [(1, 0), (0, 2)])
+    lines = path.read_text("utf-8").splitlines()
+    assert lines[0] == CROSS.strip()
+    assert lines[2].endswith(",,,,,")
+    first, second, third = (f.cross_paths for f in read_ring_log(path, sensors=3))
+    assert second is None
+    for found, put in ((first, written[0].cross_paths), (third, written[2].cross_paths)):
+        assert found is not None
+        assert put is not None
+        for one, other in zip(
+            (found.transmitters, found.listeners, found.half_paths_m),
+            (put.transmitters, put.listeners, put.half_paths_m),
+            strict=True,
+        ):
+            np.testing.assert_array_equal(one, other)
+            assert one.dtype == other.dtype
+
+
+def test_cross_paths_without_a_column_are_refused(tmp_path: Path) -> None:
+    firings = [replace(firing(0.0, [1.0, 2.0]), cross_paths=heard((0, 1, 1.0)))]
+    with pytest.raises(RingLogError, match="row 2 would have a cross path without a column; name the pairs"):
+        write_ring_log(tmp_path / "log.csv", firings)
+
+
+@pytest.mark.parametrize("column", ["x00_00", "x00_03", "x0_1", "x000_001", "x00_01_", "xyz"])
+def test_columns_of_cross_paths_name_two_sensors(tmp_path: Path, column: str) -> None:
+    with pytest.raises(RingLogError, match=f"row 1 has the column '{column}'; half paths come last"):
+        list(read_ring_log(log(tmp_path, f"t,x,y,theta,r00,r01,r02,{column}\n0,0,0,0,1,1,1,1\n")))
+
+
+def test_a_bad_half_path_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RingLogError, match="row 2 column 'x00_02' is '-1'"):
+        list(read_ring_log(log(tmp_path, f"{CROSS}0,0,0,0,0,1,1,1,1,-1\n")))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drivers.messages import Firing, Pose
+from drivers.messages import CrossPaths, Firing, Pose
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_writer import RingLogWriter
 
@@ -71,3 +72,14 @@ def test_a_full_queue_drops_firings(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         pass
     assert (log.status.messages, log.status.dropped) == (10, 5)
     assert "faster than the disk takes them" in str(log.status.last_error)
+
+
+def test_cross_paths_of_the_pattern_have_columns_and_others_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    paths = CrossPaths(np.array([0, 1]), np.array([1, 2]), np.array([1.0, 2.0]))
+    with RingLogWriter(path, [(0, 1)]) as log:
+        log.put(replace(firing(0), cross_paths=paths))
+    (found,) = read_ring_log(path, sensors=3)
+    assert found.cross_paths is not None
+    assert found.cross_paths.half_paths_m.tolist() == [1.0]
+    assert "cross paths without a column" in (log.status.last_error or "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from drivers.driver import Received
-from drivers.messages import Firing, Pose
+from drivers.messages import CrossPaths, Firing, Pose
 from runtime.analysis.export.ring_log_export import write_log
 from runtime.recording.reader import RecordingError, open_recording
 from runtime.recording.ring_log import read_ring_log
@@ -51,6 +52,13 @@ def test_only_firings_after_the_last_restart_are_written(tmp_path: Path) -> None
     )
     assert write_log(recording, tmp_path / "log.csv") == 2
     assert [f.robot_s for f in read_ring_log(tmp_path / "log.csv")] == [0.1, 0.2]
+
+
+def test_cross_paths_get_the_columns_that_they_need(tmp_path: Path) -> None:
+    paths = CrossPaths(np.array([0, 0]), np.array([2, 1]), np.array([1.5, np.inf]))
+    recording: Any = StubRecording(Received((replace(firing(0.1), cross_paths=paths),), None, rebooted=False))
+    write_log(recording, tmp_path / "log.csv")
+    assert (tmp_path / "log.csv").read_text("utf-8").splitlines()[0].endswith("r02,x00_01,x00_02")
 
 
 def test_a_recording_without_a_firing_is_refused(tmp_path: Path) -> None:
