@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from config.robot import BodyConfig
-from perception.percept import Percept
+from perception.percept import Floats, Percept, Pose
 
 
 def free_path_m(percept: Percept, reach_m: float) -> float:
@@ -31,6 +31,29 @@ def free_path_m(percept: Percept, reach_m: float) -> float:
         return math.inf
     ahead, lateral = ahead[in_the_way], lateral[in_the_way]
     return max(0.0, float((ahead - np.sqrt(reach_m * reach_m - lateral * lateral)).min()))
+
+
+def free_paths_m(points: Floats, pose: Pose, headings_rad: Floats, reach_m: float) -> Floats:
+    """Return the same along several headings, for any points: shape (k,), m.
+
+    Parameters
+    ----------
+    points
+        Shape (n, 2), m.
+    pose
+        Where the disc starts; its heading does not matter.
+    headings_rad
+        Shape (k,).
+    reach_m
+        Radius of the disc, m.
+    """
+    dx, dy = points[:, 0] - pose.x, points[:, 1] - pose.y
+    c, s = np.cos(headings_rad)[:, None], np.sin(headings_rad)[:, None]
+    ahead, lateral = c * dx + s * dy, c * dy - s * dx
+    in_the_way = (ahead > 0.0) & (np.abs(lateral) < reach_m)
+    paths = ahead - np.sqrt(np.maximum(reach_m * reach_m - lateral * lateral, 0.0))
+    nearest: Floats = np.where(in_the_way, paths, math.inf).min(axis=1, initial=math.inf)
+    return np.maximum(nearest, 0.0)
 
 
 def stoppable_speed_m_s(percept: Percept, body: BodyConfig, clearance_m: float) -> float:

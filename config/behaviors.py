@@ -125,6 +125,61 @@ class FollowValleyConfig(Strict):
         return self
 
 
+class LeaveCanyonConfig(Strict):
+    """The leave-canyon schema: round dead ends and other obstacles between the robot and its goal."""
+
+    leave_canyon_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    """Length of the schema's vector; 0 turns the schema off."""
+    room_m: float = Field(default=0.25, ge=0.0, le=10.0)
+    """Distance that is kept between the rim and what is gone round, m; gaps narrower than the robot and twice this
+    count as closed."""
+    look_m: float = Field(default=0.6, gt=0.0, le=10.0)
+    """The detour begins where something is nearer than this to the robot and its room, m."""
+    look_ahead_m: float = Field(default=8.0, ge=0.0, le=100.0)
+    """What stays in the way as far ahead as this may be the back of a canyon, and is given room, m; 0: nothing is."""
+    probability_min: float = Field(default=0.9, ge=0.0, le=1.0)
+    """Canyons that are less probable are not avoided."""
+
+
+class AvoidPastConfig(Strict):
+    """The avoid-past schema (Balch & Arkin 1993): away from where the robot has been."""
+
+    avoid_past_gain: float = Field(default=0.0, ge=0.0, le=100.0)
+    """Greatest length of the schema's vector; 0 turns the schema off."""
+    horizon_m: float = Field(default=1.0, gt=0.0, le=100.0)
+    """Half the side of the square about the robot in which its trail counts, m."""
+    saturation_m: float = Field(default=4.0, gt=0.0, le=1000.0)
+    """Length of the trail in that square at which the vector has its greatest length, m."""
+
+
+class NoiseConfig(Strict):
+    """The noise schema (Arkin 1989): a random direction, kept for a while."""
+
+    noise_gain: float = Field(default=0.0, ge=0.0, le=100.0)
+    """Length of the schema's vector; 0 turns the schema off."""
+    persistence_s: float = Field(default=3.0, gt=0.0, le=3600.0)
+    """Time for which a direction is kept, s."""
+    seed: int = Field(default=0, ge=0, le=2**31)
+    """The same seed gives the same directions."""
+
+
+class SwirlConfig(Strict):
+    """The swirl schema (MissionLab): round obstacles, on the side of the robot's way."""
+
+    swirl_gain: float = Field(default=0.0, ge=0.0, le=100.0)
+    """Greatest length of the schema's vector; 0 turns the schema off."""
+    swirl_sphere_m: float = Field(default=3.0, gt=0.0, le=100.0)
+    """Obstacles farther from the rim than this are ignored, m."""
+    swirl_safety_margin_m: float = Field(default=0.5, ge=0.0, le=100.0)
+    """Nearer than this the vector grows no more, m."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> SwirlConfig:
+        if self.swirl_safety_margin_m >= self.swirl_sphere_m:
+            raise ValueError("swirl_safety_margin_m is not below swirl_sphere_m")
+        return self
+
+
 class TeleoperationConfig(Strict):
     """Teleoperation: velocities from the operator's keys, pointer or gamepad, each valid for a short time."""
 
@@ -157,5 +212,9 @@ class BehaviorsConfig(Strict):
     avoid_static_obstacle: AvoidStaticObstacleConfig = AvoidStaticObstacleConfig()
     move_to_goal: MoveToGoalConfig = MoveToGoalConfig()
     follow_valley: FollowValleyConfig = FollowValleyConfig()
+    leave_canyon: LeaveCanyonConfig = LeaveCanyonConfig()
+    avoid_past: AvoidPastConfig = AvoidPastConfig()
+    noise: NoiseConfig = NoiseConfig()
+    swirl: SwirlConfig = SwirlConfig()
     teleoperation: TeleoperationConfig = TeleoperationConfig()
     arbiter: ArbiterConfig = ArbiterConfig()

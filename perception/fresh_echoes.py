@@ -20,12 +20,15 @@ from perception.sensor_mounts import mounts_at
 
 LOOKS: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
+STEADY_M: Final = 0.3
+STEADY_S: Final = 1.5
+"""An echo is steady if another look, by the same sensor or another one, put one this near no longer ago than this."""
 
 
 @kernel
 def record_echoes(
     ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, points: Floats,
-    bearings: Floats, times: Floats, heard: NDArray[np.bool_],
+    bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     """Enter the readings of a firing.
 
@@ -47,6 +50,8 @@ def record_echoes(
         When it did, s; −inf where none is kept. Updated.
     heard : (n, looks) bool
         Whether it heard an echo then. Updated.
+    steady : (n, looks) bool
+        Whether another look agreed with that echo. Updated.
     """
     c = math.cos(yaw)
     s = math.sin(yaw)
@@ -55,6 +60,18 @@ def record_echoes(
         if math.isnan(r):
             continue
         bearing = yaw + mounts[i, 2]
+        px = x + c * mounts[i, 0] - s * mounts[i, 1] + r * math.cos(bearing)
+        py = y + s * mounts[i, 0] + c * mounts[i, 1] + r * math.sin(bearing)
+        agrees = False
+        if math.isfinite(r):
+            for j in range(times.shape[0]):
+                for k in range(times.shape[1]):
+                    if (
+                        heard[j, k]
+                        and t - times[j, k] <= STEADY_S
+                        and (math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < STEADY_M)
+                    ):
+                        agrees = True
         oldest = 0
         for k in range(times.shape[1]):
             turned = bearing - bearings[i, k]
@@ -66,9 +83,10 @@ def record_echoes(
         bearings[i, oldest] = bearing
         times[i, oldest] = t
         heard[i, oldest] = math.isfinite(r)
+        steady[i, oldest] = agrees
         if heard[i, oldest]:
-            points[i, oldest, 0] = x + c * mounts[i, 0] - s * mounts[i, 1] + r * math.cos(bearing)
-            points[i, oldest, 1] = y + s * mounts[i, 0] + c * mounts[i, 1] + r * math.sin(bearing)
+            points[i, oldest, 0] = px
+            points[i, oldest, 1] = py
 
 
 class FreshEchoes:
@@ -91,6 +109,7 @@ class FreshEchoes:
         self._bearings = np.zeros((len(mounts), LOOKS))
         self._times = np.full((len(mounts), LOOKS), -math.inf)
         self._heard = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
+        self._steady = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
@@ -99,11 +118,17 @@ class FreshEchoes:
         record_echoes(
             firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
             float(firing.robot_s), 0.5 * self._half_angle, self._points, self._bearings, self._times, self._heard,
+            self._steady,
         )  # fmt: skip
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
         """Return a copy of the echoes no older than `age_max_s` at the robot's time `robot_s`: shape (k, 2), m."""
         fresh: Floats = self._points[self._heard & (robot_s - self._times <= age_max_s)]
+        return fresh
+
+    def steady_points(self, robot_s: float, age_max_s: float) -> Floats:
+        """Return a copy of those echoes with which another look agrees, shape (k, 2), m: no random ones."""
+        fresh: Floats = self._points[self._heard & self._steady & (robot_s - self._times <= age_max_s)]
         return fresh
 
     def looks(self, robot_s: float, age_max_s: float) -> tuple[Floats, Floats]:
@@ -123,4 +148,5 @@ class FreshEchoes:
     def clear(self) -> None:
         """Remove all readings."""
         self._heard[:] = False
+        self._steady[:] = False
         self._times[:] = -math.inf

@@ -121,6 +121,8 @@ class Percept:
         The evidence grid around the robot; None where no schema needs it.
     canyons : tuple of Canyon
         The box canyons near the robot.
+    steady : (m, 2) float or None
+        Those obstacles with which another look agrees, m; None where no schema needs them.
     """
 
     pose: Pose
@@ -129,3 +131,4 @@ class Percept:
     objects: tuple[DetectedObject, ...] = ()
     occupancy: OccupancyWindow | None = None
     canyons: tuple[Canyon, ...] = ()
+    steady: Floats | None = None

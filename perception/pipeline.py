@@ -265,6 +265,10 @@ class Perception:
         """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
         return self._echoes.points(robot_s, age_max_s)
 
+    def steady_obstacles(self, robot_s: float, age_max_s: float) -> Floats:
+        """Return those of the obstacles with which another look agrees: shape (k, 2), m."""
+        return self._echoes.steady_points(robot_s, age_max_s)
+
     def field_of_view(self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float) -> FieldOfView:
         """Return where the ring has looked.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
+from behaviors.avoid_past import Trail
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.field_of_view import unseen_way
@@ -23,6 +24,7 @@ from config.settings import Settings
 from drivers.messages import Pose, Twist
 from perception.percept import Percept, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
+from runtime.cycle.escape_schemas import escape_schemas
 from runtime.cycle.goal_drive import GoalDrive, drive_to_goal
 
 SUM: Final = "sum"
@@ -53,12 +55,14 @@ class DriveResult:
     """Why the robot does not move although it may drive, for the operator."""
     goal_drive: GoalDrive | None = None
     """What a drive to a goal keeps for the next cycle."""
+    trail: Trail = ()
+    """Where the robot has been, if avoid-past is in use."""
 
 
 def drive(
     drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
     place: GoalPlace | None = None, goal_drive: GoalDrive | None = None, map_frame: Pose | None = None,
-    cycle_s: float = 0.0,
+    cycle_s: float = 0.0, trail: Trail = (),
 ) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
@@ -82,17 +86,19 @@ def drive(
         The map frame in odometry's, while a mission needs it and the robot's place there is known.
     cycle_s : float
         Time since the cycle before, s.
+    trail : Trail
+        Of the cycle before.
     """
     away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     match drive_request:
         case Teleoperate():
             return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings, away)
         case Goal():
-            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away)
+            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away, trail)
         case Mission():
             return _on_mission(drive_request, leg, percept, settings, map_frame, cycle_s)
         case _:
-            return _along_legs(drive_request, leg, percept, settings, away)
+            return _along_legs(drive_request, run_s, leg, percept, settings, away, trail)
 
 
 def _teleoperate(
@@ -120,32 +126,41 @@ def _teleoperate(
 
 def _to_goal(
     drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
-    percept: Percept, settings: Settings, away: Response,
+    percept: Percept, settings: Settings, away: Response, trail: Trail,
 ) -> DriveResult:  # fmt: skip
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
     if place is None and not drive_request.reached:
         return DriveResult(Drive(STANDSTILL), (), drive_request, leg, NO_PLACE, goal_drive)
     there = drive_request if place is None else replace(drive_request, x=place.x, y=place.y)
+    way_rad = math.atan2(there.y - percept.pose.y, there.x - percept.pose.x)
+    others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
     there, goal_drive, responses, decision, hold_reason = drive_to_goal(
-        there, goal_drive, percept, run_s, away, settings
+        there, goal_drive, percept, run_s, (away, *others), settings
     )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
     if drive_request.reached and isinstance(decision, Drive):
         decision = Drive(STANDSTILL)
         hold_reason = f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) is reached"
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive)
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive, trail)
 
 
 def _along_legs(
-    drive_request: DriveRequest, leg: Leg, percept: Percept, settings: Settings, away: Response
-) -> DriveResult:
+    drive_request: DriveRequest, run_s: float, leg: Leg, percept: Percept, settings: Settings, away: Response,
+    trail: Trail,
+) -> DriveResult:  # fmt: skip
     """Return what the configured legs lead to."""
     ahead, leg = move_ahead(percept, leg, settings.behaviors.move_ahead)
-    responses = (ahead, away)
-    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, (AHEAD, AVOID))
+    others: tuple[Response, ...] = ()
+    if not leg.done:
+        way_rad = math.radians(settings.behaviors.move_ahead.move_ahead_direction_deg)
+        way_rad += 0.0 if leg.outbound else math.pi
+        others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
+    responses = (ahead, away, *others)
+    expected = (AHEAD, AVOID, *(response.schema for response in others))
+    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
     hold_reason = LEG_DONE if leg.done else None
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, trail=trail)
 
 
 def _on_mission(

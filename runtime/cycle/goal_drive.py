@@ -7,12 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate
-from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.follow_valley import SCHEMA as FOLLOW_VALLEY
 from behaviors.follow_valley import Valley, follow_valley
 from behaviors.goal_progress import Progress, observe_progress
-from behaviors.move_to_goal import SCHEMA as TO_GOAL
+from behaviors.leave_canyon import NO_DETOUR, Detour, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.response import Response
 from behaviors.valley.look_ahead import Search, begin, expand
@@ -26,6 +24,10 @@ MOVED_M: Final = 0.1
 """A goal whose place is corrected by more than this needs another way, m."""
 FAINT_M: Final = 0.01
 """Least depth of the zone in which avoid-static-obstacle pushes with a bound, m."""
+STANDS_S: Final = 5.0
+"""Whether there is a valley says nothing of a robot that has stood for so long, s."""
+ROUNDS_MAX: Final = 2
+"""A detour may lead away from the goal until it has led round what closes the way so often, once on either side."""
 NO_VALLEY: Final = "obstacles on all sides: no direction is free"
 
 
@@ -38,11 +40,14 @@ class GoalDrive:
     search: Search = field(default_factory=Search)
     searched_run_s: float | None = None
     """When the look-ahead began, by the run's clock."""
+    detour: Detour = NO_DETOUR
+    """How leave-canyon has come."""
 
 
 def drive_to_goal(
-    goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, away: Response, settings: Settings
-) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:
+    goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, pushes: tuple[Response, ...],
+    settings: Settings,
+) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
     """Return the goal and the drive for the next cycle, the responses, the decision, and why the robot holds.
 
     Parameters
@@ -55,8 +60,8 @@ def drive_to_goal(
         What the robot sees.
     run_s : float
         Now, by the run's clock, s.
-    away : Response
-        Of avoid-static-obstacle.
+    pushes : tuple of Response
+        Of avoid-static-obstacle and of schemas beside it.
     settings : Settings
         The run's.
     """
@@ -64,17 +69,28 @@ def drive_to_goal(
     distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
     now = GoalDrive(Progress.starting_at(percept.pose, distance_m, run_s)) if before is None else before
     response, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
-    expected, hold_reason = TO_GOAL, None
-    if behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
+    around, hold_reason = None, None
+    if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:
+        has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
+        around, detour = leave_canyon(
+            percept, (goal.x, goal.y), now.detour, body.radius_m, behaviors.leave_canyon,
+            waits=has_valley and run_s - now.progress.moved_run_s < STANDS_S,
+        )  # fmt: skip
+        now = replace(now, detour=detour)
+    if around is not None:
+        response = around
+        if now.detour.rounds < ROUNDS_MAX:
+            now = replace(now, progress=replace(now.progress, nearer_run_s=run_s))
+    elif behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
         now = _with_search(now, goal, percept, run_s, settings)
         response, valley = follow_valley(
             percept, response, distance_m, now.valley, now.search, body.radius_m, behaviors.follow_valley
         )
-        now, expected = replace(now, valley=valley), FOLLOW_VALLEY
+        now = replace(now, valley=valley)
         hold_reason = NO_VALLEY if valley.direction_rad is None else None
-        away = avoid_static_obstacle(percept, body.radius_m, _underneath(behaviors))
-    responses = (response, away)
-    decision = arbitrate(responses, percept, body, behaviors.arbiter, (expected, AVOID))
+        pushes = (avoid_static_obstacle(percept, body.radius_m, _underneath(behaviors)), *pushes[1:])
+    responses = (response, *pushes)
+    decision = arbitrate(responses, percept, body, behaviors.arbiter, tuple(r.schema for r in responses))
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
             now.progress, percept.pose, distance_m, run_s, hold_reason, behaviors.move_to_goal,

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import Final, Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
+from behaviors.avoid_past import Trail
 from behaviors.move_ahead import Leg
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
@@ -109,6 +110,8 @@ class State:
     """When the operator requested that, by the run's clock."""
     goal_place: GoalPlace | None = None
     """Where the goal lies in odometry's frame; None without a goal, or while its place is not known."""
+    trail: Trail = ()
+    """Where the robot has been since the drive request, if avoid-past is in use."""
     vectors: tuple[Response, ...] = ()
     """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
@@ -245,6 +248,7 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
         return
     state.drive_request = requested(state.drive_request, inputs.drive_request)
     state.requested_run_s, state.goal_place, state.goal_drive = inputs.run_s, None, None
+    state.trail = ()
     if isinstance(inputs.drive_request, Legs) and state.leg is not None and state.leg.done:
         state.leg = None
 
@@ -302,13 +306,14 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
     percept = Percept(
         odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects,
-        state.perception.occupancy(),
+        state.perception.occupancy(), steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),
     )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
-        state.goal_drive, map_frame, gap_s,
+        state.goal_drive, map_frame, gap_s, state.trail,
     )  # fmt: skip
     state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
+    state.trail = result.trail
     state.percept = percept
     state.vectors, state.hold_reason = result.vectors, result.hold_reason
     if isinstance(result.decision, Unseen):

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any, Final
 
 import numpy as np
 
+from behaviors.leave_canyon import Detour
 from behaviors.valley.polar_histogram import SECTORS
 from drivers.messages import CrossPaths, Firing, Floats, Odometry, Pose, Twist
 from runtime.cycle.drive_requests import validate
@@ -128,6 +130,17 @@ def _motion(what: str, monitor: MotionMonitor) -> None:
     _bounded(f"{what}.asked.turned", monitor.asked.turned, PLACE_MAX_M)
 
 
+def _detour(what: str, detour: Detour) -> None:
+    for row in detour.near:
+        for value in row:
+            _bounded(f"{what}.near", value, PLACE_MAX_M)
+    for part in (detour, detour.ahead, detour.block):
+        for field in () if part is None else fields(part):
+            value = getattr(part, field.name)
+            if isinstance(value, float):
+                _bounded(f"{what}.{field.name}", value, PLACE_MAX_M)
+
+
 def check_mode(mode: ModeState) -> None:
     """Check the times of a mode."""
     _time("mode.entered_run_s", mode.entered_run_s)
@@ -180,6 +193,9 @@ def check_state(state: Mapping[str, Any]) -> None:
         _bounded("state.goal_place.y", state["goal_place"].y, PLACE_MAX_M)
     if state["goal_drive"] is not None:
         _goal_drive("state.goal_drive", state["goal_drive"])
+    for place in state["trail"]:
+        for value in place:
+            _bounded("state.trail", value, PLACE_MAX_M)
     if (problem := validate(state["drive_request"])) is not None:
         raise ValueError(f"state.drive_request: {problem}")
     _motion("state.motion_monitor", state["motion_monitor"])
@@ -203,6 +219,7 @@ def _goal_drive(what: str, drive: GoalDrive) -> None:
         *places, *(cost for cost, _ in search.waiting), *(value for square in search.passed for value in square),
     ):  # fmt: skip
         _bounded(f"{what}'s number", value, PLACE_MAX_M)
+    _detour(f"{what}.detour", drive.detour)
     if len(valley.blocked) != SECTORS or valley.blocked.strip("01"):
         raise ValueError(f"{what}.valley.blocked: expected {SECTORS} digits 0 or 1")
     if any(not -1 <= node.parent < k for k, node in enumerate(search.nodes)):

@@ -193,7 +193,9 @@ class ObjectList(TimedPayload):
 
 _HINTS: Final = get_type_hints(State)
 _CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in {"perception", "percept"})
-_ADDED: Final = MappingProxyType({"motion_monitor": MotionMonitor(), "goal_place": None, "goal_drive": None})
+_ADDED: Final = MappingProxyType(
+    {"motion_monitor": MotionMonitor(), "goal_place": None, "goal_drive": None, "trail": ()}
+)
 """Fields that older recordings of this format lack, with the value that they had then."""
 CarriedState: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
     "CarriedState",

@@ -67,6 +67,7 @@ def simulate(
     reload: Callable[[int], Settings | None] | None = None,
     on_bytes: OnBytes | None = None,
     operator: Callable[[int, State], OperatorInput] | None = None,
+    is_over: Callable[[State], bool] | None = None,
 ) -> SimulationResult:
     """Drive through `world` until the leg is done, the robot stops or the time is up, and return the result.
 
@@ -95,6 +96,8 @@ def simulate(
     operator : callable, optional
         Called with the number of each cycle and the state before it; returns the operator's input. The robot is then
         armed only by that input, and the run lasts for `seconds_max`.
+    is_over : callable, optional
+        Called with the state after each cycle; the run ends when it returns True.
     """
     refinement_budget = QuantumBudget(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
     robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
@@ -131,4 +134,6 @@ def simulate(
             on_state(record, state, start)
         if operator is None and (state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done)):
             until = min(until, run_s + SETTLING_S)
+        if is_over is not None and is_over(state):
+            break
     return SimulationResult(state, start, robot.truth, run_s, time.perf_counter() - began, cycle_stats, driver.counts)

@@ -88,3 +88,15 @@ def test_where_more_directions_are_heard_than_kept_the_oldest_goes() -> None:
         echoes.update(at(float(k), 0.2 * k, 1.0))
     _, ages = echoes.looks(LOOKS + 2.0, 60.0)
     assert sorted(ages.tolist()) == list(range(LOOKS))
+
+
+def test_an_echo_is_steady_where_another_look_agrees() -> None:
+    """A random range is an obstacle, but never a steady one."""
+    echoes = FreshEchoes(MOUNTS, BEAM)
+    echoes.update(at(0.0, 0.0, 1.0, 2.0))
+    assert len(echoes.steady_points(0.0, 1.5)) == 0
+    echoes.update(at(0.1, 0.0, 1.1, 3.5))
+    assert len(echoes.points(0.1, 1.5)) == 2
+    assert echoes.steady_points(0.1, 1.5) == pytest.approx(np.array([[1.5, 0.0]]))
+    echoes.update(at(0.2, 0.0, 4.0, 3.5))
+    assert echoes.steady_points(0.2, 1.5) == pytest.approx(np.array([[0.0, 3.9]]))

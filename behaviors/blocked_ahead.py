@@ -1,0 +1,160 @@
+"""What is closed far ahead: an echo that stays where it is while the robot drives towards it.
+
+From outside, nothing shows a canyon whose walls are mirrors but an echo of its back: its sides answer only beside the
+robot that is already in. So what stands far ahead in the way is presumed to be such a back, and its sides to reach up
+to the robot: a block, which the robot goes round while that costs little. It is as wide as the back was seen to be,
+and grows while the robot drives past it and the back goes on answering straight ahead.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import Final, TypeVar
+
+import numpy as np
+
+from perception.percept import Floats, Pose, wrap_angle
+
+T = TypeVar("T", float, Floats)
+
+NEAR_M: Final = 1.2
+"""What is nearer to the rim is no longer far ahead."""
+STAYS_M: Final = 0.15
+STAYS_SHARE: Final = 0.03
+"""An echo stays where it is if it moves less than this, or than this share of its range …"""
+STAYS_FOR_M: Final = 0.4
+"""… over so much driving. One that is not heard for this way is forgotten."""
+FIRST_M: Final = 0.02
+"""Weight of the first echo in the mean, as way."""
+AHEAD_RAD: Final = math.radians(18.0)
+"""An echo comes from ahead if its sensor looks no further to the side."""
+TURNED_RAD: Final = math.radians(25.0)
+"""An echo is ahead no more if the way has turned this far."""
+POINTS_M: Final = 0.15
+POINTS_MAX: Final = 200
+"""Distance between the points that stand for a straight line, and most of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """An echo ahead on a way, in the frame of that way (m, rad)."""
+
+    x: float
+    y: float
+    axis_rad: float
+    """Where the way began, and its direction."""
+    along_m: float
+    """Where the echo lies along the way."""
+    stays_m: float = 0.0
+    """Driven while it stayed."""
+    missed_m: float = 0.0
+    """Driven since it was heard."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it has stayed for long enough."""
+        return self.stays_m >= STAYS_FOR_M
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A rectangle that is given room, in a frame that looks at it (m, rad)."""
+
+    x: float
+    y: float
+    axis_rad: float
+    front_m: float
+    back_m: float
+    """Its extent along the axis …"""
+    low_m: float
+    high_m: float
+    """… and across, counted to the left."""
+
+
+def blocked_ahead(
+    echoes: Floats, pose: Pose, way_rad: float, reach_m: float, ahead: Ahead | None, step_m: float, room_m: float
+) -> Ahead | None:
+    """Return the echo that stays ahead, None if there is none.
+
+    Parameters
+    ----------
+    echoes
+        Fresh ones, shape (n, 2), m.
+    pose, way_rad
+        The robot's place, and the direction of its way.
+    reach_m
+        How far along the way an echo counts.
+    ahead
+        The one so far.
+    step_m
+        Driven since.
+    room_m
+        Half the width of the way.
+    """
+    bearings = np.arctan2(echoes[:, 1] - pose.y, echoes[:, 0] - pose.x)
+    ranges = np.hypot(echoes[:, 0] - pose.x, echoes[:, 1] - pose.y)
+    off_way = np.abs(np.remainder(bearings - way_rad + math.pi, 2.0 * math.pi) - math.pi)
+    # Of a wall's echo only the range is known well: it may come from anywhere in the beam.
+    is_ahead = (off_way < AHEAD_RAD) | ((off_way < 0.5 * math.pi) & (ranges * np.sin(off_way) < room_m))
+    is_ahead &= (ranges > room_m + NEAR_M) & (ranges < reach_m)
+    if ahead is not None and abs(wrap_angle(way_rad - ahead.axis_rad)) < TURNED_RAD:
+        here, _ = _local(pose.x, pose.y, ahead)
+        along = here + ranges
+        off = np.where(is_ahead, np.abs(along - ahead.along_m), math.inf)
+        range_m = ahead.along_m - here
+        if range_m < room_m + NEAR_M:
+            return None
+        if len(off) and off.min() < max(STAYS_M, STAYS_SHARE * range_m):
+            # A mean over the way: it lags behind an echo that moves along with the robot.
+            share = step_m / (ahead.stays_m + step_m + FIRST_M)
+            mean_m = ahead.along_m + share * (float(along[off.argmin()]) - ahead.along_m)
+            return replace(ahead, along_m=mean_m, stays_m=ahead.stays_m + step_m, missed_m=0.0)
+        if ahead.missed_m + step_m < STAYS_FOR_M:
+            return replace(ahead, missed_m=ahead.missed_m + step_m)
+    return Ahead(pose.x, pose.y, way_rad, float(ranges[is_ahead].min())) if is_ahead.any() else None
+
+
+def presume(ahead: Ahead, pose: Pose, front_m: float) -> Block:
+    """Return the block that an echo ahead may belong to; it begins `front_m` before the robot."""
+    here, _ = _local(pose.x, pose.y, ahead)
+    return Block(pose.x, pose.y, ahead.axis_rad, front_m, ahead.along_m - here, 0.0, 0.0)
+
+
+def widen(block: Block, echoes: Floats, pose: Pose) -> Block:
+    """Return the block as wide as the back is by now seen to be: as far as it answers straight ahead of the robot."""
+    here, across = _local(pose.x, pose.y, block)
+    bearings = np.arctan2(echoes[:, 1] - pose.y, echoes[:, 0] - pose.x)
+    ranges = np.hypot(echoes[:, 0] - pose.x, echoes[:, 1] - pose.y)
+    range_m = block.back_m - here
+    answers = np.abs(ranges - range_m) < max(STAYS_M, STAYS_SHARE * range_m)
+    answers &= np.abs(np.remainder(bearings - block.axis_rad + math.pi, 2.0 * math.pi) - math.pi) < AHEAD_RAD
+    if range_m < 0.0 or not answers.any():
+        return block
+    return replace(block, low_m=min(block.low_m, across), high_m=max(block.high_m, across))
+
+
+def outline(block: Block) -> Floats:
+    """Return points along the outline, shape (n, 2), m."""
+    low, high, front, back = block.low_m, block.high_m, block.front_m, block.back_m
+    corners = [(front, low), (front, high), (back, high), (back, low), (front, low)]
+    local = np.concatenate([between(*a, *b) for a, b in itertools.pairwise(corners)])
+    c, s = math.cos(block.axis_rad), math.sin(block.axis_rad)
+    u, v = local.T
+    return np.column_stack([block.x + c * u - s * v, block.y + s * u + c * v])
+
+
+def between(x1: float, y1: float, x2: float, y2: float) -> Floats:
+    """Return points from one place to another, both included, shape (n, 2), m."""
+    count = 2 + min(POINTS_MAX, int(math.hypot(x2 - x1, y2 - y1) / POINTS_M))
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    points: Floats = np.array([[x1, y1]]) * (1.0 - share) + np.array([[x2, y2]]) * share
+    return points
+
+
+def _local(x: T, y: T, frame: Ahead | Block) -> tuple[T, T]:
+    """Return places along the axis of a frame, and left of it, m."""
+    c, s = math.cos(frame.axis_rad), math.sin(frame.axis_rad)
+    dx, dy = x - frame.x, y - frame.y
+    return c * dx + s * dy, c * dy - s * dx

@@ -1,0 +1,263 @@
+"""The leave-canyon schema: no dead end is entered for a goal that lies behind it, and none holds the robot.
+
+A vector towards a goal leads into every box canyon in front of it, and holds the robot at the back. This schema takes
+over from move-to-goal while something closes the way: it goes round along it with a side that it keeps (Lumelsky &
+Stepanov, Algorithmica 2, 1987, proved that this arrives), until the robot is nearer to the goal than where it began
+and the goal's direction is free. What closes the way is
+
+- echoes ahead;
+- the mouth of a known canyon (`perception.percept.Canyon`): a virtual wall for a goal that does not lie behind it;
+- what may be a canyon's back, far ahead (`behaviors.blocked_ahead`).
+
+Progress is state, and behaviours hold none: the detour is passed in and returned with each call. Ways are measured in
+metres, never in cycles, so that a robot that stands gives up nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+
+from behaviors.blocked_ahead import Ahead, Block, between, blocked_ahead, outline, presume, widen
+from behaviors.clearance import free_paths_m
+from behaviors.near_memory import NearEchoes, remember
+from behaviors.response import Response
+from config.behaviors import LeaveCanyonConfig
+from perception.percept import Canyon, Floats, Percept, Pose, wrap_angle
+
+SCHEMA: Final = "leave_canyon"
+Side: TypeAlias = Literal[-1, 1]
+
+OPEN_SIDE_M: Final = 2.0
+"""Nothing is presumed where neither side is free for this far beyond the robot's way: that is a corridor."""
+LEAVE_FREE_M: Final = 1.2
+"""The detour ends where the goal's direction is free for this far, …"""
+PROGRESS_M: Final = 0.2
+"""… and the goal is nearer by this than where it began."""
+TURNED_BACK_RAD: Final = math.radians(150.0)
+"""What was only presumed is given up if going round it leads back more than this."""
+PRESUMED_SHARE: Final = 0.7
+"""Nothing more is presumed until the robot has come nearer by this share of the distance at which it was."""
+NEARER_M: Final = 0.1
+STALL_M: Final = 2.0
+"""A robot that comes no nearer than this in so much driving is held."""
+LOOP_M: Final = 4.0
+SAME_PLACE_M: Final = 0.4
+"""A robot that is back where the detour began after this way has gone all round, and tries the other side."""
+SAME_WALL_RAD: Final = math.radians(100.0)
+LOST_M: Final = 1.0
+"""The obstacle is what is nearest within this angle of where it lay, and within this distance of the way."""
+FAR_M: Final = 1e6
+"""Farther than any goal."""
+NO_POINTS: Final = np.empty((0, 2))
+TURNS: Final = np.arange(0.0, 2.0 * math.pi, math.radians(5.0))
+"""Turns from the obstacle's direction that are tried, in this order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """The progress of the schema (m, rad, odometry's frame)."""
+
+    side: Literal[-1, 0, 1] = 0
+    """Of the obstacle that is gone round: +1 it stays on the left, −1 on the right; 0 without a detour."""
+    began_m: float = 0.0
+    """Distance to the goal where the detour began, …"""
+    began_x: float = 0.0
+    began_y: float = 0.0
+    """… that place, …"""
+    began_driven_m: float = 0.0
+    """… and how far the robot had driven by then."""
+    driven_m: float = 0.0
+    """The way since the goal was set."""
+    rounds: int = 0
+    """How often the robot has gone all round."""
+    nearest_m: float = FAR_M
+    nearest_driven_m: float = 0.0
+    """The least distance to the goal so far, and how far the robot had driven by then."""
+    near: NearEchoes = ()
+    """What was heard near the robot on its way."""
+    wall_rad: float = 0.0
+    """Where the obstacle lay in the last cycle."""
+    x: float | None = None
+    y: float | None = None
+    """The robot's place in the last cycle."""
+    ahead: Ahead | None = None
+    """What stays far ahead, …"""
+    block: Block | None = None
+    """… what it is presumed to be a part of, …"""
+    presume_below_m: float = FAR_M
+    """… and the distance to the goal below which something may be presumed."""
+
+
+NO_DETOUR: Final = Detour()
+
+
+def leave_canyon(
+    percept: Percept, goal: tuple[float, float], detour: Detour, body_radius_m: float, config: LeaveCanyonConfig,
+    *, waits: bool = False,
+) -> tuple[Response | None, Detour]:  # fmt: skip
+    """Return the vector round what closes the way to a goal, None while nothing does; and the detour so far.
+
+    Parameters
+    ----------
+    percept
+        Pose, obstacles and canyons.
+    goal
+        Its place in odometry's frame, m.
+    detour
+        As the last call returned it; `NO_DETOUR` for a new goal.
+    body_radius_m
+        Of the robot, m.
+    config
+        The schema's settings.
+    waits
+        Another schema finds a way between single obstacles: echoes ahead alone begin a detour only where the robot
+        drives and comes no nearer.
+    """
+    pose, room = percept.pose, body_radius_m + config.room_m
+    dx, dy = goal[0] - pose.x, goal[1] - pose.y
+    to_goal, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
+    echoes = percept.obstacles if percept.steady is None else percept.steady
+    detour = _presume(echoes, pose, detour, to_goal, bearing, room, config)
+    virtual = [between(*canyon.mouth) for canyon in percept.canyons if is_closed(canyon, pose, goal, config)]
+    if detour.block is not None:
+        virtual.append(outline(detour.block))
+    near, remembered = remember(detour.near, echoes, pose, detour.driven_m, body_radius_m)
+    detour = replace(detour, near=near)
+    points = np.concatenate([echoes, remembered, *virtual])
+    free = _free_m(points, pose, bearing, room)
+    if to_goal < detour.nearest_m - NEARER_M:
+        detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
+    if detour.side == 0:
+        if waits and detour.driven_m - detour.nearest_driven_m < STALL_M:
+            free = _free_m(np.concatenate([NO_POINTS, *virtual]), pose, bearing, room)
+        if free >= min(to_goal, config.look_m):
+            return None, detour
+        detour = _begin(points, pose, goal, percept.canyons, detour, room, config)
+    elif to_goal < detour.began_m - PROGRESS_M and free >= _needed_m(detour, to_goal):
+        return None, replace(detour, side=0, ahead=None, block=None)
+    elif _is_round(detour, pose):
+        side: Side = -1 if detour.side == 1 else 1
+        detour = replace(
+            detour, side=side, began_driven_m=detour.driven_m, wall_rad=bearing, rounds=detour.rounds + 1
+        )
+    wall, heading = _along(points, pose, detour.side, detour.wall_rad, room, config)
+    if detour.block is not None and abs(wrap_angle(heading - detour.block.axis_rad)) > TURNED_BACK_RAD:
+        below = to_goal - PRESUMED_SHARE * (detour.block.back_m - detour.block.front_m)
+        return None, replace(detour, side=0, ahead=None, block=None, presume_below_m=below)
+    gain = config.leave_canyon_gain
+    return Response(SCHEMA, gain * math.cos(heading), gain * math.sin(heading)), replace(detour, wall_rad=wall)
+
+
+def _free_m(points: Floats, pose: Pose, heading_rad: float, room_m: float) -> float:
+    return float(free_paths_m(points, pose, np.array([heading_rad]), room_m)[0])
+
+
+def is_closed(canyon: Canyon, pose: Pose, goal: tuple[float, float], config: LeaveCanyonConfig) -> bool:
+    """Return whether a canyon's mouth is a wall for this robot: neither it nor the goal is inside."""
+    if canyon.probability < config.probability_min:
+        return False
+    return not (_is_inside(canyon, pose.x, pose.y) or _is_inside(canyon, *goal))
+
+
+def _is_inside(canyon: Canyon, x: float, y: float) -> bool:
+    x1, y1, x2, y2 = canyon.mouth
+    c, s = math.cos(canyon.axis_rad), math.sin(canyon.axis_rad)
+    dx, dy = x - 0.5 * (x1 + x2), y - 0.5 * (y1 + y2)
+    half = 0.5 * abs(c * (y2 - y1) - s * (x2 - x1))
+    return 0.0 < c * dx + s * dy < canyon.depth_m and abs(c * dy - s * dx) < half
+
+
+def _presume(
+    echoes: Floats, pose: Pose, detour: Detour, to_goal_m: float, bearing_rad: float, room_m: float,
+    config: LeaveCanyonConfig,
+) -> Detour:  # fmt: skip
+    """Return the detour with the way driven and what is presumed far ahead brought up to date."""
+    step = 0.0 if detour.x is None or detour.y is None else math.hypot(pose.x - detour.x, pose.y - detour.y)
+    detour = replace(detour, x=pose.x, y=pose.y, driven_m=detour.driven_m + step)
+    if detour.block is not None:
+        return replace(detour, block=widen(detour.block, echoes, pose))
+    if detour.side != 0:
+        return detour
+    reach = min(config.look_ahead_m, to_goal_m)
+    detour = replace(detour, ahead=blocked_ahead(echoes, pose, bearing_rad, reach, detour.ahead, step, room_m))
+    if detour.ahead is None or not detour.ahead.is_sure or to_goal_m > detour.presume_below_m:
+        return detour
+    if not _open_sides(echoes, pose, bearing_rad, room_m):
+        return detour
+    return replace(detour, block=presume(detour.ahead, pose, room_m + 0.5 * config.look_m))
+
+
+def _open_sides(points: Floats, pose: Pose, way_rad: float, room_m: float) -> list[Side]:
+    """Return the sides on which a robot on this way keeps an obstacle if it gives way to where there is room."""
+    sides: tuple[Side, Side] = (1, -1)
+    across = np.array([way_rad - 0.5 * math.pi * side for side in sides])
+    free = free_paths_m(points, pose, across, room_m)
+    return [side for side, path in zip(sides, free.tolist(), strict=True) if path >= OPEN_SIDE_M]
+
+
+def _is_round(detour: Detour, pose: Pose) -> bool:
+    """Return whether the robot is back where the detour began, after a long way."""
+    way = detour.driven_m - detour.began_driven_m
+    return way > LOOP_M and math.hypot(pose.x - detour.began_x, pose.y - detour.began_y) < SAME_PLACE_M
+
+
+def _needed_m(detour: Detour, to_goal_m: float) -> float:
+    """Return how far the goal's direction must be free: past all of what is only presumed."""
+    return to_goal_m if detour.block is not None else min(to_goal_m, LEAVE_FREE_M)
+
+
+def _begin(
+    points: Floats, pose: Pose, goal: tuple[float, float], canyons: tuple[Canyon, ...], detour: Detour, room_m: float,
+    config: LeaveCanyonConfig,
+) -> Detour:  # fmt: skip
+    """Return a detour that begins here, on the side that promises the shorter way."""
+    to_goal, bearing = math.hypot(goal[0] - pose.x, goal[1] - pose.y), math.atan2(goal[1] - pose.y, goal[0] - pose.x)
+
+    def cost(side: Side) -> float:
+        for canyon in canyons:
+            if canyon.probability >= config.probability_min and not _is_inside(canyon, *goal):
+                end = _end(canyon, side)
+                return math.dist((pose.x, pose.y), end) + math.dist(end, goal)
+        _, heading = _along(points, pose, side, bearing, room_m, config)
+        return abs(wrap_angle(heading - bearing))
+
+    sides: list[Side] = [1, -1]
+    if detour.block is not None:
+        sides = _open_sides(points, pose, bearing, room_m) or sides
+    side = min(sides, key=cost)
+    return replace(
+        detour, side=side, began_m=to_goal, began_x=pose.x, began_y=pose.y, began_driven_m=detour.driven_m,
+        wall_rad=bearing,
+    )  # fmt: skip
+
+
+def _end(canyon: Canyon, side: Side) -> tuple[float, float]:
+    """Return the end of a mouth round which a robot goes that keeps the canyon on this side."""
+    x1, y1, x2, y2 = canyon.mouth
+    is_left = math.cos(canyon.axis_rad) * (y1 - y2) - math.sin(canyon.axis_rad) * (x1 - x2) > 0.0
+    return (x1, y1) if is_left == (side == -1) else (x2, y2)
+
+
+def _along(
+    points: Floats, pose: Pose, side: int, wall_rad: float, room_m: float, config: LeaveCanyonConfig
+) -> tuple[float, float]:
+    """Return the direction of the obstacle that is gone round, and the heading along it, rad.
+
+    The heading is the first free one from the obstacle's direction away from it: so the robot approaches what is too
+    far, leaves what is too near, turns in a corner before it is in it, and passes no gap that is too narrow.
+    """
+    dx, dy = points[:, 0] - pose.x, points[:, 1] - pose.y
+    bearings, distances = np.arctan2(dy, dx), np.hypot(dx, dy)
+    off = np.abs(np.remainder(bearings - wall_rad + math.pi, 2.0 * math.pi) - math.pi)
+    distances = np.where(off < SAME_WALL_RAD, distances, math.inf)
+    if len(points) and distances.min() < room_m + LOST_M:
+        wall_rad = float(bearings[distances.argmin()])
+    headings = wall_rad - side * TURNS
+    free = free_paths_m(points, pose, headings, room_m)
+    is_free = free >= config.look_m
+    chosen = int(is_free.argmax()) if is_free.any() else int(free.argmax())
+    return wall_rad, wrap_angle(float(headings[chosen]))

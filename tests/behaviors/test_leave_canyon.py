@@ -1,0 +1,110 @@
+"""Leave-canyon: what closes the way is gone round with a kept side, and the mouth of a known canyon is a wall."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from behaviors.arbiter import Drive, arbitrate
+from behaviors.avoid_static_obstacle import SCHEMA as AVOID
+from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.leave_canyon import NO_DETOUR, SCHEMA, is_closed, leave_canyon
+from behaviors.move_to_goal import Goal, move_to_goal
+from config.behaviors import BehaviorsConfig, LeaveCanyonConfig
+from perception.percept import Canyon, Floats, Percept, Pose
+from tests.behaviors.hall import BODY, STEP_S, World, clamp, echoes
+from tests.behaviors.views import EVERYWHERE
+
+CONFIG = LeaveCanyonConfig()
+BLIND = LeaveCanyonConfig(look_ahead_m=0.0)
+CANYON = Canyon(3, (1.0, 1.0, 1.0, -1.0), 0.0, 3.0, 0.97)
+NOTHING: Floats = np.empty((0, 2))
+U = World(walls=((2.0, 1.0, 5.0, 1.0), (5.0, 1.0, 5.0, -1.0), (5.0, -1.0, 2.0, -1.0)))
+"""A canyon 3 m deep and 2 m wide that opens towards the origin."""
+
+
+def seen(x: float, y: float, obstacles: Floats = NOTHING, canyons: tuple[Canyon, ...] = ()) -> Percept:
+    return Percept(Pose(x, y, 0.0), obstacles, EVERYWHERE, canyons=canyons)
+
+
+def heading_deg(percept: Percept, goal: tuple[float, float], config: LeaveCanyonConfig = CONFIG) -> float | None:
+    response, _ = leave_canyon(percept, goal, NO_DETOUR, 0.381, config)
+    return None if response is None else math.degrees(math.atan2(response.y, response.x))
+
+
+def drive_to(world: World, goal: Goal, config: LeaveCanyonConfig, seconds: float) -> tuple[list[Pose], Goal]:
+    """Drive to a goal with the schemas of a goal; the ring gives 24 echoes at once."""
+    behaviors, pose, v, detour, path = BehaviorsConfig(), Pose(0.0, 0.2, 0.0), 0.0, NO_DETOUR, []
+    for _ in range(round(seconds / STEP_S)):
+        percept = Percept(pose, echoes(world, pose, wide=True, noise=None), EVERYWHERE)
+        steer, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
+        if goal.reached:
+            break
+        around, detour = leave_canyon(percept, (goal.x, goal.y), detour, BODY.radius_m, config)
+        steer = steer if around is None else around
+        push = avoid_static_obstacle(percept, BODY.radius_m, behaviors.avoid_static_obstacle)
+        decision = arbitrate((steer, push), percept, BODY, behaviors.arbiter, (steer.schema, AVOID))
+        assert isinstance(decision, Drive), decision
+        v += clamp(decision.twist.v - v, BODY.acceleration_max_m_s2 * STEP_S)
+        theta = pose.theta + decision.twist.w * STEP_S
+        pose = Pose(pose.x + v * STEP_S * math.cos(theta), pose.y + v * STEP_S * math.sin(theta), theta)
+        path.append(pose)
+        assert world.clearance(pose.x, pose.y) > BODY.radius_m
+    return path, goal
+
+
+def test_a_free_way_is_left_to_move_to_goal() -> None:
+    assert heading_deg(seen(0.0, 0.0), (5.0, 0.0)) is None
+    behind_the_goal = np.array([[3.0, 0.0]])
+    assert heading_deg(seen(0.0, 0.0, behind_the_goal), (1.5, 0.0), BLIND) is None
+
+
+def test_what_is_ahead_is_gone_round_with_a_side_that_is_kept() -> None:
+    wall = np.column_stack([np.full(9, 1.0), np.linspace(-2.0, 1.0, 9)])
+    response, detour = leave_canyon(seen(0.0, 0.0, wall), (5.0, 0.0), NO_DETOUR, 0.381, BLIND)
+    assert response is not None
+    assert response.schema == SCHEMA
+    assert detour.side != 0
+    later, kept = leave_canyon(seen(0.0, 0.1 * detour.side, wall), (5.0, 0.0), detour, 0.381, BLIND)
+    assert later is not None
+    assert kept.side == detour.side
+    assert response.x * 0.0 + response.y * -detour.side > 0.5  # an obstacle on the left is passed to the right
+
+
+@pytest.mark.parametrize(("x", "goal", "closed"), [
+    (0.0, (6.0, 0.0), True), (0.0, (2.0, 0.5), False), (2.0, (6.0, 0.0), False), (5.0, (0.0, 0.0), True),
+])  # fmt: skip
+def test_the_mouth_is_a_wall_unless_the_robot_or_the_goal_is_inside(
+    x: float, goal: tuple[float, float], closed: bool
+) -> None:
+    assert is_closed(CANYON, Pose(x, 0.0, 0.0), goal, CONFIG) is closed
+    doubtful = replace(CANYON, probability=0.5)
+    assert not is_closed(doubtful, Pose(x, 0.0, 0.0), goal, CONFIG)
+
+
+@pytest.mark.parametrize(("y", "goal_y"), [(0.6, 0.4), (-0.6, -0.4)])
+def test_a_known_canyon_is_passed_on_the_side_of_the_shorter_way(y: float, goal_y: float) -> None:
+    turned = heading_deg(seen(0.0, y, canyons=(CANYON,)), (6.0, goal_y), BLIND)
+    assert turned is not None
+    assert 30.0 < math.copysign(turned, y * turned) < 100.0
+
+
+@pytest.mark.parametrize("config", [CONFIG, BLIND], ids=["looks ahead", "blind"])
+def test_it_leaves_a_canyon_and_arrives(config: LeaveCanyonConfig) -> None:
+    path, goal = drive_to(U, Goal(7.0, 0.0), config, 120.0)
+    assert goal.reached
+    inside = [2.0 < pose.x < 5.0 and abs(pose.y) < 1.0 for pose in path]
+    assert sum(b and not a for a, b in itertools.pairwise(inside)) <= 1
+    if config.look_ahead_m > 0.0:
+        assert not any(inside)
+
+
+def test_the_same_state_gives_the_same_answer() -> None:
+    percept = seen(0.0, 0.0, np.array([[1.0, 0.0], [1.0, 0.4]]))
+    assert leave_canyon(percept, (5.0, 0.0), NO_DETOUR, 0.381, CONFIG) == leave_canyon(
+        percept, (5.0, 0.0), NO_DETOUR, 0.381, CONFIG
+    )
