@@ -12,6 +12,10 @@ SHORT_M: Final = 0.15
 """Crosstalk: a reading is short if it is below those before and after it by this, m, …"""
 SHORT_SHARE: Final = 0.05
 """… and by this share of them."""
+DOUBT_M: Final = 0.06
+"""A single reading is doubted if it is below the last one of another set by this, m: two quantisation steps, …"""
+DOUBT_SHARE: Final = 0.02
+"""… and by this share, for noise. A wrong doubt costs a firing, a wrong mask a sensor: that one has wider limits."""
 SHORT_READINGS_MAX: Final = 8.0
 """Short readings that are crosstalk; each other reading subtracts two."""
 
@@ -62,4 +66,4 @@ def is_doubtful(c: SensorMemory, r: float, x: float, y: float, fired_set: int) -
     if c.readings < 1 or c.last_set == fired_set:
         return False
     moved = math.hypot(x - c.last_x, y - c.last_y)
-    return bool(r < c.last_m * (1.0 - SHORT_SHARE) - SHORT_M - moved)
+    return bool(r < c.last_m * (1.0 - DOUBT_SHARE) - DOUBT_M - moved)

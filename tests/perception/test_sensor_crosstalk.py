@@ -52,7 +52,8 @@ def test_a_set_is_masked_after_several_short_readings_and_freed_after_others() -
 def test_a_reading_is_doubtful_if_it_is_shorter_than_motion_explains() -> None:
     c = sensor()
     assert is_doubtful(c[0], 1.0, 0.0, 0.0, 1)
-    assert not is_doubtful(c[0], 3.7, 0.0, 0.0, 1), "within noise"
+    assert not is_doubtful(c[0], 3.87, 0.0, 0.0, 1), "within noise"
+    assert is_doubtful(c[0], 3.85, 0.0, 0.0, 1)
     assert not is_doubtful(c[0], 1.0, 3.0, 0.0, 1), "the base has come nearer"
     assert not is_doubtful(c[0], 1.0, 0.0, 0.0, 0), "with the same partners"
     assert not is_doubtful(sensor(readings=0)[0], 1.0, 0.0, 0.0, 1)
