@@ -22,9 +22,14 @@ from behaviors.valley.polar_histogram import (
     room_m,
 )
 from config.behaviors import FollowValleyConfig
-from perception.percept import Percept
+from perception.percept import Percept, wrap_angle
 
 SCHEMA: Final = "follow_valley"
+LEAST_WAY_M: Final = 0.1
+"""A direction is blocked if the robot cannot drive so far in it, however near the target is, m."""
+HELD_RAD: Final = math.radians(1.0)
+"""The heading is not corrected by less than this, and in full by twice this: the odometry's rounding would steer the
+wheels to and fro."""
 STRAIGHT: Final = 0.5
 """A target within so many sectors of the goal's direction is the goal: the way is straight."""
 
@@ -76,7 +81,9 @@ def follow_valley(
     cells = cells_near(percept, pose.x, pose.y, config.free_m + max(room_max_m, comfort_m), config)
     radius_m = room_m(cells, body_radius_m, room_max_m)
     flags = before.blocked.encode("ascii").translate(_FLAGS)
-    blocked, near = blocked_sectors(cells, flags, radius_m, max(radius_m, comfort_m), max(target_m, radius_m), config)
+    blocked, near = blocked_sectors(
+        cells, flags, radius_m, max(radius_m, comfort_m), max(target_m, LEAST_WAY_M), config
+    )
     kept = blocked
     if config.turning_radius_m > 0.0:
         kept = blocked | masked_by_turning(cells, pose.theta, radius_m, config.turning_radius_m)
@@ -88,7 +95,13 @@ def follow_valley(
     if chosen is None:
         return Response(SCHEMA, 0.0, 0.0), Valley(shown, None)
     direction = chosen * SECTOR_RAD
-    return Response(SCHEMA, length * math.cos(direction), length * math.sin(direction)), Valley(shown, direction)
+    if before.direction_rad is not None:
+        turned = before.direction_rad + config.turn_share * wrap_angle(direction - before.direction_rad)
+        if not blocked[round(turned / SECTOR_RAD) % SECTORS]:
+            direction = turned
+    off = wrap_angle(direction - pose.theta)
+    driven = pose.theta + off * min(1.0, max(0.0, abs(off) / HELD_RAD - 1.0))
+    return Response(SCHEMA, length * math.cos(driven), length * math.sin(driven)), Valley(shown, direction)
 
 
 _DIGITS: Final = bytes.maketrans(b"\0\1", b"01")

@@ -22,6 +22,7 @@ from bench.place_commands import (
     known_room,
     localization,
     map_size,
+    navigation,
     nees,
     sightings,
     slips,
@@ -221,7 +222,18 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
     return report(json, by_load, waking_table(by_load))
 
 
-for command in (localization, known_room, beacons, nees, slips, sightings, walls, false_drums, false_walls):
+for command in (
+    localization,
+    known_room,
+    navigation,
+    beacons,
+    nees,
+    slips,
+    sightings,
+    walls,
+    false_drums,
+    false_walls,
+):
     app.command(command)
 app.command(map_size, name="map")
 

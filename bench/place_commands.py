@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final, Literal, TypeAlias, TypeVar, get_args
+from typing import Annotated, Final, Literal, TypeAlias, TypeVar, get_args
 
+from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
@@ -96,6 +97,45 @@ def known_room(
         return measure(settings.ring, range(first, first + max(1, rooms)), tell)
 
     return _try_in_rooms(rows, known_room_table, json, parts=(EMULATOR,))
+
+
+def navigation(
+    *,
+    json: str = "navigation.json",
+    pairs: int = 100,
+    first: int = 0,
+    laser: tuple[Path, ...] = (),
+    only: str = "",
+    sets: Annotated[tuple[str, ...], Parameter(name="--set", negative="", allow_leading_hyphen=False)] = (),
+) -> int:
+    """Measure drives to goals in unknown rooms: ours, the schemas before, VFF, VFH, nav2's recoveries.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    pairs
+        Number of drives.
+    first
+        Seed of the first.
+    laser
+        Drive in real buildings instead of random rooms: recordings of a laser with corrected poses, as CARMEN logs.
+    only
+        Run only the methods whose name contains this text.
+    sets
+        Setting to override in all methods, as in behaviors.follow_valley.safety_m=0.25.
+    """
+    use_kernel_cache()
+    from bench.navigation import METHODS, measure, trials_of
+
+    chosen = [name for name in METHODS if only in name]
+    if not chosen:
+        raise UserError(f"--only {only}: no such method, expected a part of one of: {', '.join(METHODS)}")
+    return _try_in_rooms(
+        lambda _, tell: measure(trials_of(laser, max(1, pairs), first), chosen, sets, tell),
+        lambda rows: rows_table("drives to goals in unknown rooms", rows),
+        json,
+    )
 
 
 def beacons(recording: Path, *, json: str = "beacons.json") -> int:

@@ -60,7 +60,7 @@ class MoveToGoalConfig(Strict):
     goal, has come no nearer, s."""
     stuck_m: float = Field(default=0.3, gt=0.0, le=10.0)
     """See `stuck_after_s`, m."""
-    unreachable_after_s: float = Field(default=90.0, ge=1.0, le=1e5)
+    unreachable_after_s: float = Field(default=120.0, ge=1.0, le=1e5)
     """The goal is given up after the robot has not come nearer to it than ever before for so long, s."""
 
     @model_validator(mode="after")
@@ -97,6 +97,8 @@ class FollowValleyConfig(Strict):
     """μ₃: the same from the direction chosen before."""
     near_cost: float = Field(default=20.0, ge=0.0, le=1e6)
     """Cost of a direction that passes an obstacle nearer than `comfort_m`."""
+    turn_share: float = Field(default=0.15, gt=0.0, le=1.0)
+    """The direction turns by this share of the angle to the chosen one in each cycle; 1 turns at once."""
     turning_radius_m: float = Field(default=0.0, ge=0.0, le=100.0)
     """Least radius that the robot drives, m; 0 if it can turn on the spot."""
     look_ahead_step_m: float = Field(default=0.5, gt=0.05, le=10.0)
@@ -109,7 +111,9 @@ class FollowValleyConfig(Strict):
     """Distance of the target on the way that the look-ahead has found, m."""
     near_share: float = Field(default=0.5, ge=0.0, le=100.0)
     """Cost of a step that passes an obstacle nearer than `comfort_m`, as a share of its length."""
-    turn_cost_m_per_rad: float = Field(default=0.1, ge=0.0, le=10.0)
+    keep_share: float = Field(default=0.25, ge=0.0, lt=1.0)
+    """What a step along the way in force costs less, as a share of its length: like ways do not alternate."""
+    turn_cost_m_per_rad: float = Field(default=0.3, ge=0.0, le=10.0)
     """Cost of a turn on the way, m for each radian."""
 
     @model_validator(mode="after")

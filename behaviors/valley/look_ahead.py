@@ -33,6 +33,8 @@ Place: TypeAlias = tuple[float, float]
 
 SQUARES_M: Final = 0.5
 """Places in one square of this share of a step are the same place."""
+SAME: Final = 0.7
+"""A place within this share of a step of one on the way in force is on that way."""
 AWAY_M: Final = 1.0
 """A robot farther than this from its way needs another one, m."""
 
@@ -114,7 +116,7 @@ def expand(search: Search, percept: Percept, body_radius_m: float, config: Follo
         if distance < 1e-9 or _is_beyond(percept.occupancy, node, search.nodes[0]):
             return _ended(search, number, reaches=True)
         nodes = [*search.nodes]
-        for child in _children(node, number, distance, goal, percept, body_radius_m, config, is_root=number == 0):
+        for child in _children(node, number, distance, search, percept, body_radius_m, config):
             heappush(heap, (child.cost_m + math.dist((child.x, child.y), goal), len(nodes)))
             nodes.append(child)
         if len(nodes) > config.look_ahead_nodes_max:
@@ -125,26 +127,32 @@ def expand(search: Search, percept: Percept, body_radius_m: float, config: Follo
 
 
 def _children(
-    node: Node, number: int, distance: float, goal: Place, percept: Percept, body_radius_m: float,
-    config: FollowValleyConfig, *, is_root: bool,
+    node: Node, number: int, distance: float, search: Search, percept: Percept, body_radius_m: float,
+    config: FollowValleyConfig,
 ) -> list[Node]:  # fmt: skip
-    """Return the places a step ahead of one in the directions of its candidates."""
+    """Return the places a step ahead of one in the directions of its candidates.
+
+    Steps along the way in force cost less, so that another of almost the same cost does not replace it.
+    """
+    goal, kept = search.goal or (0.0, 0.0), np.array(search.way).reshape(-1, 2)
     room_max_m = body_radius_m + config.safety_m
     step_m = min(config.look_ahead_step_m, distance)
     comfort_m = body_radius_m + config.comfort_m
     cells = cells_near(percept, node.x, node.y, step_m + comfort_m, config)
-    radius_m = room_m(cells, body_radius_m, room_max_m) if is_root else room_max_m
+    radius_m = room_m(cells, body_radius_m, room_max_m) if number == 0 else room_max_m
     blocked, near = map(bytes, crossed(cells, np.array([radius_m, max(radius_m, comfort_m)]), np.full(2, step_m)))
     target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
     found = []
     for c in candidates(blocked, target, math.radians(config.wide_valley_deg) / SECTOR_RAD):
         turned_rad = apart(c, node.direction) * SECTOR_RAD
         cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
-        cost_m += config.turn_cost_m_per_rad * turned_rad
         angle = c * SECTOR_RAD
         x, y = node.x + step_m * math.cos(angle), node.y + step_m * math.sin(angle)
         if c == target and step_m == distance:
             x, y = goal
+        if len(kept) and float(((kept - (x, y)) ** 2).sum(axis=1).min()) < (SAME * step_m) ** 2:
+            cost_m *= 1.0 - config.keep_share
+        cost_m += config.turn_cost_m_per_rad * turned_rad
         found.append(Node(x, y, c, node.cost_m + cost_m, number))
     return found
 

@@ -54,6 +54,23 @@ def test_it_drives_between_two_walls_and_not_through_a_gap_that_is_too_narrow() 
         assert (abs(math.atan2(found.y, found.x)) < 0.2) is passes
 
 
+def test_a_correction_of_the_heading_by_less_than_a_degree_is_not_made() -> None:
+    found, _ = response(at(0.0, 0.0, math.radians(0.8)))
+    assert math.atan2(found.y, found.x) == pytest.approx(math.radians(0.8))
+    found, _ = response(at(0.0, 0.0, math.radians(-1.5)))
+    assert math.atan2(found.y, found.x) == pytest.approx(math.radians(-0.75))
+    found, _ = response(at(0.0, 0.0, math.radians(-3.0)))
+    assert found.y == pytest.approx(0.0)
+
+
+def test_the_direction_turns_little_by_little_where_it_is_free() -> None:
+    _, valley = response(at(0.0, 0.0), Valley(direction_rad=1.0))
+    assert valley.direction_rad == pytest.approx(0.85)
+    _, valley = response(at(0.0, 0.0, echoes=[(0.5, 0.7)]), Valley(direction_rad=1.0))
+    assert valley.direction_rad is not None
+    assert math.cos(valley.direction_rad) > 0.98, "at once where something stands in between"
+
+
 def test_fresh_echoes_count_without_a_grid() -> None:
     echoes = np.array([[0.9, 0.0]])
     found, _ = response(Percept(Pose(0.0, 0.0, 0.0), echoes, EVERYWHERE))

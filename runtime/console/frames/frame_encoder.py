@@ -23,6 +23,7 @@ from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception
 from runtime.console.frames.segment_delta import SegmentDelta
 from runtime.cycle.drive_requests import DriveRequest, GoalPlace
+from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.step import CycleRecord, State
 
 NO_LINK_COUNTS: Final = LinkCounts()
@@ -175,6 +176,7 @@ class FrameEncoder:
             "areas": [[a.number, round(a.x, 3), round(a.y, 3), a.radius] for a in state.perception.vacant_areas()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": _drive_request(state.drive_request, state.goal_place),
+            "valley": None if state.goal_drive is None else _valley(state.goal_drive),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
             "cycle_us": round(1e6 * sum(phases_s.values()), 1),
             "late_us": round(1e6 * context.late_s, 1),
@@ -285,6 +287,16 @@ def _localized(perception: Perception) -> dict[str, Any] | None:
 
 def _rounded(pose: Pose) -> list[float]:
     return [round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)]
+
+
+def _valley(drive: GoalDrive) -> dict[str, Any]:
+    """Return the blocked sectors, the direction chosen (rad) and the way of the look-ahead (m)."""
+    direction = drive.valley.direction_rad
+    return {
+        "blocked": drive.valley.blocked,
+        "direction": None if direction is None else round(direction, 3),
+        "way": [[round(x, 2), round(y, 2)] for x, y in drive.search.way],
+    }
 
 
 def _drive_request(drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:

@@ -158,6 +158,32 @@ export function drawVectors(f) {
   });
 }
 
+// The way that the look-ahead has found, and on a ring round the robot the directions in which something stands.
+export function drawValley(f) {
+  const { ctx, run, px, theme } = f, valley = run.state.valley;
+  if (!run.fresh || !valley) return;
+  const [x, y] = run.state.pose, r = 1.35 * (run.session?.body?.radius ?? 0.2);
+  const sector = (2 * Math.PI) / valley.blocked.length;
+  f.inWorld();
+  ctx.strokeStyle = theme.stop;
+  ctx.globalAlpha = 0.7;
+  ctx.lineWidth = 3 * px;
+  ctx.beginPath();
+  [...valley.blocked].forEach((flag, k) => {
+    if (flag !== "1") return;
+    const begin = (k - 0.5) * sector;
+    ctx.moveTo(x + r * Math.cos(begin), y + r * Math.sin(begin));
+    ctx.arc(x, y, r, begin, begin + sector);
+  });
+  ctx.stroke();
+  ctx.strokeStyle = theme.drive;
+  ctx.lineWidth = 2 * px;
+  ctx.beginPath();
+  valley.way.forEach(([wx, wy], i) => (i === 0 ? ctx.moveTo(wx, wy) : ctx.lineTo(wx, wy)));
+  ctx.stroke();
+  ctx.globalAlpha = 1;
+}
+
 export function drawGoal(f) {
   const { ctx, run, theme, view } = f;
   const drive_request = run.state.drive_request;

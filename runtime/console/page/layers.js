@@ -3,7 +3,7 @@
 import { el, svg } from "./dom.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
-import { drawMapFrame, drawRobot, drawVectors, drawGoal, trailDrawer } from "./draw_motion.js";
+import { drawMapFrame, drawRobot, drawVectors, drawGoal, drawValley, trailDrawer } from "./draw_motion.js";
 import { drawAreas, drawClusters, drawEllipses, drawEvidence, drawLabels, drawModels } from "./draw_objects.js";
 import { AGE_LEGEND, segmentsDrawer } from "./draw_segments.js";
 import { prefer, preferred } from "./preferences.js";
@@ -24,6 +24,7 @@ const TABLE = [
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],
   ["map_frame", "front", "map frame, known room, and where the robot is: 95 % ellipse", drawMapFrame, true, "M8 17V4m0 13h13M24 10a6 4 0 1 1-.1 0Z", "drive"],
   ["drive_request", "front", "goal", drawGoal, true, "M14 18V3l14 4-14 4", "drive"],
+  ["valley", "front", "way to the goal; directions that are blocked", drawValley, true, "M8 6a14 14 0 0 1 24 0M6 18l8-6 12 2 8-8", "drive"],
   ["vectors", "front", "schema vectors and their sum", drawVectors, true, "M4 16 30 5m0 0-8 0m8 0-5 6", "vector"],
   ["labels", "front", "labels and probability", drawLabels, true, "M14 17 20 3l6 14m-9.5-5h7", "model"],
   ["scale", "front", "scale", drawScale, true, "M5 7v6h30V7", "ink"],

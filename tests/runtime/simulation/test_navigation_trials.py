@@ -21,20 +21,18 @@ from runtime.simulation.navigation_trials import (
     run_trial,
 )
 
-SETTINGS = load_settings("hallway", ["perception.method=paper"])
-
-
-def drives(count: int, first: int) -> tuple[list[Trial], list[TrialResult]]:
-    trials = [random_trial(seed, SETTINGS) for seed in range(first, first + count)]
-    return trials, [run_trial(trial, SETTINGS, OurCycle, seed) for seed, trial in enumerate(trials)]
-
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("count", [2, pytest.param(60, marks=pytest.mark.soak)])
-def test_it_arrives_across_random_rooms_and_touches_nothing(count: int) -> None:
-    trials, results = drives(count, 700)
-    row = figures(trials, results, SETTINGS.behaviors.arbiter.base_velocity_m_s)
-    assert row["contacts"] == 0
+@pytest.mark.parametrize(
+    ("count", "grid"),
+    [(2, "off"), pytest.param(60, "directed", marks=pytest.mark.soak)],
+)
+def test_it_arrives_across_random_rooms_and_touches_nothing(count: int, grid: str) -> None:
+    settings = load_settings("hallway", ["perception.method=paper", f"perception.grid.method={grid}"])
+    trials = [random_trial(seed, settings) for seed in range(700, 700 + count)]
+    results = [run_trial(trial, settings, OurCycle, seed) for seed, trial in enumerate(trials)]
+    row = figures(trials, results, settings.behaviors.arbiter.base_velocity_m_s)
+    assert row["touched"] == 0
     assert row["arrives_pct"] >= 98.0
     assert row["way_mean"] <= 1.25
     assert row["speed_share"] >= 0.7
@@ -63,8 +61,8 @@ def test_a_goal_inside_a_drum_is_given_up_and_the_robot_stands() -> None:
 def test_figures_count_what_became_of_the_drives() -> None:
     trial = Trial(WorldConfig(), (3.0, 0.0), 3.0)
     good = TrialResult("arrived", 0, 3.6, 15.0, 7.2, 0.2)
-    row = figures([trial] * 4, [good, good, TrialResult("gave up", 2, 9.0, 60.0, 9.0, 0.0), good], 0.3)
-    assert (row["arrives_pct"], row["contacts"], row["gave_up"]) == (75.0, 2, 1)
+    row = figures([trial] * 4, [good, good, TrialResult("gave up", 1, 9.0, 60.0, 9.0, 0.0), good], 0.3)
+    assert (row["arrives_pct"], row["touched"], row["gave_up"]) == (75.0, 1, 1)
     assert row["way_mean"] == pytest.approx(1.2)
     assert row["speed_share"] == pytest.approx(0.8)
     assert row["jerk_rad_s_per_m"] == pytest.approx(2.0)

@@ -7,9 +7,13 @@ from typing import Any
 
 import pytest
 
+from behaviors.follow_valley import Valley
+from behaviors.goal_progress import Progress
+from behaviors.valley.look_ahead import Search
 from drivers.messages import Pose
 from perception.localization.drift_correction import SeenObject
 from runtime.console.frames.frame_encoder import SEGMENTS_EVERY
+from runtime.cycle.goal_drive import GoalDrive
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
 Segments = dict[int, list[float]]
@@ -125,3 +129,19 @@ async def test_new_segments_come_with_every_second_frame() -> None:
             if frame["segments"]["added"]:
                 with_segments.add(k % SEGMENTS_EVERY)
         assert with_segments == {SEGMENTS_EVERY - 1}
+
+
+async def test_the_way_to_a_goal_and_the_blocked_directions_are_shown() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        case.cycles()
+        assert (await page.next("state"))["valley"] is None
+        blocked = "1" * 3 + "0" * 69
+        case.run.state.goal_drive = GoalDrive(
+            Progress.starting_at(Pose(0.0, 0.0, 0.0), 3.0, 0.0),
+            Valley(blocked, 1.23456),
+            Search(way=((0.0, 0.0), (0.5, 0.123456))),
+        )
+        case.cycles()
+        shown = (await page.next("state"))["valley"]
+        assert shown == {"blocked": blocked, "direction": 1.235, "way": [[0.0, 0.0], [0.5, 0.12]]}
