@@ -213,8 +213,10 @@ class LinkConfig(Strict):
 
 
 class DriverConfig(Strict):
-    """The driver of the robot."""
+    """The robot's name and its driver."""
 
+    name: str | None = Field(default=None, min_length=1, max_length=64)
+    """What the robot is called on the page, in the log and in recordings; by default what it calls itself."""
     driver: str = Field(default="denning", min_length=1, max_length=64)
     """Name of a shipped driver, or of one that an installed package provides: entry points `echolocate.drivers`."""
     protocol: int | None = Field(default=None, ge=1, le=255)

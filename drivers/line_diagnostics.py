@@ -29,6 +29,24 @@ def deadman_refused(name: str, deadman_s: float, link: LinkConfig) -> str | None
     )
 
 
+def finer_than_line(resolution_m: float, unit_m: float) -> str | None:
+    """Return the message for a robot file that promises finer ranges than the line can carry; None if it does not.
+
+    Parameters
+    ----------
+    resolution_m
+        Of the robot file; 0 promises nothing.
+    unit_m
+        Step of the ranges on the line.
+    """
+    if resolution_m == 0.0 or resolution_m >= unit_m * (1.0 - 1e-3):
+        return None
+    return (
+        f"ring.resolution_m = {resolution_m:g} is finer than the {unit_m:.4g} m in which this robot's protocol "
+        f"counts ranges: objects would seem better known than they are; set ring.resolution_m = {unit_m:.4g}"
+    )
+
+
 def silence(silent_s: float, *, others: bool, bad: int) -> str:
     """Return the message for missing odometry.
 

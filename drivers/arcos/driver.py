@@ -22,8 +22,16 @@ from drivers.arcos.frames import EncoderPacket, Packet, ResetNotice, Sip, SipFla
 from drivers.arcos.handshake import CLOSE, STOP, Handshake, Stage
 from drivers.arcos.pose_stamping import SIP_PERIOD_S, PoseStamper
 from drivers.arcos.supervision import Enabling, Halting, ReceiverMonitor
-from drivers.arcos.wire_units import discs_of, drive_commands, flags_of, limit_commands, limits_of, polling_of
-from drivers.driver import LineState
+from drivers.arcos.wire_units import (
+    RANGE_UNIT_M,
+    discs_of,
+    drive_commands,
+    flags_of,
+    limit_commands,
+    limits_of,
+    polling_of,
+)
+from drivers.driver import DriverError, LineState
 from drivers.messages import Identity, LinkCounts
 from drivers.session import Session
 
@@ -62,6 +70,9 @@ class ArcosDriver(Session[PoseStamper]):
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._discs = discs_of(config)
+        finer = line_diagnostics.finer_than_line(config.ring.resolution_m, RANGE_UNIT_M)
+        if finer is not None:
+            raise DriverError(finer)
         super().__init__(PoseStamper(config, self._discs))
         self._polling = polling_of(config, self._discs)
         self._handshake = Handshake(config.link, has_speed="://" not in (config.link.port or ""))

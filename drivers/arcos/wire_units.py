@@ -18,6 +18,8 @@ _CYCLE_MIN_MS, _CYCLE_MAX_MS = 2, 120
 """Shortest and longest sonar cycle."""
 _STEPS_MAX: Final = 16
 """Longest polling sequence of an array."""
+RANGE_UNIT_M: Final = 1e-3
+"""Step of the ranges in an information packet, m."""
 STOP_S: Final = 0.25
 """Duration of a stop from full speed, s, as far as the robot allows it."""
 _ROUNDING: Final = 1e-6

@@ -10,11 +10,12 @@ from drivers import line_diagnostics
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Hello, Ident, Nak, NakCode, Odom
+from drivers.denning.line_load import refuse_overload
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
-from drivers.denning.wire_units import identity_of, newest_version, to_wire, wire_pattern
-from drivers.driver import LineState
+from drivers.denning.wire_units import finest_range_m, identity_of, newest_version, to_wire, wire_pattern
+from drivers.driver import DriverError, LineState
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.messages import Flags, LinkCounts
 from drivers.robot_clock import Jump
@@ -41,9 +42,9 @@ class DenningDriver(Session[PoseStamper]):
     Raises
     ------
     drivers.firing_pattern.FiringError
-        The ring cannot carry out the firing pattern, or the protocol cannot express it.
+        The ring cannot carry out the firing pattern, the protocol cannot express it, or the line is too slow for it.
     DriverError
-        The robot file names a version of the protocol that does not exist.
+        The robot file names a version of the protocol that does not exist, or ranges finer than it carries.
     """
 
     def __init__(self, config: RobotConfig) -> None:
@@ -51,7 +52,12 @@ class DenningDriver(Session[PoseStamper]):
         self._pattern, self._listeners = wire_pattern(config.ring), firing_pattern(config.ring).listeners
         super().__init__(PoseStamper(tuple(mount.angle_rad for mount in config.ring.mounts), config.body))
         self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
-        self._newest = self._version = newest_version(config)  # what to ask for first, and what to ask for now
+        version = newest_version(config)
+        finer = line_diagnostics.finer_than_line(config.ring.resolution_m, finest_range_m(config.ring, version))
+        if finer is not None:
+            raise DriverError(finer)
+        refuse_overload(config.link, self._pattern, self._listeners, version)
+        self._newest = self._version = version  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
         self._ident: Ident | None = None
         self._jump: Jump | None = None

@@ -113,8 +113,16 @@ def emulated_version(config: RobotConfig) -> int:
 
 def range_unit_um(ring: RingConfig) -> int:
     """Return the range unit of an emulated ring, µm: its resolution, or the finest whose counts reach its range."""
-    finest = math.ceil(1e6 * ring.range_max_m / (NO_ECHO_COUNT - 1))
-    return min(0xFFFF, max(finest, round(1e6 * ring.resolution_m)))
+    return min(0xFFFF, max(_finest_um(ring), round(1e6 * ring.resolution_m)))
+
+
+def finest_range_m(ring: RingConfig, version: int) -> float:
+    """Return the finest step in which a version of the protocol counts this ring's ranges, m."""
+    return TENTH_FT_M if version == 1 else 1e-6 * _finest_um(ring)
+
+
+def _finest_um(ring: RingConfig) -> int:
+    return math.ceil(1e6 * ring.range_max_m / (NO_ECHO_COUNT - 1))
 
 
 def to_wire(value: float, limit: float) -> int:

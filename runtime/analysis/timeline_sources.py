@@ -20,6 +20,7 @@ from runtime.recording.reader import Recording, RecordingError, is_recording, op
 from runtime.recording.replayer import Replayer, ReplayStep
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer
+from runtime.recording.ring_log_units import plausible_firings
 from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
 from runtime.recording.verification import Verifier
 
@@ -171,7 +172,7 @@ def _of_ring_log(
     path: Path, source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress
 ) -> Timeline:
     settings = load_settings(None, source.sets, robot=source.robot, models=source.models)
-    firings = read_ring_log(path, sensors=len(settings.ring.mounts))
+    firings = plausible_firings(read_ring_log(path, sensors=len(settings.ring.mounts)), path, settings)
     first = next(firings)  # reports an invalid file before kernels are compiled
     prepare(settings)
     timeline = Timeline(path, settings, None if source.world is None else load_world(source.world))

@@ -181,8 +181,8 @@ class RobotProcess:
 
     @property
     def name(self) -> str | None:
-        """The robot's name as it reports it, None until it has."""
-        return None if self._driver.identity is None else self._driver.identity.name
+        """The robot's name by its file, else as it reports it; None until it has."""
+        return self._settings.robot.name or (self._driver.identity.name if self._driver.identity else None)
 
     def stop(self) -> None:
         """End the run in good order: halt the base, then close the line."""

@@ -179,12 +179,14 @@ def _drive(file: str, robot: str | None, check: Callable[[], None]) -> tuple[Set
     from runtime.analysis.export.ring_log_export import recorded_firings
     from runtime.recording.reader import is_recording, open_recording
     from runtime.recording.ring_log import read_ring_log
+    from runtime.recording.ring_log_units import plausible_firings
 
     path = Path(file)
     if not is_recording(path):
         settings = load_settings(None, (), robot=robot)
         check()
-        return settings, list(read_ring_log(path, sensors=len(settings.ring.mounts)))
+        rows = read_ring_log(path, sensors=len(settings.ring.mounts))
+        return settings, list(plausible_firings(rows, path, settings))
     if robot is not None:
         raise UserError(f"{file}: is a recording and contains its robot; --robot is for ring logs", WRONG_CALL)
     with open_recording(path) as recording:

@@ -52,20 +52,25 @@ def replay_log(
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
+    from runtime.recording.ring_log_units import plausible_firings
 
     rows: list[str] = []
+    warnings: list[str] = []
 
     def on_pose(t: float, here: LocalizedPose) -> None:
         rows.append(trajectory_row(t, here))
 
     with progress(console, "replaying") as step:
-        firings = _each(read_ring_log(Path(log), sensors=len(settings.ring.mounts)), step)
+        logged = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
+        firings = _each(plausible_firings(logged, Path(log), settings, warnings.append), step)
         if map_file is not None:
             summary = replay_in_known_room(settings, firings, on_pose)
         elif corrects_drift:
             summary = replay_localized(settings, firings, on_pose)
         else:
             summary = replay_firings(settings, firings)
+    for warning in warnings:
+        console.print(f"echolocate: {warning}")
     if trajectory is not None:
         with writing("--trajectory", trajectory):
             Path(trajectory).write_text("\n".join([TRAJECTORY_HEADER, *rows, ""]), "utf-8")

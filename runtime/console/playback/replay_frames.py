@@ -31,9 +31,10 @@ class ReplayFrames:
 
     def session(self) -> dict[str, Any]:
         """Return the session information of the recorded run; the page keeps its own choice of units."""
-        info = session_info(self._settings, name=None, emulated=self._emulated, units="m") | {"recording": True}
+        settings = self._settings
+        info = session_info(settings, name=settings.robot.name, emulated=self._emulated, units="m")
         del info["units"]
-        return info
+        return info | {"recording": True}
 
     def take(self, record: CycleRecord) -> None:
         """Take in a cycle, whether or not it is shown."""

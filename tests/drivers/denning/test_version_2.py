@@ -96,7 +96,7 @@ def test_an_ident_of_version_1_in_answer_to_2_is_accepted() -> None:
 
 
 def test_the_robot_file_can_name_the_version() -> None:
-    harness = DriverHarness(robot(protocol=1))
+    harness = DriverHarness(robot(protocol=1, resolution_m=0.03048))
     harness.open()
     assert harness.received() == [Hello(0, 1)]
     for make in (DenningDriver, lambda config: DenningDevice(config, WALL, 1)):

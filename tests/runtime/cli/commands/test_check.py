@@ -42,3 +42,16 @@ def test_a_pattern_with_which_the_robot_could_not_drive_is_wrong(capsys: pytest.
         assert "so that the robot could not drive" in err
     assert run_command(["check", "hallway", "--set", "ring.firing=single"]) == DONE
     assert "limits the speed to 0.10 m/s" in capsys.readouterr().out
+
+
+def test_a_line_too_slow_or_ranges_finer_than_it_are_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    """The line's load was blamed on the cable, and the resolution ignored."""
+    for sets, said in (
+        (["link.baud=9600"], "a line of 9600 baud carries 960"),
+        (["robot.protocol=1", "ring.resolution_m=0.001"], "ring.resolution_m = 0.001 is finer than the 0.03048 m"),
+    ):
+        words = [word for one in sets for word in ("--set", one)]
+        assert run_command(["check", "hallway", *words]) == WRONG_CALL
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert said in err
