@@ -155,6 +155,7 @@ class DenningDriver(Session[PoseStamper]):
         deaf = None if self._ident is None else diagnostics.cannot_listen(self._ident, listeners)
         if deaf is not None:
             raise FiringError(deaf)
+        refuse_overload(self._config.link, pattern, listeners, self._newest)
         # Until the robot uses the new pattern, echoes may belong to either; an echo names its own sensors.
         step_ms = min(self._pattern.step_period_ms, pattern.step_period_ms)
         self.stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
