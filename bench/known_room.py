@@ -5,6 +5,7 @@ In furnished rooms of the emulator, or in real buildings, whose ranges are cut f
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -20,12 +21,23 @@ from perception.localization.expected_ranges import Reflection
 from perception.localization.known_room import KnownRoom
 from perception.localization.room import Room, room_of
 from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
-from runtime.simulation.known_room_trials import SURE, KnownDrive, Trace, figures, follow, furnished_drive
+from runtime.simulation.known_room_trials import (
+    SURE,
+    KnownDrive,
+    Trace,
+    building_drive,
+    figures,
+    follow,
+    furnished_drive,
+)  # fmt: skip
+from runtime.simulation.large_building import Building
+from runtime.timing.footprint import rss_mb
 
 LENGTH_M: Final = 10.0
 """Way before the robot is carried, and after."""
 LASER_M: Final = 20.0
-"""The same in buildings that a laser has recorded."""
+"""The same in buildings that a laser has recorded, and in a large building."""
+BUILDING_SEED: Final = 0
 Rows = dict[str, dict[str, float]]
 
 
@@ -71,6 +83,50 @@ def _figures_of(ring: RingConfig, drives: Iterable[KnownDrive], report: Callable
         traces.append(follow(KnownRoom(drive.room, ring), drive, costs_s))
     cost_ms = 1e3 * np.array(costs_s)
     return asdict(figures(traces)) | {"ms_median": float(np.median(cost_ms)), "ms_mean": float(cost_ms.mean())}
+
+
+def measure_building(
+    ring: RingConfig, side_m: float, seeds: Iterable[int], report: Callable[[str], None]
+) -> Rows:  # fmt: skip
+    """Return the figures of drives from an unknown start in a building of many rooms, by model of reflection.
+
+    Parameters
+    ----------
+    ring
+        The ring.
+    side_m
+        Length and width of the building.
+    seeds
+        Which drives.
+    report
+        Called with a line on what is running.
+    """
+    rows, seeds = {}, tuple(seeds)
+    for reflection in get_args(Reflection):
+        building = Building(BUILDING_SEED, side_m, ACOUSTICS.model_copy(update={"model": reflection}))
+        traces, costs_s, longest_s, first_s = [], list[float](), list[float](), 0.0
+        for seed in seeds:
+            report(f"building of {side_m:g} m, {reflection}: drive {seed}")
+            drive = building_drive(ring, building, seed, LASER_M)
+            begin_s = time.thread_time()
+            localizer = KnownRoom(drive.room, ring, seed=seed)
+            first_s = first_s or time.thread_time() - begin_s
+            took_s = list[float]()
+            traces.append(follow(localizer, drive, took_s))
+            costs_s += took_s
+            longest_s.append(max(took_s))
+        cost_ms = 1e3 * np.array(costs_s)
+        rows[f"{side_m:g} m, {reflection}"] = {
+            "walls": len(building.world.wall),
+            "drums": len(building.world.drum),
+            "map_made_s": first_s,
+            **asdict(figures(traces)),
+            "ms_median": float(np.median(cost_ms)),
+            "ms_p99": float(np.quantile(cost_ms, 0.99)),
+            "longest_search_s": max(longest_s),
+            "rss_mb": (rss_mb() or 0.0),
+        }
+    return rows
 
 
 def measure_lasers(paths: Sequence[Path], drives: int, seeds: Iterable[int], report: Callable[[str], None]) -> Rows:

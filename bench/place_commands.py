@@ -72,6 +72,7 @@ def known_room(
     first: int = 1000,
     laser: tuple[Path, ...] = (),
     seeds: int = 3,
+    building: float = 0.0,
 ) -> int:
     """Measure tracking, global localisation and recovery from kidnapping in furnished rooms that are known.
 
@@ -80,21 +81,26 @@ def known_room(
     json
         File to write.
     rooms
-        Number of rooms; with --laser, of drives from an unknown start in each building.
+        Number of rooms; with --laser or --building, of drives from an unknown start in each building.
     first
         Seed of the first room.
     laser
         Measure in real buildings instead: recordings of a laser with corrected poses, as CARMEN logs.
     seeds
         With --laser, number of drives that are tracked along the whole recording.
+    building
+        Measure in a building of many rooms instead, of this length and width, m.
     """
     use_kernel_cache()
-    from bench.known_room import known_room_table, measure, measure_lasers
+    from bench.known_room import known_room_table, measure, measure_building, measure_lasers
 
     def rows(settings: Settings, tell: Callable[[str], None]) -> dict[str, dict[str, float]]:
         if laser:
             return measure_lasers(laser, max(1, rooms), range(max(1, seeds)), tell)
-        return measure(settings.ring, range(first, first + max(1, rooms)), tell)
+        drives = range(first, first + max(1, rooms))
+        if building > 0.0:
+            return measure_building(settings.ring, building, drives, tell)
+        return measure(settings.ring, drives, tell)
 
     return _try_in_rooms(rows, known_room_table, json, parts=(EMULATOR,))
 

@@ -24,6 +24,9 @@ ROUGH_GAP_MAX_M: Final = 0.3
 """Longest gap without readings inside a span; where everything echoes, a wall leaves none so long."""
 ROUGH_WEIGHT_MIN: Final = 0.6
 """There a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near the line too."""
+LONE_GAP_M: Final = 0.35
+LONE_WEIGHT_MAX: Final = 1.0
+"""An end of so little weight beyond such a gap is left out: at so long a lever one outlier would prove any line."""
 OPENING_MIN_M: Final = 0.3
 """Least width of an opening."""
 OPENING_PASSES_MIN: Final = 1.0
@@ -158,6 +161,8 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     first = -1
     last = -1
     passes = 0.0
+    weight = 0.0  # of the run since its last long gap, …
+    before = -1  # … and the last bin before that
     for b in range(WALL_BINS + 1):
         is_end = b == WALL_BINS
         if not is_end:
@@ -171,6 +176,11 @@ def find_spans(room: WallMap, wall: Wall) -> None:
         width = (b - last - 1) * WALL_BIN_M
         is_opening = width > gap_max or passes >= CRACK_PASSES_MIN
         is_opening = is_opening or (width >= OPENING_MIN_M and passes >= OPENING_PASSES_MIN)
+        is_gap = not is_end and width >= LONE_GAP_M
+        if is_gap and not is_opening and before < 0 and weight <= LONE_WEIGHT_MAX:
+            first = b
+        if (is_end or is_opening) and before >= 0 and weight <= LONE_WEIGHT_MAX:
+            last = before
         if first >= 0 and (is_end or is_opening) and wall.span_count < SPANS_MAX:
             low = first
             high = last
@@ -186,6 +196,13 @@ def find_spans(room: WallMap, wall: Wall) -> None:
             wall.span_count += 1
         if first < 0 or is_opening:
             first = b
+            weight = 0.0
+            before = -1
+        elif is_gap:
+            before = last if first < b else -1
+            weight = 0.0
+        if b < WALL_BINS:
+            weight += wall.bins[b].weight
         last = b
         passes = 0.0
 

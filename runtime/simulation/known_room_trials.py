@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig
-from config.world import AcousticsConfig
+from config.world import AcousticsConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
@@ -21,6 +21,7 @@ from perception.localization.drift_correction import Status
 from perception.localization.known_room import KnownRoom
 from perception.localization.room import Room, room_of
 from runtime.simulation.furnished_rooms import ACOUSTICS, drive, furnished_room
+from runtime.simulation.large_building import Building
 
 STEP_M: Final = 0.03
 """Way between two firings of a part of the ring."""
@@ -104,15 +105,52 @@ def furnished_drive(
     carried_at = len(truth) if kidnapped else None
     if kidnapped:
         truth = np.concatenate([truth, _path(drive(room, seed + 500_000, STEP_M, length_m), seed)])
+    return heard_on_the_way(ring, room.world, truth, seed, carried_at)
+
+
+def building_drive(ring: RingConfig, building: Building, seed: int, length_m: float) -> KnownDrive:
+    """Return a drive through some rooms of a large building; the ring keeps its direction.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The ring.
+    building : Building
+        The building, with its acoustics.
+    seed : int
+        Of drive and errors.
+    length_m : float
+        Length of the drive, m.
+    """
+    return heard_on_the_way(ring, building.world, building.drive(seed, STEP_M, length_m), seed)
+
+
+def heard_on_the_way(
+    ring: RingConfig, world: WorldConfig, truth: Floats, seed: int, carried_at: int | None = None
+) -> KnownDrive:
+    """Return the firings of a drive through a world, with faulty odometry.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The ring.
+    world : WorldConfig
+        The world, with its acoustics.
+    truth : (n, 3) float
+        Poses of the ring, m and rad.
+    seed : int
+        Of the errors.
+    carried_at : int, optional
+        Index of a pose to which the robot was carried.
+    """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 16]))
-    scene = compile_scene(room.world)
-    sonar, pattern = Sonar(ring, scene, acoustics, rng), firing_pattern(ring)
+    sonar, pattern = Sonar(ring, compile_scene(world), world.acoustics, rng), firing_pattern(ring)
     firings = []
     for k, (odometry, row) in enumerate(zip(drifting_odometry(truth, rng, carried_at), truth.tolist(), strict=True)):
         pose = Pose(*row)
         ranges = sonar.fire(pose, pose.theta, sensors(pattern.masks[k % len(pattern.masks)]))
         firings.append(Firing(k * ring.firing.step_period_s, odometry, odometry.theta, ranges))
-    return KnownDrive(room_of(room.world), firings, truth, carried_at)
+    return KnownDrive(room_of(world), firings, truth, carried_at)
 
 
 def _path(poses: Floats, seed: int) -> Floats:

@@ -51,6 +51,19 @@ def test_an_opening_stays_open_where_ranges_pass_and_a_gap_is_closed_where_nothi
     assert spans(wall) == pytest.approx(np.array([[-1.98, -0.42], [0.06, 1.98]]), abs=0.061)
 
 
+def test_a_single_echo_far_beyond_either_end_is_no_part_of_a_wall() -> None:
+    for count, ends in ((1.0, (-0.9, 0.9)), (3.0, (-1.5, 1.5))):
+        memory, room = new_room()
+        wall = room.walls[0]
+        place_wall(wall, np.zeros(2), 0.0, 2.0)
+        fill(memory, wall, -0.9, 0.9)
+        fill(memory, wall, 1.44, 1.5, count)
+        fill(memory, wall, -1.5, -1.44, count)
+        refit(memory, wall)
+        longest = max(spans(wall), key=lambda span: span[1] - span[0])
+        assert longest == pytest.approx(ends, abs=0.061)
+
+
 def test_echoes_of_an_end_do_not_lengthen_a_wall() -> None:
     rng = np.random.default_rng(44)
     memory, room = new_room()
