@@ -19,7 +19,7 @@ ROOM_M: Final = 8.0
 MOVED_M: Final = 0.6
 """… each of which stands so far off at most, as a whole."""
 DOORWAY_M: Final = (1.1, 1.6)
-DOOR_OFF_M: Final = 2.0
+DOORWAY_OFF_M: Final = 2.0
 """Width of a doorway, and its greatest distance from the middle of the wall."""
 DRUM_AT_M: Final = (2.2, 2.8)
 """Distance of a drum from the middle of its room along both axes: beside all ways between doorways."""
@@ -52,7 +52,7 @@ class Building:
         lines = np.arange(n + 1) * ROOM_M
         self._at = lines + rng.uniform(-MOVED_M, MOVED_M, (2, n + 1))
         """Where the walls across x and those across y stand."""
-        self._door = rng.uniform(-DOOR_OFF_M, DOOR_OFF_M, (2, n + 1, n))
+        self._offsets = rng.uniform(-DOORWAY_OFF_M, DOORWAY_OFF_M, (2, n + 1, n))
         widths = rng.uniform(*DOORWAY_M, (2, n + 1, n))
         walls: list[WallConfig] = []
         for axis in range(2):
@@ -61,7 +61,7 @@ class Building:
                 for j in range(n):
                     cuts = [across[j], across[j + 1]]
                     if 0 < k < n:
-                        middle, half = 0.5 * (cuts[0] + cuts[1]) + self._door[axis, k, j], 0.5 * widths[axis, k, j]
+                        middle, half = 0.5 * (cuts[0] + cuts[1]) + self._offsets[axis, k, j], 0.5 * widths[axis, k, j]
                         cuts[1:1] = [middle - half, middle + half]
                     for low, high in zip(cuts[::2], cuts[1::2], strict=True):
                         ends = np.array([[self._at[axis, k], low], [self._at[axis, k], high]])[:, :: 1 - 2 * axis]
@@ -84,7 +84,7 @@ class Building:
         place = self.middle(column, row)
         k, j = (column + 1, row) if axis == 0 else (row + 1, column)
         place[axis] = self._at[axis, k]
-        place[1 - axis] += self._door[axis, k, j]
+        place[1 - axis] += self._offsets[axis, k, j]
         return place
 
     def drive(self, seed: int, step_m: float, length_m: float) -> Floats:
