@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.reference import FILES, markdown, settings_of
 from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.terminal.escaping_console import EscapingConsole
 
 
 def run_settings(text: str, out: str | None, *, force: bool) -> int:
@@ -38,7 +38,7 @@ def run_settings(text: str, out: str | None, *, force: bool) -> int:
             raise UserError(f"cannot write {out}: {error.strerror}", FAILED) from error
         return DONE
     wanted = text.lower()
-    console, count = Console(), 0
+    console, count = EscapingConsole(), 0
     for file, _, _ in FILES:
         for found in settings_of(file):
             if wanted in found.path.lower() or wanted in found.help.lower():
