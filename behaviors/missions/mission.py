@@ -165,12 +165,13 @@ def edit_refusal(mission: Mission | None, edit: MissionEdit) -> str | None:
 
 
 def continued(before: Mission, after: Mission) -> Mission:
-    """Return a new mission with the progress of the one before, if that is the same as far as it has come.
+    """Return a new route with the progress of the one before, if that is the same as far as it has come.
 
-    So a route whose further waypoints an operator adds, moves or removes goes on without a stop.
+    So a route whose further waypoints an operator adds, moves or removes goes on without a stop. Another mission
+    begins anew.
     """
     progress, steps = before.progress, before.progress.step + 1
-    if progress.status == "failed" or before.plan.name != after.plan.name:
+    if progress.status == "failed" or {before.plan.name, after.plan.name} != {ROUTE}:
         return after
     if len(after.plan.step) < steps or after.plan.step[:steps] != before.plan.step[:steps]:
         return after

@@ -24,6 +24,10 @@ NOT_AVAILABLE: Final = "not available in this run"
 class Robot(Protocol):
     """The robot's process, as far as commands act on it."""
 
+    @property
+    def state(self) -> State:
+        """The state after the last cycle."""
+
     def request(self, request: Request, is_valid: Callable[[], bool] = ..., /) -> None:
         """Pass a change of mode to the next cycle, which drops it if it is no longer valid; HALT is sent at once."""
 
@@ -42,10 +46,6 @@ class Run(Robot, Protocol):
 
     health: Health
     live_settings: LiveSettings
-
-    @property
-    def state(self) -> State:
-        """The state after the last cycle."""
 
     @property
     def timing_monitor(self) -> TimingMonitor:

@@ -22,6 +22,7 @@ from drivers.messages import Twist
 __all__ = [
     "COORDINATE_MAX_M",
     "GOAL_SLEW_M_S",
+    "NO_MAP",
     "STANDSTILL",
     "DriveInput",
     "DriveRequest",
@@ -39,6 +40,10 @@ __all__ = [
 ]
 
 STANDSTILL: Final = Twist(0.0, 0.0)
+NO_MAP: Final = (
+    "there is no map frame for this goal: run with --map FILE or with correction of drift, "
+    "or give it in odometry's frame"
+)
 COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate of a goal, m: one beyond it is taken for a typing error."""
 

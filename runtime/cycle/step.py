@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Final, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
 from behaviors.avoid_past import Trail
@@ -24,6 +24,7 @@ from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.cycle.drive_requests import (
+    NO_MAP,
     STANDSTILL,
     DriveInput,
     DriveRequest,
@@ -45,6 +46,7 @@ from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.timing.phases import Phase, ignore_phase
 
 __all__ = [
+    "NO_MAP",
     "STANDSTILL",
     "Command",
     "CycleRecord",
@@ -74,12 +76,6 @@ Command: TypeAlias = Twist | Order | None
 
 StopCause: TypeAlias = Literal["budget", "quota", "converged", "nothing"]
 """Why refinement ended: no time left, no quanta left for these firings, all improved, nothing there to improve."""
-
-
-NO_MAP: Final = (
-    "there is no map frame for this goal: run with --map FILE or with correction of drift, "
-    "or give it in odometry's frame"
-)
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,6 +61,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
                     "closed": True, "arc_radius_m": None}],
         "truth": {"drums": [[x, y, RADIUS] for x, y in DRUMS], "walls": [], "polygons": []},
         "known_room": {"drums": [], "walls": [[-2.0, -2.0, 4.0, -2.0]], "polygons": []},
+        "missions": [{"name": "patrol", "about": "Drives round."}, {"name": "wander", "about": ""}],
         "parameters": [dict(p) for p in PARAMETERS], "budget_s": 0.005, "period_s": PERIOD_S,
     } | changes  # fmt: skip
 

@@ -13,7 +13,7 @@ from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import STANDSTILL, CycleRecord, DriveRequest, Inputs, Order, State, step
+from runtime.cycle.step import STANDSTILL, CycleRecord, DriveInput, Inputs, Order, State, step
 
 SETTINGS = load_settings("hallway", ["perception.method=paper"])
 
@@ -49,7 +49,7 @@ class ScriptedRobot:
     run_s: float = 100.0
     robot_s: float = 7.0
     pose: Pose = HERE
-    drive_request: DriveRequest | None = None
+    drive_request: DriveInput | None = None
 
     def __post_init__(self) -> None:
         perception = Perceiving(self.settings.ring, self.settings.models, self.settings.perception)

@@ -5,20 +5,37 @@ A command that moves the robot or changes its map becomes an input of the next c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
+from behaviors.missions.mission import Mission, MissionEdit, route
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
+from config.load import ConfigError, list_shipped, load_mission, with_mission
 from config.reload import Difference
 from perception.edits import Edit
 from runtime.console.commands.command import ANSWERED_LATER, Call, PendingEdit
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.edit_history import prepare_undo
-from runtime.console.commands.messages import GetEvidence, GrantControl, NoArguments, SetParameter
-from runtime.cycle.drive_requests import Legs
+from runtime.console.commands.messages import (
+    GetEvidence,
+    GrantControl,
+    NoArguments,
+    SetParameter,
+    SetRoute,
+    StartMission,
+)
+from runtime.cycle.drive_requests import NO_MAP, Legs, needs_map, refusal
 from runtime.cycle.inputs import Request
+
+MISSION_EDITS: Final[Mapping[str, MissionEdit]] = MappingProxyType({
+    "hold_mission": MissionEdit("hold"),
+    "resume_mission": MissionEdit("resume"),
+    "skip_step": MissionEdit("skip"),
+})  # fmt: skip
+"""What each command does to the mission under way."""
 
 
 def request_mode(call: Call, _: NoArguments) -> None:
@@ -37,6 +54,59 @@ def request_drive(call: Call, request: Legs | Goal) -> None:
     """Replace the drive request."""
     call.context.is_teleoperated = False
     call.context.robot.drive_request(request, call.remains_valid())
+
+
+def start_mission(call: Call, start: StartMission) -> None:
+    """Replace the drive request by a mission, which begins anew.
+
+    Raises
+    ------
+    CommandError
+        No mission has this name, or this run cannot drive it.
+    """
+    settings = call.context.tuning.current
+    mission = settings.mission
+    if mission is None or mission.name != start.name:
+        if start.name not in list_shipped("missions"):
+            raise CommandError(f"no mission is named {start.name}: choose one from the list", "name")
+        mission = load_mission(start.name)
+        try:
+            with_mission(settings, mission)
+        except ConfigError as error:
+            raise CommandError(str(error), "name") from None
+    _request_mission(call, Mission(mission))
+
+
+def set_route(call: Call, asked: SetRoute) -> None:
+    """Replace the drive request by a route, or change the one under way.
+
+    Raises
+    ------
+    CommandError
+        The robot does not know a map, and the waypoints are places there.
+    """
+    _request_mission(call, route(asked.waypoints, asked.frame))
+
+
+def edit_mission(call: Call, _: NoArguments) -> None:
+    """Hold, resume or skip in the mission under way, whichever the command is called.
+
+    Raises
+    ------
+    CommandError
+        There is none, or it is in no state for that.
+    """
+    _request_mission(call, MISSION_EDITS[call.name])
+
+
+def _request_mission(call: Call, asked: Mission | MissionEdit) -> None:
+    """Pass a mission or a change of it to the next cycle, unless that would refuse it."""
+    state = call.context.robot.state
+    if needs_map(asked) and state.perception.localized() is None:
+        raise CommandError(NO_MAP)
+    _refuse_if(refusal(state.drive_request, asked))
+    call.context.is_teleoperated = False
+    call.context.robot.drive_request(asked, call.remains_valid())
 
 
 def teleoperate(call: Call, request: Teleoperate) -> None:

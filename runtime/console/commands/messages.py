@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 from pydantic_core import from_json
 
 from config.errors import UserError
+from config.mission_step import STEPS_MAX
 from perception.edits import COORDINATE_MAX_M
 
 MESSAGE_MAX_BYTES: Final = 64 * 1024
@@ -35,6 +36,10 @@ Angle: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 Number: TypeAlias = Annotated[int, Field(ge=0, le=ID_MAX)]
 Text: TypeAlias = Annotated[str, Field(max_length=TEXT_MAX)]
 Scalar: TypeAlias = Annotated[bool | int | float | Text | None, Field()]
+
+Degrees: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
+Waypoint: TypeAlias = tuple[Coordinate, Coordinate, Degrees | None]
+"""A place x, y, m, and the final heading there in degrees, None for any."""
 
 BOUNDS: Final[Mapping[str, Any]] = MappingProxyType({
     "x": Coordinate,
@@ -131,6 +136,21 @@ class StepRecording:
     """Go forward by this many cycles; backward where negative."""
 
     cycles: Annotated[int, Field(ge=-10_000, le=10_000)]
+
+
+@dataclass(frozen=True, slots=True)
+class StartMission:
+    """Start a shipped mission, or the run's own, by its name."""
+
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+
+
+@dataclass(frozen=True, slots=True)
+class SetRoute:
+    """Drive to these places in turn; the drive goes on where the route is the same as far as it has come."""
+
+    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1, max_length=STEPS_MAX)]
+    frame: Annotated[Literal["odom", "map"], Field()]
 
 
 class Message(NamedTuple):

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import orjson
 
+from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.settings import Settings
@@ -21,6 +22,7 @@ from drivers.messages import Firing, LinkCounts, Pose
 from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception
+from runtime.console.frames.mission_rows import MissionRows
 from runtime.console.frames.segment_delta import SegmentDelta
 from runtime.cycle.drive_requests import DriveRequest, GoalPlace
 from runtime.cycle.goal_drive import GoalDrive
@@ -114,6 +116,7 @@ class FrameEncoder:
         self._fired_s = [math.nan] * count
         self._fired: set[int] = set()
         self._segments = SegmentDelta()
+        self._mission = MissionRows()
         self._clusters = ClusterView(settings.perception)
         self._cluster_boxes: list[list[float]] = []
         self._segment_counts: tuple[int, int] | None = None
@@ -175,7 +178,7 @@ class FrameEncoder:
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
             "areas": [[a.number, round(a.x, 3), round(a.y, 3), a.radius] for a in state.perception.vacant_areas()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
-            "drive_request": _drive_request(state.drive_request, state.goal_place),
+            "drive_request": self._drive_request(state.drive_request, state.goal_place),
             "valley": None if state.goal_drive is None else _valley(state.goal_drive),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
             "cycle_us": round(1e6 * sum(phases_s.values()), 1),
@@ -208,6 +211,18 @@ class FrameEncoder:
             if not math.isnan(range_m):
                 self._ranges_m[sensor], self._fired_s[sensor] = range_m, firing.robot_s
                 self._fired.add(sensor)
+
+    def _drive_request(self, drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:
+        """Return what is driven, as the page shows it."""
+        match drive_request:
+            case Goal(x=x, y=y, frame=frame):
+                at = None if place is None else [round(place.x, 4), round(place.y, 4)]
+                return {"kind": "goal", "x": x, "y": y, "frame": frame, "at": at, "reached": drive_request.reached}
+            case Teleoperate(v=v, w=w):
+                return {"kind": "teleoperate", "v": v, "w": w}
+            case Mission():
+                return self._mission.row(drive_request)
+        return {"kind": "legs"}
 
     def _encode_archived(self, objects: tuple[DetectedObject, ...]) -> bool:
         """Encode the objects left behind; return whether any came or went since the last frame."""
@@ -297,13 +312,3 @@ def _valley(drive: GoalDrive) -> dict[str, Any]:
         "direction": None if direction is None else round(direction, 3),
         "way": [[round(x, 2), round(y, 2)] for x, y in drive.search.way],
     }
-
-
-def _drive_request(drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:
-    match drive_request:
-        case Goal(x=x, y=y, frame=frame):
-            at = None if place is None else [round(place.x, 4), round(place.y, 4)]
-            return {"kind": "goal", "x": x, "y": y, "frame": frame, "at": at, "reached": drive_request.reached}
-        case Teleoperate(v=v, w=w):
-            return {"kind": "teleoperate", "v": v, "w": w}
-    return {"kind": "legs"}

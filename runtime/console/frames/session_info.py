@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
+from config.load import list_shipped, load_mission
+from config.mission import MissionConfig
+from config.mission_step import LABELS
 from config.settings import Settings
 from config.world import StartConfig, WorldConfig
 from drivers.messages import Pose
@@ -46,12 +50,27 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
             {"name": m.name, "vertices": m.vertices_m, "closed": m.closed, "arc_radius_m": m.arc_radius_m}
             for m in settings.models
         ],
+        "missions": [{"name": m.name, "about": m.about} for m in missions(settings)],
         "truth": surfaces(settings.world, settings.world.start) if emulated and settings.world is not None else None,
         "known_room": None if known_room is None else surfaces(known_room, StartConfig()),
         "parameters": parameters(settings),
         "budget_s": settings.cycle.perception_budget_s,
         "period_s": 1.0 / settings.cycle.rate_hz,
     }
+
+
+def missions(settings: Settings) -> list[MissionConfig]:
+    """Return the missions that an operator can start: the run's own, and those of the shipped ones it can drive."""
+    known = {*(model.name for model in settings.models), *LABELS}
+    shipped = [mission for mission in shipped_missions() if mission.objects() <= known]
+    own = settings.mission
+    return shipped if own is None else [own, *(mission for mission in shipped if mission.name != own.name)]
+
+
+@functools.cache
+def shipped_missions() -> tuple[MissionConfig, ...]:
+    """Return the shipped missions; their files are read once."""
+    return tuple(load_mission(name) for name in list_shipped("missions"))
 
 
 def surfaces(world: WorldConfig, start: StartConfig) -> dict[str, Any]:

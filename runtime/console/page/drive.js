@@ -1,6 +1,7 @@
 // The drive panel: arm, disarm, HALT, handing control over, goals, and teleoperation.
 
 import { byId, setAttribute, setText, writesText } from "./dom.js";
+import { inMap } from "./map_frame.js";
 import { watchGamepad, watchKeys, watchPad } from "./drive_inputs.js";
 
 export class Drive {
@@ -133,18 +134,12 @@ export class Drive {
   }
 }
 
-// A place of the plane as a goal: in the map frame where the robot's place there is known, so that it stays in the room.
-function inMap(localized, x, y) {
-  if (localized?.status !== "tracking") return { x, y };
-  const [x0, y0, turn] = localized.frame, c = Math.cos(turn), s = Math.sin(turn);
-  return { x: c * (x - x0) + s * (y - y0), y: c * (y - y0) - s * (x - x0), frame: "map" };
-}
-
 function driveRequestText(drive_request, units) {
   if (!drive_request) return "No drive request yet.";
   if (drive_request.kind === "goal") {
     const place = units.place(drive_request.x, drive_request.y) + (drive_request.frame === "map" ? " in the map" : "");
     return `${drive_request.reached ? "At" : "To"} the goal at ${place}.`;
   }
+  if (drive_request.kind === "mission") return `Mission ${drive_request.name}: ${drive_request.status}.`;
   return drive_request.kind === "teleoperate" ? "Teleoperation." : "Ahead, as configured.";
 }

@@ -6,7 +6,7 @@ import { byId, el, writesText } from "./dom.js";
 const WORDS = [
   ["Space", "HALT, except while you type text"],
   ["Shift+A", "arm, or re-arm"],
-  ["1 … 6", "tools: move the map, select, move an object, place a model, goal, tape"],
+  ["1 … 8", "tools: move the map, select, move an object, place a model, goal, tape, say where the robot is, waypoints"],
   ["arrows", "on the map: move it, or the crosshair of a tool (Shift: finely)"],
   ["Enter", "on the map: what a click does; elsewhere: press a button, switch a box"],
   ["+  −", "zoom"],
@@ -36,7 +36,7 @@ export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, un
     Delete: chosen.delete, Backspace: chosen.delete, p: chosen.pin, P: chosen.unpin, k: () => time.pause(), "?": help,
     A: (event) => event.shiftKey && drive.arm(), // and not where the capitals are locked
   };
-  for (let n = 1; n <= 6; n++) acts[n] = () => tools.chooseNth(n);
+  for (let n = 1; n <= 8; n++) acts[n] = () => tools.chooseNth(n);
 
   addEventListener("keydown", (event) => {
     if (event.key !== " " || event.ctrlKey || event.metaKey || event.altKey || writesText(event.target)) return;

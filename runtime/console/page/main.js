@@ -8,6 +8,7 @@ import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
 import { Log } from "./log.js";
 import { MapEdits } from "./map_edits.js";
+import { MissionPanel } from "./mission.js";
 import { Notifications } from "./notifications.js";
 import { describeMap, Objects } from "./objects.js";
 import { Parameters } from "./parameters.js";
@@ -22,7 +23,7 @@ import { Teleoperation } from "./teleoperation.js";
 import { Theme } from "./theme.js";
 import { screenshot, Time } from "./time.js";
 import { hereTool, moveTool, placeTool } from "./tool_objects.js";
-import { goalTool, tapeTool } from "./tool_points.js";
+import { goalTool, routeTool, tapeTool } from "./tool_points.js";
 import { selectionBar, panTool, selectTool } from "./tool_select.js";
 import { Toolbox } from "./tools.js";
 import { Units } from "./units.js";
@@ -73,6 +74,7 @@ const tools = new Toolbox({
     goalTool({ sendGoal: (x, y) => drive.panel.goal(x, y).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan") }),
     tapeTool({ units, announce, redraw }),
     hereTool({ run, connection, notifications, redraw, choose: (id) => tools.choose(id) }),
+    routeTool({ addWaypoint: (x, y, heading) => drive.mission.add(x, y, heading), redraw }),
   ],
 });
 scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), run, view, theme, units, selection, options });
@@ -80,6 +82,7 @@ watchPointers(front, view, () => tools.current);
 
 const teleoperation = new Teleoperation({ connection, run });
 drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools });
+drive.mission = new MissionPanel({ run, units, connection, notifications, tools });
 const status = new Status({ run, units, connection, notifications });
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
 const parameters = new Parameters({ run, connection, notifications });

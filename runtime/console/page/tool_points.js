@@ -1,4 +1,4 @@
-// Tools that take points: the goal to drive to, and the measuring tape.
+// Tools that take points: the goal to drive to, the waypoints of a route, and the measuring tape.
 
 import { drawTape, describeTape } from "./tool_overlays.js";
 
@@ -9,6 +9,32 @@ export function goalTool({ sendGoal, after }) {
       sendGoal(at.x, at.y);
       after();
     },
+  };
+}
+
+// A click adds a waypoint; a drag from it gives the final heading there.
+export function routeTool({ addWaypoint, redraw }) {
+  let from = null, to = null;
+  const heading = () => (from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 12 ? Math.atan2(to.y - from.y, to.x - from.x) : null);
+  return {
+    id: "route", name: "Add waypoints to a route; drag for the final heading", icon: "i-route",
+    down(at) {
+      from = to = at;
+    },
+    move(at) {
+      to = at;
+      redraw();
+    },
+    up(at) {
+      if (!from) return;
+      to = at;
+      addWaypoint(from.x, from.y, heading());
+      from = to = null;
+    },
+    cancel() {
+      from = to = null;
+    },
+    draw: (f) => heading() !== null && drawTape(f, from, to),
   };
 }
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from behaviors.missions.mission import Mission, route
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
+from config.load import load_mission
 from perception.edits import (
     ClearMap,
     ConfirmObject,
@@ -26,6 +28,11 @@ ROBOT_REQUESTS: list[tuple[dict[str, Any], object]] = [
     ({"type": "disarm"}, Request.DISARM),
     ({"type": "legs"}, Legs()),
     ({"type": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
+    ({"type": "start_mission", "name": "patrol"}, Mission(load_mission("patrol"))),
+    (
+        {"type": "set_route", "waypoints": [[1, 0, None], [1, 1.5, 90]], "frame": "odom"},
+        route(((1.0, 0.0, None), (1.0, 1.5, 90.0)), "odom"),
+    ),
     ({"type": "teleoperate", "v": 0.2, "w": -1}, Teleoperate(0.2, -1.0, 0.25)),
 ]
 """With what the robot's process is asked for."""
@@ -60,6 +67,9 @@ ASYNC_COMMANDS: list[tuple[dict[str, Any], str]] = [
 ]
 """With what the stub of time control, recording and replay notes."""
 OTHERS: list[dict[str, Any]] = [
+    {"type": "hold_mission"},
+    {"type": "resume_mission"},
+    {"type": "skip_step"},
     {"type": "take_control"},
     {"type": "release_control"},
     {"type": "grant_control", "client": 2},

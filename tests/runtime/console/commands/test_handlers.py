@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from behaviors.missions.mission import Mission, MissionEdit
+from config.load import load_mission
 from perception.edits import ConfirmObject, RejectObject
 from runtime.console.clients.control import REQUEST_TIMEOUT_S
 from runtime.cycle.inputs import Request
@@ -31,6 +33,35 @@ async def test_edits_reach_the_next_cycle(message: dict[str, Any], edit: object)
         await case.settled(lambda: case.run.asked == [edit], "the edit")
         case.cycles(edits=(edit,), outcomes=(None,))
         assert (await page.answer(number))["ok"]
+
+
+async def test_a_mission_is_held_resumed_and_skipped_where_that_is_possible() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        answer = await page.ask(type="skip_step")
+        assert answer["error"] == "there is no mission to skip: start one, or set waypoints"
+        case.run.state.drive_request = Mission(load_mission("patrol"))
+        assert (await page.ask(type="hold_mission"))["ok"]
+        assert (await page.ask(type="skip_step"))["ok"]
+        assert case.run.asked == [MissionEdit("hold"), MissionEdit("skip")]
+        assert (await page.ask(type="resume_mission"))["error"] == "the mission patrol is not held"
+
+
+async def test_a_mission_that_this_run_cannot_drive_is_refused() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        for name, why in (
+            ("patrl", "no mission is named patrl"), ("../missions/patrol", "no mission is named"),
+            ("dock", "mission dock looks for drum"),
+        ):  # fmt: skip
+            answer = await page.ask(type="start_mission", name=name)
+            assert why in answer["error"]
+            assert answer["field"] == "name"
+        answer = await page.ask(type="set_route", waypoints=[[1, 0, None]], frame="map")
+        assert "no map frame" in answer["error"]
+        assert not (await page.ask(type="set_route", waypoints=[], frame="odom"))["ok"]
+        assert not (await page.ask(type="set_route", waypoints=[[1e9, 0, None]], frame="odom"))["ok"]
+        assert case.run.asked == []
 
 
 async def test_edits_are_answered_after_their_cycle() -> None:
