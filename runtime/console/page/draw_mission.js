@@ -30,6 +30,8 @@ export function drawMission(f) {
   for (const { at: [x, y], heading, step, isPath } of places) {
     const isPast = hasEnded || step < mission.step, isCurrent = !hasEnded && step === mission.step;
     ctx.globalAlpha = isPast ? 0.45 : 1;
+    ctx.strokeStyle = theme.drive;
+    ctx.textAlign = "center"; // the name of the step under way is written with other settings
     if (heading !== null) {
       ctx.lineWidth = 3;
       ctx.beginPath();
