@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import math
 import shlex
 import time
 from typing import Final, NamedTuple
@@ -52,6 +53,10 @@ class _Answer(NamedTuple):
     """The robot in words; None if it is none of this kind."""
     problem: str | None = None
     """Why it is not, or why the port cannot be opened."""
+    fired: int = 0
+    """How many of its sensors have fired."""
+    is_whole: bool = False
+    """Whether all have."""
 
 
 def probe(port: str | None, *, robot: str | None) -> int:
@@ -90,7 +95,8 @@ def probe(port: str | None, *, robot: str | None) -> int:
 async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     """Return what answers on a port.
 
-    Robots of one driver and one speed are tried one after the other as long as something answers them.
+    Robots of one driver and one speed are tried one after the other as long as something answers them. One of which
+    all sensors fire is the robot; some controllers do not name theirs, and of those the one of which most fire is chosen.
 
     Parameters
     ----------
@@ -99,16 +105,21 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     robots
         Robots by the names by which they are run.
     """
-    said = list[str]()
+    said, best = list[str](), (0, Finding(None, ()))
     for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
         for name, config in family:
             answer = await _try(port, config)
             if answer.text is not None:
-                return Finding(name, (answer.text,))
+                if best[1].robot is None or answer.fired > best[0]:
+                    best = (answer.fired, Finding(name, (answer.text,)))
+                if answer.is_whole:
+                    return best[1]
             if answer.problem is not None:
                 said.append(f"as {name}: {answer.problem}" if answer.has_answered else answer.problem)
             if not answer.has_answered:
                 break
+        if best[1].robot is not None:
+            return best[1]
         if said and not answer.has_answered and answer.problem is not None:
             break  # the port cannot be opened
     return Finding(None, tuple(said or ["nothing answers: is the robot on, and is this its cable?"]))
@@ -159,15 +170,15 @@ async def _try(port: str, config: RobotConfig) -> _Answer:
             await asyncio.sleep(POLL_S)
         if not link.is_open:
             return _Answer(has_answered=False, problem=link.last_error)
-        return _Answer(has_answered=True, text=await _look(connection))
+        return await _look(connection)
     finally:
         if driver.state is LineState.READY:
             await connection.shut_down()
         await link.stop()
 
 
-async def _look(connection: Connection) -> str:
-    """Return a robot that is ready in words, after listening to it for a while."""
+async def _look(connection: Connection) -> _Answer:
+    """Return what a robot that is ready says, after listening to it for a while."""
     driver, clock = connection.driver, connection.clock
     flags, fired, heard = Flags.NONE, set[int](), set[int]()
     end_s = clock() + LOOK_S
@@ -184,7 +195,9 @@ async def _look(connection: Connection) -> str:
     robot = "a robot" if identity is None else f"{_name(identity)}, {identity.sensors} sensors"
     within = f"within {LOOK_S:g} s {len(fired)} have fired and {len(heard)} have heard something"
     battery = _battery(driver.battery_v, is_low=Flags.BATTERY_LOW in flags)
-    return "; ".join([robot, battery, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+    text = "; ".join([robot, battery, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+    count = math.inf if identity is None else identity.sensors
+    return _Answer(has_answered=True, text=text, fired=len(fired), is_whole=len(fired) >= count)
 
 
 def _battery(volts: float | None, *, is_low: bool) -> str:

@@ -10,6 +10,8 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from config.errors import DONE, FAILED
+from config.load import load_robot
+from config.robot import RobotConfig
 from runtime.cli.app import run_command
 from runtime.cli.commands import probe
 from tests.hil.running import emulated
@@ -32,6 +34,31 @@ def test_a_robot_is_named_and_does_not_move(
     assert "have heard something" in text
     assert command.strip() == f"run it: echolocate run --robot {robot} --port {found.port}"
     assert all(row.still for row in Truth(found.trace).read())
+
+
+@pytest.mark.parametrize(
+    ("fired", "chosen"),
+    [
+        ({"atrvjr": 16, "b21r": 24, "b21r-both": 24, "magellan": 8}, "b21r"),
+        ({"atrvjr": 13, "b21r": 8, "magellan": 16}, "magellan"),
+        ({"atrvjr": 5, "b21r": 20}, "b21r"),
+        ({"atrvjr": 3}, "atrvjr"),
+    ],
+)
+async def test_of_robots_that_do_not_name_themselves_the_one_of_which_all_or_most_sensors_fire_is_chosen(
+    fired: dict[str, int], chosen: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robots = {name: load_robot(name) for name in ("atrvjr", "b21r", "b21r-both", "denning", "magellan")}
+
+    async def answer(_port: str, config: RobotConfig) -> probe._Answer:
+        (name,) = (name for name, known in robots.items() if known is config)
+        if config.robot.driver != "rflex":
+            return probe._Answer(has_answered=False)
+        count = fired.get(name, 0)
+        return probe._Answer(has_answered=True, text=name, fired=count, is_whole=count == len(config.ring.mounts))
+
+    monkeypatch.setattr(probe, "_try", answer)
+    assert await probe.probe_port("/dev/ttyUSB0", robots) == probe.Finding(chosen, (chosen,))
 
 
 def test_a_battery_that_is_low_is_named_with_and_without_its_voltage() -> None:
