@@ -96,7 +96,7 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     """Return what answers on a port.
 
     Robots of one driver and one speed are tried one after the other as long as something answers them. One of which
-    all sensors fire is the robot; some controllers do not name theirs, and of those the one of which most fire is chosen.
+    all sensors fire is the robot; some controllers do not name theirs, and the one of which most fire is chosen.
 
     Parameters
     ----------
