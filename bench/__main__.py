@@ -19,6 +19,7 @@ from bench.place_commands import (
     beacons,
     false_drums,
     false_walls,
+    grid,
     known_room,
     localization,
     map_size,
@@ -233,6 +234,7 @@ for command in (
     walls,
     false_drums,
     false_walls,
+    grid,
 ):
     app.command(command)
 app.command(map_size, name="map")

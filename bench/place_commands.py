@@ -11,11 +11,11 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from bench.table import report, rows_table
+from bench.table import report, rows_table, wide
 from config.errors import UserError
 from config.load import load_settings
 from config.settings import Settings
-from runtime.support.kernel_cache import EMULATOR, prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import EMULATOR, GRIDS, prepare_kernels, use_kernel_cache
 
 STEPS_FT: Final = (0.05, 0.2, 0.5, 1.0)
 """Distances between two firings of one sensor in the rooms with walls, ft."""
@@ -142,6 +142,39 @@ def navigation(
         lambda rows: rows_table("drives to goals in unknown rooms", rows),
         json,
     )
+
+
+def grid(
+    *, json: str = "grid.json", laser: tuple[Path, ...] = (), corridor: Path | None = None, seed: int = 0
+) -> int:
+    """Measure evidence grids: ours and those of others in rooms and in a corridor, and the time that ours take.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    laser
+        Recordings of a laser with corrected poses, as CARMEN logs.
+    corridor
+        Folder with poses.txt and measurement.txt of the corridor that eight sonars recorded (tests/data/README.md).
+    seed
+        Of the readings that are too long in the rooms of mirrors.
+    """
+    use_kernel_cache()
+    from bench.grid import measure_corridor, measure_cost, measure_rooms
+
+    console, settings = Console(stderr=True), load_settings("hallway")
+    prepare_kernels(settings, console, GRIDS)
+    with console.status("bench") as status:
+        rows = {"time": measure_cost(settings.ring)}
+        if laser:
+            rows["rooms"] = measure_rooms(laser, seed, status.update)
+        if corridor is not None:
+            rows["corridor"] = measure_corridor(corridor, status.update)
+    tables = [rows_table(f"evidence grids: {title}", part) for title, part in rows.items()]
+    for table in tables[1:]:
+        wide().print(table)
+    return report(json, rows, tables[0])
 
 
 def beacons(recording: Path, *, json: str = "beacons.json") -> int:

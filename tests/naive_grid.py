@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from drivers.messages import Floats
 from perception.mapping.grid import directed as d
+from perception.mapping.grid.cell_evidence import CERTAIN, FADING_PLACES, NAT, UNDIRECTED
 
 
 @dataclass
@@ -24,8 +25,8 @@ class Evidence:
 
     def now(self, place: int) -> int:
         """Return it as it has faded."""
-        value = max(-d.CERTAIN, min(d.CERTAIN, self.base + self.hit + self.free))
-        return int(math.copysign(max(0, abs(value) - d.FADING * (place - self.stamp)), value))
+        value = max(-CERTAIN, min(CERTAIN, self.base + self.hit + self.free))
+        return int(math.copysign(max(0, abs(value) - (place - self.stamp) // FADING_PLACES), value))
 
     def renew(self, place: int) -> None:
         """Begin a new place."""
@@ -34,8 +35,8 @@ class Evidence:
 
     def prior(self) -> float:
         """Return the square of the probability without this place's hits."""
-        value = max(-d.CERTAIN, min(d.CERTAIN, self.base + self.free))
-        return (1.0 + math.exp(-value / d.NAT)) ** -2
+        value = max(-CERTAIN, min(CERTAIN, self.base + self.free))
+        return (1.0 + math.exp(-value / NAT)) ** -2
 
 
 @dataclass
@@ -50,7 +51,7 @@ class NaiveGrid:
     )
 
     def enter(self, sensors: list[tuple[float, float, float]], ranges: Floats, bearings: Floats, place: int,
-              silence_m: float) -> None:  # fmt: skip
+              silence_m: float, mirrors: float) -> None:  # fmt: skip
         """Enter a firing of sensors at x, y (m) that look in a direction (rad)."""
         beams = [
             (sensor, float(r), float(bearing))
@@ -59,36 +60,46 @@ class NaiveGrid:
         ]
         for sensor, r, _ in beams:
             limit = r - d.PASSED_SIGMAS * self.sigma(r) if math.isfinite(r) else silence_m
-            weight = 1.0 if math.isfinite(r) else d.SILENCE
+            is_echo = math.isfinite(r)
+            weight = (
+                d.PASSED * (1.0 - d.MIRRORS_PASSED * mirrors)
+                if is_echo
+                else d.SILENT * (1.0 - d.MIRRORS_SILENT * mirrors)
+            )
+            weight_both = d.UNDIRECTED_PASSED if is_echo else d.UNDIRECTED_SILENT
             for cell, away, inside, k in self.beam(sensor, limit):
                 if away < limit:
-                    for evidence in (self.cells[cell][k], self.cells[cell][d.UNDIRECTED]):
+                    for index, most in ((k, weight), (UNDIRECTED, weight_both)):
+                        evidence = self.cells[cell][index]
                         evidence.renew(place)
-                        evidence.free = min(evidence.free, -int(d.PASSED * weight * inside))
+                        evidence.free = min(evidence.free, -int(most * inside))
         for sensor, r, bearing in beams:
             if math.isfinite(r):
-                self.hit(sensor, r, bearing, place)
+                self.hit(sensor, r, bearing, place, mirrors)
 
-    def hit(self, sensor: tuple[float, float, float], r: float, bearing: float, place: int) -> None:
+    def hit(self, sensor: tuple[float, float, float], r: float, bearing: float, place: int, mirrors: float) -> None:
         """Enter an echo's arc, or its contact where its bearing is known."""
         sigma = self.sigma(r)
-        arc = [
-            (cell, k, inside * math.exp(-0.5 * ((away - r) / sigma) ** 2))
-            for cell, away, inside, k in self.beam(sensor, r + d.ARC_SIGMAS * sigma)
-            if abs(away - r) <= d.ARC_SIGMAS * sigma
-        ]
-        if not math.isnan(bearing):
-            dx, dy = r * math.cos(sensor[2] + bearing), r * math.sin(sensor[2] + bearing)
-            cell = (math.floor((sensor[0] + dx) / self.cell_m), math.floor((sensor[1] + dy) / self.cell_m))
-            arc = [(cell, looking(dx, dy), 1.0)]
-        for unit, is_directed in ((1.0, True), (d.UNDIRECTED_UNIT, False)):
-            evidences = [self.cells[cell][k if is_directed else d.UNDIRECTED] for cell, k, _ in arc]
+        beam = self.beam(sensor, r + d.UNDIRECTED_ARC_SIGMAS * sigma)
+        units = ((d.UNIT + d.MIRRORS_UNIT * mirrors, d.ARC_SIGMAS), (d.UNDIRECTED_UNIT, d.UNDIRECTED_ARC_SIGMAS))
+        for unit, sigmas in units:
+            is_directed = sigmas == d.ARC_SIGMAS
+            arc = [
+                (cell, k if is_directed else UNDIRECTED, inside * math.exp(-0.5 * ((away - r) / sigma) ** 2))
+                for cell, away, inside, k in beam
+                if abs(away - r) <= sigmas * sigma
+            ]
+            if not math.isnan(bearing):
+                dx, dy = r * math.cos(sensor[2] + bearing), r * math.sin(sensor[2] + bearing)
+                contact = (math.floor((sensor[0] + dx) / self.cell_m), math.floor((sensor[1] + dy) / self.cell_m))
+                arc = [(contact, looking(dx, dy) if is_directed else UNDIRECTED, 1.0)]
+            evidences = [self.cells[cell][k] for cell, k, _ in arc]
             for evidence in evidences:
                 evidence.renew(place)
             drawn = [share * evidence.prior() for (_, _, share), evidence in zip(arc, evidences, strict=True)]
             for evidence, part in zip(evidences, drawn, strict=True):
                 q = 0.5 + 0.49 * min(1.0, unit * part / sum(drawn))
-                evidence.hit = max(evidence.hit, int(d.NAT * math.log(q / (1.0 - q))))
+                evidence.hit = max(evidence.hit, int(NAT * math.log(q / (1.0 - q))))
 
     def sigma(self, r: float) -> float:
         """Return the standard deviation of a range."""

@@ -25,102 +25,69 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.kernel import Floats, Ints, kernel
+from perception.mapping.grid.cell_evidence import (
+    CERTAIN,
+    FREE,
+    HIT,
+    NAT,
+    PLACES,
+    STAMP,
+    UNDIRECTED,
+    Cells,
+    base_elsewhere,
+    evidence_now,
+    hit_nat,
+    prior,
+    renew,
+)
 from perception.mapping.grid.window import OCTANTS, Ring, Window, octant, row_of_beam, set_edges
-
-UNDIRECTED: Final = OCTANTS
-"""Index of the undirected evidence of a cell, behind those of the looking directions."""
-BASE: Final = 0
-HIT: Final = 1
-FREE: Final = 2
-STAMP: Final = 3
-"""What is kept of each evidence: its value when the robot came to this place; the strongest hit and the strongest
-passage since; and the place."""
-NAT: Final = 1024
-"""One nat of log odds; evidence is kept in whole numbers, which replay to the bit."""
-PLACE_M: Final = 0.1
-"""Readings on so much way are from one place."""
-PLACES: Final = 1 << 15
-"""Places are numbered modulo this."""
-CERTAIN: Final = 3 * NAT
-"""Greatest evidence for and against, so that contradiction is soon seen."""
-FADING: Final = 1
-"""Evidence that is lost for each place: 1 nat on about 100 m of way."""
+from perception.sensor_mounts import mounts_at
 
 SPREAD_CELLS: Final = 0.5
 SPREAD_RELATIVE: Final = 0.01
 """Standard deviation of an echo's range, in cells and as a share of the range, at least."""
 ARC_SIGMAS: Final = 1.5
-"""Half the thickness of an echo's arc; …"""
+UNDIRECTED_ARC_SIGMAS: Final = 2.0
+"""Half the thickness of an echo's arc, in a looking direction and in the undirected evidence; …"""
 PASSED_SIGMAS: Final = 1.0
 """… and what is nearer than the range by this was passed."""
-PASSED: Final = int(1.2 * NAT)
-"""Evidence of a passage through the middle of a beam; towards the edge it vanishes …"""
-SILENCE: Final = 1.5
-"""… and that of a beam without an echo, which neither a chance echo nor crosstalk has cut short, is so much more."""
-UNDIRECTED_UNIT: Final = 4.0
-"""An echo's unit of evidence in the undirected grid: there the passages of all directions count against it."""
+PASSED: Final = 1.2 * NAT
+"""Evidence of a passage through the middle of a beam; towards the edge it vanishes."""
+SILENT: Final = 1.8 * NAT
+"""That of a beam without an echo, which neither a chance echo nor crosstalk has cut short."""
+UNIT: Final = 1.0
+"""An echo's unit of evidence: log odds by ½ + .49 times its share."""
+MIRRORS_PASSED: Final = 0.6
+MIRRORS_SILENT: Final = 0.8
+MIRRORS_UNIT: Final = 2.0
+"""Among mirrors a passage proves so much less, silence likewise, and an echo so much more: a beam of 24° and a
+looking direction of 45° are wide beside the few degrees in which a mirror answers."""
+UNDIRECTED_PASSED: Final = 1.8 * NAT
+UNDIRECTED_SILENT: Final = 1.8 * NAT
+UNDIRECTED_UNIT: Final = 2.0
+"""The same for the undirected evidence, in which the passages of all directions count."""
+FAINT: Final = int(0.1 * NAT)
+"""Directed evidence up to this is as good as none: any cell of a single echo's arc has it."""
 SURE: Final = NAT // 2
 MIDDLE: Final = 0.75
 """A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
 BEYOND_M: Final = 0.3
 """… and has not if the beam went on for this much, m."""
-
-PRIOR_ANSWERS: Final = 4.0
-"""Answers and silences that are assumed at the start."""
+PRIOR_ANSWERED: Final = 4.0
+PRIOR_PASSED: Final = 1.0
+"""Answers and passages that are assumed at the start."""
 ANSWERS_MAX: Final = 1000.0
 """When so many were counted, both are halved."""
-DIFFUSE_SHARE: Final = 0.2
-MIRROR_SHARE: Final = 0.4
-"""Share of silences from which on, and up to which, the undirected evidence counts less and less."""
-FAINT: Final = int(0.15 * NAT)
-"""Directed evidence up to this is as good as none: any cell of a single echo's arc has it."""
-
-Cells = NDArray[np.int16]
-
-
-@kernel
-def evidence_now(kept: Cells, place: int) -> int:
-    """Return the evidence of a cell in one direction, faded by the way since it was last renewed.
-
-    Parameters
-    ----------
-    kept : (4,) int16
-        As kept.
-    place : int
-        Where the robot is now.
-    """
-    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[HIT]) + int(kept[FREE])))
-    faded = FADING * ((place - int(kept[STAMP])) & (PLACES - 1))
-    return max(0, value - faded) if value > 0 else min(0, value + faded)
-
-
-@kernel
-def renew(kept: Cells, place: int) -> None:
-    """Begin a new place: what was found at the last one becomes the base."""
-    if kept[STAMP] != place:
-        kept[BASE] = evidence_now(kept, place)
-        kept[HIT] = 0
-        kept[FREE] = 0
-        kept[STAMP] = place
-
-
-@kernel
-def base_elsewhere(cell: Cells, own: int, place: int) -> int:
-    """Return the greatest evidence of a cell in any looking direction but one, without this place's readings."""
-    most = 0
-    for k in range(OCTANTS):
-        if k != own:
-            kept = cell[k]
-            value = int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)
-            most = max(most, value)
-    return most
+DIFFUSE_SHARE: Final = 0.3
+MIRROR_SHARE: Final = 0.5
+"""Share of passages from which on, and up to which, the undirected evidence counts less and less."""
 
 
 @kernel
 def enter_readings(
     cells: Cells, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float, ranges: Floats,
-    mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float, answers: Floats,
-    arc: Ints, shares: Floats, edges: Floats,
+    mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float, mirrors: float,
+    answers: Floats, arc: Ints, shares: Floats, edges: Floats,
 ) -> None:  # fmt: skip
     """Enter the readings of a firing: first what they passed, then their hits, so that their order does not matter.
 
@@ -148,6 +115,8 @@ def enter_readings(
         Standard deviation of a range by its rounding, m.
     silence_m : float
         Distance to which a beam without an echo shows free space, m.
+    mirrors : float
+        How far this is a place of mirrors, 0 to 1.
     answers : (2,) float
         How often a cell that was heard from other directions answered, and how often not. Updated.
     arc : (k, 4) int
@@ -175,10 +144,13 @@ def enter_readings(
         set_edges(axis, half_angle, edges)
         sigma = max(SPREAD_CELLS * cell_m, rounding_m, SPREAD_RELATIVE * r) if is_echo else 0.0
         passed = r - PASSED_SIGMAS * sigma if is_echo else silence_m
-        end = r + ARC_SIGMAS * sigma if is_echo else silence_m
+        end = r + UNDIRECTED_ARC_SIGMAS * sigma if is_echo else silence_m
         is_located = is_echo and not math.isnan(bearings[i])
-        weight = PASSED if is_echo else SILENCE * PASSED
-        first = m
+        weight = PASSED * (1.0 - MIRRORS_PASSED * mirrors)
+        weight_both = UNDIRECTED_PASSED
+        if not is_echo:
+            weight = SILENT * (1.0 - MIRRORS_SILENT * mirrors)
+            weight_both = UNDIRECTED_SILENT
         nearest = math.inf
         low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
         high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
@@ -199,10 +171,10 @@ def enter_readings(
                 d = math.sqrt(square)
                 k = octant(dx, dy)
                 cell = cells[iy & mask, ix & mask]
-                if is_echo and not is_located and abs(d - r) <= ARC_SIGMAS * sigma and m < arc.shape[0]:
+                if is_echo and not is_located and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
                     arc[m, 0] = iy & mask
                     arc[m, 1] = ix & mask
-                    arc[m, 2] = k
+                    arc[m, 2] = k if abs(d - r) <= ARC_SIGMAS * sigma else UNDIRECTED
                     arc[m, 3] = i
                     shares[m] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
                     m += 1
@@ -214,7 +186,7 @@ def enter_readings(
                     own[FREE] = min(int(own[FREE]), -int(weight * inside))
                     both = cell[UNDIRECTED]
                     renew(both, place)
-                    both[FREE] = min(int(both[FREE]), -int(weight * inside))
+                    both[FREE] = min(int(both[FREE]), -int(weight_both * inside))
         if is_located and m < arc.shape[0]:
             px = r * math.cos(axis + bearings[i])
             py = r * math.sin(axis + bearings[i])
@@ -232,48 +204,49 @@ def enter_readings(
                 answers[0] += 1.0
             elif nearest < passed - BEYOND_M:
                 answers[1] += 1.0
+    enter_hits(cells, place, UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares)
+
+
+@kernel
+def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats) -> None:
+    """Share each echo over its arc.
+
+    Parameters
+    ----------
+    cells, place, shares
+        As of `enter_readings`.
+    unit : float
+        The unit of evidence in a looking direction.
+    arc : (m, 4) int
+        As of `enter_readings`; cells for the undirected evidence only have that in place of a looking direction.
+    """
     first = 0
-    while first < m:
+    while first < len(arc):
         last = first
         total = 0.0
         total_both = 0.0
-        while last < m and arc[last, 3] == arc[first, 3]:
+        while last < len(arc) and arc[last, 3] == arc[first, 3]:
             cell = cells[arc[last, 0], arc[last, 1]]
             own = cell[arc[last, 2]]
             renew(own, place)
             both = cell[UNDIRECTED]
             renew(both, place)
-            total += shares[last] * prior(own)
+            if arc[last, 2] != UNDIRECTED:
+                total += shares[last] * prior(own)
             total_both += shares[last] * prior(both)
             last += 1
         for n in range(first, last):
             cell = cells[arc[n, 0], arc[n, 1]]
-            own = cell[arc[n, 2]]
+            if arc[n, 2] != UNDIRECTED:
+                own = cell[arc[n, 2]]
+                own[HIT] = max(int(own[HIT]), hit_nat(unit * shares[n] * prior(own) / total))
             both = cell[UNDIRECTED]
-            h = hit_nat(shares[n] * prior(own) / total)
-            own[HIT] = max(int(own[HIT]), h)
-            h = hit_nat(UNDIRECTED_UNIT * shares[n] * prior(both) / total_both)
-            both[HIT] = max(int(both[HIT]), h)
+            both[HIT] = max(int(both[HIT]), hit_nat(UNDIRECTED_UNIT * shares[n] * prior(both) / total_both))
         first = last
 
 
 @kernel
-def prior(kept: Cells) -> float:
-    """Return how much of an echo a cell draws: the square of its probability, this place's hits left out."""
-    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
-    probability = 1.0 / (1.0 + math.exp(-value / NAT))
-    return probability * probability
-
-
-@kernel
-def hit_nat(share: float) -> int:
-    """Return the evidence of a share of an echo, in units."""
-    q = 0.5 + 0.49 * min(1.0, share)
-    return int(NAT * math.log(q / (1.0 - q)))
-
-
-@kernel
-def fill_evidence(
+def fill_probability(
     cells: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
     odds: NDArray[np.float32], out: NDArray[np.float32],
 ) -> None:  # fmt: skip
@@ -284,7 +257,7 @@ def fill_evidence(
     cells, corner, cell_m, place
         As of `enter_readings`.
     mirrors : float
-        Weight of the looking directions, 0 to 1; the rest is that of the undirected evidence.
+        Weight of the looking directions, 0 to 1, where they are asked together; the rest is that of the undirected.
     from_x, from_y : float
         The place from which the cells are asked, m; NaN: from any direction.
     odds : (2 CERTAIN + 1,) float32
@@ -298,20 +271,23 @@ def fill_evidence(
         for column in range(count):
             ix = int(corner[0]) + column
             cell = cells[iy & (count - 1), ix & (count - 1)]
-            directed = 0
+            if cell[UNDIRECTED, STAMP] == 0:
+                out[row, column] = odds[CERTAIN]
+                continue
             if math.isnan(from_x):
+                most = 0
                 least = 0
-                for k in range(OCTANTS):
+                for k in range(OCTANTS if mirrors > 0.0 else 0):
                     value = evidence_now(cell[k], place)
-                    directed = max(directed, value)
+                    most = max(most, value)
                     least = min(least, value)
-                directed = directed if directed > 0 else least
+                directed = max(0, most - FAINT) if most > 0 else least
+                value = int(mirrors * directed + (1.0 - mirrors) * evidence_now(cell[UNDIRECTED], place))
             else:
                 k = octant((ix + 0.5) * cell_m - from_x, (iy + 0.5) * cell_m - from_y)
-                directed = evidence_now(cell[k], place)
-            directed = directed if directed <= 0 else max(0, directed - FAINT)
-            mixed = mirrors * directed + (1.0 - mirrors) * evidence_now(cell[UNDIRECTED], place)
-            out[row, column] = odds[CERTAIN + int(mixed)]
+                value = evidence_now(cell[k], place)
+                value = max(0, value - FAINT) if value > 0 else value
+            out[row, column] = odds[CERTAIN + value]
 
 
 class DirectedGrid:
@@ -325,11 +301,11 @@ class DirectedGrid:
         The sensors.
     """
 
-    SCRATCH: Final = ("window", "_mounts", "_half_angle", "_rounding_m", "_arc", "_shares", "_edges", "_odds")
+    SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_arc", "_shares", "_edges", "_odds")
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
-        self._mounts = ring.mounts
+        self._ring = ring
         self._half_angle = ring.half_angle
         self._rounding_m = ring.rounding_m
         self.cells: Cells = np.zeros((window.cells, window.cells, OCTANTS + 1, 4), np.int16)
@@ -346,18 +322,19 @@ class DirectedGrid:
     def mirrors(self) -> float:
         """How far cells answer in the direction only from which they were heard, 0 to 1."""
         answered, passed = self._answers.tolist()
-        share = (passed + PRIOR_ANSWERS) / (answered + passed + 2.0 * PRIOR_ANSWERS)
+        share = (passed + PRIOR_PASSED) / (answered + passed + PRIOR_ANSWERED + PRIOR_PASSED)
         return min(1.0, max(0.0, (share - DIFFUSE_SHARE) / (MIRROR_SHARE - DIFFUSE_SHARE)))
 
     def observe(self, firing: Firing, bearings: Floats, place: int, silence_m: float) -> None:
         """Enter a firing; see `EvidenceGrid.observe`."""
         if not self.window.follow(firing.pose, (self.cells,)):
             return
-        self._place = place % PLACES
+        self._place = 1 + place % (PLACES - 1)  # 0 is that of a cell without evidence
+        mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_readings(
             self.cells, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
-            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, self._mounts, bearings, self._half_angle,
-            self._rounding_m, silence_m, self._answers, self._arc, self._shares, self._edges,
+            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings, self._half_angle,
+            self._rounding_m, silence_m, self.mirrors, self._answers, self._arc, self._shares, self._edges,
         )  # fmt: skip
         if self._answers.sum() > ANSWERS_MAX:
             self._answers *= 0.5
@@ -366,7 +343,7 @@ class DirectedGrid:
         """Return the probability of each cell; see `EvidenceGrid.occupancy`."""
         out = np.empty(self.cells.shape[:2], np.float32)
         x, y = (math.nan, math.nan) if seen_from is None else seen_from
-        fill_evidence(
+        fill_probability(
             self.cells, self.window.corner, self.window.cell_m, self._place, self.mirrors, x, y, self._odds, out
         )
         return out
@@ -381,5 +358,7 @@ class DirectedGrid:
 def arc_cells_max(window: Window, ring: Ring) -> int:
     """Return how many cells the arc of one echo has at most."""
     reach = min(ring.reach_m, math.sqrt(2.0) * window.cells * window.cell_m) / window.cell_m
-    thickness = 2.0 * ARC_SIGMAS * max(SPREAD_CELLS, ring.rounding_m / window.cell_m, SPREAD_RELATIVE * reach)
+    thickness = (
+        2.0 * UNDIRECTED_ARC_SIGMAS * max(SPREAD_CELLS, ring.rounding_m / window.cell_m, SPREAD_RELATIVE * reach)
+    )
     return int((2.0 * ring.half_angle * (reach + thickness) + 4.0) * (thickness + 2.0))

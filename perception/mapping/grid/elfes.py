@@ -100,11 +100,11 @@ class ElfesGrid:
         The sensors.
     """
 
-    SCRATCH: Final = ("window", "_mounts", "_half_angle", "_rounding_m", "_edges")
+    SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_edges")
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
-        self._mounts = ring.mounts
+        self._ring = ring
         self._half_angle = ring.half_angle
         self._rounding_m = ring.rounding_m
         self.log_odds: Floats = np.zeros((window.cells, window.cells))
@@ -116,7 +116,7 @@ class ElfesGrid:
         if not self.window.follow(firing.pose, (self.log_odds,)):
             return
         cell_m = self.window.cell_m
-        for (sx, sy, axis), r in zip(placed(firing, self._mounts), firing.ranges_m.tolist(), strict=True):
+        for (sx, sy, axis), r in zip(placed(firing, self._ring), firing.ranges_m.tolist(), strict=True):
             if math.isnan(r) or (r == math.inf and silence_m == 0.0):
                 continue
             sigma = max(SPREAD_CELLS * cell_m, self._rounding_m, SPREAD * r) if r < math.inf else 0.0

@@ -84,15 +84,15 @@ class EvidenceGrid:
         Method, cells and window; the method is not `off`.
     """
 
-    SCRATCH: Final = ("_ring",)
+    SCRATCH: Final = ("ring",)
 
     def __init__(self, ring: RingConfig, config: GridConfig) -> None:
-        self._ring = Ring(
+        self.ring = Ring(
             mounts_array(ring.mounts), math.radians(ring.beam_half_angle_deg), ring.resolution_m / math.sqrt(12.0),
-            ring.range_max_m,
+            ring.range_max_m, ring.turning,
         )  # fmt: skip
         self.window = Window(config.cells, config.cell_m)
-        self.method = make_grid_method(config, self.window, self._ring)
+        self.method = make_grid_method(config, self.window, self.ring)
         self._way_m = 0.0
         self._at = np.full(2, math.nan)
         self._heard = np.zeros(int(ring.range_max_m / HEARD_M) + 2, np.int64)
@@ -119,7 +119,7 @@ class EvidenceGrid:
         if total < HEARD_MIN:
             return 0.0
         farthest = int(np.searchsorted(self._heard.cumsum(), HEARD_SHARE * total))
-        return min(self._ring.reach_m, HEARD_M * (farthest + 1))
+        return min(self.ring.reach_m, HEARD_M * (farthest + 1))
 
     @property
     def firings(self) -> int:

@@ -107,11 +107,11 @@ class MoravecElfesGrid:
         The sensors.
     """
 
-    SCRATCH: Final = ("window", "_mounts", "_half_angle", "_edges")
+    SCRATCH: Final = ("window", "_ring", "_half_angle", "_edges")
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
-        self._mounts = ring.mounts
+        self._ring = ring
         self._half_angle = ring.half_angle
         self.cells: Floats = np.zeros((window.cells, window.cells, 2))
         self._edges = np.zeros(4)
@@ -122,7 +122,7 @@ class MoravecElfesGrid:
         if not self.window.follow(firing.pose, (self.cells,)):
             return
         cell_m = self.window.cell_m
-        for (sx, sy, axis), r in zip(placed(firing, self._mounts), firing.ranges_m.tolist(), strict=True):
+        for (sx, sy, axis), r in zip(placed(firing, self._ring), firing.ranges_m.tolist(), strict=True):
             if math.isnan(r) or (r == math.inf and silence_m == 0.0):
                 continue
             accuracy_m = max(ACCURACY_CELLS * cell_m, ACCURACY * r) if r < math.inf else 0.0

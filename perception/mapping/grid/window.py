@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
 from perception.kernel import Floats, Ints, kernel
+from perception.sensor_mounts import mounts_at
 
 OCTANTS: Final = 8
 """Looking directions, 45° each; the first is around +x, then counter-clockwise."""
@@ -40,12 +41,15 @@ class Ring:
         Standard deviation of a range by its rounding, m.
     reach_m : float
         Longest range, m.
+    turning : tuple of int
+        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
     """
 
     mounts: Floats
     half_angle: float
     rounding_m: float
     reach_m: float
+    turning: tuple[int, ...] = ()
 
 
 @kernel
@@ -102,16 +106,9 @@ def set_edges(bearing: float, half_angle: float, edges: Floats) -> None:
     edges[3] = math.sin(bearing + half_angle)
 
 
-def placed(firing: Firing, mounts: Floats) -> list[list[float]]:
-    """Return place x, y (m) and direction (rad) of each sensor at a firing.
-
-    Parameters
-    ----------
-    firing : Firing
-        The firing.
-    mounts : (n, 3) float
-        As of `Ring`.
-    """
+def placed(firing: Firing, ring: Ring) -> list[list[float]]:
+    """Return place x, y (m) and direction (rad) of each sensor at a firing."""
+    mounts = mounts_at(firing, ring.mounts, ring.turning)
     c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
     x = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
     y = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
@@ -135,6 +132,12 @@ class Window:
         self.corner: Ints = np.zeros(2, np.int64)
         """The number of the first cell in x and y, counted from the odometry's origin."""
         self.placed = False
+        self.fixed = False
+
+    def fix(self, x: float, y: float) -> None:
+        """Put the middle of the window at a place (m) for good: it no longer follows the robot."""
+        self.corner[:] = [math.floor(at / self.cell_m) - self.cells // 2 for at in (x, y)]
+        self.placed = self.fixed = True
 
     def follow(self, pose: Pose, planes: tuple[NDArray[np.generic], ...]) -> bool:
         """Move the window after the robot and clear what comes in; return whether the pose is a possible one.
@@ -148,6 +151,8 @@ class Window:
         """
         if not (abs(pose.x) < COORDINATE_MAX_M and abs(pose.y) < COORDINATE_MAX_M and math.isfinite(pose.theta)):
             return False
+        if self.fixed:
+            return True
         for axis, at in enumerate((pose.x, pose.y)):
             wanted = math.floor(at / self.cell_m) - self.cells // 2
             moved = wanted - int(self.corner[axis])
@@ -172,6 +177,7 @@ class Window:
         return np.roll(plane, (-y, -x), axis=(0, 1))
 
     def clear(self) -> None:
-        """Forget the place."""
-        self.corner[:] = 0
-        self.placed = False
+        """Forget the place, unless it is fixed."""
+        if not self.fixed:
+            self.corner[:] = 0
+            self.placed = False

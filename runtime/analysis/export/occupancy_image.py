@@ -1,7 +1,8 @@
 """A finished run's map as an occupancy image with its YAML, as ROS's map_server reads and writes them.
 
-Free is where the robot has been, and what an echo's sound has passed, in the middle half of the beam; occupied is
-what was recognised. All else is unknown.
+Occupied is what was recognised, and what the directed evidence grid holds for occupied; free is what it holds for
+free, and where the robot has been. All else is unknown. The grid enters all readings of the run once more: an echo
+that something recognised explains marks its contact only.
 """
 
 from __future__ import annotations
@@ -15,23 +16,26 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from config.robot import RingConfig
+from config.settings import GridConfig
 from config.world import WorldConfig
-from drivers.messages import Floats
+from drivers.messages import Firing, Floats, Pose
+from perception.percept import OccupancyWindow
+from runtime.analysis.export.shapes import scans_of
 from runtime.analysis.timeline import Echoes
 
 RESOLUTION_M: Final = 0.05
 MARGIN_M: Final = 0.5
 """Around everything that the image shows."""
-BEFORE_ECHO_M: Final = 0.1
-"""Nothing is known to be free this near an echo."""
-BEAM_SHARE: Final = 0.5
-"""Share of the beam whose sound counts."""
-RAYS: Final = 9
-"""Rays across that share of a beam."""
-PASSES_MIN: Final = 2
-"""Readings that must have passed a cell, so that one outlier frees nothing."""
-BATCH: Final = 2000
-"""Readings that are entered at once; bounds the memory."""
+CELL_M: Final = 0.1
+"""Side of a cell of the evidence grid: two pixels."""
+CELLS_MAX: Final = 2048
+"""Greatest side of its window: 205 m."""
+OCCUPIED_MIN: Final = 0.65
+FREE_MAX: Final = 0.196
+"""Probabilities from which on a cell is occupied, and up to which it is free, as map_server has them."""
+EXPLAINED_M: Final = 0.08
+"""Greatest error of a range that something recognised explains."""
 PIXELS_MAX: Final = 100_000_000
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 """Grey values of map_server."""
@@ -67,7 +71,7 @@ class OccupancyImage:
         beside.write_text(
             f"image: {path.name}\nmode: trinary\nresolution: {RESOLUTION_M}\n"
             f"origin: [{self.x_m:.3f}, {self.y_m:.3f}, 0.0]\n"
-            "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+            f"negate: 0\noccupied_thresh: {OCCUPIED_MIN}\nfree_thresh: {FREE_MAX}\n",
             encoding="utf-8",
         )
         return beside
@@ -79,7 +83,7 @@ def yaml_beside(path: Path) -> Path:
 
 
 def occupancy_image(
-    world: WorldConfig, echoes: Echoes, half_angle_rad: float, way: Floats, body_radius_m: float
+    world: WorldConfig, echoes: Echoes, ring: RingConfig, way: Floats, body_radius_m: float
 ) -> OccupancyImage:  # fmt: skip
     """Return the image of a run.
 
@@ -89,8 +93,8 @@ def occupancy_image(
         What was recognised.
     echoes : (n,) record of `timeline.ECHO`
         Every reading.
-    half_angle_rad : float
-        Half the beam's width, rad.
+    ring : RingConfig
+        The sensors.
     way : (n, 2) float
         Positions of the robot, m.
     body_radius_m : float
@@ -99,25 +103,99 @@ def occupancy_image(
     Raises
     ------
     ValueError
-        It would have more than `PIXELS_MAX` pixels.
+        It would have more than `PIXELS_MAX` pixels, or its evidence grid more than `CELLS_MAX` cells along a side.
     """
     heard = echoes[np.isfinite(echoes["range_m"])]
     outlines = world_outlines(world)
     ends = [heard[axis] + heard["range_m"] * turn(heard["bearing"]) for axis, turn in (("x", np.cos), ("y", np.sin))]
     places = np.concatenate([np.zeros((1, 2)), way, np.column_stack(ends), *outlines])
     low, high = places.min(axis=0) - body_radius_m - MARGIN_M, places.max(axis=0) + body_radius_m + MARGIN_M
+    low = np.floor(low / CELL_M) * CELL_M
     columns, rows = (int(n) for n in np.ceil((high - low) / RESOLUTION_M))
     if rows * columns > PIXELS_MAX:
         raise ValueError(f"an image of {columns} × {rows} pixels is too large")
-    passes = np.zeros((rows, columns), np.int32)
-    for begin in range(0, len(heard), BATCH):
-        _enter_passes(passes, heard[begin : begin + BATCH], low, half_angle_rad)
-    _enter_way(passes, way - low, body_radius_m)
-    pixels = np.where(passes >= PASSES_MIN, FREE, UNKNOWN).astype(np.uint8)
+    window = run_evidence(world, echoes, ring, low, high)
+    pixels = np.full((rows, columns), UNKNOWN, np.uint8)
+    probability = _pixels_of(window, low, rows, columns)
+    pixels[probability <= FREE_MAX] = FREE
+    _enter_way(pixels, way - low, body_radius_m)
+    pixels[probability >= OCCUPIED_MIN] = OCCUPIED
     for outline in outlines:
         cells = np.floor((_dense(outline) - low) / RESOLUTION_M).astype(np.int64)
         pixels[np.clip(cells[:, 1], 0, rows - 1), np.clip(cells[:, 0], 0, columns - 1)] = OCCUPIED
     return OccupancyImage(np.ascontiguousarray(pixels[::-1]), float(low[0]), float(low[1]))
+
+
+def run_evidence(world: WorldConfig, echoes: Echoes, ring: RingConfig, low: Floats, high: Floats) -> OccupancyWindow:
+    """Return the directed evidence grid of all readings of a run.
+
+    Parameters
+    ----------
+    world, echoes, ring
+        As of `occupancy_image`.
+    low, high : (2,) float
+        The rectangle that it has to hold, m.
+
+    Raises
+    ------
+    ValueError
+        It is too large.
+    """
+    from perception.mapping.grid.evidence_grid import EvidenceGrid
+
+    cells = 2 ** math.ceil(math.log2(max(32.0, float((high - low).max()) / CELL_M + 1.0)))
+    if cells > CELLS_MAX:
+        raise ValueError(f"an evidence grid of {cells} × {cells} cells is too large")
+    grid = EvidenceGrid(
+        ring, GridConfig().model_copy(update={"method": "directed", "cells": cells, "cell_m": CELL_M})
+    )
+    grid.window.fix(*(0.5 * (low + high)).tolist())
+    half_angle = math.radians(ring.beam_half_angle_deg)
+    for scan in scans_of(echoes, ring):
+        sensors, ranges = scan.rows["sensor"], np.full(len(ring.mounts), np.nan)
+        ranges[sensors] = scan.rows["range_m"]
+        grid.bearings[:] = np.nan
+        grid.bearings[sensors] = explained_bearings(world, scan.rows, half_angle)
+        on_wheels = [row for row in scan.rows if row["sensor"] in ring.turning]
+        theta = float(on_wheels[0]["bearing"]) - ring.mounts[on_wheels[0]["sensor"]][2] if on_wheels else scan.yaw
+        grid.observe(Firing(scan.t_s, Pose(scan.x, scan.y, theta), scan.yaw, ranges))
+    return grid.occupancy()
+
+
+def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> Floats:
+    """Return where in its beam each echo came from, rad from the axis; NaN where nothing in the world explains it.
+
+    Parameters
+    ----------
+    world : WorldConfig
+        Drums answer from their near side, and walls from the foot of the perpendicular.
+    rows : (n,) record of `timeline.ECHO`
+        The readings.
+    half_angle : float
+        Half the beam's width, rad.
+    """
+    at = np.column_stack([rows["x"], rows["y"]])
+    best, found = np.full(len(rows), EXPLAINED_M), np.full(len(rows), np.nan)
+    contacts = [((drum.x_m, drum.y_m) - at, drum.radius_m) for drum in world.drum]
+    for wall in world.wall:
+        start, chord = np.array([wall.x1_m, wall.y1_m]), np.array([wall.x2_m - wall.x1_m, wall.y2_m - wall.y1_m])
+        along = (at - start) @ chord / max(1e-12, float(chord @ chord))
+        feet = start + np.outer(np.where((along >= 0.0) & (along <= 1.0), along, np.nan), chord)
+        contacts.append((feet - at, 0.0))
+    for towards, radius_m in contacts:
+        off = np.mod(np.arctan2(towards[:, 1], towards[:, 0]) - rows["bearing"] + math.pi, 2.0 * math.pi) - math.pi
+        with np.errstate(invalid="ignore"):
+            error = np.abs(rows["range_m"] - np.hypot(towards[:, 0], towards[:, 1]) + radius_m)
+            better = (error < best) & (np.abs(off) <= half_angle)
+        best[better], found[better] = error[better], off[better]
+    return found
+
+
+def _pixels_of(window: OccupancyWindow, low: Floats, rows: int, columns: int) -> NDArray[np.float32]:
+    """Return the probability of each pixel."""
+    corners = ((low[1] - window.y_m, rows), (low[0] - window.x_m, columns))
+    cells = [((first + (np.arange(n) + 0.5) * RESOLUTION_M) / window.cell_m).astype(np.int64) for first, n in corners]
+    return window.occupied[np.ix_(*cells)]
 
 
 def world_outlines(world: WorldConfig) -> list[Floats]:
@@ -138,29 +216,11 @@ def _dense(chain: Floats) -> Floats:
     )
 
 
-def _enter_passes(passes: NDArray[np.int32], heard: Echoes, low: Floats, half_angle_rad: float) -> None:
-    """Count for each cell the readings whose sound has passed it."""
-    edge = BEAM_SHARE * half_angle_rad
-    length = heard["range_m"] - BEFORE_ECHO_M
-    along = np.arange(0.0, float(length.max(initial=0.0)), RESOLUTION_M)
-    reading, step = np.nonzero(along[None] < length[:, None])
-    rows, columns = passes.shape
-    seen = list[NDArray[np.int64]]()
-    for turn in np.linspace(-edge, edge, RAYS).tolist():
-        bearing = heard["bearing"][reading] + turn
-        x = np.floor((heard["x"][reading] + along[step] * np.cos(bearing) - low[0]) / RESOLUTION_M).astype(np.int64)
-        y = np.floor((heard["y"][reading] + along[step] * np.sin(bearing) - low[1]) / RESOLUTION_M).astype(np.int64)
-        is_inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-        seen.append(((reading * rows + y) * columns + x)[is_inside])
-    cells = np.unique(np.concatenate(seen)) % (rows * columns)  # once for each reading
-    np.add.at(passes.reshape(-1), cells, 1)
-
-
-def _enter_way(passes: NDArray[np.int32], way: Floats, radius_m: float) -> None:
-    """Count the cells that the robot has covered as passed."""
+def _enter_way(pixels: NDArray[np.uint8], way: Floats, radius_m: float) -> None:
+    """Free the pixels that the robot has covered."""
     side = np.arange(-radius_m, radius_m + RESOLUTION_M, RESOLUTION_M)
     x, y = (part.reshape(-1) for part in np.meshgrid(side, side))
     disc = np.column_stack([x, y])[np.hypot(x, y) <= radius_m]
     stood = np.unique(np.floor(way / RESOLUTION_M).astype(np.int64), axis=0)
     cells = (stood[:, None] + np.floor(disc / RESOLUTION_M + 0.5).astype(np.int64)[None]).reshape(-1, 2)
-    passes[cells[:, 1], cells[:, 0]] = PASSES_MIN
+    pixels[cells[:, 1], cells[:, 0]] = FREE

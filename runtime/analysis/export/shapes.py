@@ -47,7 +47,11 @@ class FiringScan:
 
 def firing_scans(timeline: Timeline) -> Iterator[FiringScan]:
     """Yield the firings of a run, each with the pose of the ring, computed from the positions of its sensors."""
-    rows, ring = timeline.echoes, timeline.settings.ring
+    yield from scans_of(timeline.echoes, timeline.settings.ring)
+
+
+def scans_of(rows: Echoes, ring: RingConfig) -> Iterator[FiringScan]:
+    """Yield the firings of some readings; see `firing_scans`."""
     mounts, turning = ring.mounts, frozenset(ring.turning)
     if not len(rows):
         return

@@ -14,6 +14,7 @@ from config.files import utf8
 from config.world import ITEMS_MAX
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.support.kernel_cache import use_kernel_cache
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline_sources import TimelineSource
@@ -37,6 +38,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) 
     from runtime.analysis.export.world_file import round_names, world_of, world_text
     from runtime.analysis.map_changes import MapChange, compare_with_map
 
+    use_kernel_cache()
     console, output = plain_console(stderr=True), plain_console()
     files = {"--out": out, "--grid": grid, "--grid (its YAML)": None if grid is None else yaml_beside(Path(grid))}
     timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
@@ -69,7 +71,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) 
         try:
             scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
             way = scans if view is None else view.way
-            image = occupancy_image(world, echoes, half_angle_rad, way, settings.body.radius_m)
+            image = occupancy_image(world, echoes, settings.ring, way, settings.body.radius_m)
         except ValueError as error:
             raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
         with writing("--grid", grid):

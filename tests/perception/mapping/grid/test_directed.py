@@ -9,7 +9,8 @@ import pytest
 
 from drivers.messages import Firing, Floats, Pose
 from perception.mapping.grid import directed
-from perception.mapping.grid.directed import CERTAIN, NAT, UNDIRECTED, DirectedGrid, arc_cells_max, evidence_now
+from perception.mapping.grid.cell_evidence import FADING_PLACES, HIT, NAT, UNDIRECTED, evidence_now
+from perception.mapping.grid.directed import DirectedGrid, arc_cells_max
 from perception.mapping.grid.window import Ring, Window, placed
 from tests.naive_grid import NaiveGrid
 
@@ -27,10 +28,10 @@ def firing(ranges: list[float], x: float = 0.0, y: float = 0.0, yaw: float = 0.0
 
 
 def evidence(grid: DirectedGrid, place: int, x: float, y: float) -> Floats:
-    """Return the nine evidences of the cell at a point, nat."""
+    """Return the nine evidences of the cell at a point, nat; places are numbered from 1."""
     mask = grid.window.cells - 1
     cell = grid.cells[math.floor(y / 0.1) & mask, math.floor(x / 0.1) & mask]
-    return np.array([evidence_now(kept, place) for kept in cell]) / NAT
+    return np.array([evidence_now(kept, place + 1) for kept in cell]) / NAT
 
 
 def test_every_cell_is_as_in_the_oracle() -> None:
@@ -43,9 +44,10 @@ def test_every_cell_is_as_in_the_oracle() -> None:
             ranges = rng.choice([rng.uniform(0.3, 3.0), rng.uniform(0.3, 3.0), math.inf, math.nan], 4)
             bearings = np.where(rng.random(4) < 0.2, rng.uniform(-0.2, 0.2, 4), math.nan)
             fired = Firing(0.0, Pose(x, y, yaw), yaw, ranges)
-            grid.observe(fired, bearings, place, 2.0)
-            sensors = [(sx, sy, axis) for sx, sy, axis in placed(fired, MOUNTS)]
-            oracle.enter(sensors, ranges, bearings, place, 2.0)
+            mirrors = grid.mirrors
+            grid.observe(fired, bearings, place - 1, 2.0)
+            sensors = [(sx, sy, axis) for sx, sy, axis in placed(fired, RING)]
+            oracle.enter(sensors, ranges, bearings, place, 2.0, mirrors)
     cx, cy = grid.window.corner.tolist()
     seen = 0
     for iy in range(cy, cy + 128):
@@ -94,7 +96,7 @@ def test_an_echo_from_further_places_is_further_evidence() -> None:
 def test_an_echo_whose_bearing_is_known_marks_its_contact_only() -> None:
     grid = make_grid()
     grid.observe(firing([2.0, math.nan, math.nan, math.nan]), np.array([0.1, math.nan, math.nan, math.nan]), 1, 3.0)
-    hit = np.argwhere(grid.cells[..., directed.HIT] > 0)
+    hit = np.argwhere(grid.cells[..., HIT] > 0)
     assert {tuple(row) for row in hit[:, :2].tolist()} == {
         (math.floor(2.0 * math.sin(0.1) / 0.1), math.floor((0.2 + 2.0 * math.cos(0.1)) / 0.1))
     }
@@ -119,9 +121,9 @@ def test_silence_counts_in_its_own_direction_only_and_to_the_learnt_range() -> N
 def test_evidence_fades_with_the_way() -> None:
     grid = make_grid()
     grid.observe(firing([math.inf] * 4), UNKNOWN, 1, 2.0)
-    assert evidence(grid, 1, 1.2, 0.0)[0] == pytest.approx(-directed.PASSED * directed.SILENCE / NAT, rel=0.1)
-    assert evidence(grid, 101, 1.2, 0.0)[0] == pytest.approx(evidence(grid, 1, 1.2, 0.0)[0] + 100 / NAT)
-    assert evidence(grid, 1 + CERTAIN, 1.2, 0.0)[0] == 0.0
+    assert evidence(grid, 1, 1.2, 0.0)[0] == pytest.approx(-directed.SILENT / NAT, rel=0.1)
+    later = 1 + 100 * FADING_PLACES
+    assert evidence(grid, later, 1.2, 0.0)[0] == pytest.approx(evidence(grid, 1, 1.2, 0.0)[0] + 100 / NAT)
 
 
 def test_a_place_of_mirrors_is_recognised() -> None:
@@ -129,9 +131,9 @@ def test_a_place_of_mirrors_is_recognised() -> None:
     for slanting, mirrors in ((math.inf, 1.0), (1.6, 0.0)):
         grid = make_grid()
         for place in range(1, 60, 2):
-            x = 0.05 * place
+            x = 0.02 * place
             grid.observe(firing([1.3, math.nan, math.nan, math.nan], x, 0.0, math.pi / 2.0), UNKNOWN, place, 4.0)
-            beam = firing([slanting, math.nan, math.nan, math.nan], x - 1.0, 0.1, math.pi / 4.0)
+            beam = firing([slanting, math.nan, math.nan, math.nan], x - 1.6, 0.1, math.pi / 4.0)
             grid.observe(beam, UNKNOWN, place + 1, 4.0)
         assert grid.mirrors == mirrors
 

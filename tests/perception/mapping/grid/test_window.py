@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.messages import Firing, Pose
-from perception.mapping.grid.window import Window, octant, placed, row_of_beam, set_edges
+from perception.mapping.grid.window import Ring, Window, octant, placed, row_of_beam, set_edges
 
 
 @given(st.floats(-math.pi, math.pi))
@@ -62,5 +62,7 @@ def test_impossible_pose_moves_nothing(pose: Pose) -> None:
 
 
 def test_sensors_are_placed_on_the_turned_ring() -> None:
-    firing = Firing(0.0, Pose(1.0, 2.0, 9.0), math.pi / 2.0, np.zeros(1))
-    np.testing.assert_allclose(placed(firing, np.array([[0.3, 0.1, 0.2]])), [[0.9, 2.3, math.pi / 2.0 + 0.2]])
+    firing = Firing(0.0, Pose(1.0, 2.0, -math.pi / 2.0), math.pi / 2.0, np.zeros(1))
+    ring = Ring(np.array([[0.3, 0.1, 0.2], [0.3, 0.1, 0.2]]), 0.2, 0.0, 5.0, (1,))
+    expected = [[0.9, 2.3, math.pi / 2.0 + 0.2], [1.1, 1.7, -math.pi / 2.0 + 0.2]]
+    np.testing.assert_allclose(placed(firing, ring), expected)

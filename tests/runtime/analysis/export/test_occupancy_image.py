@@ -9,27 +9,33 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from config.robot import FiringConfig, RingConfig, SensorConfig
 from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from runtime.analysis.export.occupancy_image import (
-    BEFORE_ECHO_M,
     FREE,
     OCCUPIED,
     RESOLUTION_M,
     UNKNOWN,
     OccupancyImage,
+    explained_bearings,
     occupancy_image,
     world_outlines,
 )
 from runtime.analysis.timeline import ECHO, Echoes
 
 HALF_ANGLE_RAD = math.radians(12.0)
+RING = RingConfig(
+    sensors=(SensorConfig(x_m=0.0, y_m=0.0, angle_deg=0.0),), beam_half_angle_deg=12.0, resolution_m=0.0,
+    range_min_m=0.1, range_max_m=7.0, firing=FiringConfig(sets=((0,),)),
+)  # fmt: skip
 WAY = np.zeros((1, 2))
 BODY_M = 0.2
 
 
 def readings(*ranges_m: float, bearing: float = 0.0) -> Echoes:
-    """Return readings of one sensor at the origin."""
+    """Return readings of one sensor at the origin, one after another."""
     rows = np.zeros(len(ranges_m), ECHO)
+    rows["robot_s"] = np.arange(len(ranges_m))
     rows["range_m"], rows["bearing"] = ranges_m, bearing
     return rows
 
@@ -39,14 +45,30 @@ def value_at(image: OccupancyImage, x: float, y: float) -> int:
     return int(image.pixels[row, int((x - image.x_m) / RESOLUTION_M)])
 
 
-def test_free_is_what_two_echoes_have_passed_and_where_the_robot_stood() -> None:
-    image = occupancy_image(WorldConfig(), readings(3.0, 3.0, math.inf, 5.0), HALF_ANGLE_RAD, WAY, BODY_M)
-    assert [value_at(image, x, 0.0) for x in (1.0, 2.8, 3.0 - BEFORE_ECHO_M + 0.06, 4.0)] == [
-        FREE, FREE, UNKNOWN, UNKNOWN,
-    ]  # fmt: skip
-    edge = math.tan(0.25 * HALF_ANGLE_RAD)
-    assert (value_at(image, 2.0, 2.0 * edge), value_at(image, 2.0, 2.0 * math.tan(HALF_ANGLE_RAD))) == (FREE, UNKNOWN)
+def driving(wall_x: float) -> Echoes:
+    """Return readings of a sensor that drives at a wall and looks at it."""
+    rows = readings(*(wall_x - 0.1 * k for k in range(12)))
+    rows["x"] = 0.1 * np.arange(12)
+    return rows
+
+
+def test_free_is_what_sound_has_passed_and_where_the_robot_stood_and_occupied_what_answers() -> None:
+    image = occupancy_image(WorldConfig(), driving(3.03), RING, WAY, BODY_M)
+    assert [value_at(image, x, 0.02) for x in (1.5, 2.5, 3.03, 3.3)] == [FREE, FREE, OCCUPIED, UNKNOWN]
+    assert [value_at(image, 2.5, y) for y in (0.2, 0.6)] == [FREE, UNKNOWN]
     assert (value_at(image, -0.15, 0.0), value_at(image, -0.3, 0.0)) == (FREE, UNKNOWN)
+
+
+def test_an_echo_that_something_recognised_explains_marks_its_contact_only() -> None:
+    rows = readings(2.02, 2.02, 1.0, math.inf, bearing=0.1)
+    drum = WorldConfig(drum=(DrumConfig(x_m=2.3, y_m=0.1, radius_m=0.3),))
+    found = explained_bearings(drum, rows, HALF_ANGLE_RAD)
+    assert found[:2] == pytest.approx(math.atan2(0.1, 2.3) - 0.1)
+    assert np.isnan(found[2:]).all()
+    wall = WorldConfig(wall=(WallConfig(x1_m=2.0, y1_m=-1.0, x2_m=2.0, y2_m=1.0),))
+    assert explained_bearings(wall, rows, HALF_ANGLE_RAD)[0] == pytest.approx(-0.1)
+    ended = WorldConfig(wall=(WallConfig(x1_m=2.0, y1_m=0.5, x2_m=2.0, y2_m=1.0),))
+    assert np.isnan(explained_bearings(ended, rows, HALF_ANGLE_RAD)).all()
 
 
 def test_what_was_recognised_is_occupied_wherever_sound_has_passed() -> None:
@@ -55,15 +77,14 @@ def test_what_was_recognised_is_occupied_wherever_sound_has_passed() -> None:
         wall=(WallConfig(x1_m=-1.0, y1_m=1.0, x2_m=4.0, y2_m=1.0),),
         polygon=(PolygonConfig(vertices_m=((3.0, -1.0), (4.0, -1.0), (4.0, -2.0))),),
     )
-    image = occupancy_image(world, readings(6.0, 6.0), HALF_ANGLE_RAD, WAY, BODY_M)
+    image = occupancy_image(world, readings(6.0, 6.0), RING, WAY, BODY_M)
     for x, y in ((1.7, 0.0), (2.3, 0.0), (2.0, 0.3), (0.5, 1.0), (3.5, -1.0), (4.0, -1.5), (3.52, -1.52)):
         assert value_at(image, x, y) == OCCUPIED, (x, y)
-    assert value_at(image, 5.0, 0.0) == FREE
     assert len(world_outlines(world)) == 3
 
 
 def test_the_files_are_those_of_map_server(tmp_path: Path) -> None:
-    image = occupancy_image(WorldConfig(), readings(3.0, 3.0, bearing=0.7), HALF_ANGLE_RAD, WAY, BODY_M)
+    image = occupancy_image(WorldConfig(), readings(3.0, 3.0, bearing=0.7), RING, WAY, BODY_M)
     beside = image.write(tmp_path / "map.pgm")
     data = (tmp_path / "map.pgm").read_bytes()
     head = re.match(rb"P5\n(\d+) (\d+)\n255\n", data)
@@ -79,4 +100,6 @@ def test_the_files_are_those_of_map_server(tmp_path: Path) -> None:
 def test_an_image_beyond_all_measure_is_refused() -> None:
     far = np.array([(0.0, 0.0), (9000.0, 9000.0)])
     with pytest.raises(ValueError, match="too large"):
-        occupancy_image(WorldConfig(), readings(), HALF_ANGLE_RAD, far, BODY_M)
+        occupancy_image(WorldConfig(), readings(), RING, far, BODY_M)
+    with pytest.raises(ValueError, match="4096 cells is too large"):
+        occupancy_image(WorldConfig(), readings(), RING, np.array([(0.0, 0.0), (300.0, 0.0)]), BODY_M)

@@ -1,0 +1,89 @@
+"""The evidence of one cell in one direction: log odds in whole numbers, which fade with the robot's way.
+
+The strongest hit and the strongest passage at a place are kept beside what was known before it, so that the same
+reading again changes nothing, and neither does the order of readings.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.kernel import kernel
+from perception.mapping.grid.window import OCTANTS
+
+UNDIRECTED: Final = OCTANTS
+"""Index of the undirected evidence of a cell, behind those of the looking directions."""
+BASE: Final = 0
+HIT: Final = 1
+FREE: Final = 2
+STAMP: Final = 3
+"""What is kept of each evidence: its value when the robot came to this place; the strongest hit and the strongest
+passage since; and the place."""
+NAT: Final = 1024
+"""One nat of log odds; evidence is kept in whole numbers, which replay to the bit."""
+PLACES: Final = 1 << 15
+"""Places are numbered modulo this."""
+CERTAIN: Final = 3 * NAT
+"""Greatest evidence for and against, so that contradiction is soon seen."""
+FADING_PLACES: Final = 50
+"""Evidence loses one unit for each so many places: 1 nat on 5 km of way, on which odometry has drifted through the
+window; the faint evidence of one echo is gone after a few hundred metres."""
+
+Cells = NDArray[np.int16]
+
+
+@kernel
+def evidence_now(kept: Cells, place: int) -> int:
+    """Return the evidence of a cell in one direction, faded by the way since it was last renewed.
+
+    Parameters
+    ----------
+    kept : (4,) int16
+        As kept.
+    place : int
+        Where the robot is now.
+    """
+    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[HIT]) + int(kept[FREE])))
+    faded = ((place - int(kept[STAMP])) & (PLACES - 1)) // FADING_PLACES
+    return max(0, value - faded) if value > 0 else min(0, value + faded)
+
+
+@kernel
+def renew(kept: Cells, place: int) -> None:
+    """Begin a new place: what was found at the last one becomes the base."""
+    if kept[STAMP] != place:
+        kept[BASE] = evidence_now(kept, place)
+        kept[HIT] = 0
+        kept[FREE] = 0
+        kept[STAMP] = place
+
+
+@kernel
+def base_elsewhere(cell: Cells, own: int, place: int) -> int:
+    """Return the greatest evidence of a cell in any looking direction but one, without this place's readings."""
+    most = 0
+    for k in range(OCTANTS):
+        if k != own:
+            kept = cell[k]
+            value = int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)
+            most = max(most, value)
+    return most
+
+
+@kernel
+def prior(kept: Cells) -> float:
+    """Return how much of an echo a cell draws: the square of its probability, this place's hits left out."""
+    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
+    probability = 1.0 / (1.0 + math.exp(-value / NAT))
+    return probability * probability
+
+
+@kernel
+def hit_nat(share: float) -> int:
+    """Return the evidence of a share of an echo, in units."""
+    q = 0.5 + 0.49 * min(1.0, share)
+    return int(NAT * math.log(q / (1.0 - q)))
