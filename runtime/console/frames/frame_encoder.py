@@ -269,6 +269,7 @@ def _json_numbers(values: Iterable[float], places: int) -> list[float | None]:
 
 
 def _object(detected: DetectedObject) -> dict[str, Any]:
+    ends = detected.ends
     return {
         "number": detected.number,
         "model": detected.model,
@@ -282,6 +283,7 @@ def _object(detected: DetectedObject) -> dict[str, Any]:
         "score": round(detected.score, 4),
         "confirmed": detected.confirmed,
         "placed": detected.placed,
+        "ends": None if ends is None else [round(value, 3) for value in ends],
     }
 
 

@@ -92,7 +92,14 @@ export function drawAreas(f) {
 export function drawModels(f) {
   const { ctx, run, theme, px, selection } = f;
   const sure = new Path2D(), unsure = new Path2D(), picked = new Path2D();
+  const walls = new Path2D(), unsureWalls = new Path2D();
   for (const object of run.state.objects) {
+    if (object.ends) {
+      const [x1, y1, x2, y2] = object.ends, path = (object.probability ?? object.score) >= SURE ? walls : unsureWalls;
+      path.moveTo(x1, y1);
+      path.lineTo(x2, y2);
+      continue;
+    }
     const model = run.model(object.model);
     const chance = object.probability ?? object.score;
     outlinePath(chance >= SURE ? sure : unsure, model, object, px);
@@ -112,7 +119,11 @@ export function drawModels(f) {
   ctx.strokeStyle = theme.model;
   ctx.lineWidth = 2 * px;
   ctx.stroke(sure);
+  ctx.lineWidth = 4 * px;
+  ctx.stroke(walls);
   ctx.setLineDash([6 * px, 4 * px]);
+  ctx.stroke(unsureWalls);
+  ctx.lineWidth = 2 * px;
   ctx.stroke(unsure);
 }
 
@@ -120,7 +131,8 @@ export function drawEllipses(f) {
   const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;
   const path = new Path2D(), centres = new Path2D();
-  for (const { x, y, covariance } of run.state.objects) {
+  for (const { x, y, covariance, ends } of run.state.objects) {
+    if (ends) continue; // a wall is a line; the covariance of its place is its length
     const arm = 3.5 * px;
     centres.moveTo(x - arm, y);
     centres.lineTo(x + arm, y);

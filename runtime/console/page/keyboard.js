@@ -25,14 +25,14 @@ const WORDS = [
   ["?", "this list"],
 ];
 
-export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, undo, notifications, drivingByKeys }) {
+export function watchKeyboard({ drive, tools, view, fit, chosen, time, undo, notifications, drivingByKeys }) {
   const help = () => notifications.confirm("Keys", el("dl", { class: "keys" }, ...WORDS.flatMap(([key, text]) =>
     [el("dt", {}, el("kbd", {}, key)), el("dd", {}, text)])), [["Close", null]]);
   byId("keys").addEventListener("click", help);
 
   const acts = {
     "+": () => view.zoom(1.25), "=": () => view.zoom(1.25), "-": () => view.zoom(0.8), "−": () => view.zoom(0.8),
-    f: fit, l: () => view.setFollow(!view.follow), u: () => units.choose(units.name === "m" ? "ft" : "m"),
+    f: fit, l: () => view.setFollow(!view.follow), u: () => byId("units").click(),
     Delete: chosen.delete, Backspace: chosen.delete, p: chosen.pin, P: chosen.unpin, k: () => time.pause(), "?": help,
     A: (event) => event.shiftKey && drive.arm(), // and not where the capitals are locked
   };

@@ -93,6 +93,7 @@ const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: 
 const chosen = selectionBar({ run, selection, connection, notifications });
 const tabs = new Tabs((name) => {
   drawInstruments();
+  prefer("tab", name);
   if (name === "time") time.shown();
 });
 
@@ -201,7 +202,8 @@ byId("clear-map").addEventListener("click", () => notifications.confirm("Clear t
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, units, chosen, time, undo: () => (tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
+watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
+tabs.restore(preferred("tab", ""));
 
 export { connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };

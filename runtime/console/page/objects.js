@@ -31,7 +31,9 @@ export class Objects {
 
   refresh() {
     const { objects, waiting } = this.run.state;
-    setText(byId("objects-count"), waiting > 0 ? `${objects.length}, ${waiting} near ones have no room` : `${objects.length}`);
+    const walls = objects.filter(({ ends }) => ends).length, others = objects.length - walls;
+    const counted = walls > 0 ? `${others}, and ${walls} wall${walls > 1 ? "s" : ""}` : `${others}`;
+    setText(byId("objects-count"), waiting > 0 ? `${counted}, ${waiting} near ones have no room` : counted);
     byId("objects-empty").hidden = objects.length > 0;
     const seen = new Set();
     objects.forEach((object, index) => {
@@ -42,8 +44,10 @@ export class Objects {
       setText(row.number, object.number === null || object.number === undefined ? "–" : `${object.number}`);
       setText(row.name, object.model);
       setText(row.sure, certainty(object));
-      setText(row.where, `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
-      setText(row.off, `± ${this.units.length(object.sigma, 3)}`);
+      const [x1, y1, x2, y2] = object.ends ?? [];
+      setText(row.where, object.ends ? `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}`
+        : `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
+      setText(row.off, object.ends ? `${this.units.length(Math.hypot(x2 - x1, y2 - y1))} long` : `± ${this.units.length(object.sigma, 3)}`);
       const picked = object.number !== null && object.number === this.selection.object;
       setAttribute(row.element, "aria-selected", picked);
       if (this.#list.children[index] !== row.element) this.#list.insertBefore(row.element, this.#list.children[index] ?? null);

@@ -25,6 +25,11 @@ export class Tabs {
     this.#changed(name);
   }
 
+  // Shows the panel of the last visit, if this screen has a tab for it.
+  restore(name) {
+    if (this.#tabs.some((tab) => tab.id === `tab-${name}` && tab.offsetParent !== null)) this.show(name);
+  }
+
   get shown() {
     return this.#tabs.find((tab) => tab.getAttribute("aria-selected") === "true").id.slice(4);
   }

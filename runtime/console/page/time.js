@@ -2,12 +2,14 @@
 
 import { byId, download, el, setAttribute, setText } from "./dom.js";
 
+const PACE_S = 3;
 const clock = (s) => `${s.toFixed(1)} s`;
 
 export class Time {
   #file = null; // the recording that is open
   #liveSession = null; // the live run's greeting meanwhile
   #scrubbing = false;
+  #paced = null; // since when the pace is measured, and what it was before
 
   constructor({ run, connection, notifications, shoot }) {
     Object.assign(this, { run, connection, notifications, shoot });
@@ -58,7 +60,7 @@ export class Time {
     const emulated = (this.#liveSession ?? this.run.session)?.emulated ?? false;
     const at = `${clock(robot_s)}, cycle ${cycle}`;
     const then = `in ${mode.replace("_", " ")}${reason ? ` (${reason})` : ""}`;
-    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`;
+    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}${this.#pace()}` : ""}`;
     setText(byId("time-text"), playback ? `Recording ${name(this.#file)}: ${at}, the robot then ${then}` : live);
     setText(byId("pause"), paused ? "Resume" : "Pause");
     for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated || playback !== null;
@@ -68,6 +70,22 @@ export class Time {
     if (playback) this.#follow(playback);
     this.notifications.banner("playback", playback ? `This is a recording, not the live run: ${name(this.#file)}` : null,
       { buttons: [["Back to the live run", () => this.#backToLive()]] });
+  }
+
+  // What a busy machine makes of the speed that was chosen: the robot's clock against the host's, over some seconds.
+  #pace() {
+    const { robot_s: robot, host_s: host } = this.run.state, { speed, paused } = this.run.robot;
+    const from = this.#paced;
+    if (from === null || from.speed !== speed || paused || robot < from.robot || host < from.host) {
+      this.#paced = { robot, host, speed, text: "" };
+      return "";
+    }
+    if (host - from.host > PACE_S) {
+      const pace = (robot - from.robot) / (host - from.host);
+      const text = Math.abs(pace - speed) > 0.1 * speed ? ` (this machine reaches × ${pace.toFixed(1)})` : "";
+      this.#paced = { robot, host, speed, text };
+    }
+    return this.#paced.text;
   }
 
   #follow({ s, is_playing: playing }) {

@@ -11,8 +11,9 @@ from behaviors.follow_valley import Valley
 from behaviors.goal_progress import Progress
 from behaviors.valley.look_ahead import Search
 from drivers.messages import Pose
+from perception.detected_object import DetectedObject
 from perception.localization.drift_correction import SeenObject
-from runtime.console.frames.frame_encoder import SEGMENTS_EVERY
+from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, _object
 from runtime.cycle.goal_drive import GoalDrive
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
@@ -145,3 +146,12 @@ async def test_the_way_to_a_goal_and_the_blocked_directions_are_shown() -> None:
         case.cycles()
         shown = (await page.next("state"))["valley"]
         assert shown == {"blocked": blocked, "direction": 1.235, "way": [[0.0, 0.0], [0.5, 0.12]]}
+
+
+def test_a_wall_is_sent_with_its_ends_and_other_objects_without() -> None:
+    """The page draws a wall as a line: an ellipse of its length looks like another wall."""
+    wall = DetectedObject("wall", 2.0, 1.0, 0.0, 0.01, 40, 0.99, covariance=(4.0**2 / 12.0, 0.0, 1e-4))
+    assert _object(wall)["ends"] == pytest.approx([0.0, 1.0, 4.0, 1.0], abs=2e-3)
+    assert (
+        _object(DetectedObject("drum", 2.0, 1.0, 0.0, 0.01, 40, 0.99, covariance=(1e-4, 0.0, 1e-4)))["ends"] is None
+    )
