@@ -12,6 +12,7 @@ from rich.console import Console
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
+from bench.ear_commands import cross_paths, one_stand
 from bench.estimator import Peer
 from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
@@ -238,6 +239,8 @@ for command in (
 ):
     app.command(command)
 app.command(map_size, name="map")
+app.command(cross_paths)
+app.command(one_stand)
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:

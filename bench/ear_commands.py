@@ -1,0 +1,55 @@
+"""Measurements of listening sensors: the emulator's cross paths, and what one stand says of a surface."""
+
+from __future__ import annotations
+
+from rich.console import Console
+
+from bench.table import report, rows_table, wide
+from config.load import load_robot
+
+
+def cross_paths(*, json: str = "cross_paths.json", rooms: int = 30, first: int = 0) -> int:
+    """Compare the emulator's cross paths with an independent simulator of bursts and a threshold.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of random rooms with walls, corners and posts.
+    first
+        Seed of the first room.
+    """
+    from bench.cross_paths import measure
+
+    with Console(stderr=True).status("bench") as status:
+        rows = measure(range(first, first + max(1, rooms)), status.update)
+    return report(json, rows, rows_table("cross paths: the emulator and bursts of sound", rows))
+
+
+def one_stand(*, json: str = "one_stand.json", scenes: int = 20, first: int = 1000, rounds: int = 1) -> int:
+    """Measure how well one stand gives kind and place of a surface, with ranges of 1 mm and of a tenth of a foot.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    scenes
+        Random scenes of each kind: wall, corner, edge, drum, post.
+    first
+        Seed of the first one.
+    rounds
+        Rounds of the firing pattern in a stand.
+    """
+    from bench.one_stand import TENTH_FT_M, measure
+
+    ring = load_robot("ears").ring
+    rows, tables = {}, []
+    with Console(stderr=True).status("bench") as status:
+        for name, resolution_m in (("1 mm", ring.resolution_m), (".1 ft", TENTH_FT_M)):
+            coarse = ring.model_copy(update={"resolution_m": resolution_m})
+            counts, rows[name] = measure(coarse, rounds, max(1, scenes), first, status.update)
+            tables.append(rows_table(f"what scenes are called, ranges of {name}", counts))
+    for table in tables:
+        wide().print(table)
+    return report(json, rows, rows_table("one stand", rows))
