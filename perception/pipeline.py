@@ -37,9 +37,10 @@ from perception.localization.drift_correction import LocalizedPose
 from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
+from perception.mapping.canyons import EVERY_FIRINGS, PASSAGE_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method, make_method
-from perception.percept import FieldOfView, OccupancyWindow
+from perception.percept import Canyon, FieldOfView, OccupancyWindow
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
@@ -91,6 +92,8 @@ class Perception:
         self._models = tuple(models)
         self.vacant = VacantAreas()
         """In the frame of `method`."""
+        self.canyon_map = CanyonMap(2.0 * (max(math.hypot(*mount[:2]) for mount in mounts.tolist()) + PASSAGE_M))
+        """The box canyons found so far, in odometry's frame."""
 
     @property
     def can_refine(self) -> bool:
@@ -134,6 +137,10 @@ class Perception:
         if self.grid is not None:
             self.method.locate_echoes(self.grid.bearings)
             self.grid.observe(trusted)
+        self.canyon_map.firings += 1
+        if self.canyon_map.firings % EVERY_FIRINGS == 0:
+            radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
+            self.canyon_map.observe(trusted.pose, self.labelled_objects(), radii_m)
         return made
 
     def refine(self) -> int:
@@ -296,6 +303,10 @@ class Perception:
             age_max_s,
         )
 
+    def canyons(self) -> tuple[Canyon, ...]:
+        """Return the box canyons found so far, in odometry's frame, those left behind included."""
+        return self.canyon_map.canyons()
+
     def occupancy(self) -> OccupancyWindow | None:
         """Return the evidence grid around the robot, None where the settings have none."""
         return None if self.grid is None else self.grid.occupancy()
@@ -306,6 +317,7 @@ class Perception:
         if self.grid is not None:
             self.grid.clear()
         self.vacant.clear()
+        self.canyon_map.clear()
         if self.map_frame is not None:
             self.map_frame.reset()
         if self.known_room is not None:

@@ -10,7 +10,7 @@ from runtime.simulation.scene_names import SceneName
 
 
 def experiment(
-    name: Literal["hallway", "irregular", "budget", "drift"],
+    name: Literal["hallway", "irregular", "budget", "drift", "canyon"],
     /,
     *,
     method: Literal["paper", "bayes"] = "bayes",
@@ -32,7 +32,8 @@ def experiment(
     ----------
     name
         The simulated hallway, the irregular hallway of the real run, the effect of smaller time budgets for
-        perception in a hall of 40 drums, or rounds among drums with drifting odometry.
+        perception in a hall of 40 drums, rounds among drums with drifting odometry, or drives to a goal behind a box
+        canyon by several sets of schemas.
     method
         How objects are recognised.
     scene
@@ -88,6 +89,13 @@ def experiment(
             raise UserError("experiment drift has a hall of its own and records nothing: leave out --scene, --world "
                             "and --out", WRONG_CALL)  # fmt: skip
         return run_drift(sets, models=model, seeds=seeds, json_file=json, force=force, units=units)
+    if name == "canyon":
+        from runtime.cli.commands.canyon import run_canyons
+
+        if scene is not None or world is not None or out is not None:
+            raise UserError("experiment canyon has worlds of its own and records nothing: leave out --scene, --world "
+                            "and --out", WRONG_CALL)  # fmt: skip
+        return run_canyons(sets, models=model, seeds=seeds, json_file=json, force=force)
     if scene is not None:
         if name != "hallway" or world is not None:
             raise UserError("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)

@@ -302,7 +302,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
     percept = Percept(
         odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects,
-        state.perception.occupancy(), steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),
+        state.perception.occupancy(), state.perception.canyons(),
+        steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),
     )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,

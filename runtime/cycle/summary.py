@@ -67,12 +67,26 @@ class CornerRow(TypedDict):
     probability: float
 
 
+class CanyonRow(TypedDict):
+    """One box canyon, m and rad, in the frame of the objects: its mouth, the direction inwards, and its depth."""
+
+    number: int
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    axis: float
+    depth: float
+    probability: float
+
+
 class PerceivedRows(TypedDict):
     """What perception reports, in one frame."""
 
     objects: list[ObjectRow]
     walls: list[WallRow]
     corners: list[CornerRow]
+    canyons: list[CanyonRow]
 
 
 class PoseRow(TypedDict):
@@ -175,7 +189,20 @@ def perceived_rows(
     """
     to = Pose(0.0, 0.0, 0.0) if to is None else to
     found = (turned_object(to, seen) for seen in perception.objects()) if objects is None else objects
-    rows: PerceivedRows = {"objects": [object_row(seen) for seen in found], "walls": [], "corners": []}
+    rows: PerceivedRows = {"objects": [object_row(seen) for seen in found], "walls": [], "corners": [], "canyons": []}
+    for canyon in perception.canyons():
+        (x1, y1), (x2, y2) = (
+            (at.x, at.y)
+            for at in (
+                to.compose(Pose(*canyon.mouth[:2], 0.0)),
+                to.compose(Pose(*canyon.mouth[2:], 0.0)),
+            )
+        )
+        rows["canyons"].append({
+            "number": canyon.number, "x1": x1, "y1": y1, "x2": x2, "y2": y2,
+            "axis": math.remainder(to.theta + canyon.axis_rad, math.tau), "depth": canyon.depth_m,
+            "probability": canyon.probability,
+        })  # fmt: skip
     labelled = (*perception.labelled_objects(), *perception.archived_objects())
     for seen in (turned_object(to, one) for one in labelled):
         if seen.ends is not None and seen.covariance is not None:
@@ -237,6 +264,7 @@ def run_summary(
         "objects": perceived["objects"],
         "walls": perceived["walls"],
         "corners": perceived["corners"],
+        "canyons": perceived["canyons"],
         "cycles": stats.cycles,
         "cycle_us": stats.cycle_us(),
         "late": stats.late,

@@ -65,6 +65,7 @@ class FiringReplayer:
             "objects": perceived["objects"],
             "walls": perceived["walls"],
             "corners": perceived["corners"],
+            "canyons": perceived["canyons"],
             "segments": counts.segments_total,
             "clusters": counts.hypotheses,
             "cycles": self._cycle_stats.cycles,

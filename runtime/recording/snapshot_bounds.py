@@ -83,7 +83,7 @@ UNHEARD: Final = "method.memory.state.sensors.last."
 _CONSTANTS: Final = (
     "_axes _mounts _half_angle _sensors _segments_min _reach_m sensor_monitor._neighbours "
     "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows _tracker._ring "
-    "drift._range_min_m"
+    "drift._range_min_m canyon_map.sealed_m"
 )
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
@@ -95,7 +95,7 @@ MAY_BE_INFINITE: Final = frozenset({
 """Floats for which an infinity stands for no echo, for no evidence yet, or for no place or time yet."""
 
 _COUNTS: Final = (
-    "vacant.last vacant.rows.object "
+    "vacant.last vacant.rows.object canyon_map.numbered canyon_map.firings canyon_map.rows.number "
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "names_withdrawn near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total "

@@ -196,13 +196,14 @@ def replay_again(
 def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
     """Return the summary of a replay."""
     perception = result.state.perception if result.state is not None else None
-    perceived: PerceivedRows = {"objects": [], "walls": [], "corners": []}
+    perceived: PerceivedRows = {"objects": [], "walls": [], "corners": [], "canyons": []}
     if perception is not None:
         perceived = perceived_rows(perception)
     return {
         "objects": perceived["objects"],
         "walls": perceived["walls"],
         "corners": perceived["corners"],
+        "canyons": perceived["canyons"],
         "segments": 0 if perception is None else perception.counts.segments_total,
         "clusters": 0 if perception is None else perception.counts.hypotheses,
         "cycles": result.cycles,

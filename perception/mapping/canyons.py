@@ -1,0 +1,300 @@
+"""Box canyons: places that walls, objects and gaps too narrow for this robot close on all sides but one.
+
+Seen from a place inside, the surfaces round a canyon are one chain without a gap that the robot could pass, over more
+than half a turn; what the chain leaves open is the mouth. So one place is examined at a time: where the robot is, and
+before the walls it knows. What was found is remembered by its number when the robot has left it behind.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.messages import Pose
+from perception.detected_object import DetectedObject
+from perception.kernel import Floats
+from perception.percept import Canyon
+
+REACH_M: Final = 9.0
+"""Surfaces farther from the place than this do not count."""
+WIDTH_MAX_M: Final = 5.0
+DEPTH_MIN_M: Final = 0.8
+DEPTH_SHARE: Final = 0.3
+"""Widest mouth; least depth, also as a share of the width. What is wider or shallower is a room or a niche."""
+BACK_SHARE: Final = 0.7
+"""At half its depth a canyon is still as wide as this share of its mouth: the corner of a room is none."""
+CLIPPED: Final = 1.25
+"""A mouth longer than this times a nearer crossing slants, as one side goes on: the crossing is the mouth then."""
+BRIDGE_WEIGHT: Final = 0.85
+"""Weight of a gap that is too narrow, in place of the surface's probability."""
+SURFACE_PROBABILITY_MIN: Final = 0.5
+SURFACES_MIN: Final = 3
+SURFACES_MAX: Final = 48
+POST_RADIUS_M: Final = 0.1
+"""Radius of what has a place but no known shape."""
+STEP_RAD: Final = math.radians(5.0)
+NUDGE_RAD: Final = 1e-4
+"""Directions just beside the end of a surface, so that no opening is missed between two directions."""
+CLEAR_M: Final = 0.3
+"""A place nearer to a surface than this is none of the robot's."""
+SAME_M: Final = 1.0
+SAME_RAD: Final = math.radians(40.0)
+"""Mouths nearer than this, of canyons that point alike, are of the same canyon."""
+REMEMBERED_MAX: Final = 16
+DOUBT: Final = 0.6
+FORGOTTEN: Final = 0.3
+"""The probability of a canyon that is not found again falls by this factor, down to where it is forgotten."""
+PASSAGE_M: Final = 0.085
+"""Room on either side of the robot below which a gap is closed; less than the arbiter's clearance, as the ends of
+walls are known within some centimetres only, and a doorway that the robot can pass must stay one."""
+EVERY_FIRINGS: Final = 4
+"""One place is examined after so many firings."""
+
+
+class Surfaces(NamedTuple):
+    """What is closed: straight pieces x1, y1, x2, y2 (n, 4) and circles x, y, radius (m, 3), m, and how surely."""
+
+    pieces: Floats
+    piece_weights: Floats
+    circles: Floats
+    circle_weights: Floats
+
+
+CANYON_DTYPE: Final = np.dtype([
+    ("number", "i8"), ("mouth", "f8", 4), ("axis", "f8"), ("depth", "f8"), ("probability", "f8"), ("inside", "f8", 2),
+])  # fmt: skip
+
+
+def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], sealed_m: float) -> Surfaces:
+    """Return the surfaces that are sure enough, and a straight piece across each gap narrower than `sealed_m`.
+
+    Parameters
+    ----------
+    seen
+        What perception reports.
+    radii_m
+        Radius by label; what has another label and is no wall is a post.
+    sealed_m
+        Gaps narrower than this are closed for the robot, m.
+    """
+    walls: list[tuple[float, ...]] = []
+    rounds: list[tuple[float, ...]] = []
+    for one in seen:
+        weight = one.score if one.probability is None else one.probability
+        if weight < SURFACE_PROBABILITY_MIN:
+            continue
+        if one.ends is not None:
+            walls.append((*one.ends, weight))
+        elif len(rounds) < SURFACES_MAX:
+            rounds.append((one.x, one.y, radii_m.get(one.model, POST_RADIUS_M), weight))
+    pieces = np.array(walls[:SURFACES_MAX]).reshape(-1, 5)
+    circles = np.array(rounds).reshape(-1, 4)
+    bridges = _bridges(pieces[:, :4], circles[:, :3], sealed_m)
+    weights = np.concatenate([pieces[:, 4], np.full(len(bridges), BRIDGE_WEIGHT)])
+    return Surfaces(np.concatenate([pieces[:, :4], bridges]), weights, circles[:, :3], circles[:, 3])
+
+
+def _bridges(pieces: Floats, circles: Floats, sealed_m: float) -> Floats:
+    """Return straight pieces across the gaps that are too narrow, shape (k, 4)."""
+    ends = np.concatenate([pieces[:, :2], pieces[:, 2:], circles[:, :2]])
+    radii = np.concatenate([np.zeros(2 * len(pieces)), circles[:, 2]])
+    owner = np.concatenate([np.arange(len(pieces)), np.arange(len(pieces)), np.full(len(circles), -1)])
+    found = []
+    if len(pieces):
+        a, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
+        share = ((ends[:, None] - a) * along).sum(axis=2) / np.maximum((along * along).sum(axis=1), 1e-12)
+        feet = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
+        gaps = np.hypot(*np.moveaxis(feet - ends[:, None], 2, 0)) - radii[:, None]
+        gaps[owner[:, None] == np.arange(len(pieces))] = math.inf
+        for i, k in np.argwhere(gaps < sealed_m):
+            found.append((*ends[i], *feet[i, k]))
+    apart = np.hypot(*np.moveaxis(circles[:, None, :2] - circles[:, :2], 2, 0)) - circles[:, None, 2] - circles[:, 2]
+    for i, k in np.argwhere(np.triu(apart < sealed_m, 1)):
+        found.append((*circles[i, :2], *circles[k, :2]))
+    return np.array(found, dtype=np.float64).reshape(-1, 4)
+
+
+def canyon_round(x: float, y: float, surfaces: Surfaces, sealed_m: float) -> Canyon | None:
+    """Return the canyon that a place lies in, without a number; None if it lies in none.
+
+    Parameters
+    ----------
+    x, y
+        The place, m.
+    surfaces
+        From `surfaces_of`.
+    sealed_m
+        As for `surfaces_of`.
+    """
+    angles, points, items, weights = _seen_from(x, y, surfaces)
+    ranges = np.hypot(points[:, 0] - x, points[:, 1] - y)
+    if len(ranges) == 0 or ranges.min() < CLEAR_M:
+        return None
+    heard = ranges < REACH_M
+    after = np.roll(points, -1, axis=0)
+    gaps = np.hypot(after[:, 0] - points[:, 0], after[:, 1] - points[:, 1])
+    joined = heard & np.roll(heard, -1) & ((items == np.roll(items, -1)) | (gaps < sealed_m))
+    cuts = np.flatnonzero(~joined)
+    if len(cuts) == 0:
+        return None
+    # The longest run of directions between two cuts, in turn from just after a cut.
+    begins, counts = (cuts + 1) % len(angles), np.diff(np.append(cuts, cuts[0] + len(angles)))
+    spans = np.array([
+        (angles[(b + n - 1) % len(angles)] - angles[b]) % (2.0 * math.pi) if n > 1 else 0.0
+        for b, n in zip(begins, counts, strict=True)
+    ])  # fmt: skip
+    longest = int(spans.argmax())
+    if spans[longest] <= math.pi:
+        return None
+    run = (begins[longest] + np.arange(counts[longest])) % len(angles)
+    return _measured(x, y, points[run], weights[run], sealed_m)
+
+
+def _measured(x: float, y: float, chain: Floats, weights: Floats, sealed_m: float) -> Canyon | None:
+    """Return the canyon of a chain of points in turn, counter-clockwise round (x, y)."""
+    first, last, half = 0, len(chain) - 1, len(chain) // 2
+    to_first = np.hypot(*(chain[half:] - chain[0]).T)
+    to_last = np.hypot(*(chain[:half] - chain[-1]).T)
+    if math.dist(chain[0], chain[-1]) > CLIPPED * min(to_first.min(), to_last.min()):
+        if to_first.min() < to_last.min():
+            last = half + int(to_first.argmin())
+        else:
+            first = int(to_last.argmin())
+    (x1, y1), (x2, y2) = chain[first], chain[last]
+    width = math.hypot(x2 - x1, y2 - y1)
+    if not sealed_m <= width <= WIDTH_MAX_M:
+        return None
+    # The chain turns counter-clockwise from the right end of the mouth, looking in, to the left one.
+    ux, uy = (y2 - y1) / width, -(x2 - x1) / width
+    depths = (chain[first : last + 1, 0] - x1) * ux + (chain[first : last + 1, 1] - y1) * uy
+    depth = float(depths.max())
+    if (x - x1) * ux + (y - y1) * uy <= 0.0 or depth < max(DEPTH_MIN_M, DEPTH_SHARE * width):
+        return None
+    across = (chain[first : last + 1, 0] - x1) * uy - (chain[first : last + 1, 1] - y1) * ux
+    if np.ptp(across[depths >= 0.5 * depth]) < BACK_SHARE * width:
+        return None
+    mouth = (float(x1), float(y1), float(x2), float(y2))
+    return Canyon(0, mouth, math.atan2(uy, ux), depth, float(weights[first : last + 1].mean()))
+
+
+def _seen_from(x: float, y: float, surfaces: Surfaces) -> tuple[Floats, Floats, NDArray[np.int64], Floats]:
+    """Return, by direction in turn: the angle, the point seen, which surface it is of, and its weight."""
+    pieces, circles = surfaces.pieces, surfaces.circles
+    ends = np.concatenate([pieces[:, :2], pieces[:, 2:]]) - (x, y)
+    corners = np.arctan2(ends[:, 1], ends[:, 0])
+    away = circles[:, :2] - (x, y)
+    distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
+    half, middle = np.arcsin(np.minimum(circles[:, 2] / distance, 1.0)), np.arctan2(away[:, 1], away[:, 0])
+    edges = np.concatenate([corners, middle - half, middle + half])
+    angles = np.concatenate([np.arange(-math.pi, math.pi, STEP_RAD), edges - NUDGE_RAD, edges + NUDGE_RAD])
+    angles = np.sort(np.remainder(angles + math.pi, 2.0 * math.pi) - math.pi)
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    ax, ay = pieces[:, 0] - x, pieces[:, 1] - y
+    dx, dy = pieces[:, 2] - pieces[:, 0], pieces[:, 3] - pieces[:, 1]
+    with np.errstate(all="ignore"):
+        across = c * dy - s * dx
+        at, share = (ax * dy - ay * dx) / across, (ax * s - ay * c) / across
+        to_pieces = np.where((at > 0.0) & (share >= 0.0) & (share <= 1.0), at, math.inf)
+        along, off = c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0]
+        to_circles = along - np.sqrt(circles[:, 2] ** 2 - off * off)
+        to_circles = np.where((np.abs(off) < circles[:, 2]) & (along > 0.0), np.maximum(to_circles, 0.0), math.inf)
+    ranges = np.concatenate([to_pieces, to_circles, np.full((len(angles), 1), 1e6)], axis=1)
+    items = ranges.argmin(axis=1)
+    nearest = ranges[np.arange(len(angles)), items]
+    weights = np.concatenate([surfaces.piece_weights, surfaces.circle_weights, [0.0]])[items]
+    points = np.column_stack([x + nearest * c[:, 0], y + nearest * s[:, 0]])
+    return angles, points, items.astype(np.int64), weights
+
+
+def places_before(surfaces: Surfaces, room_m: float) -> Floats:
+    """Return places before both faces of the straight pieces, `room_m` away, in a fixed order, shape (k, 2), m."""
+    middle = 0.5 * (surfaces.pieces[:, :2] + surfaces.pieces[:, 2:])
+    along = surfaces.pieces[:, 2:] - surfaces.pieces[:, :2]
+    length = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
+    normal = np.column_stack([-along[:, 1], along[:, 0]]) / length
+    return np.concatenate([middle + room_m * normal, middle - room_m * normal])
+
+
+class CanyonMap:
+    """The canyons found so far, those left behind included.
+
+    Attributes
+    ----------
+    rows : (REMEMBERED_MAX,) record of `CANYON_DTYPE`
+        A number of 0 is a free row.
+    numbered, firings : int
+        Canyons numbered, and firings, so far.
+    """
+
+    def __init__(self, sealed_m: float) -> None:
+        self.sealed_m = sealed_m
+        self.rows: NDArray[Any] = np.zeros(REMEMBERED_MAX, CANYON_DTYPE)
+        self.numbered = 0
+        self.firings = 0
+
+    def observe(self, pose: Pose, seen: Iterable[DetectedObject], radii_m: Mapping[str, float]) -> None:
+        """Examine the next place: in turn that of the robot, a known canyon's, and one before a wall.
+
+        Parameters
+        ----------
+        pose
+            The robot's.
+        seen
+            What perception reports near it.
+        radii_m
+            Radius by label of round models.
+        """
+        surfaces = surfaces_of(seen, radii_m, self.sealed_m)
+        if len(surfaces.piece_weights) + len(surfaces.circle_weights) < SURFACES_MIN and not self.numbered:
+            return
+        turn, known = self.firings // EVERY_FIRINGS, np.flatnonzero(self.rows["number"] > 0)
+        before = places_before(surfaces, 0.5 * self.sealed_m + CLEAR_M)
+        x, y = pose.x, pose.y
+        row = None
+        if turn % 3 == 1 and len(known):
+            row = int(known[turn // 3 % len(known)])
+            x, y = self.rows["inside"][row].tolist()
+        elif turn % 3 == 2 and len(before):
+            x, y = before[turn // 3 % len(before)].tolist()
+        found = canyon_round(x, y, surfaces, self.sealed_m)
+        if found is not None:
+            self._enter(found, x, y)
+        elif row is not None and math.hypot(x - pose.x, y - pose.y) < 0.5 * REACH_M:
+            self.rows["probability"][row] *= DOUBT
+            if self.rows["probability"][row] < FORGOTTEN:
+                self.rows[row] = 0
+
+    def _enter(self, found: Canyon, x: float, y: float) -> None:
+        """Take over a canyon under its own number if it is known, otherwise in place of the least sure one."""
+        rows = self.rows
+        middle = 0.5 * (np.array(found.mouth[:2]) + found.mouth[2:])
+        away = np.hypot(*(0.5 * (rows["mouth"][:, :2] + rows["mouth"][:, 2:]) - middle).T)
+        off = np.abs(np.remainder(rows["axis"] - found.axis_rad + math.pi, 2.0 * math.pi) - math.pi)
+        inside = np.hypot(*(rows["inside"] - (x, y)).T)
+        same = (rows["number"] > 0) & (off < SAME_RAD) & ((away < SAME_M) | (inside < SAME_M))
+        if same.any():
+            at = int(np.flatnonzero(same)[0])
+            number = int(rows["number"][at])
+        else:
+            at = int(np.where(rows["number"] > 0, rows["probability"], -1.0).argmin())
+            self.numbered += 1
+            number = self.numbered
+        rows[at] = (number, found.mouth, found.axis_rad, found.depth_m, found.probability, (x, y))
+
+    def canyons(self) -> tuple[Canyon, ...]:
+        """Return the canyons, in the order of their numbers."""
+        known = self.rows[self.rows["number"] > 0]
+        return tuple(
+            Canyon(int(row["number"]), tuple(row["mouth"].tolist()), float(row["axis"]), float(row["depth"]),
+                   float(row["probability"]))
+            for row in known[np.argsort(known["number"])]
+        )  # fmt: skip
+
+    def clear(self) -> None:
+        """Forget all canyons."""
+        self.rows[:] = 0
+        self.numbered = self.firings = 0

@@ -1,0 +1,105 @@
+"""Box canyons: recognised from walls, chains and posts; no false ones in halls, corridors and corners; remembered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.messages import Pose
+from perception.detected_object import DetectedObject
+from perception.mapping.canyons import DOUBT, CanyonMap, canyon_round, places_before, surfaces_of
+from perception.percept import Canyon
+
+SEALED_M = 0.93
+RADII = {"drum": 0.3048}
+Ends = tuple[float, float, float, float]
+U: tuple[Ends, ...] = ((2, 1, 5, 1), (5, 1, 5, -1), (5, -1, 2, -1))
+
+
+def wall(x1: float, y1: float, x2: float, y2: float, score: float = 1.0) -> DetectedObject:
+    """Return a wall as perception reports it."""
+    theta, twelfth = math.atan2(y2 - y1, x2 - x1), math.hypot(x2 - x1, y2 - y1) ** 2 / 12.0
+    c, s = math.cos(theta), math.sin(theta)
+    covariance = (twelfth * c * c, twelfth * c * s, twelfth * s * s)
+    return DetectedObject("wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), theta, 0.1, 9, score, covariance=covariance)
+
+
+def drum(x: float, y: float) -> DetectedObject:
+    return DetectedObject("drum", x, y, 0.0, 0.01, 9, 1.0)
+
+
+def found(seen: list[DetectedObject], x: float, y: float) -> Canyon | None:
+    return canyon_round(x, y, surfaces_of(seen, RADII, SEALED_M), SEALED_M)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 2.5, -1.9])
+def test_three_walls_are_a_canyon_at_any_angle(turn: float) -> None:
+    c, s = math.cos(turn), math.sin(turn)
+    seen = [wall(c * a - s * b, s * a + c * b, c * d - s * e, s * d + c * e) for a, b, d, e in U]
+    canyon = found(seen, 4.0 * c, 4.0 * s)
+    assert canyon is not None
+    assert canyon.depth_m == pytest.approx(3.0, abs=0.01)
+    assert math.remainder(canyon.axis_rad - turn, math.tau) == pytest.approx(0.0, abs=0.01)
+    middle = 0.5 * (np.array(canyon.mouth[:2]) + canyon.mouth[2:])
+    assert middle == pytest.approx((2.0 * c, 2.0 * s), abs=0.01)
+    assert canyon.probability > 0.95
+    assert found(seen, 1.0 * c, 1.0 * s) is None
+
+
+def test_a_gap_that_is_too_narrow_is_closed_and_one_of_a_doorway_is_open() -> None:
+    for gap, closed in ((0.85, True), (1.1, False)):
+        seen = [wall(2, 1, 3.5, 1), wall(3.5 + gap, 1, 7, 1), wall(7, 1, 7, -1), wall(7, -1, 2, -1)]
+        canyon = found(seen, 3.0, 0.0)
+        assert (canyon is not None) is closed, gap
+    behind = found([wall(2, 1, 3.5, 1), wall(4.6, 1, 7, 1), wall(7, 1, 7, -1), wall(7, -1, 2, -1)], 6.0, 0.0)
+    assert behind is not None
+    assert behind.depth_m == pytest.approx(2.4, abs=0.3)
+
+
+def test_columns_of_drums_are_a_corridor_and_with_a_back_a_canyon() -> None:
+    columns = [drum(0.3 + 0.914 * k, y) for k in range(3) for y in (1.2, -1.2)]
+    assert found(columns, 1.2, 0.0) is None
+    pen = found([*columns, drum(2.9, 0.5), drum(2.9, -0.5)], 1.2, 0.0)
+    assert pen is not None
+    assert pen.axis_rad == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_corridor_a_corner_a_niche_and_a_doubtful_wall_are_none() -> None:
+    assert found([wall(0, 1, 8, 1), wall(0, -1, 8, -1)], 4.0, 0.0) is None
+    assert found([wall(0, 0, 4, 0), wall(0, 0, 0, 4)], 0.8, 0.8) is None
+    assert found([wall(2, 1, 2.5, 1), wall(2.5, 1, 2.5, -1), wall(2.5, -1, 2, -1)], 2.2, 0.0) is None
+    assert found([wall(*ends, score=0.3) for ends in U], 4.0, 0.0) is None
+    assert found([], 0.0, 0.0) is None
+
+
+def test_one_side_may_go_on_beyond_the_mouth() -> None:
+    canyon = found([wall(2, 1, 5, 1), wall(5, 1, 5, -1), wall(5, -1, -3, -1)], 4.0, 0.0)
+    assert canyon is not None
+    assert canyon.depth_m == pytest.approx(3.0, abs=0.2)
+
+
+def test_a_canyon_keeps_its_number_is_remembered_and_forgotten_when_it_is_gone() -> None:
+    seen, canyon_map = [wall(*ends) for ends in U], CanyonMap(SEALED_M)
+    for firing in range(0, 160, 4):
+        canyon_map.firings = firing
+        canyon_map.observe(Pose(0.0, 0.0, 0.0), seen, RADII)
+    assert [canyon.number for canyon in canyon_map.canyons()] == [1]  # seen from outside: places before the walls
+    for firing in range(160, 260, 4):
+        canyon_map.firings = firing
+        canyon_map.observe(Pose(30.0, 0.0, 0.0), [], RADII)
+    assert [canyon.number for canyon in canyon_map.canyons()] == [1]
+    canyon_map.firings = 4
+    canyon_map.observe(Pose(3.0, 0.0, 0.0), [], RADII)
+    assert canyon_map.canyons()[0].probability == pytest.approx(DOUBT)
+    for _ in range(3):
+        canyon_map.observe(Pose(3.0, 0.0, 0.0), [], RADII)
+    assert canyon_map.canyons() == ()
+    canyon_map.clear()
+    assert canyon_map.numbered == 0
+
+
+def test_places_lie_before_both_faces() -> None:
+    surfaces = surfaces_of([wall(0, 0, 4, 0)], RADII, SEALED_M)
+    assert places_before(surfaces, 0.7).tolist() == [pytest.approx([2.0, 0.7]), pytest.approx([2.0, -0.7])]
