@@ -37,7 +37,7 @@ from perception.localization.drift_correction import LocalizedPose
 from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
-from perception.mapping.canyons import EVERY_FIRINGS, PASSAGE_M, CanyonMap
+from perception.mapping.canyons import PASSAGE_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method, make_method
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
@@ -98,12 +98,12 @@ class Perception:
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return self.method.can_refine or self._can_localize
+        return self.method.can_refine or self.canyon_map.is_due or self._can_localize
 
     @property
     def converged(self) -> bool:
         """Whether nothing is left to improve, now or with the next firing."""
-        return self.method.converged and not self._can_localize
+        return self.method.converged and not self.canyon_map.is_due and not self._can_localize
 
     @property
     def _can_localize(self) -> bool:
@@ -137,10 +137,7 @@ class Perception:
         if self.grid is not None:
             self.method.locate_echoes(self.grid.bearings)
             self.grid.observe(trusted)
-        self.canyon_map.firings += 1
-        if self.canyon_map.firings % EVERY_FIRINGS == 0:
-            radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
-            self.canyon_map.observe(trusted.pose, self.labelled_objects(), radii_m)
+        self.canyon_map.observe(trusted.pose)
         return made
 
     def refine(self) -> int:
@@ -148,9 +145,13 @@ class Perception:
 
         The method comes first: its quanta of a firing are few, while the search of a known room has hundreds.
         """
-        if self.known_room is None or self.method.can_refine:
+        if self.method.can_refine:
             return self.method.refine()
-        if not self.known_room.can_refine:
+        if self.canyon_map.is_due:
+            radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
+            self.canyon_map.refine(self.labelled_objects(), radii_m)
+            return 1
+        if self.known_room is None or not self.known_room.can_refine:
             return 0
         self.known_room.refine()
         return 1

@@ -39,10 +39,8 @@ from perception.bayes.wall_records import (
 from perception.kernel import kernel
 from perception.records import Records
 
-CROSSING_REACH_M: Final = 3.0
-"""Farthest that walls may meet beyond their ends, …"""
 CORNER_REACH_M: Final = 2.0
-"""… and that a wall goes on to a corner that is heard …"""
+"""Farthest that a corner may lie beyond the ends of its walls …"""
 CORNER_INSIDE_M: Final = 0.4
 """… and inside them."""
 CORNER_SINE_MIN: Final = 0.4
@@ -93,7 +91,7 @@ def crossing(a: Wall, b: Wall) -> tuple[bool, float, float]:
     y = (ax * level_b - bx * level_a) / det
     along_a = position_along(a, x, y)
     along_b = position_along(b, x, y)
-    is_near = is_on_span(a, along_a, CROSSING_REACH_M) and is_on_span(b, along_b, CROSSING_REACH_M)
+    is_near = is_on_span(a, along_a, CORNER_REACH_M) and is_on_span(b, along_b, CORNER_REACH_M)
     is_within = is_on_span(a, along_a, -CORNER_INSIDE_M) or is_on_span(b, along_b, -CORNER_INSIDE_M)
     return is_near and not is_within, x, y
 

@@ -51,8 +51,8 @@ FORGOTTEN: Final = 0.3
 PASSAGE_M: Final = 0.085
 """Room on either side of the robot below which a gap is closed; less than the arbiter's clearance, as the ends of
 walls are known within some centimetres only, and a doorway that the robot can pass must stay one."""
-EVERY_FIRINGS: Final = 4
-"""One place is examined after so many firings."""
+EVERY_FIRINGS: Final = 10
+"""One place is examined after so many firings: half a second."""
 
 
 class Surfaces(NamedTuple):
@@ -228,6 +228,8 @@ class CanyonMap:
         A number of 0 is a free row.
     numbered, firings : int
         Canyons numbered, and firings, so far.
+    is_due : bool
+        Whether the next place is to be examined.
     """
 
     def __init__(self, sealed_m: float) -> None:
@@ -235,25 +237,33 @@ class CanyonMap:
         self.rows: NDArray[Any] = np.zeros(REMEMBERED_MAX, CANYON_DTYPE)
         self.numbered = 0
         self.firings = 0
+        self.is_due = False
+        self._at = np.zeros(2)
 
-    def observe(self, pose: Pose, seen: Iterable[DetectedObject], radii_m: Mapping[str, float]) -> None:
+    def observe(self, pose: Pose) -> None:
+        """Take the robot's pose at a firing; after some of them the next place is due."""
+        self.firings += 1
+        if self.firings % EVERY_FIRINGS == 0:
+            self.is_due = True
+            self._at[:] = pose.x, pose.y
+
+    def refine(self, seen: Iterable[DetectedObject], radii_m: Mapping[str, float]) -> None:
         """Examine the next place: in turn that of the robot, a known canyon's, and one before a wall.
 
         Parameters
         ----------
-        pose
-            The robot's.
         seen
             What perception reports near it.
         radii_m
             Radius by label of round models.
         """
+        self.is_due = False
         surfaces = surfaces_of(seen, radii_m, self.sealed_m)
         if len(surfaces.piece_weights) + len(surfaces.circle_weights) < SURFACES_MIN and not self.numbered:
             return
         turn, known = self.firings // EVERY_FIRINGS, np.flatnonzero(self.rows["number"] > 0)
         before = places_before(surfaces, 0.5 * self.sealed_m + CLEAR_M)
-        x, y = pose.x, pose.y
+        x, y = robot_x, robot_y = self._at.tolist()
         row = None
         if turn % 3 == 1 and len(known):
             row = int(known[turn // 3 % len(known)])
@@ -263,7 +273,7 @@ class CanyonMap:
         found = canyon_round(x, y, surfaces, self.sealed_m)
         if found is not None:
             self._enter(found, x, y)
-        elif row is not None and math.hypot(x - pose.x, y - pose.y) < 0.5 * REACH_M:
+        elif row is not None and math.hypot(x - robot_x, y - robot_y) < 0.5 * REACH_M:
             self.rows["probability"][row] *= DOUBT
             if self.rows["probability"][row] < FORGOTTEN:
                 self.rows[row] = 0
@@ -298,3 +308,4 @@ class CanyonMap:
         """Forget all canyons."""
         self.rows[:] = 0
         self.numbered = self.firings = 0
+        self.is_due = False

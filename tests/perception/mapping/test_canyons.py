@@ -9,7 +9,7 @@ import pytest
 
 from drivers.messages import Pose
 from perception.detected_object import DetectedObject
-from perception.mapping.canyons import DOUBT, CanyonMap, canyon_round, places_before, surfaces_of
+from perception.mapping.canyons import DOUBT, EVERY_FIRINGS, CanyonMap, canyon_round, places_before, surfaces_of
 from perception.percept import Canyon
 
 SEALED_M = 0.93
@@ -82,24 +82,25 @@ def test_one_side_may_go_on_beyond_the_mouth() -> None:
 
 def test_a_canyon_keeps_its_number_is_remembered_and_forgotten_when_it_is_gone() -> None:
     seen, canyon_map = [wall(*ends) for ends in U], CanyonMap(SEALED_M)
-    for firing in range(0, 160, 4):
-        canyon_map.firings = firing
-        canyon_map.observe(Pose(0.0, 0.0, 0.0), seen, RADII)
+
+    def examine(pose: Pose, objects: list[DetectedObject]) -> None:
+        for _ in range(EVERY_FIRINGS):
+            assert not canyon_map.is_due
+            canyon_map.observe(pose)
+        assert canyon_map.is_due
+        canyon_map.refine(objects, RADII)
+
+    for _ in range(40):
+        examine(Pose(0.0, 0.0, 0.0), seen)
     assert [canyon.number for canyon in canyon_map.canyons()] == [1]  # seen from outside: places before the walls
-    for firing in range(160, 260, 4):
-        canyon_map.firings = firing
-        canyon_map.observe(Pose(30.0, 0.0, 0.0), [], RADII)
+    for _ in range(25):
+        examine(Pose(30.0, 0.0, 0.0), [])
     assert [canyon.number for canyon in canyon_map.canyons()] == [1]
-    canyon_map.firings = 4
-    canyon_map.observe(Pose(3.0, 0.0, 0.0), [], RADII)
+    for _ in range(3):  # one of three times at the canyon itself
+        examine(Pose(3.0, 0.0, 0.0), [])
     assert canyon_map.canyons()[0].probability == pytest.approx(DOUBT)
-    for _ in range(3):
-        canyon_map.observe(Pose(3.0, 0.0, 0.0), [], RADII)
+    for _ in range(9):
+        examine(Pose(3.0, 0.0, 0.0), [])
     assert canyon_map.canyons() == ()
     canyon_map.clear()
     assert canyon_map.numbered == 0
-
-
-def test_places_lie_before_both_faces() -> None:
-    surfaces = surfaces_of([wall(0, 0, 4, 0)], RADII, SEALED_M)
-    assert places_before(surfaces, 0.7).tolist() == [pytest.approx([2.0, 0.7]), pytest.approx([2.0, -0.7])]
