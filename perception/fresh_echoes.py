@@ -60,10 +60,12 @@ def record_echoes(
         if math.isnan(r):
             continue
         bearing = yaw + mounts[i, 2]
-        px = x + c * mounts[i, 0] - s * mounts[i, 1] + r * math.cos(bearing)
-        py = y + s * mounts[i, 0] + c * mounts[i, 1] + r * math.sin(bearing)
+        is_echo = math.isfinite(r)
+        reach = r if is_echo else 0.0
+        px = x + c * mounts[i, 0] - s * mounts[i, 1] + reach * math.cos(bearing)
+        py = y + s * mounts[i, 0] + c * mounts[i, 1] + reach * math.sin(bearing)
         agrees = False
-        if math.isfinite(r):
+        if is_echo:
             for j in range(times.shape[0]):
                 for k in range(times.shape[1]):
                     if (
@@ -82,9 +84,9 @@ def record_echoes(
                 oldest = k
         bearings[i, oldest] = bearing
         times[i, oldest] = t
-        heard[i, oldest] = math.isfinite(r)
+        heard[i, oldest] = is_echo
         steady[i, oldest] = agrees
-        if heard[i, oldest]:
+        if is_echo:
             points[i, oldest, 0] = px
             points[i, oldest, 1] = py
 

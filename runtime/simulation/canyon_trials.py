@@ -10,9 +10,7 @@ from typing import Final, TypedDict
 
 from behaviors.move_to_goal import Goal
 from config.settings import GoalConfig, Settings
-from drivers.emulator.acoustics import clearance
 from drivers.emulator.robot_device import GroundTruth
-from drivers.emulator.scene import compile_scene
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.canyon_worlds import CanyonWorld
@@ -91,10 +89,9 @@ class CanyonRow(TypedDict):
 class _Watch:
     """What one drive comes to."""
 
-    def __init__(self, place: CanyonWorld, radius_m: float) -> None:
-        self.place, self._radius_m = place, radius_m
-        self._scene = compile_scene(place.world)
-        self._inside = self._touches = self._still = False
+    def __init__(self, place: CanyonWorld) -> None:
+        self.place = place
+        self._inside = False
         self.entries = self.contacts = 0
         self.deepest_m, self.way_m, self.time_s = -math.inf, 0.0, 0.0
         self.reported_m: float | None = None
@@ -114,9 +111,7 @@ class _Watch:
             self._inside, self.entries = True, self.entries + 1
         elif self._inside and along < -LEFT_M:
             self._inside = False
-        touches = clearance(x, y, self._scene.circles, self._scene.segments) < self._radius_m
-        self.contacts += touches and not self._touches
-        self._touches = touches
+        self.contacts = truth.contacts
         if math.hypot(x - self._rest[0], y - self._rest[1]) > STILL_M:
             self._rest = (x, y, self.time_s)
 
@@ -142,7 +137,7 @@ def drive(settings: Settings, place: CanyonWorld, seed: int) -> CanyonOutcome:
     """
     x, y = place.goal_in_odometry()
     settings = settings.model_copy(update={"goal": GoalConfig(x_m=x, y_m=y), "world": place.world})
-    watch = _Watch(place, settings.body.radius_m)
+    watch = _Watch(place)
     simulate(settings, place.world, seed, TIME_MAX_S, watch.see, is_over=watch.is_over)
     return CanyonOutcome(
         place.depth_m, place.width_m, math.dist((watch.x, watch.y), place.goal) < ARRIVED_M, watch.entries,

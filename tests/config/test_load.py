@@ -80,7 +80,7 @@ def test_unknown_names(load: Any, what: str, near: str, wrong: str) -> None:
 def test_an_unknown_name_in_a_run_names_the_run_and_the_known_ones(tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"robot": "denning", "world": "xyz"})
     line = problem(run)
-    assert line.startswith(f'{run}: world "xyz": no such world; known worlds: hallway, irregular')
+    assert line.startswith(f'{run}: world "xyz": no such world; known worlds: hallway, irregular, office, room')
     assert problem(robot="denig").startswith('command line: robot "denig": no such robot; did you mean denning?')
     assert problem(None, ["models.0=bix"]).startswith('--set: model "bix": no such model; did you mean box?')
 
@@ -92,7 +92,7 @@ def test_bare_name_of_an_existing_file(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_reported_with_the_file_that_names_it(tmp_path: Path) -> None:
-    assert problem("run.toml") == "run.toml: file not found; known runs: hallway, irregular"
+    assert problem("run.toml") == "run.toml: file not found; known runs: hallway, irregular, office, room"
     run = write(tmp_path / "run.toml", {"robot": "robots/mine.toml"})
     assert problem(run) == f"{tmp_path}/robots/mine.toml: file not found; named by {run}; known robots: {ROBOTS}"
 

@@ -33,9 +33,9 @@ def test_the_names_of_shipped_files() -> None:
         "peoplebot",
         "powerbot",
     )
-    assert list_shipped("worlds") == ("hallway", "irregular", "room")
+    assert list_shipped("worlds") == ("hallway", "irregular", "office", "room")
     assert list_shipped("models") == ("box", "drum", "semicircle")
-    assert list_shipped("runs") == ("hallway", "irregular", "room")
+    assert list_shipped("runs") == ("hallway", "irregular", "office", "room")
     assert len(list_shipped("missions")) == 10
 
 

@@ -104,3 +104,8 @@ def test_a_canyon_keeps_its_number_is_remembered_and_forgotten_when_it_is_gone()
     assert canyon_map.canyons() == ()
     canyon_map.clear()
     assert canyon_map.numbered == 0
+
+
+def test_places_lie_before_both_faces() -> None:
+    surfaces = surfaces_of([wall(0, 0, 4, 0)], RADII, SEALED_M)
+    assert places_before(surfaces, 0.7).tolist() == [pytest.approx([2.0, 0.7]), pytest.approx([2.0, -0.7])]
