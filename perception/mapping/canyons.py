@@ -228,6 +228,8 @@ class CanyonMap:
         A number of 0 is a free row.
     numbered, firings : int
         Canyons numbered, and firings, so far.
+    is_wanted : bool
+        Whether to look for canyons: a place takes a millisecond, and only a drive to a goal needs them.
     is_due : bool
         Whether the next place is to be examined.
     """
@@ -237,13 +239,14 @@ class CanyonMap:
         self.rows: NDArray[Any] = np.zeros(REMEMBERED_MAX, CANYON_DTYPE)
         self.numbered = 0
         self.firings = 0
+        self.is_wanted = False
         self.is_due = False
         self._at = np.zeros(2)
 
     def observe(self, pose: Pose) -> None:
-        """Take the robot's pose at a firing; after some of them the next place is due."""
+        """Take the robot's pose at a firing; after some of them the next place is due, where that is wanted."""
         self.firings += 1
-        if self.firings % EVERY_FIRINGS == 0:
+        if self.is_wanted and self.firings % EVERY_FIRINGS == 0:
             self.is_due = True
             self._at[:] = pose.x, pose.y
 

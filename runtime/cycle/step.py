@@ -163,6 +163,8 @@ def step(
     mark : callable
         Called at the end of each phase; no decision depends on it.
     """
+    is_goal = isinstance(state.drive_request, Goal)
+    state.perception.canyon_map.is_wanted = is_goal and settings.behaviors.leave_canyon.leave_canyon_gain > 0.0
     new_segments = _perceive(state, inputs)
     mark(Phase.PERCEIVE)
     problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request)

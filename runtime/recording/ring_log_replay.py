@@ -34,6 +34,7 @@ class FiringReplayer:
 
     def __init__(self, settings: Settings, firings: Iterable[Firing]) -> None:
         self.perception = Perception(settings.ring, settings.models, settings.perception)
+        self.perception.canyon_map.is_wanted = True
         self._firings = firings
         self._cycle_stats = CycleStats(late_after_s=float("inf"))
 

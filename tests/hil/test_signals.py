@@ -120,7 +120,7 @@ def test_a_service_is_armed_reloaded_halted_and_ended(tmp_path: Path, measured: 
         assert bad["event"] == "the new configuration is refused"
         assert str(bad["problem"]).startswith(f"{config}: behaviors.arbiter.base_velocity_m_s = ")
         slow = good.replace("0.3", "0.05") + '[ring]\nfiring = "quadrants"\n'
-        fixed = reloaded(run, config, slow + "[link]\nbaud = 9600\n")
+        fixed = reloaded(run, config, slow + "[link]\nbaud = 57600\n")
         assert str(fixed["problem"]).startswith("link.baud: ")
         assert str(fixed["problem"]).endswith("needs a restart")
         drive.get_under_way()  # faster than the settings that were refused would have it

@@ -83,6 +83,11 @@ def test_one_side_may_go_on_beyond_the_mouth() -> None:
 def test_a_canyon_keeps_its_number_is_remembered_and_forgotten_when_it_is_gone() -> None:
     seen, canyon_map = [wall(*ends) for ends in U], CanyonMap(SEALED_M)
 
+    for _ in range(2 * EVERY_FIRINGS):
+        canyon_map.observe(Pose(0.0, 0.0, 0.0))
+    assert not canyon_map.is_due
+    canyon_map.is_wanted = True
+
     def examine(pose: Pose, objects: list[DetectedObject]) -> None:
         for _ in range(EVERY_FIRINGS):
             assert not canyon_map.is_due

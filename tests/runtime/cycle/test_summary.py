@@ -13,6 +13,7 @@ import pytest
 from config.errors import FAILED, UserError
 from drivers.messages import Pose
 from perception.localization.drift_correction import LocalizedPose
+from perception.percept import Canyon
 from perception.pipeline import DetectedObject, Perception
 from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, perceived_rows, pose_row, write_json
 from runtime.recording.replay_summary import ReplaySummary
@@ -63,12 +64,19 @@ class Perceived:
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         return (DetectedObject("edge", -5.0, 0.0, 0.0, 0.03, 9, 0.9),)
 
+    def canyons(self) -> tuple[Canyon, ...]:
+        return (Canyon(3, (1.0, -1.0, 1.0, 1.0), 0.0, 2.5, 0.97),)
+
 
 def test_walls_and_corners_have_rows_of_their_own_in_the_frame_of_the_result() -> None:
     rows = perceived_rows(cast("Perception", Perceived()), Pose(10.0, 0.0, math.pi / 2))
     (seen,) = rows["objects"]
     assert seen["model"] == "semicircle"
     assert seen["x"] == pytest.approx(12.0)
+    (canyon,) = rows["canyons"]
+    assert (canyon["x1"], canyon["y1"], canyon["x2"], canyon["y2"]) == pytest.approx((11.0, 1.0, 9.0, 1.0))
+    assert (canyon["number"], canyon["depth"], canyon["probability"]) == (3, 2.5, 0.97)
+    assert canyon["axis"] == pytest.approx(math.pi / 2)
     (wall,) = rows["walls"]
     assert (wall["x1"], wall["y1"], wall["x2"], wall["y2"]) == pytest.approx((8.0, 1.0, 6.0, 1.0))
     assert (wall["sigma_offset"], wall["sigma_angle"], wall["probability"]) == pytest.approx((0.01, 0.002, 0.99))
