@@ -43,7 +43,10 @@ def filled_pipe(into: int) -> int:
 def test_a_disk_that_fills_up_and_a_log_and_a_terminal_that_take_nothing(
     tmp_path: Path, measured: Callable[[str], None]
 ) -> None:
-    """Files end at 64 KiB, which the start alone does not fill; the log and what stands for the terminal are full pipes: a write to them never ends."""
+    """Files end at 64 KiB, which the start alone does not fill.
+
+    The log and what stands for the terminal are full pipes: a write to them never ends.
+    """
     fifo, runs, summary = tmp_path / "log", tmp_path / "runs", tmp_path / "summary.json"
     os.mkfifo(fifo)
     runs.mkdir()
