@@ -75,14 +75,15 @@ def hear(
     readings = np.array(rows).reshape(-1, 5)
     if not len(readings):
         return None
-    t, l = readings[:, 0:2] @ [1.0, 1j], readings[:, 2:4] @ [1.0, 1j]  # noqa: E741
+    transmitters, listeners = readings[:, 0:2] @ [1.0, 1j], readings[:, 2:4] @ [1.0, 1j]
     towards = complex(math.cos(bearing), math.sin(bearing))
-    own = readings[t == l]
+    own = readings[transmitters == listeners]
     if not len(own):
         return None
-    ahead = own[np.argmax((t[t == l] * np.conj(towards)).real)]
+    ahead = own[np.argmax((transmitters[transmitters == listeners] * np.conj(towards)).real)]
     point = (complex(ahead[0], ahead[1]) * towards.conjugate()).real * towards + ahead[4] * towards
-    readings = readings[abs(0.5 * (abs(point - t) + abs(point - l)) - readings[:, 4]) <= GATE_M + ring.resolution_m]
+    expected = 0.5 * (abs(point - transmitters) + abs(point - listeners))
+    readings = readings[abs(expected - readings[:, 4]) <= GATE_M + ring.resolution_m]
     noise_m, step_m = max(world.acoustics.noise_m, 1e-4), ring.resolution_m
     return echo_kind(readings[:, :2], readings[:, 2:4], readings[:, 4], noise_m, step_m)
 

@@ -8,7 +8,7 @@ of the callables give the same record, bit for bit; replay relies on that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Literal, TypeAlias
 
@@ -302,11 +302,12 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
-    percept = Percept(
-        odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects,
-        state.perception.occupancy(), state.perception.canyons(),
-        steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),
-    )  # fmt: skip
+    percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects)
+    if isinstance(state.drive_request, Goal):  # only a way to a goal is looked for in the memory of space
+        percept = replace(
+            percept, occupancy=state.perception.occupancy(), canyons=state.perception.canyons(),
+            steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),
+        )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
         state.goal_drive, map_frame, gap_s, state.trail,
