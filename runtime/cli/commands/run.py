@@ -31,6 +31,7 @@ from runtime.support.kernel_loader import KernelPreparation, begin_preparation
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, log_path, open_log
 from runtime.support.sd_notify import SdNotifier
+from runtime.support.user_folders import state_folder
 from runtime.timing.run_clock import RunClock, ScaledClock
 
 if TYPE_CHECKING:
@@ -273,6 +274,7 @@ async def run_process(
         reloader = Reloader(process.live_settings, reload, log, kernel_loader)
         if settings.console.enabled:
             from runtime.cli.commands.serve_console import serve_console
+            from runtime.support.console_address import announced
 
             page = await stack.enter_async_context(
                 serve_console(
@@ -282,6 +284,7 @@ async def run_process(
             log_status.listeners.append(page.hub.on_log)
             stack.callback(log_status.listeners.remove, page.hub.on_log)
             listeners.append(page.on_cycle)
+            stack.enter_context(announced(page.url, state_folder()))
             if view is not None:
                 for line in page.hints():
                     console.print(line, markup=False, highlight=False, soft_wrap=True)
