@@ -31,7 +31,8 @@ class DetectedObject:
     """xx, xy, yy of the position, m²; None from the paper's method. Along a wall it is that of an even distribution
     over its length, a twelfth of the length squared."""
     number: int | None = None
-    """The object's number for as long as it exists; numbers are never reused. None for walls."""
+    """The object's number for as long as it exists; numbers are never reused. Each piece of a wall between openings
+    has one, which it keeps as it grows; where two pieces become one, it is the older. None for corners of a room."""
     confirmed: bool = False
     """A user confirmed it."""
     placed: bool = False

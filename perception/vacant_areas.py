@@ -94,11 +94,12 @@ class VacantAreas:
         return tuple(area for area, inside in zip(self.listed(), self._contain(x, y), strict=True) if inside)
 
     def hides(self, seen: DetectedObject) -> bool:
-        """Return whether an object is in an area. Walls have places, but no number to reject; they stay."""
+        """Return whether an object was rejected or lies in an area, a wall with both its ends; corners never do."""
         if seen.number is None:
             return False
         by_number = seen.number in self.rows["object"][: self.count]
-        return bool(by_number or self._contain(seen.x, seen.y).any())
+        x1, y1, x2, y2 = seen.ends or (seen.x, seen.y, seen.x, seen.y)
+        return bool(by_number or (self._contain(x1, y1) & self._contain(x2, y2)).any())
 
     def outside(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return the objects that are in no area; the same tuple where there is no area."""

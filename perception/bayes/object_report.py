@@ -136,7 +136,7 @@ def known_walls(memory: Memory) -> NDArray[Any]:
 
 def wall_object(segment: Row) -> DetectedObject:
     """Return a `WallSegment` as a reported object: its middle and direction; its length is in the covariance."""
-    x1, y1, x2, y2, variance_across, variance_turn, echoes, log_odds = segment
+    x1, y1, x2, y2, variance_across, variance_turn, echoes, log_odds, number = segment
     length = math.hypot(x2 - x1, y2 - y1) or 1.0  # 0 in a damaged recording
     tx, ty = (x2 - x1) / length, (y2 - y1) / length
     along = length * length / 12.0
@@ -145,7 +145,7 @@ def wall_object(segment: Row) -> DetectedObject:
     probability = 1.0 / (1.0 + math.exp(-log_odds))
     return DetectedObject(
         "wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.atan2(ty, tx), worst_sigma(xx, xy, yy), int(echoes),
-        probability, probability, (xx, xy, yy), sigma_theta=math.sqrt(variance_turn),
+        probability, probability, (xx, xy, yy), int(number) or None, sigma_theta=math.sqrt(variance_turn),
     )  # fmt: skip
 
 

@@ -72,6 +72,7 @@ def clear_bins(wall: Wall) -> None:
         of.offset_sum = 0.0
         of.range_sum = 0.0
         of.passes = 0.0
+        of.number = 0
 
 
 def free(wall: Wall) -> None:

@@ -10,7 +10,8 @@ from perception.bayes.state import StateRecord
 from perception.bayes.wall_bins import HALF, clear_wall, is_covered, mean_error, middle_of
 from perception.bayes.wall_contact import EDGE_REACH_M, are_mirrors, edges_answer
 from perception.bayes.wall_evidence import judge
-from perception.bayes.wall_records import SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
+from perception.bayes.wall_numbers import number_spans
+from perception.bayes.wall_records import CANDIDATE, SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.kernel import kernel
 
 SLOPE_SIGMA: Final = 0.15
@@ -209,7 +210,7 @@ def find_spans(room: WallMap, wall: Wall) -> None:
 
 @kernel
 def fit_walls(s: StateRecord, p: SettingsRecord, first: int, end: int, step: int) -> None:
-    """Find the spans of the walls whose bins have changed, fit and judge them; end those of which little is left.
+    """Find the spans of the walls whose bins have changed, fit, judge and number them; end those that fade away.
 
     Parameters
     ----------
@@ -231,3 +232,5 @@ def fit_walls(s: StateRecord, p: SettingsRecord, first: int, end: int, step: int
                 clear_wall(wall)
             else:
                 judge(wall, p)
+                if k != CANDIDATE:
+                    number_spans(s, k)

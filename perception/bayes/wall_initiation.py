@@ -29,6 +29,7 @@ from perception.bayes.wall_contact import (
 )
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_fit import fit_walls
+from perception.bayes.wall_numbers import number_spans
 from perception.bayes.wall_records import (
     CANDIDATE,
     GOLDEN_RATIO,
@@ -331,6 +332,7 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
         slot = int(np.argmin(weight))
         if weight[slot] < min(walls["weight"][CANDIDATE], REPLACED_WEIGHT_MAX):
             walls[slot] = walls[CANDIDATE]
+            number_spans(memory.s, slot)
     walls["weight"][CANDIDATE] = 0.0
     marks: NDArray[Any] = memory.state["room"]["recent"]["is_free"][0]
     marks[marks == IS_TAKEN] = IS_KNOWN if is_new else IS_FREE

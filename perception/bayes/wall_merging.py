@@ -127,6 +127,7 @@ def move_bins(main: Wall, part: Wall) -> None:
         np.add.at(target[name], at, source[name])
     np.maximum.at(target["passes"], at, source["passes"])
     target["newest"][at] = source["newest"]
+    target["number"][at] = source["number"]
     main.is_changed = 1
     free(part)
 

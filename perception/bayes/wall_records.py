@@ -47,6 +47,8 @@ class WallBin(Record):
     """Sum of the ranges, by precision, m⁻¹."""
     passes: float
     """Ranges that passed through, less with each new echo."""
+    number: int
+    """That of the numbered span that held it last, 0 before."""
     newest: Reading
 
 
@@ -64,6 +66,8 @@ class Span(Record):
     """Of the bins."""
     chi2: float
     """Evidence that it is straight; see `wall_evidence.flatness`."""
+    number: int
+    """The object's number, of the same sequence as those of tracks; 0 of a span too short to be reported."""
 
 
 class Wall(Record):

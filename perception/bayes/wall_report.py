@@ -21,15 +21,15 @@ from perception.bayes.wall_corners import (
 )
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_fit import OPENING_PASSES_MIN
+from perception.bayes.wall_numbers import SPAN_MIN_M
 from perception.bayes.wall_records import MAX_WALLS, WALL_BINS
 from perception.kernel import Floats
 from perception.records import Record
 
 WALL_CHI2_MIN: Final = 20.0
 """Least evidence of the best span, or of all together."""
-SPAN_MIN_M: Final = 0.29
 SPAN_WEIGHT_MIN: Final = 3.0
-"""Least length and weight of a span that is reported, …"""
+"""Least weight of a span that is reported, …"""
 MISFIT_MAX: Final = 3.0
 """Greatest χ² of a wall's line for each degree of freedom."""
 CORNER_NEAR_M: Final = 1.0
@@ -85,6 +85,7 @@ class WallSegment(Record):
     """rad²"""
     echoes: float
     log_odds: float
+    number: int
 
 
 class CornerPoint(Record):
@@ -167,11 +168,12 @@ def has_mirrors(memory: Memory) -> bool:
 
 def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
     variance, covariance, variance_turn = (float(of.wall[name]) for name in VARIANCES)
-    for (low, high), weight, chi2 in zip(of.ends.tolist(), of.spans["weight"], of.spans["chi2"], strict=True):
+    columns = (of.ends.tolist(), *(of.spans[name] for name in ("weight", "chi2", "number")))
+    for (low, high), weight, chi2, number in zip(*columns, strict=True):
         middle = 0.5 * (low + high)
         across = variance + 2.0 * middle * covariance + middle * middle * variance_turn
         evidence = min(EVIDENCE_MAX_NAT, 0.5 * max(of.wall["chi2"], chi2))
-        yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence)
+        yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence, number)
 
 
 def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight]:

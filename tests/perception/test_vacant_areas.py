@@ -19,7 +19,7 @@ def drum(number: int | None, x: float, y: float) -> DetectedObject:
     return DetectedObject("drum", x, y, 0.0, 0.01, 9, 0.9, number=number)
 
 
-def test_objects_are_hidden_by_place_and_by_number_and_walls_never() -> None:
+def test_objects_are_hidden_by_place_and_by_number_and_corners_never() -> None:
     areas = VacantAreas()
     seen = (drum(1, 0.0, 0.0), drum(2, 0.5, 0.0), drum(3, 5.0, 0.0), drum(None, 0.0, 0.0))
     assert areas.outside(seen) is seen
@@ -35,6 +35,19 @@ def test_objects_are_hidden_by_place_and_by_number_and_walls_never() -> None:
     assert areas.listed() == ()
     assert areas.mark(0.0, 0.0, 1.0) is None
     assert areas.listed()[0].number == 3, "no number is given twice"
+
+
+def test_a_wall_is_hidden_by_number_and_where_an_area_contains_all_of_it() -> None:
+    areas = VacantAreas()
+    wall = DetectedObject("wall", 0.0, 0.0, 0.0, 0.6, 9, 0.9, covariance=(4.0 / 12.0, 0.0, 0.0), number=7)
+    assert wall.ends == pytest.approx((-1.0, 0.0, 1.0, 0.0))
+    areas.mark(0.0, 0.0, 0.9)
+    assert not areas.hides(wall), "an area on a wall is not all of it"
+    areas.mark(0.0, 0.1, 1.1)
+    assert areas.hides(wall)
+    areas.clear()
+    areas.mark(5.0, 5.0, 0.3, 7)
+    assert areas.hides(wall)
 
 
 def test_areas_are_bounded() -> None:
