@@ -35,6 +35,8 @@ from runtime.recording.writer import (
 from runtime.support.kernel_cache import kernels_key
 from runtime.timing.run_clock import RunClock, run_clock
 
+WRITE_S: Final = 0.2
+"""Interval at which a cycle wakes the thread that writes, s: it works while the loop sleeps, and on warm caches."""
 SNAPSHOT_S: Final = 1.0
 """Interval at which changes of the map, and the objects, are recorded."""
 BOOKMARK_MAX: Final = 500
@@ -111,6 +113,7 @@ class Recorder:
     ) -> None:
         self._clock = run_clock(clock)
         self._snapshot_cycles = max(1, round(SNAPSHOT_S * settings.cycle.rate_hz))
+        self._write_cycles = max(1, round(WRITE_S * settings.cycle.rate_hz))
         self._keyframe_s = settings.recording.keyframe_period_s
         info = run_info(settings, self._clock.host, emulated=emulated)
         self._writer = RecordingWriter(target, info, self._clock.host, queue_max, on=on)
@@ -214,6 +217,8 @@ class Recorder:
         elif cycle % self._snapshot_cycles == self._snapshot_cycles // 2:
             objects = MapSnapshot(cycle, objects=perception.near_objects())
             self._put((OBJECTS, host_s, run_s, objects))
+        if cycle % self._write_cycles == 0:
+            self._writer.thread.wake()
 
     def on_bytes(self, direction: str, run_s: float, host_s: float, data: bytes) -> None:
         """Record bytes that were just received or sent over the serial line.

@@ -41,10 +41,10 @@ from runtime.support.background_writer import BackgroundWriter
 
 QUEUE_MAX: Final = 8192
 """Items that may wait: about a minute and a half of a stalled disk."""
-POLL_S: Final = 0.05
-"""Interval at which the thread looks for items."""
-FLUSH_S: Final = 0.6
-"""Interval between chunks. With the poll this is what a killed process loses."""
+POLL_S: Final = 0.3
+"""Longest interval at which the thread looks for items: for a run without cycles, which otherwise wake it."""
+FLUSH_S: Final = 0.5
+"""A chunk ends at the first look after this time. With the poll this is what a killed process loses."""
 SYNC_S: Final = 1.0
 RETRY_S: Final = 10.0
 """Wait after a disk error before the next file is tried."""

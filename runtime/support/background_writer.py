@@ -45,7 +45,8 @@ class BackgroundWriter(Generic[Item]):
     finish : callable, optional
         Called after the last item, unless the thread failed.
     poll_s : float, optional
-        Look for items at this interval, s. Without it each `put` wakes the thread at once, which costs more.
+        Look for items at this interval, s, and at each `wake`. Without it each `put` wakes the thread at once, which
+        costs more.
     capacity : int
         Items that may wait.
     close_max_s : float
@@ -123,6 +124,10 @@ class BackgroundWriter(Generic[Item]):
         if self._poll_s is None:
             self._wake.set()
         return True
+
+    def wake(self) -> None:
+        """Write what is queued now: at a moment at which the interpreter is free for this thread."""
+        self._wake.set()
 
     def probe(self) -> str | None:
         """Return how the thread ended; None while it runs. See `runtime.support.health`."""

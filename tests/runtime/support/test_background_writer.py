@@ -108,6 +108,20 @@ def test_callbacks_run_on_the_thread_in_order() -> None:
     assert threads == {"notes"}
 
 
+def test_it_can_be_woken_before_its_interval_ends() -> None:
+    written, was_written = list[int](), threading.Event()
+
+    def write(number: int) -> None:
+        written.append(number)
+        was_written.set()
+
+    with BackgroundWriter("log", write, poll_s=60.0) as writer:
+        writer.put(7)
+        writer.wake()
+        assert was_written.wait(50.0)
+    assert written == [7]
+
+
 def test_a_poll_interval_delays_items(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(background_writer, "BATCH_PAUSE_S", 0.0)
     written = list[int]()
