@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Literal, TypeAlias
 
 from config.behaviors import MoveToGoalConfig
 from perception.percept import Pose
 
+Fault: TypeAlias = Literal["stuck", "unreachable"]
 NEARER_M: Final = 0.1
 """Least gain on the smallest distance so far that counts as progress, m."""
 
@@ -31,6 +32,8 @@ class Progress:
     """The smallest distance to the goal so far, and when it was reached, m and s."""
     given_up: str | None = None
     """Why the drive has ended short of the goal; None while it goes on."""
+    fault: Fault | None = None
+    """Which of the two faults that was."""
 
     @classmethod
     def starting_at(cls, pose: Pose, distance_m: float, run_s: float) -> Progress:
@@ -71,12 +74,14 @@ def observe_progress(
     if distance_m <= before.nearest_m - NEARER_M:
         after = replace(after, nearest_m=distance_m, nearer_run_s=run_s)
     stood_s, stayed_s = run_s - after.moved_run_s, run_s - after.nearer_run_s
+    fault: Fault = "unreachable"
     if stood_s >= config.stuck_after_s and not is_occupied:
         if is_blocked:
             why = f"the goal is unreachable: the map shows no way to it, {distance_m:.1f} m short of it"
         else:
             cause = "" if held is None else f" ({held})"
             little = f"less than {config.stuck_m:g} m in {stood_s:.0f} s"
+            fault = "stuck"
             why = f"stuck {distance_m:.1f} m short of the goal: {little}{cause}"
     elif is_occupied and stayed_s >= config.stuck_after_s:
         why = f"the goal is unreachable: something stands there, no nearer than {after.nearest_m:.1f} m"
@@ -84,4 +89,4 @@ def observe_progress(
         why = f"the goal is unreachable: no nearer than {after.nearest_m:.1f} m for {stayed_s:.0f} s"
     else:
         return after
-    return replace(after, given_up=f"{why}; clear the way or set another goal")
+    return replace(after, given_up=why, fault=fault)

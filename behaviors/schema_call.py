@@ -12,6 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from behaviors.avoid_past import Trail
+from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from config.behaviors import BehaviorsConfig
 from config.mission_step import Frame
@@ -31,6 +33,8 @@ class Memory:
     number: int | None = None
     since_s: float = 0.0
     is_set: bool = False
+    trail: Trail = ()
+    """Where the robot has been, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,10 @@ class Scene:
     visited: tuple[Visited, ...] = ()
     radii_m: Mapping[str, float] | None = None
     """Radius about an object's position that holds its outline, by model, m."""
+    run_s: float = 0.0
+    """Now, by the run's clock, s."""
+    way_rad: float | None = None
+    """Where the schemas lead that lead somewhere, in odometry's frame; None for those schemas themselves."""
 
     def frame(self, name: Frame) -> Pose | None:
         """Return the pose of a frame in odometry's; None while it is not known."""
@@ -83,3 +91,5 @@ class Answer:
     """Which obstacles of the percept the schema itself keeps its distance from, shape (n,): others avoid the rest."""
     visited: Visited | None = None
     """The object at which it has arrived."""
+    goal: Goal | None = None
+    """The place to which it drives, in odometry's frame: the robot goes there as to any goal."""

@@ -11,18 +11,29 @@ from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 from behaviors.approach_object import approach_object
+from behaviors.avoid_past import avoid_past
 from behaviors.follow_wall import follow_wall
 from behaviors.goal_place import GoalPlace, goal_place
 from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal, move_to_goal
+from behaviors.noise import noise
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene
 from behaviors.search import search
 from behaviors.stay_on_path import stay_on_path
+from behaviors.swirl import swirl
 from behaviors.turn import UNKNOWN_FRAME, is_aligned, turn
 from behaviors.wander import wander
-from config.mission_step import MoveAheadUse, MoveToGoalUse
+from config.mission_step import (
+    AvoidPastUse,
+    FollowValleyUse,
+    LeaveCanyonUse,
+    MoveAheadUse,
+    MoveToGoalUse,
+    NoiseUse,
+    SwirlUse,
+)
 
 Schema: TypeAlias = Callable[[Scene, Memory, Any], Answer]
 """A schema: what it sees, what it has kept, and its settings in the step, of the type that has its name."""
@@ -72,11 +83,75 @@ def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
     remaining_m = math.hypot(place.x - scene.percept.pose.x, place.y - scene.percept.pose.y)
     if not is_there:
         vector = Response(TO_GOAL, use.gain * response.x, use.gain * response.y)
-        return Answer(vector, memory, remaining_m=remaining_m)
+        return Answer(vector, memory, remaining_m=remaining_m, goal=Goal(place.x, place.y))
     if use.heading_deg is None:
         return Answer(still, memory, has_arrived=True, remaining_m=0.0)
     direction = frame.theta + math.radians(use.heading_deg)
     return Answer(still, memory, is_aligned(scene, direction), 0.0, direction)
+
+
+def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveCanyonUse) -> Answer:
+    """Return no vector: the schema turns that of the others (`runtime.cycle.goal_drive`).
+
+    Parameters
+    ----------
+    scene, memory
+        Not used.
+    use
+        The schema.
+    """
+    del scene
+    return Answer(Response(use.name, 0.0, 0.0), memory)
+
+
+def avoid_past_in_step(scene: Scene, memory: Memory, use: AvoidPastUse) -> Answer:
+    """Return the vector away from where the robot has been in this step.
+
+    Parameters
+    ----------
+    scene
+        The pose.
+    memory
+        `trail`: where the robot has been.
+    use
+        The gain.
+    """
+    config = scene.behaviors.avoid_past.model_copy(update={"avoid_past_gain": use.gain})
+    response, trail = avoid_past(scene.percept, memory.trail, config)
+    return Answer(response, Memory(trail=trail))
+
+
+def noise_in_step(scene: Scene, memory: Memory, use: NoiseUse) -> Answer:
+    """Return a random vector.
+
+    Parameters
+    ----------
+    scene
+        The time.
+    memory
+        Not used.
+    use
+        The gain.
+    """
+    config = scene.behaviors.noise.model_copy(update={"noise_gain": use.gain})
+    return Answer(noise(scene.run_s, config), memory)
+
+
+def swirl_in_step(scene: Scene, memory: Memory, use: SwirlUse) -> Answer:
+    """Return the vector round obstacles.
+
+    Parameters
+    ----------
+    scene
+        Obstacles, and where the other schemas lead.
+    memory
+        Not used.
+    use
+        The gain.
+    """
+    config = scene.behaviors.swirl.model_copy(update={"swirl_gain": use.gain})
+    way_rad = scene.percept.pose.theta if scene.way_rad is None else scene.way_rad
+    return Answer(swirl(scene.percept, way_rad, scene.body.radius_m, config), memory)
 
 
 SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType({
@@ -88,5 +163,10 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType({
     "stay_on_path": stay_on_path,
     "approach_object": approach_object,
     "search": search,
+    "follow_valley": steering_in_step,
+    "leave_canyon": steering_in_step,
+    "avoid_past": avoid_past_in_step,
+    "noise": noise_in_step,
+    "swirl": swirl_in_step,
 })  # fmt: skip
 """Every schema by its name in a step."""

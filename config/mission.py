@@ -6,7 +6,7 @@ A mission is a finite state machine. Its first step is where it begins. Each ste
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 from pydantic import Field, model_validator
@@ -15,6 +15,7 @@ from config.files import did_you_mean
 from config.mission_step import (
     DONE,
     FAILED,
+    HELPERS,
     NEXT,
     STEPS_MAX,
     TARGETS,
@@ -22,6 +23,7 @@ from config.mission_step import (
     Condition,
     FollowWallUse,
     MoveAheadUse,
+    MoveToGoalUse,
     Name,
     ReachedCondition,
     SchemaUse,
@@ -42,6 +44,8 @@ class StepConfig(Strict):
     """Factor on avoid-static-obstacle, which is part of every step. The arbiter's clearance applies in any case."""
     stuck_after_s: float = Field(default=30.0, ge=1.0, le=1e5)
     """Time without progress after which the step is stuck, s."""
+    unreachable_after_s: float = Field(default=120.0, ge=1.0, le=1e5)
+    """A goal to which the robot has come no nearer for so long, although it drives, is unreachable, s."""
     until: TomlList[Condition] = Field(default=(), max_length=16)
     """The conditions, first match first; by default the next step follows when the step's schema arrives."""
 
@@ -49,6 +53,16 @@ class StepConfig(Strict):
     def arrives(self) -> bool:
         """Whether a schema of the step can arrive."""
         return sum(map(_arrives, self.schemas)) > 0
+
+    @cached_property
+    def goal(self) -> MoveToGoalUse | None:
+        """The place to which the step drives, if it is one of `move_to_goal`."""
+        return next((use for use in self.schemas if isinstance(use, MoveToGoalUse)), None)
+
+    @cached_property
+    def gains(self) -> dict[str, float]:
+        """The gains that the step gives the schemas which lead nowhere by themselves, by their names."""
+        return {use.name: use.gain for use in self.schemas if use.name in HELPERS}
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -62,11 +76,25 @@ class StepConfig(Strict):
         names = [use.name for use in self.schemas]
         if "turn" in names and len(names) > 1:
             raise ValueError("the schema turn stands alone in its step, as the robot turns on the spot")
+        self._check_helpers(names)
+        if self.goal is None and any(condition.when == "unreachable" for condition in self.until):
+            raise ValueError(f"until: the step {self.name} has no goal that could be unreachable: use stuck")
         if not self.arrives and any(condition.when == "reached" for condition in self.until):
             raise ValueError(f"until: nothing in the step {self.name} can be reached: give a time or a way instead")
         if not self.conditions:
             raise ValueError(f"the step {self.name} never ends: give it `until`, for example a time")
         return self
+
+    def _check_helpers(self, names: Sequence[str]) -> None:
+        """Refuse schemas that lead nowhere by themselves where they have nothing to work on, or stand twice."""
+        for name in HELPERS:
+            if names.count(name) > 1:
+                raise ValueError(f"the schema {name} stands twice: leave one of them out")
+        if "leave_canyon" in names and self.goal is None:
+            raise ValueError("leave_canyon goes round what closes the way to a goal: add move_to_goal")
+        for name in {"follow_valley", "swirl"}.intersection(names):
+            if not set(names).difference(HELPERS):
+                raise ValueError(f"{name} needs a way: add a schema that leads somewhere, for example move_ahead")
 
 
 class MissionConfig(Strict):
@@ -115,9 +143,9 @@ class MissionConfig(Strict):
 
 def _arrives(use: SchemaUse) -> bool:
     """Return whether a schema can arrive."""
-    return not isinstance(use, WanderUse | FollowWallUse) and not (
-        isinstance(use, MoveAheadUse) and use.distance_m is None
-    )
+    if use.name in HELPERS or isinstance(use, WanderUse | FollowWallUse):
+        return False
+    return not isinstance(use, MoveAheadUse) or use.distance_m is not None
 
 
 def _problems(steps: tuple[StepConfig, ...], *, endless: bool) -> Iterator[str]:

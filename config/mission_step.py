@@ -177,6 +177,48 @@ class SearchUse(Strict):
         return self
 
 
+class FollowValleyUse(Strict):
+    """`follow_valley`: the free valley nearest to where the step's other schemas lead (VFH+)."""
+
+    name: Literal["follow_valley"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    """With `move_to_goal`, which is driven so in any case, 0 drives straight to the goal."""
+
+
+class LeaveCanyonUse(Strict):
+    """`leave_canyon`: beside `move_to_goal`, which is driven with it in any case: its gain in this step."""
+
+    name: Literal["leave_canyon"]
+    """Of the schema."""
+    gain: Gain = 1.0
+    """0 does not go round dead ends."""
+
+
+class AvoidPastUse(Strict):
+    """`avoid_past`: away from where the robot has been in this step; its distances are those of the run's table."""
+
+    name: Literal["avoid_past"]
+    """Of the schema."""
+    gain: Gain = 1.0
+
+
+class NoiseUse(Strict):
+    """`noise`: a random direction, kept for a while; persistence and seed are those of the run's table."""
+
+    name: Literal["noise"]
+    """Of the schema."""
+    gain: Gain = 1.0
+
+
+class SwirlUse(Strict):
+    """`swirl`: round obstacles, on the side of the way on which the step's other schemas lead."""
+
+    name: Literal["swirl"]
+    """Of the schema."""
+    gain: Gain = 1.0
+
+
 SchemaUse: TypeAlias = Annotated[
     MoveAheadUse
     | MoveToGoalUse
@@ -185,10 +227,18 @@ SchemaUse: TypeAlias = Annotated[
     | FollowWallUse
     | StayOnPathUse
     | ApproachObjectUse
-    | SearchUse,
+    | SearchUse
+    | FollowValleyUse
+    | LeaveCanyonUse
+    | AvoidPastUse
+    | NoiseUse
+    | SwirlUse,
     Field(discriminator="name"),
 ]
 """A schema of a step with its settings; `behaviors.schema_registry` has a function for each."""
+
+HELPERS: Final = ("follow_valley", "leave_canyon", "avoid_past", "noise", "swirl")
+"""Schemas that lead nowhere by themselves."""
 
 
 class ReachedCondition(Strict):
@@ -268,9 +318,23 @@ class LostCondition(Strict):
 
 
 class StuckCondition(Strict):
-    """`stuck`: the step has come no nearer to its end for `stuck_after_s`; without this the mission is held."""
+    """`stuck`: the step has come no nearer to its end for `stuck_after_s`; without this the mission is held.
+
+    A robot on the way to a goal may go round and is stuck if it has hardly moved for so long.
+    """
 
     when: Literal["stuck"]
+    """The condition."""
+    go: Target = NEXT
+
+
+class UnreachableCondition(Strict):
+    """`unreachable`: the step's goal cannot be reached; without this it is stuck.
+
+    Something stands on the goal, or the robot drives and comes no nearer to it for `unreachable_after_s`.
+    """
+
+    when: Literal["unreachable"]
     """The condition."""
     go: Target = NEXT
 
@@ -283,7 +347,8 @@ Condition: TypeAlias = Annotated[
     | WayCondition
     | BumperCondition
     | LostCondition
-    | StuckCondition,
+    | StuckCondition
+    | UnreachableCondition,
     Field(discriminator="when"),
 ]
 """A condition and where it leads."""

@@ -200,7 +200,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P32": Promise(
             "A mission moves nothing by itself and never stands without a reason",
-            "200 random missions with random edits, stops and faults, 60 cycles each (soak: 10⁴ of 200): no motion "
+            "120 random missions with random edits, stops and faults, 60 cycles each (soak: 10⁴ of 200): no motion "
             "out of DRIVE, none after a stop before an explicit re-arm and resume, no cycle in DRIVE without motion "
             "or a reason, none 60 s without progress that is not held; ten shipped missions driven in the emulator: "
             "no contact",

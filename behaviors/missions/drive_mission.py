@@ -15,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from behaviors.approach_object import matching
+from behaviors.goal_progress import Fault
 from behaviors.missions.mission import VISITED_MAX, Mission, Progress, goes_to, held
+from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene, Visited
 from behaviors.schema_registry import SCHEMAS
-from config.mission_step import Condition, SeenCondition, UnseenCondition
+from config.mission_step import HELPERS, Condition, SchemaUse, SeenCondition, UnseenCondition
+from perception.percept import Pose
 
 PROGRESS_M: Final = 0.1
 """Coming nearer by less than this is no progress, and neither is staying this near to a place, m."""
@@ -31,8 +34,14 @@ class MissionDrive:
 
     mission: Mission
     """After the cycle."""
-    responses: tuple[Response, ...] = ()
-    """Of the step's schemas; empty where the robot is to stand."""
+    leads: tuple[Response, ...] = ()
+    """Of the step's schemas that lead somewhere; empty where the robot is to stand."""
+    helpers: tuple[Response, ...] = ()
+    """Of those that lead nowhere by themselves."""
+    goal: Goal | None = None
+    """The place to which the robot is to drive as to any goal, in place of `leads`."""
+    remaining_m: float | None = None
+    """How far it still is, m; None if the step leads nowhere in particular."""
     turn_to_rad: float | None = None
     """The direction to which the robot is to turn on the spot, in place of the responses."""
     own_echoes: NDArray[np.bool_] | None = None
@@ -71,16 +80,42 @@ def drive_mission(mission: Mission, scene: Scene) -> MissionDrive:
     if mission.progress.status != "running":
         return MissionDrive(mission, hold_reason=mission.progress.reason)
     turn_to_rad = next((answer.turn_to_rad for answer in answers if answer.turn_to_rad is not None), None)
-    is_waiting = all(answer.waits_for is not None for answer in answers)
-    if is_waiting:
+    if _is_waiting(mission, answers):
         return MissionDrive(mission, hold_reason=_waiting_reason(mission, answers))
     own = [answer.own_echoes for answer in answers if answer.own_echoes is not None]
+    named = [(use.name in HELPERS, answer.response) for use, answer in _named(mission, answers)]
     return MissionDrive(
         mission,
-        tuple(answer.response for answer in answers),
+        tuple(response for helps, response in named if not helps),
+        tuple(response for helps, response in named if helps),
+        _goal(answers),
+        _remaining_m(answers),
         turn_to_rad,
         np.logical_or.reduce(own) if own else None,
     )
+
+
+def given_up(mission: Mission, fault: Fault, why: str) -> Mission:
+    """Return the mission after the drive to its step's goal was given up.
+
+    It goes where the condition of that fault leads, or without one is held. An unreachable goal is a stuck step
+    where only that has a condition.
+
+    Parameters
+    ----------
+    mission
+        The mission, in a step with a goal.
+    fault
+        Why the goal was given up.
+    why
+        The same for the operator.
+    """
+    faults = (fault, "stuck")
+    found = [c for when in faults for c in mission.step.conditions if c.when == when]
+    if not found:
+        reason = f"step {mission.step.name}: {why}; clear the way and resume the mission, or skip the step"
+        return held(mission, reason)
+    return goes_to(mission, found[0].go, f"{fault} in its step {mission.step.name}")
 
 
 def is_stuck(mission: Mission) -> bool:
@@ -113,9 +148,12 @@ def _answered(mission: Mission, scene: Scene) -> tuple[Mission, tuple[Answer, ..
     scene = replace(
         scene, start=progress.start or scene.percept.pose, step_s=progress.step_s, visited=progress.visited
     )
+    used = list(zip(mission.step.schemas, progress.memories, strict=True))
+    leads = [SCHEMAS[use.name](scene, memory, use) for use, memory in used if use.name not in HELPERS]
+    scene = replace(scene, way_rad=_way_rad(leads, scene.percept.pose))
+    rest = iter(leads)
     answers = tuple(
-        SCHEMAS[use.name](scene, memory, use)
-        for use, memory in zip(mission.step.schemas, progress.memories, strict=True)
+        SCHEMAS[use.name](scene, memory, use) if use.name in HELPERS else next(rest) for use, memory in used
     )
     visited: tuple[Visited, ...] = tuple(
         answer.visited for answer in answers if answer.visited is not None and answer.visited not in progress.visited
@@ -128,9 +166,8 @@ def _answered(mission: Mission, scene: Scene) -> tuple[Mission, tuple[Answer, ..
 def _watched(mission: Mission, scene: Scene, answers: tuple[Answer, ...]) -> Mission:
     """Return the mission with its progress noted; a step that waits for something makes it by waiting."""
     progress, pose = mission.progress, scene.percept.pose
-    left = [answer.remaining_m for answer in answers if answer.remaining_m is not None]
-    remaining_m, anchor = (min(left) if left else None), progress.anchor or pose
-    if all(answer.waits_for is not None for answer in answers):
+    remaining_m, anchor = _remaining_m(answers), progress.anchor or pose
+    if _is_waiting(mission, answers) or _goal(answers) is not None:  # the drive to the goal knows its own progress
         has_moved = True
     elif remaining_m is None or remaining_m == 0.0:  # nowhere in particular, or only a turn is left
         turned = abs(math.remainder(pose.theta - anchor.theta, math.tau))
@@ -142,6 +179,36 @@ def _watched(mission: Mission, scene: Scene, answers: tuple[Answer, ...]) -> Mis
         return mission if progress.anchor is not None else _with_anchor(mission, progress, scene)
     progress = replace(progress, best_m=remaining_m, best_s=progress.step_s)
     return _with_anchor(mission, progress, scene)
+
+
+def _is_waiting(mission: Mission, answers: tuple[Answer, ...]) -> bool:
+    """Return whether the schemas that lead somewhere all ask for no motion; others alone do not."""
+    leads = [answer for use, answer in _named(mission, answers) if use.name not in HELPERS]
+    return all(answer.waits_for is not None for answer in leads) if leads else not answers
+
+
+def _named(mission: Mission, answers: tuple[Answer, ...]) -> list[tuple[SchemaUse, Answer]]:
+    """Return the step's schemas with their answers."""
+    return list(zip(mission.step.schemas, answers, strict=True))
+
+
+def _goal(answers: tuple[Answer, ...]) -> Goal | None:
+    """Return the place to which the step drives as to any goal."""
+    return next((answer.goal for answer in answers if answer.goal is not None), None)
+
+
+def _remaining_m(answers: tuple[Answer, ...]) -> float | None:
+    """Return the least distance left to where a schema leads, m; None if none leads to a place."""
+    return min((answer.remaining_m for answer in answers if answer.remaining_m is not None), default=None)
+
+
+def _way_rad(leads: list[Answer], pose: Pose) -> float | None:
+    """Return the direction in which the schemas lead together, rad in odometry's frame; None if in none."""
+    goal = _goal(tuple(leads))
+    if goal is not None:
+        return math.atan2(goal.y - pose.y, goal.x - pose.x)
+    x, y = sum(lead.response.x for lead in leads), sum(lead.response.y for lead in leads)
+    return None if x == y == 0.0 else math.atan2(y, x)
 
 
 def _with_anchor(mission: Mission, progress: Progress, scene: Scene) -> Mission:
@@ -185,8 +252,8 @@ def _holds(condition: Condition, number: int, mission: Mission, answers: tuple[A
 def _waiting_reason(mission: Mission, answers: tuple[Answer, ...]) -> str:
     """Return why a step asks for no motion: what its schemas wait for, or its conditions where it has no schema."""
     step, progress = mission.step, mission.progress
-    if answers:
-        return f"step {step.name}: {'; '.join(answer.waits_for or '' for answer in answers)}"
+    if waits := [answer.waits_for for answer in answers if answer.waits_for is not None]:
+        return f"step {step.name}: {'; '.join(waits)}"
     return f"step {step.name} waits for: {', '.join(_left(c, progress) for c in step.conditions)}"
 
 
@@ -205,8 +272,8 @@ def _left(condition: Condition, progress: Progress) -> str:
 
 def _stuck_reason(mission: Mission, answers: tuple[Answer, ...]) -> str:
     step, progress = mission.step, mission.progress
-    left = [answer.remaining_m for answer in answers if answer.remaining_m is not None]
-    where = f"{min(left):.1f} m before its end" if left else f"after {progress.way_m:.1f} m"
+    left_m = _remaining_m(answers)
+    where = f"after {progress.way_m:.1f} m" if left_m is None else f"{left_m:.1f} m before its end"
     return (
         f"step {step.name} is stuck {where}: it has come no nearer for {step.stuck_after_s:g} s, as something is in "
         "the way; clear the way and resume the mission, or skip the step"

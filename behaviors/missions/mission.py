@@ -211,6 +211,7 @@ def progress_problem(mission: Mission) -> str | None:
     numbers = [
         *(n for pose in poses for n in (pose.x, pose.y, pose.theta)),
         *(n for memory in progress.memories for n in (memory.index, memory.x, memory.y, memory.since_s)),
+        *(n for memory in progress.memories for place in memory.trail for n in place),
         *(n for visited in progress.visited for n in (visited.x, visited.y)),
         *(
             progress.step_s,

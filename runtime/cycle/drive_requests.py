@@ -32,8 +32,10 @@ __all__ = [
     "after_stop",
     "first_request",
     "goal_place",
+    "is_same_drive",
     "needs_map",
     "needs_objects",
+    "needs_space",
     "refusal",
     "requested",
     "validate",
@@ -79,6 +81,19 @@ def needs_map(asked: DriveInput) -> bool:
 def needs_objects(drive_request: DriveRequest) -> bool:
     """Return whether a request depends on the objects that are recognised."""
     return isinstance(drive_request, Mission) and drive_request.plan.needs_objects
+
+
+def needs_space(drive_request: DriveRequest) -> bool:
+    """Return whether a request is driven by what is remembered of the space: to a goal, or through valleys."""
+    if isinstance(drive_request, Mission):
+        step = drive_request.step
+        return drive_request.progress.status == "running" and (step.goal is not None or "follow_valley" in step.gains)
+    return isinstance(drive_request, Goal)
+
+
+def is_same_drive(before: DriveRequest, after: DriveRequest) -> bool:
+    """Return whether an operator's request changes nothing of what is driven now: it is a route's later waypoints."""
+    return isinstance(before, Mission) and isinstance(after, Mission) and after.progress is before.progress
 
 
 def requested(before: DriveRequest, asked: DriveInput) -> DriveRequest:

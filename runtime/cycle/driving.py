@@ -11,21 +11,25 @@ from behaviors.avoid_past import Trail
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.field_of_view import unseen_way
-from behaviors.missions.drive_mission import drive_mission
+from behaviors.follow_valley import SCHEMA as VALLEY
+from behaviors.leave_canyon import SCHEMA as CANYON
+from behaviors.missions.drive_mission import drive_mission, given_up
 from behaviors.missions.mission import Mission
 from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_ahead import Leg, move_ahead
+from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.schema_call import ODOM_FRAME, Scene
 from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
+from config.mission import StepConfig
 from config.settings import Settings
 from drivers.messages import Pose, Twist
 from perception.percept import Percept, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
 from runtime.cycle.escape_schemas import escape_schemas
-from runtime.cycle.goal_drive import GoalDrive, drive_to_goal
+from runtime.cycle.goal_drive import GoalDrive, drive_through_valley, drive_to_goal
 
 SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""
@@ -81,7 +85,7 @@ def drive(
     place : GoalPlace, optional
         Where a goal lies, from `goal_place`.
     goal_drive : GoalDrive, optional
-        Of the cycle before, for a goal.
+        Of the cycle before, for a goal or a mission's step with one.
     map_frame : Pose, optional
         The map frame in odometry's, while a mission needs it and the robot's place there is known.
     cycle_s : float
@@ -96,7 +100,7 @@ def drive(
         case Goal():
             return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away, trail)
         case Mission():
-            return _on_mission(drive_request, leg, percept, settings, map_frame, cycle_s)
+            return _on_mission(drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s)
         case _:
             return _along_legs(drive_request, run_s, leg, percept, settings, away, trail)
 
@@ -139,6 +143,8 @@ def _to_goal(
     )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
+    if goal_drive.progress.given_up is not None:
+        hold_reason = f"{goal_drive.progress.given_up}; clear the way or set another goal"
     if drive_request.reached and isinstance(decision, Drive):
         decision = Drive(STANDSTILL)
         hold_reason = f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) is reached"
@@ -164,29 +170,66 @@ def _along_legs(
 
 
 def _on_mission(
-    mission: Mission, leg: Leg, percept: Percept, settings: Settings, map_frame: Pose | None, cycle_s: float
-) -> DriveResult:
+    mission: Mission, run_s: float, leg: Leg, goal_drive: GoalDrive | None, percept: Percept, settings: Settings,
+    map_frame: Pose | None, cycle_s: float,
+) -> DriveResult:  # fmt: skip
     """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
     behaviors, body = settings.behaviors, settings.body
     radii_m = {model.name: model.reach_m for model in settings.models}
-    scene = Scene(percept, body, behaviors, ODOM_FRAME, 0.0, cycle_s, map_frame, radii_m=radii_m)
+    scene = Scene(percept, body, behaviors, ODOM_FRAME, 0.0, cycle_s, map_frame, radii_m=radii_m, run_s=run_s)
     asked = drive_mission(mission, scene)
     if asked.hold_reason is not None:
         return DriveResult(Drive(STANDSTILL), (), asked.mission, leg, asked.hold_reason)
     if asked.turn_to_rad is not None:
         angle = wrap_angle(asked.turn_to_rad - percept.pose.theta)
-        turning = Twist(0.0, behaviors.arbiter.turn_gain_per_s * angle)
-        decision = limit_velocity(turning, asked.responses, percept, body, behaviors.arbiter, asked.schemas)
-        return DriveResult(decision, with_sum(asked.responses, decision), asked.mission, leg)
+        turning, responses = Twist(0.0, behaviors.arbiter.turn_gain_per_s * angle), (*asked.leads, *asked.helpers)
+        decision = limit_velocity(turning, responses, percept, body, behaviors.arbiter, asked.schemas)
+        return DriveResult(decision, with_sum(responses, decision), asked.mission, leg)
+    if asked.mission.progress.changes != mission.progress.changes:
+        goal_drive = None
+    mission, step = asked.mission, asked.mission.step
+    settings = _of_step(step, settings)
     others = percept if asked.own_echoes is None else replace(percept, obstacles=percept.obstacles[~asked.own_echoes])
-    away = avoid_static_obstacle(others, body.radius_m, behaviors.avoid_static_obstacle)
-    gain = asked.mission.step.avoid_gain
-    responses = (*asked.responses, replace(away, x=gain * away.x, y=gain * away.y))
-    decision = arbitrate(responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID))
+    away = avoid_static_obstacle(others, body.radius_m, settings.behaviors.avoid_static_obstacle)
     hold_reason = None
-    if isinstance(decision, Drive) and decision.twist == STANDSTILL:
-        hold_reason = NO_WAY.format(asked.mission.step.name)
-    return DriveResult(decision, with_sum(responses, decision), asked.mission, leg, hold_reason)
+    if asked.goal is not None:
+        beside = (r for r in (*asked.leads, *asked.helpers) if r.schema not in {TO_GOAL, VALLEY, CANYON})
+        _, goal_drive, responses, decision, hold_reason = drive_to_goal(
+            asked.goal, goal_drive, percept, run_s, (away, *beside), settings
+        )
+        if goal_drive.progress.fault is not None:
+            mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")
+            goal_drive, hold_reason = None, mission.progress.reason or hold_reason
+    elif step.gains.get(VALLEY, 0.0) > 0.0:
+        x, y = sum(r.x for r in asked.leads), sum(r.y for r in asked.leads)
+        remaining_m = math.inf if asked.remaining_m is None else asked.remaining_m
+        beside = (r for r in asked.helpers if r.schema != VALLEY)
+        goal_drive, responses, decision, hold_reason = drive_through_valley(
+            Response(SUM, x, y), remaining_m, goal_drive, others, run_s, (away, *beside), settings
+        )
+    else:
+        responses = (*asked.leads, *asked.helpers, away)
+        decision = arbitrate(responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID))
+    if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:
+        hold_reason = NO_WAY.format(step.name)
+    return DriveResult(decision, with_sum(responses, decision), mission, leg, hold_reason, goal_drive)
+
+
+def _of_step(step: StepConfig, settings: Settings) -> Settings:
+    """Return the run's settings with a step's gains and times."""
+    behaviors = settings.behaviors
+    to_goal, avoid = behaviors.move_to_goal, behaviors.avoid_static_obstacle
+    updates: dict[str, dict[str, float]] = {
+        "move_to_goal": {
+            "move_to_goal_gain": to_goal.move_to_goal_gain * (1.0 if step.goal is None else step.goal.gain),
+            "stuck_after_s": step.stuck_after_s,
+            "unreachable_after_s": step.unreachable_after_s,
+        },
+        "avoid_static_obstacle": {"avoid_obstacle_gain": avoid.avoid_obstacle_gain * step.avoid_gain},
+        **{name: {f"{name}_gain": step.gains[name]} for name in (VALLEY, CANYON) if name in step.gains},
+    }
+    tables = {name: getattr(behaviors, name).model_copy(update=update) for name, update in updates.items()}
+    return settings.model_copy(update={"behaviors": behaviors.model_copy(update=tables)})
 
 
 def with_sum(responses: tuple[Response, ...], decision: Decision) -> tuple[Response, ...]:

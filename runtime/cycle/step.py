@@ -33,8 +33,10 @@ from runtime.cycle.drive_requests import (
     after_reboot,
     after_stop,
     goal_place,
+    is_same_drive,
     needs_map,
     needs_objects,
+    needs_space,
     refusal,
     requested,
 )
@@ -163,8 +165,8 @@ def step(
     mark : callable
         Called at the end of each phase; no decision depends on it.
     """
-    is_goal = isinstance(state.drive_request, Goal)
-    state.perception.canyon_map.is_wanted = is_goal and settings.behaviors.leave_canyon.leave_canyon_gain > 0.0
+    leaves_canyons = settings.behaviors.leave_canyon.leave_canyon_gain > 0.0
+    state.perception.canyon_map.is_wanted = leaves_canyons and needs_space(state.drive_request)
     new_segments = _perceive(state, inputs)
     mark(Phase.PERCEIVE)
     problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request)
@@ -235,7 +237,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) 
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
         bumper = bool((inputs.received.flags | state.odometry.flags) & Flags.BUMPER) if state.odometry else False
         state.drive_request = after_stop(state.drive_request, bumper=bumper)
-    if not isinstance(state.drive_request, Goal):
+    if not needs_space(state.drive_request):
         state.goal_drive = None
     return command
 
@@ -244,9 +246,11 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
     """Take over the operator's drive request; legs that were done begin again."""
     if inputs.drive_request is None:
         return
-    state.drive_request = requested(state.drive_request, inputs.drive_request)
-    state.requested_run_s, state.goal_place, state.goal_drive = inputs.run_s, None, None
-    state.trail = ()
+    before = state.drive_request
+    state.drive_request = requested(before, inputs.drive_request)
+    state.requested_run_s, state.goal_place, state.trail = inputs.run_s, None, ()
+    if not is_same_drive(before, state.drive_request):
+        state.goal_drive = None
     if isinstance(inputs.drive_request, Legs) and state.leg is not None and state.leg.done:
         state.leg = None
 
@@ -303,7 +307,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         state.leg = Leg.starting_at(odometry.pose)
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
     percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects)
-    if isinstance(state.drive_request, Goal):  # only a way to a goal is looked for in the memory of space
+    if needs_space(state.drive_request):
         percept = replace(
             percept, occupancy=state.perception.occupancy(), canyons=state.perception.canyons(),
             steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),

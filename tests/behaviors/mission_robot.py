@@ -18,6 +18,7 @@ from drivers.messages import Twist
 from perception.percept import DetectedObject, Percept, Pose
 from runtime.cycle.driving import DriveResult
 from runtime.cycle.driving import drive as drive_request
+from runtime.cycle.goal_drive import GoalDrive
 from tests.behaviors.hall import STEP_S, World, clamp, echoes
 from tests.behaviors.views import EVERYWHERE
 
@@ -53,6 +54,7 @@ class MissionRobot:
     steps: list[str] = field(default_factory=list)
     """Names of the steps in the order in which they were driven."""
     result: DriveResult | None = None
+    goal_drive: GoalDrive | None = None
 
     def cycle(self) -> DriveResult:
         """Decide once, and move for a cycle; every stand has a reason."""
@@ -60,11 +62,12 @@ class MissionRobot:
         self.run_s += STEP_S
         result = drive_request(
             self.mission, 0.0, self.run_s, Leg(0.0, 0.0), percept, self.settings,
-            map_frame=self.map_frame, cycle_s=STEP_S,
+            goal_drive=self.goal_drive, map_frame=self.map_frame, cycle_s=STEP_S,
         )  # fmt: skip
         assert isinstance(result.decision, Drive), result.decision
         assert isinstance(result.drive_request, Mission)
         self.result, self.mission, twist = result, result.drive_request, result.decision.twist
+        self.goal_drive = result.goal_drive
         assert result.hold_reason is not None or twist != Twist(0.0, 0.0), "it stands and does not say why"
         body = self.settings.body
         v = self.velocity.v + clamp(twist.v - self.velocity.v, body.acceleration_max_m_s2 * STEP_S)
@@ -101,7 +104,7 @@ class MissionRobot:
 
     def put(self, edits: Mission) -> None:
         """Go on with an edited mission."""
-        self.mission = edits
+        self.mission, self.goal_drive = edits, None
 
 
 def driven(*steps: dict[str, Any], seconds: float = 60.0, **about: Any) -> MissionRobot:

@@ -28,9 +28,7 @@ def test_a_drive_that_comes_nearer_goes_on() -> None:
 
 def test_a_robot_that_stands_is_stuck_after_a_while() -> None:
     assert driven([(0.0, 0.0)] * 10) is None
-    assert driven([(0.0, 0.0)] * 11) == (
-        "stuck 10.0 m short of the goal: less than 0.3 m in 10 s; clear the way or set another goal"
-    )
+    assert driven([(0.0, 0.0)] * 11) == "stuck 10.0 m short of the goal: less than 0.3 m in 10 s"
     assert "in 10 s (no direction is free)" in (driven([(0.0, 0.0)] * 11, held="no direction is free") or "")
 
 

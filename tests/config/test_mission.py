@@ -89,17 +89,34 @@ WRONG = {
     "an unknown schema": (
         steps({"name": "a", "schemas": [{"name": "wandr"}]}),
         'step.0.schemas.0.name = "wandr": must be one of move_ahead, move_to_goal, turn, wander, follow_wall, '
-        "stay_on_path, approach_object, search; did you mean wander?",
+        "stay_on_path, approach_object, search, follow_valley, leave_canyon, avoid_past, noise, swirl; did you mean "
+        "wander?",
     ),
     "a schema without a name": (
         steps({"name": "a", "schemas": [{"x_m": 1.0}]}),
         "step.0.schemas.0.name: missing; must be one of move_ahead, move_to_goal, turn, wander, follow_wall, "
-        "stay_on_path, approach_object, search",
+        "stay_on_path, approach_object, search, follow_valley, leave_canyon, avoid_past, noise, swirl",
     ),
     "an unknown condition": (
         steps({"name": "a", "schemas": GOAL, "until": [{"when": "reach"}]}),
-        'step.0.until.0.when = "reach": must be one of reached, seen, unseen, time, way, bumper, lost, stuck; did '
-        "you mean reached?",
+        'step.0.until.0.when = "reach": must be one of reached, seen, unseen, time, way, bumper, lost, stuck, '
+        "unreachable; did you mean reached?",
+    ),
+    "a schema that turns the others', without others": (
+        steps({"name": "a", "schemas": [{"name": "swirl"}, {"name": "noise"}], "until": A_SECOND}),
+        "step.0: swirl needs a way: add a schema that leads somewhere, for example move_ahead",
+    ),
+    "a canyon without a goal": (
+        steps({"name": "a", "schemas": [*WANDER, {"name": "leave_canyon"}], "until": A_SECOND}),
+        "step.0: leave_canyon goes round what closes the way to a goal: add move_to_goal",
+    ),
+    "a gain given twice": (
+        steps({"name": "a", "schemas": [*GOAL, {"name": "noise"}, {"name": "noise", "gain": 0.5}]}),
+        "step.0: the schema noise stands twice: leave one of them out",
+    ),
+    "nothing that could be unreachable": (
+        steps({"name": "a", "schemas": WANDER, "until": [{"when": "unreachable"}]}),
+        "step.0: until: the step a has no goal that could be unreachable: use stuck",
     ),
     "a key of another schema": (
         steps({"name": "a", "schemas": [{"name": "wander", "x_m": 1.0}], "until": A_SECOND}),
