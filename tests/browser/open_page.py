@@ -22,6 +22,8 @@ PROBES = Path(__file__).parent / "probes"
 MODULE = "import('/page/main.js')"
 BEGIN = datetime(2026, 1, 2, 12, 0, 0, tzinfo=UTC)
 FRAME_MS = 16
+TOUR_SEEN = """if (location.protocol === 'http:' && localStorage.getItem('echolocate') === null)
+    localStorage.setItem('echolocate', '{"tour seen": true}');"""
 
 
 @dataclass
@@ -151,12 +153,14 @@ class PagePool:
         self._browser = browser
         self._free: dict[bool, list[Page]] = {False: [], True: []}
 
-    async def context(self, *, touch: bool) -> BrowserContext:
-        """Return a new context."""
+    async def context(self, *, touch: bool, first_visit: bool = False) -> BrowserContext:
+        """Return a new context, in which the tour of the page has been seen unless it is a first visit."""
         context = await self._browser.new_context(
             has_touch=touch, is_mobile=touch, device_scale_factor=2 if touch else 1, accept_downloads=True
         )
         context.set_default_timeout(1000 * TIMEOUT_S)
+        if not first_visit:
+            await context.add_init_script(TOUR_SEEN)
         return context
 
     async def take(self, origin: str, *, touch: bool) -> Page:
@@ -218,7 +222,7 @@ class Opener:
     async def open(
         self, url: str, size: tuple[int, int] = DESKTOP, *, scheme: Literal["dark", "light"] = "light",
         touch: bool = False, calm: bool = False, script: str | None = None, live: bool = True,
-        real_time: bool = False, expected_errors: str | None = None,
+        first_visit: bool = False, real_time: bool = False, expected_errors: str | None = None,
     ) -> Opened:  # fmt: skip
         """Open a page and wait for its first state.
 
@@ -226,13 +230,15 @@ class Opener:
         ----------
         live
             Whether a first state comes.
+        first_visit
+            Whether the tour of the page has not been seen.
         real_time
             Whether the page has the browser's own clock.
         expected_errors
             A pattern of the errors that belong to the test; any other fails it.
         """
-        if real_time or script is not None:
-            context = await self._pool.context(touch=touch)
+        if real_time or first_visit or script is not None:
+            context = await self._pool.context(touch=touch, first_visit=first_visit)
             self._contexts.append(context)
             if script is not None:
                 await context.add_init_script(script)

@@ -12,7 +12,7 @@ from tests.browser.open_page import DESKTOP, PHONE, PROJECTOR, Opened, Opener, u
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Log")
+PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Plot", "Log")
 MODES = ("READY", "SAFE_STOP", "FAULT", "CONNECTING")
 AA = 4.5
 AA_LARGE = 3.0
@@ -55,7 +55,7 @@ async def test_all_text_has_contrast_in_every_panel_and_mode(
     assert len(shapes) == 5, "two modes look alike but for their colour"
 
 
-DESKTOPS = {"desktop": DESKTOP, "projector": PROJECTOR, "tablet": (820, 1180)}
+DESKTOPS = {"desktop": DESKTOP, "projector": PROJECTOR, "laptop": (1024, 768), "tablet": (820, 1180)}
 HANDHELDS = {"phone": PHONE, "side": (740, 360)}
 
 
@@ -72,7 +72,7 @@ async def test_it_fits_every_screen_and_every_control_has_a_name(
             p for p in (*PANELS, "Cycle") if await opened.page.get_by_role("tab", name=p, exact=True).is_visible()
         ]
         assert tabs[: len(PANELS)] == list(PANELS)
-        assert ("Cycle" in tabs) == (name not in {"desktop", "projector"})
+        assert ("Cycle" in tabs) == (name not in {"desktop", "projector", "laptop"})
         for panel in tabs:
             await opened.tab(panel)
             wide = await opened.probe("too_wide")
@@ -93,7 +93,7 @@ async def test_panels_tools_and_help_are_reached_with_keys_alone(server: FakeSer
     opened = await scene(server, opener, DESKTOP)
     page = opened.page
     await page.locator("#tab-objects").focus()
-    for panel in ("drive", "layers", "tune", "time", "log", "objects"):
+    for panel in ("drive", "layers", "tune", "time", "plot", "log", "objects"):
         await page.keyboard.press("ArrowRight")
         await expect(page.locator(f"#panel-{panel}")).to_be_visible()
         await expect(page.locator(f"#tab-{panel}")).to_be_focused()

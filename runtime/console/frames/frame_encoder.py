@@ -53,8 +53,8 @@ class FrameContext:
     clients: int = 0
     phases_s: Mapping[str, float] | None = None
     """Duration of each phase of the last cycle."""
-    late_s: float = 0.0
-    """How long after its deadline that cycle began."""
+    late_s: float | None = 0.0
+    """How long after its deadline that cycle began; like its phases None where a recording does not hold it."""
     missed: int | None = 0
     late: int | None = 0
     link: LinkCounts | None = NO_LINK_COUNTS
@@ -160,7 +160,7 @@ class FrameEncoder:
         segments = self._encode_segments(state, may_wait=is_moving and self._number % SEGMENTS_EVERY > 0)
         odometry = state.odometry
         robot_s = 0.0 if odometry is None else odometry.robot_s
-        link, phases_s = context.link, context.phases_s or {}
+        link, phases_s, late_s = context.link, context.phases_s, context.late_s
         head: dict[str, Any] = {
             "type": "state",
             **robot_status(state, context),
@@ -180,9 +180,9 @@ class FrameEncoder:
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": self._drive_request(state.drive_request, state.goal_place),
             "valley": None if state.goal_drive is None else _valley(state.goal_drive),
-            "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
-            "cycle_us": round(1e6 * sum(phases_s.values()), 1),
-            "late_us": round(1e6 * context.late_s, 1),
+            "phases": {name: round(1e6 * s, 1) for name, s in (phases_s or {}).items()},
+            "cycle_us": None if phases_s is None else round(1e6 * sum(phases_s.values()), 1),
+            "late_us": None if late_s is None else round(1e6 * late_s, 1),
             "missed": context.missed,
             "late": context.late,
             "quanta": 0 if record is None else record.quanta,

@@ -5,6 +5,7 @@ import { textWithHalo, overlap } from "./scene.js";
 
 const CHI2_95 = 5.991;
 const SURE = 0.8; // below this the outline is dashed
+const MAGNIFIED_MAX_M = 0.3; // a longer half axis would look like a wall
 
 export function drawClusters(f) {
   const { ctx, px, theme } = f;
@@ -130,7 +131,7 @@ export function drawModels(f) {
 export function drawEllipses(f) {
   const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;
-  const path = new Path2D(), centres = new Path2D();
+  const path = new Path2D(), magnified = new Path2D(), centres = new Path2D();
   for (const { x, y, covariance, ends } of run.state.objects) {
     if (ends) continue; // a wall is a line; the covariance of its place is its length
     const arm = 3.5 * px;
@@ -140,8 +141,10 @@ export function drawEllipses(f) {
     centres.lineTo(x, y + arm);
     if (!covariance) continue;
     const { major, minor, angle } = ellipseOf(covariance);
-    path.moveTo(x + times * major * Math.cos(angle), y + times * major * Math.sin(angle));
-    path.ellipse(x, y, times * major, times * minor, angle, 0, 2 * Math.PI);
+    const drawn = times * major > MAGNIFIED_MAX_M ? 1 : times;
+    const to = drawn === 1 ? path : magnified;
+    to.moveTo(x + drawn * major * Math.cos(angle), y + drawn * major * Math.sin(angle));
+    to.ellipse(x, y, drawn * major, drawn * minor, angle, 0, 2 * Math.PI);
   }
   f.inWorld();
   ctx.strokeStyle = theme.ellipse;
@@ -149,6 +152,9 @@ export function drawEllipses(f) {
   ctx.stroke(centres);
   ctx.lineWidth = 1.8 * px;
   ctx.stroke(path);
+  ctx.lineCap = "round";
+  ctx.setLineDash([0.1 * px, 3.5 * px]);
+  ctx.stroke(magnified);
 }
 
 // Labels look for a place of their own, within the outline first, and are only a number where none is free.

@@ -6,7 +6,7 @@ import { watchGamepad, watchKeys, watchPad } from "./drive_inputs.js";
 
 export class Drive {
   constructor({ run, units, connection, notifications, teleoperation, tools }) {
-    Object.assign(this, { run, units, connection, notifications, teleoperation });
+    Object.assign(this, { run, units, connection, notifications, teleoperation, tools });
     const asks = {
       arm: () => this.arm(), disarm: { type: "disarm" }, "take-control": { type: "take_control" },
       "give-control": { type: "release_control" }, "drive-request-legs": { type: "legs" },
@@ -74,6 +74,7 @@ export class Drive {
     if (this.enabled !== enabled) {
       this.enabled = enabled;
       for (const element of document.querySelectorAll(".control")) element.disabled = !enabled;
+      this.tools.enable(enabled);
       this.#mode();
     }
     if (this.controller !== controller) {
@@ -86,8 +87,9 @@ export class Drive {
     }
     byId("arm").disabled = !enabled || mode === "DRIVE" || mode === "FAULT";
     byId("disarm").disabled = !enabled || mode !== "DRIVE";
-    byId("take-control").disabled = controller;
-    byId("give-control").disabled = !controller;
+    const live = !this.run.watchesRecording;
+    byId("take-control").disabled = controller || !live;
+    byId("give-control").disabled = !controller || !live;
     setAttribute(byId("pad"), "aria-disabled", this.teleoperation.refusalReason() !== null);
     const others = clients - 1;
     setText(byId("role-text"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "no other client is connected."}`);

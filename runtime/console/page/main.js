@@ -1,9 +1,11 @@
 // The operator console: creates the modules and connects them.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
+import { Alerts } from "./alerts.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { Drive } from "./drive.js";
+import { DriveMode } from "./drive_mode.js";
 import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
 import { Log } from "./log.js";
@@ -12,11 +14,13 @@ import { MissionPanel } from "./mission.js";
 import { Notifications } from "./notifications.js";
 import { describeMap, Objects } from "./objects.js";
 import { Parameters } from "./parameters.js";
+import { Plots } from "./plots.js";
 import { watchPointers } from "./pointer.js";
 import { prefer, preferred } from "./preferences.js";
 import { Ring } from "./ring.js";
 import { Scene } from "./scene.js";
 import { Selection } from "./selection.js";
+import { watchSplitters } from "./splitters.js";
 import { Status } from "./status.js";
 import { Tabs } from "./tabs.js";
 import { Teleoperation } from "./teleoperation.js";
@@ -26,6 +30,7 @@ import { hereTool, moveTool, placeTool } from "./tool_objects.js";
 import { goalTool, routeTool, tapeTool } from "./tool_points.js";
 import { selectionBar, panTool, selectTool } from "./tool_select.js";
 import { Toolbox } from "./tools.js";
+import { Tour } from "./tour.js";
 import { Units } from "./units.js";
 import { extent, View } from "./view.js";
 import { RunState } from "./run_state.js";
@@ -53,7 +58,7 @@ const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
 const layers = makeLayers();
 
-let scene = null;
+let scene = null, tabs = null;
 const redraw = () => scene?.invalidate("front");
 const redrawAll = () => scene?.invalidate("back", "front");
 const theme = new Theme(() => {
@@ -83,16 +88,19 @@ watchPointers(front, view, () => tools.current);
 const teleoperation = new Teleoperation({ connection, run });
 drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools });
 drive.mission = new MissionPanel({ run, units, connection, notifications, tools });
-const status = new Status({ run, units, connection, notifications });
+const alerts = new Alerts({ run, connection, seen: () => tabs?.shown === "log" });
+const status = new Status({ run, units, connection, notifications, alerts });
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
 const parameters = new Parameters({ run, connection, notifications });
 const log = new Log(run);
 const time = new Time({ run, connection, notifications, shoot: () => screenshot({ scene, view, run, theme, units }) });
 const ring = new Ring({ canvas: byId("ring"), text: byId("ring-text"), run, theme, units });
 const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), run, theme });
+const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot" });
 const chosen = selectionBar({ run, selection, connection, notifications });
-const tabs = new Tabs((name) => {
+tabs = new Tabs((name) => {
   drawInstruments();
+  alerts.look();
   prefer("tab", name);
   if (name === "time") time.shown();
 });
@@ -105,9 +113,13 @@ function drawInstruments() {
     instrumentsAsked = false;
     ring.draw();
     charts.draw();
+    plots.draw();
   });
 }
-new ResizeObserver(() => drawInstruments()).observe(byId("panel-cycle"));
+const instrumentsResized = new ResizeObserver(() => drawInstruments());
+for (const id of ["panel-cycle", "plot-lanes"]) instrumentsResized.observe(byId(id));
+watchSplitters(document.querySelector("main"));
+
 
 // Measure what covers the map, so that fitting keeps clear of it: a row takes height, a column width.
 function measureInsets() {
@@ -205,5 +217,8 @@ byId("clear-map").addEventListener("click", () => notifications.confirm("Clear t
 watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 tabs.restore(preferred("tab", ""));
+tools.restore(preferred("tool", ""));
+new DriveMode({ teleoperation, changed: () => drawInstruments() });
+new Tour().beginOnce();
 
 export { connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };

@@ -12,6 +12,7 @@ export class Objects {
   #rows = new Map();
   #asked_ms = -Infinity;
   #asking = false;
+  #refused = null; // the object whose evidence was refused: an answer that would not change, and a warning in the log each time
 
   constructor({ run, units, selection, connection, notifications, tools }) {
     Object.assign(this, { run, units, selection, connection, notifications });
@@ -80,7 +81,7 @@ export class Objects {
   }
 
   #onSelected() {
-    this.run.evidence = null;
+    this.run.evidence = this.#refused = null;
     this.#asked_ms = -Infinity;
     byId("evidence").replaceChildren();
     this.refresh();
@@ -126,12 +127,15 @@ export class Objects {
   #askEvidence() {
     const now = performance.now();
     const { object } = this.selection;
-    if (object === null || this.run.object(object) === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
+    if (object === null || object === this.#refused || this.run.watchesRecording || this.run.object(object) === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
     this.#asking = true;
     this.#asked_ms = now;
     this.connection.request({ type: "evidence", object }).then((data) => {
       if (data?.readings) this.showEvidence({ object, ...data });
-    }, (error) => this.#showEvidenceError(error)).finally(() => {
+    }, (error) => {
+      if (error.answered) this.#refused = object;
+      this.#showEvidenceError(error);
+    }).finally(() => {
       this.#asking = false;
     });
   }

@@ -14,6 +14,7 @@ export class Status {
   #units;
   #connection;
   #notifications;
+  #alerts;
   #announce = byId("announce");
   #announced = null;
   #closed = null;
@@ -23,8 +24,9 @@ export class Status {
   #was_open = false;
   #counts = new Map();
 
-  constructor({ run, units, connection, notifications }) {
-    [this.#run, this.#units, this.#connection, this.#notifications] = [run, units, connection, notifications];
+  constructor({ run, units, connection, notifications, alerts }) {
+    [this.#run, this.#units, this.#connection, this.#notifications, this.#alerts] = [run, units, connection, notifications, alerts];
+    alerts.on("changed", () => this.#show());
     run.on("session", (session) => {
       setText(byId("robot-name"), session.name || "echolocate");
       // The page's own files are those of the program that served it.
@@ -65,7 +67,8 @@ export class Status {
     document.body.classList.toggle("old", old);
     setAttribute(byId("facts"), "aria-label", this.#run.watchesRecording ? "State in the recording" : "State of the run");
     if (old) fact("twist", "unknown");
-    const title = `${special ?? mode} · ${this.#run.session?.name || "robot"} · echolocate`;
+    const warnings = this.#alerts.unseen > 0 ? `(${this.#alerts.unseen}) ` : "";
+    const title = `${warnings}${special ?? mode} · ${this.#run.session?.name || "robot"} · echolocate`;
     if (document.title !== title) document.title = title;
     // A reason that counts is announced once, not each second; that data are missing is announced by #age and #lost.
     const kind = `${special ?? ""} ${mode} ${reason}`.replace(/\d+/g, "");
@@ -126,7 +129,9 @@ export class Status {
     const age = this.#run.age(performance.now());
     const quiet = age > STALE_S;
     if (this.#isOld !== document.body.classList.contains("old")) this.#show();
-    fact("age", age === Infinity ? "none" : age < 1 ? `${age.toFixed(1)} s` : `${Math.round(age)} s`, quiet);
+    // The moment shown of a recording has an age of years; whether the robot answers is in the state.
+    if (this.#run.watchesRecording) fact("age", "a recording", quiet);
+    else fact("age", age === Infinity ? "none" : age < 1 ? `${age.toFixed(1)} s` : `${Math.round(age)} s`, quiet);
     if (this.#closed === null) {
       const text = `No update for ${Math.round(age)} s: what you see is old.`;
       const silent = quiet && age > SILENT_S && age !== Infinity;

@@ -1,15 +1,16 @@
 // The time panel: pause, single-step and speed of the emulator, recording, and playback.
 
 import { byId, download, el, setAttribute, setText } from "./dom.js";
+import { Pace, paceText } from "./pace.js";
 
-const PACE_S = 3;
 const clock = (s) => `${s.toFixed(1)} s`;
 
 export class Time {
   #file = null; // the recording that is open
   #liveSession = null; // the live run's greeting meanwhile
   #scrubbing = false;
-  #paced = null; // since when the pace is measured, and what it was before
+  #pace = new Pace(); // of the emulator
+  #playPace = new Pace();
 
   constructor({ run, connection, notifications, shoot }) {
     Object.assign(this, { run, connection, notifications, shoot });
@@ -55,13 +56,17 @@ export class Time {
   }
 
   #refresh() {
-    const { robot_s, cycle, mode, reason, playback, controller } = this.run.state;
+    const { robot_s, host_s, cycle, mode, reason, playback, controller } = this.run.state;
     const { paused, speed, recording } = this.run.robot;
     const emulated = (this.#liveSession ?? this.run.session)?.emulated ?? false;
     const at = `${clock(robot_s)}, cycle ${cycle}`;
     const then = `in ${mode.replace("_", " ")}${reason ? ` (${reason})` : ""}`;
-    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}${this.#pace()}` : ""}`;
-    setText(byId("time-text"), playback ? `Recording ${name(this.#file)}: ${at}, the robot then ${then}` : live);
+    const goes = playback === null && !paused ? speed : null;
+    const reached = this.#pace.measure(robot_s, host_s, goes);
+    const played = this.#playPace.measure(playback?.s ?? 0, performance.now() / 1000, playback?.is_playing ? playback.speed : null);
+    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 || reached !== null ? `, ${paceText(speed, reached)}` : ""}`;
+    const plays = playback?.is_playing ? `, ${paceText(playback.speed, played)}` : "";
+    setText(byId("time-text"), playback ? `Recording ${name(this.#file)}${plays}: ${at}, the robot then ${then}` : live);
     setText(byId("pause"), paused ? "Resume" : "Pause");
     for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated || playback !== null;
     if (document.activeElement !== byId("speed")) choose(byId("speed"), String(speed));
@@ -70,22 +75,6 @@ export class Time {
     if (playback) this.#follow(playback);
     this.notifications.banner("playback", playback ? `This is a recording, not the live run: ${name(this.#file)}` : null,
       { buttons: [["Back to the live run", () => this.#backToLive()]] });
-  }
-
-  // What a busy machine makes of the speed that was chosen: the robot's clock against the host's, over some seconds.
-  #pace() {
-    const { robot_s: robot, host_s: host } = this.run.state, { speed, paused } = this.run.robot;
-    const from = this.#paced;
-    if (from === null || from.speed !== speed || paused || robot < from.robot || host < from.host) {
-      this.#paced = { robot, host, speed, text: "" };
-      return "";
-    }
-    if (host - from.host > PACE_S) {
-      const pace = (robot - from.robot) / (host - from.host);
-      const text = Math.abs(pace - speed) > 0.1 * speed ? ` (this machine reaches × ${pace.toFixed(1)})` : "";
-      this.#paced = { robot, host, speed, text };
-    }
-    return this.#paced.text;
   }
 
   #follow({ s, is_playing: playing }) {

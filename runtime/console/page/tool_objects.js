@@ -31,7 +31,7 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
     redraw();
   };
   return {
-    id: "move", name: "Move and turn an object", icon: "i-move",
+    id: "move", sends: true, name: "Move and turn an object", icon: "i-move",
     down(at) {
       const object = picked();
       if (object !== null) {
@@ -101,7 +101,7 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
     return { x: c * dx + s * dy, y: c * dy - s * dx, theta: theta - turn };
   };
   return {
-    id: "here", name: "Say where the robot is in the known room", icon: "i-here",
+    id: "here", sends: true, name: "Say where the robot is in the known room", icon: "i-here",
     down(at) {
       pose = { x: at.x, y: at.y, theta: 0, dragged: false };
       redraw();
@@ -146,7 +146,7 @@ export function placeTool({ run, view, connection, notifications, redraw }) {
     redraw();
   };
   return {
-    id: "place", name: "Place a model", icon: "i-place",
+    id: "place", sends: true, name: "Place a model", icon: "i-place",
     begin: () => {
       byId("placing").hidden = false;
     },

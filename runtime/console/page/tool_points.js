@@ -4,7 +4,7 @@ import { drawTape, describeTape } from "./tool_overlays.js";
 
 export function goalTool({ sendGoal, after }) {
   return {
-    id: "goal", name: "Drive to a goal", icon: "i-goal",
+    id: "goal", sends: true, name: "Drive to a goal", icon: "i-goal",
     up(at) {
       sendGoal(at.x, at.y);
       after();
@@ -17,7 +17,7 @@ export function routeTool({ addWaypoint, redraw }) {
   let from = null, to = null;
   const heading = () => (from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 12 ? Math.atan2(to.y - from.y, to.x - from.x) : null);
   return {
-    id: "route", name: "Add waypoints to a route; drag for the final heading", icon: "i-route",
+    id: "route", sends: true, name: "Add waypoints to a route; drag for the final heading", icon: "i-route",
     down(at) {
       from = to = at;
     },

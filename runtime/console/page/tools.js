@@ -1,6 +1,7 @@
 // The map tools as a row of radio buttons, and the crosshair that stands in for the pointer when the keyboard is used.
 
 import { el, icon, setAttribute } from "./dom.js";
+import { prefer } from "./preferences.js";
 import { drawCross } from "./tool_overlays.js";
 
 const STEP_PX = 24;
@@ -10,8 +11,9 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 export class Toolbox {
   #buttons = new Map();
   #cross = null; // the crosshair, in metres
+  #last = null; // a tool of the last visit that may not be used yet
 
-  // `tools` is a list of {id, name, icon, down, move, up, cancel, hover, key, draw, begin, end}.
+  // `tools` is a list of {id, name, icon, sends, down, move, up, cancel, hover, key, draw, begin, end}.
   constructor({ box, canvas, tools, view, redraw }) {
     Object.assign(this, { canvas, tools, view, redraw });
     tools.forEach((tool, index) => {
@@ -21,7 +23,7 @@ export class Toolbox {
         const by = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
         if (by === undefined) return;
         event.preventDefault();
-        const shown = tools.filter((one) => !this.#buttons.get(one.id).hidden);
+        const shown = tools.filter((one) => this.#usable(one));
         const next = shown[(shown.indexOf(tool) + by + shown.length) % shown.length];
         this.choose(next.id);
         this.#buttons.get(next.id).focus();
@@ -32,10 +34,10 @@ export class Toolbox {
     canvas.addEventListener("keydown", (event) => this.#key(event));
     canvas.addEventListener("blur", () => this.#setCross(null));
     canvas.addEventListener("pointerdown", () => this.#setCross(null));
-    this.choose("pan");
+    this.choose("pan", { kept: false });
   }
 
-  choose(id, { focus = false } = {}) {
+  choose(id, { focus = false, kept = true } = {}) {
     const tool = this.tools.find((one) => one.id === id);
     if (tool !== this.current) {
       this.current?.cancel?.();
@@ -48,13 +50,34 @@ export class Toolbox {
       button.tabIndex = name === id ? 0 : -1;
     }
     setAttribute(this.canvas, "data-tool", id);
+    if (kept) prefer("tool", id);
     if (focus) this.canvas.focus();
     this.redraw();
   }
 
+  // Tools that send commands are for the page that controls a live run.
+  enable(on) {
+    for (const tool of this.tools) if (tool.sends) this.#buttons.get(tool.id).disabled = !on;
+    if (!on && this.current.sends) this.choose("pan", { kept: false });
+    else if (on && this.#usable(this.tools.find(({ id }) => id === this.#last))) this.choose(this.#last);
+    if (on) this.#last = null;
+  }
+
+  // The tool of the last visit, as soon as it may be used.
+  restore(id) {
+    const tool = this.tools.find((one) => one.id === id);
+    if (tool?.sends) this.#last = id;
+    else if (tool) this.choose(id);
+  }
+
+  #usable(tool) {
+    const button = this.#buttons.get(tool?.id);
+    return button !== undefined && !button.hidden && !button.disabled;
+  }
+
   chooseNth(n) {
     const tool = this.tools[n - 1];
-    if (tool && !this.#buttons.get(tool.id).hidden) this.choose(tool.id);
+    if (this.#usable(tool)) this.choose(tool.id);
   }
 
   draw(f) {

@@ -42,7 +42,9 @@ class ReplayFrames:
 
     def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
-        context = FrameContext(host_s=position.s, playback=position._asdict(), missed=None, late=None, link=None)
+        context = FrameContext(
+            host_s=position.s, late_s=None, missed=None, late=None, link=None, playback=position._asdict()
+        )
         frame = self._encoder.frame(replayed.state, replayed.record, context)
         return FrameParts(frame.head, frame.changes, frame.whole())
 
