@@ -62,11 +62,12 @@ def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidS
     dx = percept.pose.x - percept.obstacles[:, 0]
     dy = percept.pose.y - percept.obstacles[:, 1]
     distances = np.hypot(dx, dy)
-    # An echo at the robot's centre has no direction; the robot has just come from behind, so that way is free.
-    centred = distances == 0.0
-    dx[centred], dy[centred] = -math.cos(percept.pose.theta), -math.sin(percept.pose.theta)
-    lengths = np.where(centred, 1.0, distances)
-    pushes = repulsions(distances - body_radius_m, config) / lengths
+    gaps_m, lengths = distances - body_radius_m, distances
+    if not distances.all():
+        # An echo at the robot's centre has no direction; the robot has just come from behind, so that way is free.
+        centred = distances == 0.0
+        dx[centred], dy[centred], lengths[centred] = -math.cos(percept.pose.theta), -math.sin(percept.pose.theta), 1.0
+    pushes = repulsions(gaps_m, config) / lengths
     px, py = pushes * dx, pushes * dy
     x, y = float(px.sum()), float(py.sum())
     magnitude = math.hypot(x, y)

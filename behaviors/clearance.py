@@ -20,17 +20,14 @@ def free_path_m(percept: Percept, reach_m: float) -> float:
 
     Zero if an echo ahead is inside the disc already, infinite if the path is free.
     """
-    if len(percept.obstacles) == 0:
-        return math.inf
-    c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
-    dx = percept.obstacles[:, 0] - percept.pose.x
-    dy = percept.obstacles[:, 1] - percept.pose.y
-    ahead, lateral = c * dx + s * dy, c * dy - s * dx
-    in_the_way = (ahead > 0.0) & (np.abs(lateral) < reach_m)
-    if not in_the_way.any():
-        return math.inf
-    ahead, lateral = ahead[in_the_way], lateral[in_the_way]
-    return max(0.0, float((ahead - np.sqrt(reach_m * reach_m - lateral * lateral)).min()))
+    pose, free_m = percept.pose, math.inf
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    for x, y in percept.obstacles.tolist():  # two dozen: numpy's calls would take longer
+        dx, dy = x - pose.x, y - pose.y
+        ahead, lateral = c * dx + s * dy, c * dy - s * dx
+        if ahead > 0.0 and abs(lateral) < reach_m:
+            free_m = min(free_m, ahead - math.sqrt(reach_m * reach_m - lateral * lateral))
+    return max(0.0, free_m)
 
 
 def free_paths_m(points: Floats, pose: Pose, headings_rad: Floats, reach_m: float) -> Floats:

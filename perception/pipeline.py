@@ -293,7 +293,8 @@ class Perception:
         """
         bearings, ages = self._echoes.looks(robot_s, age_max_s)
         axes = ring_yaw + self._axes
-        axes[self._turning] += travel - ring_yaw
+        if self._turning:
+            axes[self._turning] += travel - ring_yaw
         return FieldOfView(
             bearings,
             ages,

@@ -137,7 +137,8 @@ class SensorMonitor:
         had not fired.
         """
         pose, trusted, possible = firing.pose, self._trusted, self._possible
-        self._turns[self._turning] = pose.theta - firing.ring_yaw
+        if self._turning:
+            self._turns[self._turning] = pose.theta - firing.ring_yaw
         changed = check_firing(
             firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._axes, self._turns,
             self._neighbours, self._expected, self._half_angle, self._tolerance, self._near, self._sensor_records,

@@ -352,10 +352,11 @@ class DenningDriver(Session[PoseStamper]):
             return
         self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
         self._odometry = sample
-        self._flags |= sample.flags
         if (error := self.stamper.clock_error) is not None and error > 0.0:
             self._go_down(diagnostics.wrong_clock_rate(error))
         self._drive_acks.acknowledged(odom.last_drive_seq)
-        if sample.flags & Flags.LATCHED:
-            self._drive_acks.forget()  # while latched, the robot refuses every DRIVE with a NAK
+        if sample.flags:
+            self._flags |= sample.flags
+            if sample.flags & Flags.LATCHED:
+                self._drive_acks.forget()  # while latched, the robot refuses every DRIVE with a NAK
         self._firings.extend(self.stamper.firings(self._run_s))

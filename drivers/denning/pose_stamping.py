@@ -173,9 +173,9 @@ class PoseStamper:
         ranges, heard = ranges_of(echo, len(self._axes), unit_m), cross_paths_of(echo, self._axes, unit_m)
         slack_m = 0.0 if isinstance(echo, Echo) else unit_m  # a range at the window's end is rounded to a count
         window_m = self._window * TENTH_FT_M + slack_m
-        beyond = np.isfinite(ranges) & (ranges > window_m)
-        if beyond.any():
-            self.out_of_window += int(np.count_nonzero(beyond))
+        beyond = [sensor for sensor, range_m in enumerate(ranges.tolist()) if window_m < range_m < math.inf]
+        if beyond:
+            self.out_of_window += len(beyond)
             ranges[beyond] = math.nan
         if heard is not None:
             heard = self._within(heard, window_m)

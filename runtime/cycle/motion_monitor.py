@@ -166,13 +166,15 @@ class MotionMonitor:
         self, commands: tuple[Command, ...], moved: Amount, passed_s: float, body: BodyConfig
     ) -> tuple[tuple[Direction, ...], bool]:
         """Return the directions after a motion, and whether too much is unexplained; the sum then starts anew."""
-        twists = [command.twist for command in commands]
-        along = _axis(self.directions[:2], [t.v for t in twists], moved.along, body.acceleration_max_m_s2, passed_s,
-                      NOISE.along)  # fmt: skip
-        turned = _axis(self.directions[2:], [t.w for t in twists], moved.turned, body.turn_acceleration_max_rad_s2,
-                       passed_s, NOISE.turned)  # fmt: skip
-        is_excessive = max(d.excess for d in along) > EXCESS.along or max(d.excess for d in turned) > EXCESS.turned
-        directions = along + turned
+        v, w = [command.twist.v for command in commands], [command.twist.w for command in commands]
+        braked, slowed = body.acceleration_max_m_s2 * passed_s, body.turn_acceleration_max_rad_s2 * passed_s
+        ahead, back, left, right = self.directions
+        ahead = _direction(ahead, max(v, default=0.0), moved.along, braked, passed_s, NOISE.along)
+        back = _direction(back, -min(v, default=0.0), -moved.along, braked, passed_s, NOISE.along)
+        left = _direction(left, max(w, default=0.0), moved.turned, slowed, passed_s, NOISE.turned)
+        right = _direction(right, -min(w, default=0.0), -moved.turned, slowed, passed_s, NOISE.turned)
+        directions = ahead, back, left, right
+        is_excessive = max(ahead.excess, back.excess) > EXCESS.along or max(left.excess, right.excess) > EXCESS.turned
         return tuple(Direction(d.explained) for d in directions) if is_excessive else directions, is_excessive
 
     def _ask(self, run_s: float) -> tuple[float, Amount]:
@@ -186,22 +188,29 @@ class MotionMonitor:
         return self.asked_s + lasted_s, Amount(along, turned)
 
 
-def _axis(
-    before: tuple[Direction, ...],
-    commanded: list[float],
-    moved: float,
-    deceleration: float,
-    passed_s: float,
-    noise: float,
-) -> tuple[Direction, Direction]:
-    """Return both directions of an axis after `passed_s`, in which the base moved by `moved` in the first of them."""
-    both = []
-    for direction, sign in zip(before, (1.0, -1.0), strict=True):
-        fastest = max((sign * velocity for velocity in commanded), default=0.0)
-        explained = max(0.0, fastest, direction.explained - deceleration * passed_s)
-        allowed = (GAIN * max(explained, direction.explained) + noise) * passed_s
-        both.append(Direction(explained, max(0.0, direction.excess + sign * moved - allowed)))
-    return both[0], both[1]
+def _direction(
+    before: Direction, fastest: float, moved: float, braked: float, passed_s: float, noise: float
+) -> Direction:
+    """Return a direction after `passed_s`, in which the base moved by `moved` in it.
+
+    Parameters
+    ----------
+    before
+        The direction before.
+    fastest
+        Greatest velocity commanded in it.
+    moved
+        Motion, m or rad.
+    braked
+        By how much a base that brakes has become slower.
+    passed_s
+        Time since `before`.
+    noise
+        Velocity that is none.
+    """
+    explained = max(0.0, fastest, before.explained - braked)
+    allowed = (GAIN * max(explained, before.explained) + noise) * passed_s
+    return Direction(explained, max(0.0, before.excess + moved - allowed))
 
 
 def _between(before: Pose, after: Pose) -> Amount:

@@ -233,7 +233,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) 
         twist = command if isinstance(command, Twist) else None
         state.motion_monitor = state.motion_monitor.command(twist, inputs.run_s)
     after = state.mode
-    stopped = after.mode in {Mode.SAFE_STOP, Mode.FAULT} and after.entered_since(before)
+    stopped = after.entered_since(before) and after.mode in {Mode.SAFE_STOP, Mode.FAULT}
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
         bumper = bool((inputs.received.flags | state.odometry.flags) & Flags.BUMPER) if state.odometry else False
         state.drive_request = after_stop(state.drive_request, bumper=bumper)
@@ -264,7 +264,9 @@ def _refusal(state: State, drive_request: DriveInput) -> str | None:
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Return the command that mode and schemas lead to."""
-    flags = inputs.received.flags | (Flags.NONE if state.odometry is None else state.odometry.flags)
+    flags = inputs.received.flags
+    if state.odometry is not None and state.odometry.flags:
+        flags |= state.odometry.flags
     before = state.mode
     gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
     state.run_s = inputs.run_s

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 
 
-class Phase(Enum):
-    """A part of the cycle, in the order in which they follow each other."""
+class Phase(StrEnum):
+    """A part of the cycle, in the order in which they follow each other.
+
+    A `StrEnum`, because its hash is that of a text; a plain Enum computes its own in Python.
+    """
 
     GATHER = "gather"
     """Take what arrived on the line."""
