@@ -15,6 +15,7 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Floats, LinkCounts, Odometry, Pose
 from perception.detected_object import DetectedObject
+from perception.mapping.grid.known_cells import KnownCells
 
 ECHO: Final = np.dtype(
     [
@@ -60,6 +61,8 @@ class RunSnapshot:
     """(n, 4): ends x, y, x, y (m) of the outline segments that the paper's front end finds."""
     clusters: tuple[Cluster, ...]
     objects: tuple[DetectedObject, ...]
+    grid: KnownCells | None = None
+    """What the evidence grid holds; None where the settings keep none."""
 
 
 @dataclass(frozen=True, slots=True)

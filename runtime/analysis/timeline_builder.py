@@ -14,6 +14,7 @@ import numpy as np
 from drivers.messages import Firing, Floats, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.localization.map_frame import turned_object
+from perception.mapping.grid.known_cells import known_cells
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array, mounts_at
@@ -144,10 +145,11 @@ class TimelineBuilder:
         if len(snapshots) >= SNAPSHOTS_MAX:
             del snapshots[1::2]
             self._interval_s *= 2.0
+        window = perception.occupancy()
         snapshots.append(
             RunSnapshot(
                 t_s, self._pose, self._yaw, self._row_count, front.segment_geometry()[:, :4], clusters_of(front),
-                perception.objects(),
+                perception.objects(), None if window is None else known_cells(window),
             )
         )  # fmt: skip
 

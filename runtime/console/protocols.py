@@ -105,6 +105,9 @@ class ReplayControl(Protocol):
     async def step(self, viewer: Viewer, cycles: int) -> None:
         """Go forward by this many cycles; backward where negative."""
 
+    def show_grid(self, viewer: Viewer) -> None:
+        """Send the viewer the evidence grid at the moment of its recording."""
+
     async def close_recording(self, viewer: Viewer) -> None:
         """Show the client the run itself again."""
 

@@ -43,7 +43,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     server.silent = True
     boxes = opened.page.locator("#layers input")
     names = await opened.page.locator("#layers label").all_inner_texts()
-    assert len(names) == 19
+    assert len(names) == 20
     assert [name for name in names if "arc" in name or "beam" in name] == [
         "arcs of recent echoes",
         "beams firing now",
@@ -51,14 +51,36 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     await change(opened, "run.state.valley = { blocked: '11000000', way: [[0.0, 0.0], [1.0, 0.5]] };")
     whole = await opened.picture()
     for index, name in enumerate(names):
-        if "mission" in name:
-            continue  # takes the goal's place: see test_mission
+        if "mission" in name or "evidence grid" in name:
+            continue  # see test_mission, and below
         await boxes.nth(index).uncheck()
         without = await opened.picture()
         assert without != whole, f"{name} draws nothing"
         await boxes.nth(index).check()
         assert await opened.picture() == whole, f"{name} is not what it was"
     await opened.save_screenshot("layers")
+
+
+GRID = {"type": "grid", "on": True, "x": -1.0, "y": -0.5, "cell": 0.5, "columns": 2, "rows": 2, "cells": "Wgr/ZA=="}
+"""Four cells: 90, 10, −1 and 100 %."""
+
+
+async def test_the_evidence_grid_is_asked_for_only_while_its_layer_is_on(server: FakeServer, opener: Opener) -> None:
+    opened = await still(server, opener)
+    server.silent = True
+    whole = await opened.picture()
+    await opened.run_for(3000)
+    assert server.of("show_grid") == []
+    await opened.tab("Layers")
+    await opened.page.locator("#layer-evidence_grid").check()
+    await opened.run_for(1000)
+    await server.wait("show_grid")
+    await server.send(GRID)
+    await opened.page.wait_for_function(f"async () => (await {MODULE}).run.grid?.picture !== undefined")
+    assert await opened.picture() != whole
+    await opened.save_screenshot("evidence-grid")
+    await opened.page.locator("#layer-evidence_grid").uncheck()
+    assert await opened.picture() == whole
 
 
 async def test_what_a_layer_draws_depends_on_the_state(server: FakeServer, opener: Opener) -> None:

@@ -17,6 +17,7 @@ from foxglove import channels as ch
 from foxglove import messages as fx
 
 from drivers.messages import Pose
+from perception.mapping.grid.known_cells import KnownCells
 from runtime.analysis.export.shapes import (
     CLUSTER,
     HEIGHT_M,
@@ -103,6 +104,7 @@ class _RunExporter:
         self._clusters = ch.SceneUpdateChannel("/clusters", context=context)
         self._objects = ch.SceneUpdateChannel("/models", context=context)
         self._truth = ch.SceneUpdateChannel("/truth", context=context)
+        self._grid = ch.GridChannel("/grid", context=context)
         self._log = ch.LogChannel("/log", context=context)
 
     def write(self) -> None:
@@ -183,11 +185,24 @@ class _RunExporter:
             )  # fmt: skip
             texts.append(text)
         _scene(self._objects, "models", shapes, texts, at)
+        if snapshot.grid is not None and snapshot.grid.percent.size:
+            self._grid.log(_grid(snapshot.grid, at), log_time=at)
 
     def _write_log_entry(self, entry: LogEntry, at: int) -> None:
         levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
         level = levels.get(entry.level, fx.LogLevel.Info)
         self._log.log(fx.Log(timestamp=_stamp(at), level=level, message=entry.text, name="echolocate"), log_time=at)
+
+
+def _grid(known: KnownCells, at: int) -> fx.Grid:
+    """Return the evidence grid: per cent occupied in each cell, −1 where nothing is known."""
+    return fx.Grid(
+        timestamp=_stamp(at), frame_id="odom", pose=_placed(known.x_m, known.y_m, 0.0),
+        column_count=known.percent.shape[1], cell_size=fx.Vector2(x=known.cell_m, y=known.cell_m),
+        row_stride=known.percent.shape[1], cell_stride=1,
+        fields=[fx.PackedElementField(name="occupied", offset=0, type=fx.PackedElementFieldNumericType.Int8)],
+        data=known.percent.tobytes(),
+    )  # fmt: skip
 
 
 def _scene(

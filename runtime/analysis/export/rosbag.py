@@ -1,8 +1,8 @@
 """Export of a run as a ROS 2 bag, without ROS: ranges, odometry, markers and frames, written by rosbags.
 
-Topics: `/sonar/s00` … (sensor_msgs/Range), each in its own frame below `ring`; `/odom`; `/markers`; `/tf` and
-`/tf_static`. The frame `ring` is the pose of the ring at the last firing: on a synchro drive it does not turn with
-`base_link`.
+Topics: `/sonar/s00` … (sensor_msgs/Range), each in its own frame below `ring`; `/odom`; `/markers`; `/grid`
+(nav_msgs/OccupancyGrid), where the run kept an evidence grid; `/tf` and `/tf_static`. The frame `ring` is the pose of
+the ring at the last firing: on a synchro drive it does not turn with `base_link`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from drivers.messages import Odometry, Pose
+from perception.mapping.grid.known_cells import KnownCells
 from runtime.analysis.export.shapes import (
     CLUSTER,
     MODEL,
@@ -87,9 +88,11 @@ class _RunExporter:
             self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
         self._writer.write(self._connections[topic], at, self._store.serialize_cdr(message, kind))
 
+    def _time(self, at: int) -> Msg:
+        return self._make("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
+
     def _header(self, frame: str, at: int) -> Msg:
-        stamp = self._make("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
-        return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
+        return self._make("std_msgs/msg/Header", stamp=self._time(at), frame_id=frame)
 
     def _vector(self, x: float, y: float, z: float = 0.0) -> Msg:
         return self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
@@ -181,6 +184,22 @@ class _RunExporter:
             row = _looped(points.tolist()) if closed else points.tolist()
             markers.append(self._marker(f"models/{seen.model}", number, STRIP, row, MODEL, at))
         self._markers("/markers", markers, at)
+        if snapshot.grid is not None and snapshot.grid.percent.size:
+            self._write_grid(snapshot.grid, at)
+
+    def _write_grid(self, known: KnownCells, at: int) -> None:
+        rows, columns = known.percent.shape
+        about = self._make(
+            "nav_msgs/msg/MapMetaData", map_load_time=self._time(at), resolution=known.cell_m, width=columns,
+            height=rows, origin=self._placed(Pose(known.x_m, known.y_m, 0.0)),
+        )  # fmt: skip
+        kind = "nav_msgs/msg/OccupancyGrid"
+        self._write(
+            "/grid",
+            kind,
+            self._make(kind, header=self._header("odom", at), info=about, data=known.percent.ravel()),
+            at,
+        )
 
     def _markers(self, topic: str, markers: list[Msg], at: int) -> None:
         kind = "visualization_msgs/msg/MarkerArray"

@@ -12,15 +12,18 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import Affine2D
 
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
+from perception.mapping.grid.known_cells import UNKNOWN, KnownCells
 from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, world_outlines
-from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
+from runtime.analysis.plots.plot_style import CLUSTER, ECHO, FREE, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
 from runtime.analysis.timeline import BookmarkEntry, Cluster, Echoes, Timeline
 from runtime.simulation.evaluation import nearest_pairs
 from runtime.support.length_format import Units, format_length
@@ -113,6 +116,34 @@ def received_echoes(echoes: Echoes) -> Echoes:
     back: Echoes = echoes[np.isfinite(echoes["range_m"])]
     thinned: Echoes = back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
     return thinned
+
+
+def draw_evidence_grid(axes: Axes, known: KnownCells, frame: Frame) -> list[Line2D]:
+    """Draw the cells of the evidence grid: occupied ones dark, free ones light, each as strongly as it is known.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw, in the unit of `frame`.
+    known : KnownCells
+        The grid, in the odometry's frame.
+    frame : Frame
+        The coordinates of the figure: its place in the world and the unit of its axes.
+    """
+    rows, columns = known.percent.shape
+    share = (known.percent.astype(np.float64) - 50.0) / 50.0
+    pixels = np.zeros((rows, columns, 4))
+    pixels[..., :3] = np.where((share > 0.0)[..., None], to_rgb(INK), to_rgb(FREE))
+    pixels[..., 3] = np.where(known.percent == UNKNOWN, 0.0, np.abs(share))
+    width, height = columns * known.cell_m, rows * known.cell_m
+    corners = frame.points(np.array([[0.0, 0.0], [width, 0.0], [0.0, height]]) + np.array([known.x_m, known.y_m]))
+    (x, y), along, up = corners[0], corners[1] - corners[0], corners[2] - corners[0]
+    image = axes.imshow(pixels, origin="lower", extent=(0.0, 1.0, 0.0, 1.0), interpolation="nearest", zorder=0.5)
+    placed = Affine2D(np.array([[along[0], up[0], x], [along[1], up[1], y], [0.0, 0.0, 1.0]]))
+    image.set_transform(placed + axes.transData)
+    image.set_gid("evidence-grid")
+    style: Any = {"marker": "s", "markersize": 7, "linestyle": ""}
+    return [Line2D([], [], color=INK, label="occupied", **style), Line2D([], [], color=FREE, label="free", **style)]
 
 
 def draw_arcs(axes: Axes, echoes: Echoes, half_angle: float, frame: Frame) -> list[Line2D]:

@@ -18,6 +18,7 @@ from runtime.analysis.plots.layers import (
     draw_arcs,
     draw_bookmarks,
     draw_clusters,
+    draw_evidence_grid,
     draw_objects,
     draw_path,
     draw_segments,
@@ -26,7 +27,7 @@ from runtime.analysis.plots.layers import (
 )
 from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
 from runtime.analysis.timeline import Timeline
-from runtime.support.length_format import Units
+from runtime.support.length_format import Units, format_length
 
 NAMES: Final = ("raw", "segments", "clusters", "models")
 """The figures, in the paper's order."""
@@ -72,7 +73,7 @@ def paper_figures(timeline: Timeline) -> tuple[int, int, int, int] | None:
 
 
 def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
-    """Return the four figures of the end of a run by name, in the paper's order."""
+    """Return the paper's four figures of the end of a run by name, and the evidence grid's if it has one."""
     canvas, last = Canvas(timeline, units), timeline.last
     if last is None:
         return {}
@@ -111,6 +112,11 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
     for at, (name, (title, line, draw)) in enumerate(zip(NAMES, layers, strict=True)):
         like = "" if numbers is None else f", as the paper's Figure {numbers[at]}"
         drawn[name] = _figure(canvas, f"{title}{like}", line, draw)
+    if last.grid is not None and last.grid.percent.size:
+        known = last.grid
+        side = format_length(known.cell_m, units, 2)
+        line = f"cells of {side} {units}, in the window around the robot"
+        drawn["grid"] = _figure(canvas, "Evidence grid", line, lambda axes: draw_evidence_grid(axes, known, frame))
     return drawn
 
 

@@ -16,6 +16,7 @@ SEGMENT: Final = "#d55e00"
 CLUSTER: Final = "#009e73"
 MODEL: Final = "#0072b2"
 ROBOT: Final = "#cc79a7"
+FREE: Final = "#56b4e9"
 
 WIDTH_IN: Final = 7.2
 """Width of a figure: two columns of a page."""

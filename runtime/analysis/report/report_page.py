@@ -32,6 +32,7 @@ CAPTIONS: Final = MappingProxyType(
         "raw": "Every echo as the arc on which its reflection may lie.",
         "segments": "Outline segments: tangents to the arcs of two readings of one sensor.",
         "clusters": "Clusters of outline segments by minimum distance, as rectangles with an X at the centre.",
+        "grid": "The evidence grid around the robot at the end: what each cell has answered, from any direction.",
         "models": "Models at their matched poses, over the true world if it is known.",
     }
 )

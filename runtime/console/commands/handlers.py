@@ -10,6 +10,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
+import orjson
+
 from behaviors.missions.mission import Mission, MissionEdit, route
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
@@ -27,6 +29,7 @@ from runtime.console.commands.messages import (
     SetRoute,
     StartMission,
 )
+from runtime.console.frames.grid_message import grid_message
 from runtime.cycle.drive_requests import NO_MAP, Legs, needs_map, refusal
 from runtime.cycle.inputs import Request
 
@@ -200,6 +203,21 @@ def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:
         "lines": [[line.number, line.x1, line.y1, line.x2, line.y2, line.supports] for line in found.lines],
         "rivals": found.rivals,
     }
+
+
+def show_grid(call: Call, _: NoArguments) -> None:
+    """Send the client the evidence grid of the run, or of the recording that it is shown, as a message of its own.
+
+    Raises
+    ------
+    CommandError
+        Its recording has ended.
+    """
+    client, replay = call.client, call.context.replay
+    if client.is_live or replay is None:
+        client.send_newest("grid", orjson.dumps(grid_message(call.context.robot.state)))
+    else:
+        replay.show_grid(client)
 
 
 def set_parameter(call: Call, change: SetParameter) -> list[dict[str, Any]]:

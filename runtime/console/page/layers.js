@@ -2,6 +2,7 @@
 
 import { el, svg } from "./dom.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
+import { drawEvidenceGrid } from "./draw_evidence.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
 import { drawMapFrame, drawRobot, drawVectors, drawGoal, drawValley, trailDrawer } from "./draw_motion.js";
 import { drawMission } from "./draw_mission.js";
@@ -12,6 +13,7 @@ import { prefer, preferred } from "./preferences.js";
 // [id, plane, name, draw, on, how it looks: SVG path, and its style sheet's colour]
 const TABLE = [
   ["truth", "back", "true outlines (emulator)", drawTruth, true, "M20 2a8 8 0 1 1-.1 0Z", "truth", "3 2"],
+  ["evidence_grid", "back", "evidence grid: occupied and free cells", drawEvidenceGrid, false, "M4 4h10v6h10v6h12M4 10h6v6", "occupied"],
   ["grid", "back", "grid", drawGrid, true, "M3 7h34M3 14h34M10 2v16M20 2v16M30 2v16", "axis"],
   ["segments", "back", `outline segments (${AGE_LEGEND})`, segmentsDrawer(), true, "M4 6l12-3M18 10h16M6 16l14-2", "segment"],
   ["clusters", "front", "clusters: rectangle and X", drawClusters, true, "M6 3h28v14H6zl28 14M34 3 6 17", "cluster"],

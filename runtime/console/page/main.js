@@ -5,6 +5,7 @@ import { Alerts } from "./alerts.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { Drive } from "./drive.js";
+import { watchGrid } from "./draw_evidence.js";
 import { DriveMode } from "./drive_mode.js";
 import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
@@ -200,6 +201,7 @@ function fitUntouched(room = 0) {
   fitted = true;
 }
 
+watchGrid({ layer: layers.find(({ id }) => id === "evidence_grid"), run, connection, notifications, changed: () => scene.invalidate("back") });
 connection.on("session", (session) => run.beginSession(session));
 connection.on("state", (state) => run.apply(state, performance.now()));
 connection.on("robot", (status) => run.applyRobot(status, performance.now()));

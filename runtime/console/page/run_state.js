@@ -32,6 +32,7 @@ export class RunState extends Emitter {
   echoes = []; // {x, y, angle, range, t}: arcs of recent echoes
   chart = []; // {phases, late_ms, missed}: a column a frame
   evidence = null;
+  grid = null; // the evidence grid, if its layer asks for it
   log = [];
 
   // A greeting may come again, with other parameters or models; the whole map comes after it, the past stays known.
@@ -108,6 +109,7 @@ export class RunState extends Emitter {
     this.trailVersion++;
     this.echoes = [];
     this.chart = [];
+    this.grid = null;
   }
 
   #applySegments(update) {

@@ -246,6 +246,16 @@ class ReplayClient:
             raise ReplayError(f"a step may have at most {STEP_MAX} cycles")
         self._replay_of(viewer).command({"do": "step", "cycles": cycles})
 
+    def show_grid(self, viewer: Viewer) -> None:
+        """Have the worker send the evidence grid at the moment of the recording.
+
+        Raises
+        ------
+        ReplayError
+            No recording is open.
+        """
+        self._replay_of(viewer).command({"do": "grid"})
+
     async def close_recording(self, viewer: Viewer) -> None:
         """Show the client the run itself again."""
         await self._close(viewer)

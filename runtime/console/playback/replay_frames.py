@@ -7,6 +7,7 @@ from typing import Any
 
 from config.settings import Settings
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
+from runtime.console.frames.grid_message import grid_message
 from runtime.console.frames.session_info import session_info
 from runtime.console.playback.replay_cursor import ReplayedCycle
 from runtime.console.playback.replay_worker import FrameParts, PlaybackPosition, run_worker
@@ -47,6 +48,10 @@ class ReplayFrames:
         )
         frame = self._encoder.frame(replayed.state, replayed.record, context)
         return FrameParts(frame.head, frame.changes, frame.whole())
+
+    def grid(self, replayed: ReplayedCycle) -> dict[str, Any]:
+        """Return the evidence grid after a cycle, as a message."""
+        return grid_message(replayed.state)
 
 
 def make_replay_frames(settings: Settings, *, emulated: bool) -> ReplayFrames:

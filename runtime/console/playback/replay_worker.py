@@ -64,6 +64,9 @@ class FrameMaker(Protocol):
     def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
 
+    def grid(self, replayed: ReplayedCycle) -> dict[str, Any]:
+        """Return the evidence grid after a cycle, as a message."""
+
 
 class MakeFrameMaker(Protocol):
     """Constructs frame makers."""
@@ -83,6 +86,8 @@ class ReplayWorker:
         Returns a frame maker for the settings in force, given as the recording has them.
     show : callable
         Gets each frame: the number of its source, its number in the source, and its parts.
+    answer : callable
+        Gets each message that is no frame.
     clock : callable
         Monotonic, s.
     """
@@ -92,14 +97,17 @@ class ReplayWorker:
         cursor: ReplayCursor,
         make_frames: Callable[[dict[str, Any]], FrameMaker],
         show: Callable[[int, int, FrameParts], None],
+        answer: Callable[[dict[str, Any]], None],
         clock: Callable[[], float],
     ) -> None:
         self._cursor = cursor
         self._make_frames = make_frames
         self._show = show
+        self._answer = answer
         self._clock = clock
         self._source = self._number = self._jumps = self._target = 0
         self._last: ReplayedCycle | None = None
+        self._newest: ReplayedCycle | None = None
         self._settings: dict[str, Any] | None = None
         self._frames: FrameMaker | None = None
         self._seek: Iterator[ReplayedCycle] | None = None
@@ -109,7 +117,7 @@ class ReplayWorker:
         self._shown_s = -math.inf
 
     def execute(self, command: dict[str, Any]) -> None:
-        """Begin to execute a command: seek to `s`, play at `speed` (0 pauses), or step by so many `cycles`.
+        """Begin to execute a command: seek to `s`, play at `speed` (0 pauses), step `cycles`, or show the `grid`.
 
         Raises
         ------
@@ -124,6 +132,9 @@ class ReplayWorker:
                 self._playing_from = None
                 current = cursor.position if self._seek is None else self._target
                 self._seek_to(current + int(command["cycles"]))
+            case "grid":
+                if self._frames is not None and self._newest is not None:
+                    self._answer(self._frames.grid(self._newest))
             case "play":
                 self._play(float(command["speed"]))
             case _:
@@ -196,6 +207,7 @@ class ReplayWorker:
             self._source += 1
             self._number = 0
         self._frames.take(replayed.record)
+        self._newest = replayed
 
     def _show_frame(self, replayed: ReplayedCycle) -> None:
         if self._frames is not None:
@@ -235,7 +247,7 @@ def run_worker(file: str, make: MakeFrameMaker) -> int:
 
             session = make_frames(recording.info.settings).session()
             _write_answer(describe(cursor, {"about": session, "started": recording.info.started}))
-            worker = ReplayWorker(cursor, make_frames, _write_frame, time.monotonic)
+            worker = ReplayWorker(cursor, make_frames, _write_frame, _write_answer, time.monotonic)
             worker.execute({"do": "seek", "s": 0.0})
             _serve(worker)
     except RecordingError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from config.load import load_settings
 from drivers.messages import Flags, LinkCounts, Odometry, Pose, Twist
 from perception.detected_object import DetectedObject
+from perception.mapping.grid.known_cells import KnownCells
 from runtime.analysis.timeline import ECHO, BookmarkEntry, Cluster, Echoes, LogEntry, ModeEntry, RunSnapshot, Timeline
 
 SETTINGS = load_settings("hallway")
@@ -47,6 +49,13 @@ def synthetic_timeline(*, with_world: bool = True) -> Timeline:
     timeline.bookmarks = [BookmarkEntry(1.5, "here", Pose(0.45, 0.0, 0.0))]
     timeline.refinement_stops = {"budget": 20, "nothing": 40}
     timeline.counts = LinkCounts(300, 1, 2)
+    return timeline
+
+
+def with_grid(timeline: Timeline) -> Timeline:
+    """Return the timeline with an evidence grid of two rows and three columns at its end."""
+    cells = np.array([[-1, 10, 90], [50, -1, 100]], np.int8)
+    timeline.snapshots[-1] = replace(timeline.snapshots[-1], grid=KnownCells(cells, 1.0, -0.5, 0.1))
     return timeline
 
 

@@ -74,6 +74,7 @@ OTHERS: list[dict[str, Any]] = [
     {"type": "release_control"},
     {"type": "grant_control", "client": 2},
     {"type": "evidence", "object": 1},
+    {"type": "show_grid"},
     {"type": "load_model", "toml": "name = 1"},
     {"type": "set_parameter", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4},
     {"type": "undo_parameter"},

@@ -55,6 +55,10 @@ class StubFrames:
         }  # fmt: skip
         return FrameParts(orjson.dumps(head)[:-1], b'"segments":{"whole":false}', b'"segments":{"whole":true}')
 
+    def grid(self, replayed: ReplayedCycle) -> dict[str, Any]:
+        """Return the grid after a cycle: here only which cycle that is."""
+        return {"type": "grid", "cycle": replayed.record.cycle}
+
 
 def make_stub_frames(settings: Settings, *, emulated: bool) -> StubFrames:
     """Return a frame maker."""

@@ -18,7 +18,7 @@ from drivers.messages import Firing, Pose
 from runtime.analysis.export.foxglove import write_foxglove
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_builder import TimelineBuilder
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_grid
 
 UNEVEN = """
 [ring]
@@ -81,6 +81,15 @@ def test_a_run_for_foxglove(tmp_path: Path) -> None:
     assert [i for i, r in enumerate(scan.ranges) if not math.isnan(r)] == [6]
     assert math.isinf(scan.ranges[6])
     assert newest["/log"].message == "sensor 7 never answers"
+
+
+def test_the_evidence_grid_lies_where_it_is(tmp_path: Path) -> None:
+    (path,) = write_foxglove(with_grid(synthetic_timeline()), tmp_path / "fox.mcap")
+    (grid,) = (proto for topic, _, _, proto in messages(path) if topic == "/grid")
+    cells = np.frombuffer(grid.data, np.int8).reshape(-1, grid.column_count)
+    assert cells.tolist() == [[-1, 10, 90], [50, -1, 100]]
+    assert (grid.frame_id, grid.pose.position.x, grid.pose.position.y) == ("odom", 1.0, -0.5)
+    assert (grid.cell_size.x, grid.row_stride, grid.fields[0].name) == (0.1, 3, "occupied")
 
 
 def test_an_uneven_ring_is_an_arc_for_each_sensor(tmp_path: Path) -> None:

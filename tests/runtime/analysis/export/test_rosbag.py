@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from runtime.analysis.export.rosbag import write_bag
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_grid
 
 
 def test_a_run_as_a_ros_2_bag(tmp_path: Path) -> None:
@@ -49,3 +49,14 @@ def test_a_run_as_a_ros_2_bag(tmp_path: Path) -> None:
     assert np.allclose(places, [(o.x, o.y) for o in run.objects])
     assert len(newest["/tf_static"].transforms) == 25
     assert len(newest["/truth"].markers) == 6
+
+
+def test_the_evidence_grid_is_an_occupancy_grid(tmp_path: Path) -> None:
+    (folder,) = write_bag(with_grid(synthetic_timeline()), tmp_path / "bag")
+    with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        (found,) = (one for one in reader.messages() if one[0].topic == "/grid")
+        grid: Any = reader.deserialize(found[2], found[0].msgtype)
+    assert found[0].msgtype == "nav_msgs/msg/OccupancyGrid"
+    assert grid.data.reshape(grid.info.height, grid.info.width).tolist() == [[-1, 10, 90], [50, -1, 100]]
+    assert (grid.header.frame_id, grid.info.origin.position.x, grid.info.origin.position.y) == ("odom", 1.0, -0.5)
+    assert grid.info.resolution == pytest.approx(0.1)

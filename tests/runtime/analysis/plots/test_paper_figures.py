@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from config.load import load_world
-from runtime.analysis.plots.figure_files import styled
+from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.paper_figures import HEIGHT_MAX_IN, HEIGHT_MIN_IN, Canvas, paper_figures, pictures
 from runtime.analysis.plots.plot_style import WIDTH_IN
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_grid
 
 RUN = synthetic_timeline()
 
@@ -33,6 +34,21 @@ def test_each_figure_shows_its_own() -> None:
     assert len(seen) == 3
     assert shown["models"] >= {name.replace("model", "centre") for name in seen}
     assert "cluster-1" not in shown["models"]
+
+
+def test_the_evidence_grid_lies_in_the_figure_where_it_lay() -> None:
+    run = with_grid(synthetic_timeline())
+    drawn = pictures(run, "ft")
+    assert list(drawn) == ["raw", "segments", "clusters", "models", "grid"]
+    (axes,) = drawn["grid"].axes
+    (image,) = axes.get_images()
+    assert image.get_gid() == "evidence-grid"
+    corners = (image.get_transform() - axes.transData).transform([[0.0, 0.0], [1.0, 1.0]])
+    ends = Canvas(run, "ft").frame.points(np.array([[1.0, -0.5], [1.3, -0.3]]))
+    assert np.allclose(corners, ends)
+    shades = np.asarray(image.get_array())[..., 3]
+    assert shades.tolist() == pytest.approx(np.array([[0.0, 0.8, 0.8], [0.0, 0.0, 1.0]]))
+    assert "data:image/png" in svg_of(drawn["grid"])
 
 
 def test_a_hall_of_the_paper_is_named_by_its_figures() -> None:

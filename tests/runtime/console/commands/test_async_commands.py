@@ -73,6 +73,9 @@ class StubControl:
     async def step(self, _viewer: Viewer, cycles: int) -> None:
         await self._show(f"step {cycles}")
 
+    def show_grid(self, _viewer: Viewer) -> None:
+        self.calls.append("grid")
+
     async def close_recording(self, viewer: Viewer) -> None:
         await self._show("close_recording")
         viewer.switch(live=True)

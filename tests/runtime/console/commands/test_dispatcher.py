@@ -31,8 +31,8 @@ async def test_a_client_without_control_is_refused(message: dict[str, Any]) -> N
 def test_commands_that_need_no_control() -> None:
     """They neither move the robot, other than to stop it, nor change anything of the run."""
     assert {name for name, command in COMMANDS.items() if command.permission is Permission.TOKEN} == {
-        "halt", "take_control", "evidence", "save_toml", "list_recordings", "open_recording", "seek_recording",
-        "play_recording", "step_recording", "close_recording",
+        "halt", "take_control", "evidence", "show_grid", "save_toml", "list_recordings", "open_recording",
+        "seek_recording", "play_recording", "step_recording", "close_recording",
     }  # fmt: skip
 
 

@@ -132,6 +132,16 @@ async def test_a_closed_page_leaves_a_goal_in_force() -> None:
         assert len(case.run.asked) == 2
 
 
+async def test_the_evidence_grid_is_sent_to_the_client_that_asks() -> None:
+    async with open_console() as case:
+        page, other = await case.page(), await case.page()
+        assert (await page.ask(type="show_grid"))["ok"]
+        message = next(message for message in page.received if message["type"] == "grid")
+        assert message == {"type": "grid", "on": False, "columns": 0, "rows": 0, "cells": ""}
+        assert (await other.ask(type="save_toml"))["ok"]
+        assert all(message["type"] != "grid" for message in other.received)
+
+
 async def test_the_evidence_for_an_object() -> None:
     async with open_console() as case:
         _first, page = await case.page(), await case.page()

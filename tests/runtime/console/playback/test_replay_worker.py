@@ -29,11 +29,13 @@ class WorkerCase:
     def __init__(self, cursor: ReplayCursor) -> None:
         self.host_s = 50.0
         self.frames: list[tuple[float, int, int, dict[str, Any]]] = []
+        self.answers: list[dict[str, Any]] = []
         self.worked = 0
         self.worker = ReplayWorker(
             cursor,
             lambda settings: make_stub_frames(parse_settings(settings), emulated=True),
             self._show,
+            self.answers.append,
             lambda: self.host_s,
         )
 
@@ -77,6 +79,16 @@ def test_a_seek_shows_one_frame(it: WorkerCase) -> None:
     assert (it.last["cycle"], it.last["s"], it.last["playing"]) == (81, 4.0, False)
     assert it.last["fired"] == 24, "by then every sensor has fired"
     assert it.worker.wait_s == math.inf
+
+
+def test_the_grid_is_that_of_the_cycle_shown_and_comes_only_when_asked(it: WorkerCase) -> None:
+    it.do(do="grid")
+    assert it.answers == [], "nothing is shown yet"
+    it.do(do="seek", s=4.0)
+    it.run_for(1.0)
+    assert it.answers == []
+    it.do(do="grid")
+    assert it.answers == [{"type": "grid", "cycle": 81}]
 
 
 def test_only_the_last_of_many_seeks_is_completed(it: WorkerCase) -> None:
