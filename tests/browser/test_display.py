@@ -68,19 +68,21 @@ GRID = {"type": "grid", "on": True, "x": -1.0, "y": -0.5, "cell": 0.5, "columns"
 async def test_the_evidence_grid_is_asked_for_only_while_its_layer_is_on(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     server.silent = True
-    whole = await opened.picture()
     await opened.run_for(3000)
     assert server.of("show_grid") == []
     await opened.tab("Layers")
-    await opened.page.locator("#layer-evidence_grid").check()
+    box = opened.page.locator("#layer-evidence_grid")
+    await box.check()
     await opened.run_for(1000)
     await server.wait("show_grid")
     await server.send(GRID)
     await opened.page.wait_for_function(f"async () => (await {MODULE}).run.grid?.picture !== undefined")
-    assert await opened.picture() != whole
+    shown = await opened.picture()
     await opened.save_screenshot("evidence-grid")
-    await opened.page.locator("#layer-evidence_grid").uncheck()
-    assert await opened.picture() == whole
+    await box.uncheck()
+    assert await opened.picture() != shown
+    await box.check()
+    assert await opened.picture() == shown
 
 
 async def test_what_a_layer_draws_depends_on_the_state(server: FakeServer, opener: Opener) -> None:

@@ -32,14 +32,14 @@ function paint(grid, theme) {
 
 // Asks for the grid while its layer is on; the answer comes as a message of its own.
 export function watchGrid({ layer, run, connection, notifications, changed }) {
-  let waiting = false, told = false, refused = false;
+  let waiting = false, warned = false, refused = false;
   connection.on("open", () => {
     refused = false;
   });
   connection.on("grid", (message) => {
     run.grid = message;
-    if (layer.on && !message.on && !told) notifications.toast("This run keeps no evidence grid: set perception.grid.method to directed.");
-    told = !message.on;
+    if (layer.on && !message.on && !warned) notifications.toast("This run keeps no evidence grid: set perception.grid.method to directed.");
+    warned = !message.on;
     changed();
   });
   setInterval(async () => {
@@ -48,7 +48,7 @@ export function watchGrid({ layer, run, connection, notifications, changed }) {
     try {
       await connection.request({ type: "show_grid" });
     } catch (error) {
-      refused = error.answered; // by a run for a page that may only watch
+      refused = error.answered; // a page that may only watch
       if (refused) notifications.showError(error);
     }
     waiting = false;

@@ -29,7 +29,7 @@ def commands(script: RequestedRobot, asked: Mission | Goal) -> list[str]:
     return [repr(script.request_drive(asked if k == 0 else None).command) for k in range(15)]
 
 
-def begun_run_s(script: RequestedRobot) -> float | None:
+def search_began_run_s(script: RequestedRobot) -> float | None:
     """Return when the look-ahead of the drive to a goal began; None without one."""
     return None if script.state.goal_drive is None else script.state.goal_drive.searched_run_s
 
@@ -65,18 +65,18 @@ def test_a_stop_and_a_hold_forget_the_drive_and_later_waypoints_do_not() -> None
     script = driving()
     script.request_drive(route(((5.5, 0.0, None),), "odom"))
     script.request_drive(None)
-    searched_run_s = begun_run_s(script)
+    searched_run_s = search_began_run_s(script)
     assert searched_run_s is not None
     script.request_drive(route(((5.5, 0.0, None), (0.0, 1.0, None)), "odom"))
-    assert begun_run_s(script) == searched_run_s, "it is the same drive"
+    assert search_began_run_s(script) == searched_run_s, "it is the same drive"
     script.drive_request = MissionEdit("hold")
     script.cycle()
-    assert begun_run_s(script) is None
+    assert search_began_run_s(script) is None
     script.drive_request = MissionEdit("resume")
     script.cycle()
-    assert begun_run_s(script) is not None
+    assert search_began_run_s(script) is not None
     script.request_drive(None, flags=Flags.BUMPER | Flags.LATCHED)
-    assert begun_run_s(script) is None
+    assert search_began_run_s(script) is None
 
 
 def test_a_goal_that_is_given_up_leads_on_once_and_the_robot_stands_with_the_reason() -> None:
