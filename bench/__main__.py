@@ -18,6 +18,7 @@ from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
+    false_canyons,
     false_drums,
     false_walls,
     grid,
@@ -235,6 +236,7 @@ for command in (
     walls,
     false_drums,
     false_walls,
+    false_canyons,
     grid,
 ):
     app.command(command)

@@ -333,6 +333,30 @@ def false_walls(*, json: str = "false_walls.json", halls: int = 100, hours: floa
     )  # fmt: skip
 
 
+def false_canyons(*, json: str = "false_canyons.json", halls: int = 100, corridors: int = 100, first: int = 0) -> int:
+    """Measure whether canyons are reported where no dead end is: among drums, and in corridors with doorways.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    halls
+        Number of random halls of drums, posts and barrels, at steps of .05 to 1 ft in turn; 0: none.
+    corridors
+        Number of random corridors with doorways of 1.1 m and more; 0: none.
+    first
+        Seed of the first hall and corridor.
+    """
+    use_kernel_cache()
+    from bench.false_canyons import measure
+
+    seeds, ways = (range(first, first + max(0, count)) for count in (halls, corridors))
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, ways, tell),
+        lambda rows: rows_table("canyons reported where no dead end is", rows), json, BY_BAYES,
+    )  # fmt: skip
+
+
 def false_drums(
     *,
     json: str = "false_drums.json",

@@ -15,9 +15,9 @@ class NeighbourCounts(Record):
     """A sensor's running counts, against which its neighbours are compared."""
 
     changes: int
-    """Changes of the reading beyond the tolerance."""
+    """Changes of the steady reading."""
     leaps: int
-    """Changes of the reading by more than `LEAP_M`."""
+    """Those by more than `LEAP_M`."""
     near_echoes: int
     """Echoes nearer than the near limit."""
 
@@ -30,6 +30,8 @@ class SensorMemory(Record):
     last_m: float
     """The last reading, m."""
     before_last_m: float
+    steady_m: float
+    """What it reads but for strays, m."""
     last_set: int
     """The set it fired in at the last reading."""
     before_last_set: int

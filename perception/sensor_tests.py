@@ -32,12 +32,14 @@ PASSED_MIN_M: Final = 2.0
 """Stuck after passing by: the base has moved at least this far, m."""
 PASSED_READINGS_MIN: Final = 40
 """Stuck after passing by, or silent: at least so many equal readings."""
-PASSED_CHANGES_MIN: Final = 20
+PASSED_CHANGES_MIN: Final = 12
 """Stuck after passing by: changes of either neighbour's reading that count even without leaps."""
 SILENT_MIN_M: Final = 5.0
 """Silent: the base has moved at least this far without an echo, m; free space is common."""
 NEAR_ECHO_SHARE: Final = 0.5
 """Silent: near echoes of either neighbour for each firing without an echo."""
+NOISE_SHARE: Final = 0.04
+"""A neighbour's reading has changed only beyond the tolerance and this share: four deviations of 1 % noise."""
 LEAP_M: Final = 0.3
 """A change of the reading by more than this is a leap, m."""
 REGULARITY_GAIN: Final = 0.05
@@ -119,6 +121,37 @@ def begin_run(
 
 
 @kernel
+def is_off(r: float, steady: float, tolerance: float) -> bool:
+    """Return whether a reading differs from a steady one (m, or inf) by more than the tolerance and noise."""
+    return bool(r != steady and not abs(r - steady) <= tolerance + NOISE_SHARE * min(r, steady))
+
+
+@kernel
+def count_changes(c: SensorMemory, r: float, tolerance: float) -> None:
+    """Count a change of what a sensor reads: two readings in turn that are off the steady one.
+
+    Single stray readings come along every wall, by drop-outs, the echoes of others and noise: they say nothing of
+    whether the surface comes nearer.
+
+    Parameters
+    ----------
+    c : record
+        What is remembered of the sensor. Its counts are updated.
+    r : float
+        Its new reading, m.
+    tolerance : float
+        Readings that differ by no more than this are equal, m.
+    """
+    first = c.readings == 0
+    has_changed = not first and is_off(r, c.steady_m, tolerance) and is_off(c.last_m, c.steady_m, tolerance)
+    if first or has_changed:
+        steady = r if first else c.last_m
+        c.counts.changes += 1
+        c.counts.leaps += has_changed and not abs(steady - c.steady_m) <= LEAP_M
+        c.steady_m = steady
+
+
+@kernel
 def neighbour_counts(
     i: int, neighbours: Ints, sensors: Records[SensorMemory], skip_deaf: bool
 ) -> tuple[float, float, float]:
@@ -135,14 +168,14 @@ def neighbour_counts(
     sensors : (n,) records
         What is remembered of each sensor.
     skip_deaf : bool
-        Leave out a neighbour whose last reading was without an echo.
+        Leave out a neighbour that hears no echo at present.
     """
     changes = leaps = near_echoes = math.inf
     for side in range(2):
         k = neighbours[i, side]
         if k < 0:
             return 0.0, 0.0, 0.0
-        if not (skip_deaf and math.isinf(sensors[k].last_m)):
+        if not (skip_deaf and math.isinf(sensors[k].steady_m)):
             counts, then = sensors[k].counts, sensors[i].run_neighbours[side]
             changes = min(changes, float(counts.changes - then.changes))
             leaps = min(leaps, float(counts.leaps - then.leaps))
@@ -322,13 +355,11 @@ def check_firing(
             continue
         c.missed = 0
         c.faults &= ~FAILING
-        if c.readings > 0 and not (r == c.last_m or abs(r - c.last_m) <= LEAP_M):
-            c.counts.leaps += 1
+        count_changes(c, r, tolerance)
         if r < near:
             c.counts.near_echoes += 1
         if c.run_length == 0 or not (r == c.run_m or abs(r - c.run_m) <= tolerance):
             c.run_firing = ring[0].firings
-            c.counts.changes += 1
             begin_run(i, r, x, y, own_yaw, neighbours, sensors)
         elif abs(own_yaw - c.run_yaw) > 0.5 * half_angle:
             begin_run(i, c.run_m, x, y, own_yaw, neighbours, sensors)

@@ -205,6 +205,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "or a reason, none 60 s without progress that is not held; ten shipped missions driven in the emulator: "
             "no contact",
         ),
+        "P33": Promise(
+            "A dead end is neither invented nor a trap",
+            "a corridor with doorways of 1.1 m and more, 1 % noise, 5 % drop-outs, 3 % strays: no canyon reported, "
+            "one in a dead end (soak: twenty corridors and twenty halls of drums, by both models of reflection)",
+        ),
     }
 )  # fmt: skip
 

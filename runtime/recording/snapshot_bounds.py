@@ -89,7 +89,7 @@ CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
 
 MAY_BE_INFINITE: Final = frozenset({
-    "_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y",
+    "_sensors.last_m", "before_last_m", "steady_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y",
     "_keyframes._latest", "_keyframes.readings", "_grid._readings", "_grid._found.least", "_echoes._times",
 })  # fmt: skip
 """Floats for which an infinity stands for no echo, for no evidence yet, or for no place or time yet."""

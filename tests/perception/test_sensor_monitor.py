@@ -37,6 +37,7 @@ PERIOD_S = 0.05
 MIRRORS, ROUGH = AcousticsConfig(model="specular"), AcousticsConfig(model="cone")
 NOISY = AcousticsConfig(model="specular", noise_relative=0.01, dropout=0.05, outliers=0.03)
 WILD = AcousticsConfig(outliers=0.2, noise_relative=0.01)
+STRAYS = AcousticsConfig(model="cone", noise_relative=0.01, dropout=0.05, outliers=0.03)
 FAULTY = math.nan
 
 Path = Iterable[tuple[float, float, float]]
@@ -94,7 +95,7 @@ def test_no_healthy_sensor_is_masked(halls: int, measured: Callable[[str], None]
 
 
 @promise
-@pytest.mark.parametrize("acoustics", [MIRRORS, ROUGH])
+@pytest.mark.parametrize("acoustics", [MIRRORS, ROUGH, STRAYS])
 def test_equal_readings_are_legitimate_if_nothing_should_change_them(
     acoustics: AcousticsConfig, measured: Callable[[str], None]
 ) -> None:
