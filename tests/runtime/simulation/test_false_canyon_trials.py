@@ -67,7 +67,9 @@ def reaches_outside(world: WorldConfig, place: list[float], robot_m: float) -> b
 
 @pytest.mark.compiled
 @pytest.mark.promise("P33")
-def test_no_canyon_in_a_corridor_with_doorways_and_one_where_its_end_is_closed(measured: Callable[[str], None]) -> None:
+def test_no_canyon_in_a_corridor_with_doorways_and_one_where_its_end_is_closed(
+    measured: Callable[[str], None],
+) -> None:
     world, path = corridor(1, ROUGH)
     open_end = try_path(SETTINGS, world, path[: len(path) // 2], 1)
     assert open_end.reported == {}
