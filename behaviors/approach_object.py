@@ -65,7 +65,7 @@ def approach_object(scene: Scene, memory: Memory, use: ApproachObjectUse) -> Ans
     visited = Visited(memory.number, memory.x, memory.y)
     if memory.index == 1 or remaining_m <= goal.success_radius_m:
         memory = replace(memory, index=1)
-        has_arrived = is_aligned(scene, facing)
+        has_arrived = is_aligned(scene.percept.pose, facing)
         return Answer(still, memory, has_arrived, 0.0, facing, visited=visited if has_arrived else None)
     round_rad = wrap_angle(side - (facing + math.pi))
     if abs(round_rad) > ORBIT_RAD and away_m > 0.0:

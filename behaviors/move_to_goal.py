@@ -28,6 +28,10 @@ class Goal:
     reached: bool = False
     frame: Literal["odom", "map"] = "odom"
     kind: Literal["goal"] = "goal"
+    heading: float | None = None
+    """The final heading in that frame, rad; None for any."""
+    aligned: bool = False
+    """Whether the robot has turned to the final heading, once it was there."""
 
 
 def move_to_goal(percept: Percept, goal: Goal, config: MoveToGoalConfig) -> tuple[Response, Goal]:

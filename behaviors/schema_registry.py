@@ -87,7 +87,7 @@ def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
     if use.heading_deg is None:
         return Answer(still, memory, has_arrived=True, remaining_m=0.0)
     direction = frame.theta + math.radians(use.heading_deg)
-    return Answer(still, memory, is_aligned(scene, direction), 0.0, direction)
+    return Answer(still, memory, is_aligned(scene.percept.pose, direction), 0.0, direction)
 
 
 def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveCanyonUse) -> Answer:

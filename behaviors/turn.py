@@ -8,7 +8,7 @@ from typing import Final
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene
 from config.mission_step import TurnUse
-from perception.percept import wrap_angle
+from perception.percept import Pose, wrap_angle
 
 SCHEMA: Final = "turn"
 ALIGNED_RAD: Final = math.radians(3.0)
@@ -33,9 +33,9 @@ def turn(scene: Scene, memory: Memory, use: TurnUse) -> Answer:
     if frame is None:
         return Answer(still, memory, waits_for=UNKNOWN_FRAME)
     direction = frame.theta + math.radians(use.heading_deg)
-    return Answer(still, memory, has_arrived=is_aligned(scene, direction), turn_to_rad=direction)
+    return Answer(still, memory, has_arrived=is_aligned(scene.percept.pose, direction), turn_to_rad=direction)
 
 
-def is_aligned(scene: Scene, direction_rad: float) -> bool:
-    """Return whether the robot looks in a direction of odometry's frame."""
-    return abs(wrap_angle(direction_rad - scene.percept.pose.theta)) <= ALIGNED_RAD
+def is_aligned(pose: Pose, direction_rad: float) -> bool:
+    """Return whether a robot at a pose looks in a direction, both of odometry's frame."""
+    return abs(wrap_angle(direction_rad - pose.theta)) <= ALIGNED_RAD

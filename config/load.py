@@ -20,7 +20,7 @@ from config.model import ModelConfig
 from config.overrides import apply_overrides, parse_override
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
-from config.settings import Settings
+from config.settings import GoalConfig, Settings
 from config.world import WorldConfig
 
 __all__ = [
@@ -33,7 +33,8 @@ __all__ = [
     "load_settings",
     "load_world",
     "override_settings",
-    "parse_model",
+    "parse_text",
+    "with_goal",
     "with_known_room",
     "with_mission",
     "with_value",
@@ -230,6 +231,18 @@ def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) ->
     return with_value(settings, f"map {os.fspath(name_or_path)}", location, surfaces)
 
 
+def with_goal(settings: Settings, goal: GoalConfig) -> Settings:
+    """Return the settings with a goal in place of their own goal or mission.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of its bounds.
+    """
+    free = settings.model_copy(update={"goal": None, "mission": None})
+    return with_value(free, "goal", ("goal",), goal.model_dump(mode="json"))
+
+
 def with_mission(settings: Settings, mission: MissionConfig) -> Settings:
     """Return the settings with a mission in place of their own goal or mission.
 
@@ -271,18 +284,18 @@ def with_value(settings: Settings, name: str, location: Location, value: object)
     return _validated(Settings, layers)
 
 
-def parse_model(text: str, name: str) -> ModelConfig:
-    """Return the object model of a TOML text, called `name` in error messages.
+def parse_text(model: type[M], text: str, name: str) -> M:
+    """Return the object model, mission or world of a TOML text, called `name` in error messages.
 
     Raises
     ------
     ConfigError
-        The text is not TOML, or not a model.
+        The text is not TOML, or not of this kind.
     """
     source = Source(name)
     layers = Layers(source)
     layers.lay(parse_document(text.encode("utf-8", "surrogatepass"), name), source)
-    return _validated(ModelConfig, layers)
+    return _validated(model, layers)
 
 
 def _load(kind: Kind, name: str | os.PathLike[str], model: type[M]) -> M:

@@ -181,6 +181,8 @@ class GoalConfig(Strict):
     """The place, m."""
     frame: Literal["odom", "map"] = "odom"
     """`odom`: the place is fixed in the robot's odometry. `map`: in the map (`run --map`, or correction of drift)."""
+    heading_deg: float | None = Field(default=None, ge=-360.0, le=360.0)
+    """Heading to which the robot turns at the goal, in its frame, degrees counter-clockwise from x."""
 
 
 class RealtimeConfig(Strict):

@@ -11,7 +11,8 @@ from typing import Final, Literal, TypeAlias
 
 from behaviors.schema_call import Memory, Visited
 from config.mission import MissionConfig, StepConfig
-from config.mission_step import DONE, FAILED, HOLD, NEXT, MoveToGoalUse, ReachedCondition
+from config.mission_step import DONE, FAILED, HOLD, NEXT, Frame, ReachedCondition
+from config.route import Waypoint, route_config
 from perception.percept import Pose
 
 VISITED_MAX: Final = 256
@@ -165,24 +166,30 @@ def edit_refusal(mission: Mission | None, edit: MissionEdit) -> str | None:
 
 
 def continued(before: Mission, after: Mission) -> Mission:
-    """Return a new route with the progress of the one before, if that is the same as far as it has come.
+    """Return a new route with the progress of the one before, if that is the same as far as it is behind the robot.
 
-    So a route whose further waypoints an operator adds, moves or removes goes on without a stop. Another mission
-    begins anew.
+    So a route whose further waypoints an operator adds, moves or removes goes on without a stop. One whose present
+    waypoint is moved or removed goes on from there. Another mission begins anew.
     """
-    progress, steps = before.progress, before.progress.step + 1
+    progress, at = before.progress, before.progress.step
     if progress.status == "failed" or {before.plan.name, after.plan.name} != {ROUTE}:
         return after
-    if len(after.plan.step) < steps or after.plan.step[:steps] != before.plan.step[:steps]:
+    behind = at + 1 if progress.status == "done" else at
+    if after.plan.step[:behind] != before.plan.step[:behind]:
         return after
-    if progress.status != "done":
+    if len(after.plan.step) == behind:
+        if progress.status == "done":
+            return after
+        return _ended(replace(after, progress=_begin(progress, at - 1)), DONE, "the operator removed what was left")
+    if behind == at and after.plan.step[at] == before.plan.step[at]:
         return replace(after, progress=progress)
-    if len(after.plan.step) == steps:
-        return after
-    return replace(after, progress=_begin(replace(progress, status="running", reason=None), steps))
+    fresh = _begin(progress, behind)
+    if progress.status == "held":
+        fresh = replace(fresh, status="held", reason=progress.reason)
+    return replace(after, progress=fresh)
 
 
-def route(waypoints: tuple[tuple[float, float, float | None], ...], frame: Literal["odom", "map"]) -> Mission:
+def route(waypoints: tuple[Waypoint, ...], frame: Frame) -> Mission:
     """Return the mission of driving to places in turn.
 
     Parameters
@@ -192,14 +199,7 @@ def route(waypoints: tuple[tuple[float, float, float | None], ...], frame: Liter
     frame
         The frame of all of them.
     """
-    steps = tuple(
-        StepConfig(
-            name=f"waypoint-{number}",
-            schemas=(MoveToGoalUse(name="move_to_goal", x_m=x, y_m=y, frame=frame, heading_deg=heading),),
-        )
-        for number, (x, y, heading) in enumerate(waypoints, 1)
-    )
-    return Mission(MissionConfig(name=ROUTE, about="The waypoints that the operator set.", step=steps))
+    return Mission(route_config(waypoints, frame, ROUTE))
 
 
 def progress_problem(mission: Mission) -> str | None:

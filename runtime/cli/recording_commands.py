@@ -259,11 +259,12 @@ def map_command(
     *,
     out: str,
     grid: str | None = None,
+    geojson: str | None = None,
     force: Force = False,
     options: SourceOptions = NO_OPTIONS,
     sets: Sets = (),
 ) -> int:
-    """Write the map of a run as a world file, and as an occupancy image with the YAML of ROS's map_server.
+    """Write the map of a run as a world file, as an occupancy image with the YAML of ROS's map_server, as GeoJSON.
 
     Of a run in a known room (`run --map`) it is that map, corrected by what the run found, and what changed is said.
 
@@ -273,6 +274,8 @@ def map_command(
         World file to write (TOML).
     grid
         Image to write (PGM); its YAML is written beside it.
+    geojson
+        GeoJSON to write: drums, polygons and walls in metres of the map's own frame.
     force
         Overwrite files that exist already.
     file
@@ -284,7 +287,7 @@ def map_command(
     """
     from runtime.cli.commands.map_run import map_run
 
-    return map_run(options.timeline_source(file, sets), out, grid, force=force)
+    return map_run(options.timeline_source(file, sets), out, grid, geojson, force=force)
 
 
 def calibrate(

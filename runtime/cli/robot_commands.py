@@ -26,6 +26,7 @@ def run(
     robot: RobotFile = None,
     world: str | None = None,
     mission: str | None = None,
+    goal: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     seed: Count = 0,
     trace: str | None = None,
     faults: str | None = None,
@@ -60,6 +61,9 @@ def run(
         Emulated robot: world file, or the name of a shipped one.
     mission
         What to do once armed: a mission file, or the name of a shipped one; None for that of the run file.
+    goal
+        Where to drive once armed: X,Y in metres, or X,Y,HEADING with the final heading in degrees. A place in the map
+        with --map, otherwise in odometry's frame, from where the run begins.
     seed
         Emulated robot: seed of everything random.
     trace
@@ -82,8 +86,8 @@ def run(
     emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults, force=force)
     return run_robot(
         config, sets, robot=robot, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
-        map_file=map_file, mission=mission, no_record=no_record, no_console=no_console, json_file=json, force=force,
-        emulator=emulator, units=units,
+        map_file=map_file, mission=mission, goal=goal, no_record=no_record, no_console=no_console, json_file=json,
+        force=force, emulator=emulator, units=units,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import socket
 import time as host_time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from config.errors import UserError
@@ -29,7 +30,7 @@ from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import listen
 from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
-from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl, Run
+from runtime.console.protocols import NOT_AVAILABLE, FileControl, RecordingControl, ReplayControl, Run
 from runtime.console.timed_coroutine import timed_coroutine
 from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
 from runtime.cycle.inputs import Request
@@ -67,6 +68,8 @@ class Console:
         Starts and stops recording the run.
     replay : ReplayControl, optional
         Shows recordings.
+    files : FileControl, optional
+        Names, keeps and deletes recordings, and makes files of them.
     limits : Limits, optional
         What clients may cost.
     clock : callable
@@ -91,6 +94,7 @@ class Console:
         time: TimeControl | None = None,
         recording: RecordingControl | None = None,
         replay: ReplayControl | None = None,
+        files: FileControl | None = None,
         limits: Limits | None = None,
         clock: Callable[[], float] = host_time.monotonic,
     ) -> None:
@@ -109,7 +113,9 @@ class Console:
         self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
-        self._commands = CommandContext(run, self.hub, self.tuning, clock, time, recording, replay)
+        self._commands = CommandContext(run, self.hub, self.tuning, clock, time, recording, replay, files)
+        if files is not None:
+            files.jobs.tell = self.hub.broadcast
         self.dispatcher = CommandDispatcher(self._commands, self._console_log, self._start_task)
         self._publisher = FramePublisher(run, self.hub, self._commands, settings, log, clock, self._on_stalled)
         self._issue_challenge = run.timing_monitor.timed(CONSOLE_SEND, self._challenge)
@@ -224,6 +230,7 @@ class Console:
             on_leave=self._on_leave,
             on_fault=self._run.health.report,
             report=self._report,
+            file_of=self._file_of,
             watch_without_token=self._config.watch_without_token,
             timed=self._run.timing_monitor.timed,
             clock=self._clock,
@@ -286,6 +293,18 @@ class Console:
         if self._commands.replay is None:
             raise CommandError(f"report: {NOT_AVAILABLE}")
         return await self._commands.replay.report()
+
+    async def _file_of(self, path: str, job: str, name: str) -> Path | None:
+        """Return the path of a recording, or of a file that a job made; None if there is none of this name."""
+        files = self._commands.files
+        if files is None:
+            return None
+        if path == "/made":
+            return files.jobs.path_of(int(job), name) if job.isascii() and job.isdigit() and len(job) < 10 else None
+        try:
+            return await files.find(name)
+        except CommandError:
+            return None
 
     def _start_task(self, client: Client, work: Callable[[], Awaitable[None]]) -> None:
         """Run an asynchronous command as a task that ends with the console; report its unexpected errors."""

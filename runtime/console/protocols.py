@@ -1,12 +1,13 @@
 """Protocols of what the console needs from the rest of the run: the robot's process, recording and replay.
 
-Recording and replay are optional: commands that need a part which this run does not have are refused.
+Recording, replay and files are optional: commands that need a part which this run does not have are refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from pathlib import Path
+from typing import Any, Final, Literal, Protocol
 
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
@@ -119,3 +120,42 @@ class ReplayControl(Protocol):
 
     async def close(self) -> None:
         """End all recordings that are shown."""
+
+
+class JobControl(Protocol):
+    """Makes reports and maps of recordings, one at a time; a CommandError of any call is the client's answer."""
+
+    tell: Callable[[dict[str, Any]], None]
+    """Sends every client how far a job is."""
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return the jobs of which progress or files can be had, the newest first."""
+
+    def cancel(self, number: int, /) -> None:
+        """End a job."""
+
+    def path_of(self, number: int, name: str, /) -> Path | None:
+        """Return the path of a file that a job made, None if it made none of this name."""
+
+
+class FileControl(Protocol):
+    """The recordings as files; a CommandError of any call is the client's answer."""
+
+    @property
+    def jobs(self) -> JobControl:
+        """What is made of them."""
+
+    async def find(self, file: str) -> Path:
+        """Return the path of a recording as listed."""
+
+    async def rename(self, file: str, to: str) -> str:
+        """Give a recording another name, and return that."""
+
+    async def pin(self, file: str, *, pinned: bool) -> None:
+        """Keep a recording when the folder is full, or no longer."""
+
+    async def delete(self, file: str) -> None:
+        """Delete a recording."""
+
+    async def make(self, kind: Literal["report", "map"], file: str) -> int:
+        """Begin to make something of a recording, and return the job's number."""

@@ -48,6 +48,8 @@ NO_MAP: Final = (
 )
 COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate of a goal, m: one beyond it is taken for a typing error."""
+HEADING_MAX_RAD: Final = 1e6
+"""Largest final heading, rad; any number of turns may be in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,10 @@ def first_request(settings: Settings) -> DriveRequest:
     if settings.mission is not None:
         return Mission(settings.mission)
     goal = settings.goal
-    return Legs() if goal is None else Goal(goal.x_m, goal.y_m, frame=goal.frame)
+    if goal is None:
+        return Legs()
+    heading = None if goal.heading_deg is None else math.radians(goal.heading_deg)
+    return Goal(goal.x_m, goal.y_m, frame=goal.frame, heading=heading)
 
 
 def needs_map(asked: DriveInput) -> bool:
@@ -122,9 +127,11 @@ def refusal(before: DriveRequest, asked: DriveInput) -> str | None:
 def validate(drive_request: DriveRequest) -> str | None:
     """Return why a drive request is invalid, None if it is valid."""
     match drive_request:
-        case Goal(x, y):
+        case Goal(x, y, heading=heading):
             if not (abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M):
                 return f"invalid goal ({x:g}, {y:g}): expected metres, at most {COORDINATE_MAX_M:g} along each axis"
+            if heading is not None and not abs(heading) <= HEADING_MAX_RAD:
+                return f"invalid final heading {heading:g}: expected radians, at most {HEADING_MAX_RAD:g}"
         case Teleoperate(v, w, valid_s):
             if not (math.isfinite(v) and math.isfinite(w) and valid_s >= 0.0):
                 return (

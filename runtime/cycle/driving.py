@@ -23,6 +23,7 @@ from behaviors.response import Response
 from behaviors.schema_call import ODOM_FRAME, Scene
 from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
+from behaviors.turn import is_aligned
 from config.mission import StepConfig
 from config.settings import Settings
 from drivers.messages import Pose, Twist
@@ -98,7 +99,7 @@ def drive(
         case Teleoperate():
             return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings, away)
         case Goal():
-            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away, trail)
+            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away, trail, map_frame)
         case Mission():
             return _on_mission(drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s)
         case _:
@@ -130,7 +131,7 @@ def _teleoperate(
 
 def _to_goal(
     drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
-    percept: Percept, settings: Settings, away: Response, trail: Trail,
+    percept: Percept, settings: Settings, away: Response, trail: Trail, map_frame: Pose | None,
 ) -> DriveResult:  # fmt: skip
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
     if place is None and not drive_request.reached:
@@ -146,9 +147,36 @@ def _to_goal(
     if goal_drive.progress.given_up is not None:
         hold_reason = f"{goal_drive.progress.given_up}; clear the way or set another goal"
     if drive_request.reached and isinstance(decision, Drive):
-        decision = Drive(STANDSTILL)
-        hold_reason = f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) is reached"
+        drive_request, decision, hold_reason = _at_goal(drive_request, responses, percept, settings, map_frame)
     return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive, trail)
+
+
+def _at_goal(
+    goal: Goal, responses: tuple[Response, ...], percept: Percept, settings: Settings, map_frame: Pose | None
+) -> tuple[Goal, Decision, str | None]:
+    """Return the goal, the decision where it is reached, and why the robot stands: it turns to a final heading."""
+    if goal.heading is not None and not goal.aligned:
+        frame = ODOM_FRAME if goal.frame == "odom" else map_frame
+        if frame is None:
+            return goal, Drive(STANDSTILL), NO_PLACE
+        direction = frame.theta + goal.heading
+        if not is_aligned(percept.pose, direction):
+            expected = tuple(response.schema for response in responses)
+            return goal, _turn_to(direction, responses, expected, percept, settings), None
+        goal = replace(goal, aligned=True)
+    heading = "" if goal.heading is None else f", heading {math.degrees(goal.heading):.0f}°,"
+    return goal, Drive(STANDSTILL), f"the goal ({goal.x:.2f} m, {goal.y:.2f} m){heading} is reached"
+
+
+def _turn_to(
+    direction_rad: float, responses: tuple[Response, ...], expected: tuple[str, ...], percept: Percept,
+    settings: Settings,
+) -> Decision:  # fmt: skip
+    """Return the arbiter's decision on a turn on the spot to a direction of odometry's frame."""
+    behaviors = settings.behaviors
+    angle = wrap_angle(direction_rad - percept.pose.theta)
+    turning = Twist(0.0, behaviors.arbiter.turn_gain_per_s * angle)
+    return limit_velocity(turning, responses, percept, settings.body, behaviors.arbiter, expected)
 
 
 def _along_legs(
@@ -181,9 +209,8 @@ def _on_mission(
     if asked.hold_reason is not None:
         return DriveResult(Drive(STANDSTILL), (), asked.mission, leg, asked.hold_reason)
     if asked.turn_to_rad is not None:
-        angle = wrap_angle(asked.turn_to_rad - percept.pose.theta)
-        turning, responses = Twist(0.0, behaviors.arbiter.turn_gain_per_s * angle), (*asked.leads, *asked.helpers)
-        decision = limit_velocity(turning, responses, percept, body, behaviors.arbiter, asked.schemas)
+        responses = (*asked.leads, *asked.helpers)
+        decision = _turn_to(asked.turn_to_rad, responses, asked.schemas, percept, settings)
         return DriveResult(decision, with_sum(responses, decision), asked.mission, leg)
     if asked.mission.progress.changes != mission.progress.changes:
         goal_drive = None

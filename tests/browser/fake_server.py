@@ -74,6 +74,8 @@ class FakeServer:
     changed: list[tuple[str, Any]] = field(default_factory=list)
     areas: list[list[float]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
+    data: dict[str, Any] = field(default_factory=dict)
+    """What commands of other kinds are answered with, by kind."""
     silent: bool = False
     """Send no state, like a process that hangs."""
     refusing: bool = False
@@ -303,7 +305,7 @@ class FakeServer:
                 self.playback["is_playing"] = message["speed"] > 0
             case "close_recording":
                 self.playback = None
-        return None
+        return self.data.get(kind)
 
     def _evidence(self, number: int) -> dict[str, Any]:
         x, y = self.hall.places[number - 1]

@@ -1,4 +1,4 @@
-"""Missions on the page: the state machine, why it waits, waypoints by click and drag, hold, resume and skip."""
+"""Missions on the page: the state machine, why it waits, hold, resume and skip; routes by click, drag and keys."""
 
 from __future__ import annotations
 
@@ -69,27 +69,85 @@ async def waypoint(opened: Opened, x: float, y: float, towards: float | None = N
     await mouse.up()
 
 
-async def test_waypoints_by_click_and_drag_make_a_route(server: FakeServer, opener: Opener) -> None:
+async def test_a_route_is_set_changed_driven_and_queued(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.steady()
+    await page.get_by_role("tab", name="Drive").click()
+    await page.locator("#route-add").click()
+    rows_of = page.locator("#route-list > li")
+    await waypoint(opened, 2.0, 0.4)
+    await waypoint(opened, 3.0, -0.4, towards=math.pi / 2)
+    await waypoint(opened, 1.0, -0.4)
+    await expect(rows_of).to_have_count(3)
+    assert server.of("set_route") == [], "nothing is driven before the operator says so"
+    await opened.save_screenshot("route")
+
+    await drag(opened, (1.0, -0.4), (1.4, 0.8))
+    await page.get_by_role("button", name="Earlier waypoint 3").press("Enter")
+    await page.get_by_role("button", name="Later waypoint 1").press("Enter")
+    await page.get_by_role("button", name="Remove waypoint 3").press("Enter")
+    await expect(rows_of).to_have_count(2)
+    await page.locator("#map-front").press("Control+z")
+    await expect(rows_of).to_have_count(3)
+    await page.locator("#route-row-2").click()
+    await page.locator("#route-heading").fill("-45")
+    await page.locator("#route-heading").press("Enter")
+    await expect(page.locator("#route-row-2")).to_contain_text("-45°")
+
+    await page.locator("#route-drive").press("Enter")
+    sent = await server.wait("set_route")
+    frame = opened_frame(server)
+    places = [in_plane(frame, x, y) for x, y, _ in sent["waypoints"]]
+    for place, expected in zip(places, ((1.4, 0.8), (2.0, 0.4), (3.0, -0.4)), strict=True):
+        assert place == pytest.approx(expected, abs=0.03)
+    assert [heading for _, _, heading in sent["waypoints"]] == [None, None, -45]
+    under_way = goes_to(route(tuple(map(tuple, sent["waypoints"])), sent["frame"]), "next", "reached")
+    server.drive_request = rows(under_way)
+    await opened.says("#mission-title", "route: running")
+    await opened.says("#route-text", "3 waypoints, in the map, 1 behind the robot")
+    await expect(page.locator("#route-remove-0")).to_be_disabled()
+    await waypoint(opened, 0.4, 0.0)
+    queued = await server.wait("set_route", 2)
+    assert queued["waypoints"][:3] == sent["waypoints"], "it goes on, and one more follows"
+    await opened.save_screenshot("route-under-way")
+
+
+async def test_a_route_is_saved_and_loaded_as_a_mission_file(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     page = opened.page
     await page.get_by_role("tab", name="Drive").click()
-    await page.locator("#route-add").click()
-    await waypoint(opened, 2.0, 0.4)
-    first = await server.wait("set_route")
-    assert len(first["waypoints"]) == 1
-    assert first["waypoints"][0][2] is None
-    await waypoint(opened, 3.0, -0.4, towards=math.pi / 2)
-    second = await server.wait("set_route", 2)
-    assert second["waypoints"][0] == first["waypoints"][0]
-    turn_deg = math.degrees(opened_frame(server)[2])
-    assert second["waypoints"][1][2] + turn_deg == pytest.approx(90.0, abs=1.5)
-    places = tuple((x, y, heading) for x, y, heading in second["waypoints"])
-    server.drive_request = rows(route(places, second["frame"]))
-    await opened.says("#mission-title", "route: running")
-    await expect(page.locator("#mission-steps > li")).to_have_count(2)
-    await opened.save_screenshot("route")
-    await page.locator("#route-remove").click()
-    assert (await server.wait("set_route", 3))["waypoints"] == first["waypoints"]
+    server.data["read_mission"] = {"name": "corridor", "about": "", "waypoints": [[1, 2, None], [3, 4, 90]],
+                                   "frame": "odom"}  # fmt: skip
+    chosen = {"name": "corridor.toml", "mimeType": "text/plain", "buffer": b"name = 1"}
+    await page.locator("#route-file").set_input_files(chosen)  # type: ignore[arg-type]
+    assert await server.wait("read_mission") == {"toml": "name = 1"}
+    await expect(page.locator("#route-list > li")).to_have_count(2)
+    server.data["save_route"] = "# A route\n"
+    async with page.expect_download() as downloading:
+        await page.locator("#route-keep").click()
+    saved = await server.wait("save_route")
+    assert saved == {"name": "corridor", "waypoints": [[1, 2, None], [3, 4, 90]], "frame": "odom"}
+    assert (await downloading.value).suggested_filename == "corridor.toml"
+    server.data["read_mission"] |= {"name": "dock", "waypoints": None, "frame": None}
+    await page.locator("#route-file").set_input_files(chosen)  # type: ignore[arg-type]
+    await page.get_by_role("button", name="Start it").click()
+    assert await server.wait("run_mission") == {"toml": "name = 1"}
+
+
+async def drag(opened: Opened, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Drag from one place to another."""
+    mouse = opened.page.mouse
+    await mouse.move(*await opened.screen(*start))
+    await mouse.down()
+    await mouse.move(*await opened.screen(*end), steps=3)
+    await mouse.up()
+
+
+def in_plane(frame: tuple[float, float, float], x: float, y: float) -> tuple[float, float]:
+    """Return where a place of the map lies in the plane."""
+    x0, y0, turn = frame
+    return x0 + math.cos(turn) * x - math.sin(turn) * y, y0 + math.sin(turn) * x + math.cos(turn) * y
 
 
 def opened_frame(server: FakeServer) -> tuple[float, float, float]:

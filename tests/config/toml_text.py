@@ -118,7 +118,7 @@ RUN: dict[str, Any] = {
     },
     "behaviors": {"move_ahead": {}, "avoid_static_obstacle": {}, "arbiter": {}},
     "log": {},
-    "goal": {"x_m": 1.0, "y_m": 2.0},
+    "goal": {"x_m": 1.0, "y_m": 2.0, "heading_deg": 90.0},
 }
 """A run file that names no other file."""
 

@@ -1,13 +1,14 @@
-"""`echolocate map`: the map of a finished run as a world file, and as an occupancy image."""
+"""`echolocate map`: the map of a finished run as a world file, an occupancy image and GeoJSON."""
 
 from __future__ import annotations
 
 import math
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+import orjson
 
 from config.errors import DONE, FAILED, UserError
 from config.files import utf8
@@ -15,17 +16,18 @@ from config.world import ITEMS_MAX
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.support.kernel_cache import use_kernel_cache
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline_sources import TimelineSource
 
 
-def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) -> int:
+def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | None, *, force: bool) -> int:
     """Write the map of a run and return the exit code.
 
     Parameters
     ----------
-    source, out, grid, force
+    source, out, grid, geojson, force
         As of `runtime.cli.recording_commands.map_command`.
 
     Raises
@@ -33,6 +35,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) 
     UserError
         The input cannot be read, an output cannot be written, or the map is too large for one.
     """
+    from runtime.analysis.export.geojson import world_geojson
     from runtime.analysis.export.occupancy_image import occupancy_image, yaml_beside
     from runtime.analysis.export.shapes import firing_scans
     from runtime.analysis.export.world_file import round_names, world_of, world_text
@@ -40,7 +43,8 @@ def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) 
 
     use_kernel_cache()
     console, output = plain_console(stderr=True), plain_console()
-    files = {"--out": out, "--grid": grid, "--grid (its YAML)": None if grid is None else yaml_beside(Path(grid))}
+    beside = None if grid is None else yaml_beside(Path(grid))
+    files = {"--out": out, "--grid": grid, "--grid (its YAML)": beside, "--geojson": geojson}
     timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
     settings, view, changes = timeline.settings, timeline.map_view, list[MapChange]()
     known = settings.perception.localization.known_room
@@ -67,11 +71,17 @@ def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) 
         output.print(str(change))
     if view is not None and not changes:
         output.print("nothing has changed where the robot has looked")
+    if geojson is not None:
+        frame: Literal["odom", "map"] = "odom" if view is None else "map"
+        with writing("--geojson", geojson):
+            Path(geojson).write_bytes(orjson.dumps(world_geojson(world, utf8(Path(source.file).stem), frame)) + b"\n")
+        output.print(f"{geojson}: {len(world.drum) + len(world.polygon) + len(world.wall)} features")
     if grid is not None:
         try:
             scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
             way = scans if view is None else view.way
-            image = occupancy_image(world, echoes, settings.ring, way, settings.body.radius_m)
+            with progress(console, "drawing the map"):
+                image = occupancy_image(world, echoes, settings.ring, way, settings.body.radius_m)
         except ValueError as error:
             raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
         with writing("--grid", grid):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -44,12 +45,13 @@ def read_timeline(
         The file cannot be read, or it holds nothing to show.
     """
     from runtime.analysis.timeline_sources import load_timeline
+    from runtime.recording.extent import recording_extent
 
     def prepare(settings: Settings) -> None:
         check_outputs()
         prepare_kernels(settings, console)
 
-    with progress(console, "reading") as step:
+    with progress(console, "reading", recording_extent(Path(source.file)).messages) as step:
         timeline = load_timeline(source, prepare, step)
     if timeline.last is None:
         raise UserError(f"{source.file}: holds no echo and no odometry: nothing to show", FAILED)

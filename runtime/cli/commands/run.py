@@ -89,6 +89,7 @@ def run_robot(
     record: str | None,
     map_file: str | None,
     mission: str | None,
+    goal: str | None,
     no_record: bool,
     no_console: bool,
     json_file: str | None,
@@ -102,7 +103,7 @@ def run_robot(
     ----------
     config, sets, robot, port, arm, seconds, headless, record, map_file, mission, no_record, no_console, json_file
         As of `runtime.cli.robot_commands.run`.
-    force, units
+    goal, force, units
         As of `runtime.cli.robot_commands.run`.
     emulator : EmulatorOptions
         Used without a port.
@@ -114,7 +115,9 @@ def run_robot(
     """
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
-    settings = settings_of_files(config, sets, emulator.world, robot, map_file, mission, no_console=no_console)
+    settings = settings_of_files(
+        config, sets, emulator.world, robot, map_file, mission, goal=goal, no_console=no_console
+    )
     console = EscapingConsole(stderr=True)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     plugged = [] if (port or settings.link.port) is not None else plugged_in()
@@ -125,7 +128,7 @@ def run_robot(
         if found is not None:
             port, robot, arm = found.port, found.robot or robot, False
             settings = settings_of_files(
-                config, sets, emulator.world, robot, map_file, mission, no_console=no_console
+                config, sets, emulator.world, robot, map_file, mission, goal=goal, no_console=no_console
             )
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
@@ -178,7 +181,7 @@ def run_robot(
                     emulated=port is None, preparation=preparation,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
-                        robot=robot, map_file=map_file, mission=mission, no_console=no_console,
+                        robot=robot, map_file=map_file, mission=mission, goal=goal, no_console=no_console,
                     ),
                 )  # fmt: skip
 

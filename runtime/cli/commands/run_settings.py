@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from config.errors import WRONG_CALL, UserError
-from config.files import is_utf8, utf8
-from config.load import ConfigError, load_settings, with_known_room
-from config.settings import Settings
+from config.files import is_utf8, one_line, utf8
+from config.load import ConfigError, load_settings, with_goal, with_known_room
+from config.mission_step import Frame
+from config.settings import GoalConfig, Settings
 from runtime.support.pattern_check import refuse_undrivable
 
 
@@ -19,13 +20,14 @@ def settings_of_files(
     map_file: str | None,
     mission: str | None,
     *,
+    goal: str | None = None,
     no_console: bool,
 ) -> Settings:
     """Return the settings as the files are now, on the port that they name.
 
     Parameters
     ----------
-    config, sets, world, robot, map_file, mission, no_console
+    config, sets, world, robot, map_file, mission, goal, no_console
         As of `runtime.cli.robot_commands.run`.
 
     Raises
@@ -38,6 +40,10 @@ def settings_of_files(
     settings = load_settings(config, sets, robot=robot, world=world, mission=mission)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
+    if goal is not None:
+        if mission is not None:
+            raise UserError("--goal and --mission exclude each other: leave one of them out", WRONG_CALL)
+        settings = with_goal(settings, parse_goal(goal, "odom" if map_file is None else "map"))
     refuse_undrivable(settings)
     return without_console(settings) if no_console else settings
 
@@ -52,13 +58,14 @@ def reload_settings(
     robot: str | None = None,
     map_file: str | None = None,
     mission: str | None = None,
+    goal: str | None = None,
     no_console: bool = False,
 ) -> Settings:
     """Return the settings as the files are now, for a run on the same port as before.
 
     Parameters
     ----------
-    config, sets, world, port, robot, map_file, mission, no_console
+    config, sets, world, port, robot, map_file, mission, goal, no_console
         As of `runtime.cli.robot_commands.run`.
     emulator_port : str, optional
         Port of the emulator, which is used if the settings name none.
@@ -69,13 +76,33 @@ def reload_settings(
         The settings are wrong, or no robot can carry them out.
     """
     try:
-        settings = settings_of_files(config, sets, world, robot, map_file, mission, no_console=no_console)
+        settings = settings_of_files(config, sets, world, robot, map_file, mission, goal=goal, no_console=no_console)
     except ConfigError:
         raise
     except UserError as error:
         raise ConfigError(str(error)) from error
     port = port or settings.link.port or emulator_port
     return settings if port is None else with_port(settings, port)
+
+
+def parse_goal(text: str, frame: Frame) -> GoalConfig:
+    """Return the goal of `--goal`: X,Y in metres and, if given, the final heading in degrees.
+
+    Raises
+    ------
+    UserError
+        The text is something else.
+    """
+    keys = ("x_m", "y_m", "heading_deg")
+    try:
+        values = [float(word) for word in text.split(",")]
+        return GoalConfig.model_validate({"frame": frame, **dict(zip(keys[: len(values)], values, strict=True))})
+    except ValueError:  # a word is no number, there are too many or too few, or one is out of its bounds
+        raise UserError(
+            f"--goal {one_line(text)}: expected X,Y in metres, or X,Y,HEADING with a final heading from -360 to 360 "
+            "degrees, for example --goal 3,1.5,90",
+            WRONG_CALL,
+        ) from None
 
 
 def without_console(settings: Settings) -> Settings:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from config.settings import Settings
 from runtime.console.console import Console
+from runtime.console.files.jobs import Jobs
+from runtime.console.files.recording_files import RecordingFiles
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.cycle.live_settings import PrepareSettings
 from runtime.recording.storage import recordings_folder
@@ -58,12 +60,15 @@ async def serve_console(
     def current_file() -> str | None:
         return None if recording.now is None else recording.now.file
 
-    replays = ReplayClient(recordings_folder(settings.recording), REPLAY_PROGRAM, current_file, units)
+    folder, jobs = recordings_folder(settings.recording), Jobs(units)
+    replays = ReplayClient(folder, REPLAY_PROGRAM, current_file, units)
     console = Console(
-        process, log, prepare, emulated=emulated, units=units, time=control, recording=recording, replay=replays
+        process, log, prepare, emulated=emulated, units=units, time=control, recording=recording, replay=replays,
+        files=RecordingFiles(folder, current_file, jobs),
     )  # fmt: skip
     try:
         async with console.open():
             yield console
     finally:
+        await jobs.close()
         await replays.close()

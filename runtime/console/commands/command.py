@@ -13,7 +13,7 @@ from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.edit_history import EditHistory, Undo
 from runtime.console.commands.tuning import Tuning
-from runtime.console.protocols import RecordingControl, ReplayControl, Run
+from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run
 from runtime.timing.time_control import TimeControl
 
 Arguments = TypeVar("Arguments")
@@ -56,6 +56,7 @@ class CommandContext:
     time: TimeControl | None = None
     recording: RecordingControl | None = None
     replay: ReplayControl | None = None
+    files: FileControl | None = None
     pending_edits: deque[PendingEdit] = field(default_factory=deque)
     """In the order in which the cycle carries them out."""
     history: EditHistory = field(default_factory=EditHistory)

@@ -15,8 +15,10 @@ import orjson
 from behaviors.missions.mission import Mission, MissionEdit, route
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
-from config.load import ConfigError, list_shipped, load_mission, with_mission
+from config.load import ConfigError, list_shipped, load_mission, parse_text, with_mission
+from config.mission import MissionConfig
 from config.reload import Difference
+from config.route import mission_text, route_config, waypoints_of
 from perception.edits import Edit
 from runtime.console.commands.command import ANSWERED_LATER, Call, PendingEdit
 from runtime.console.commands.command_error import CommandError
@@ -25,12 +27,16 @@ from runtime.console.commands.messages import (
     GetEvidence,
     GrantControl,
     NoArguments,
+    ReadMission,
+    RunMission,
+    SaveRoute,
+    SetGoal,
     SetParameter,
     SetRoute,
     StartMission,
 )
 from runtime.console.frames.grid_message import grid_message
-from runtime.cycle.drive_requests import NO_MAP, Legs, needs_map, refusal
+from runtime.cycle.drive_requests import NO_MAP, DriveInput, Legs, needs_map, refusal
 from runtime.cycle.inputs import Request
 
 MISSION_EDITS: Final[Mapping[str, MissionEdit]] = MappingProxyType({
@@ -53,10 +59,20 @@ def request_mode(call: Call, _: NoArguments) -> None:
     call.context.robot.request(request)
 
 
-def request_drive(call: Call, request: Legs | Goal) -> None:
-    """Replace the drive request."""
-    call.context.is_teleoperated = False
-    call.context.robot.drive_request(request, call.remains_valid())
+def follow_legs(call: Call, legs: Legs) -> None:
+    """Replace the drive request by the configured legs."""
+    _request_drive(call, legs)
+
+
+def set_goal(call: Call, asked: SetGoal) -> None:
+    """Replace the drive request by a goal.
+
+    Raises
+    ------
+    CommandError
+        The robot does not know a map, and the goal is a place there.
+    """
+    _request_drive(call, Goal(asked.x, asked.y, frame=asked.frame, heading=asked.heading))
 
 
 def start_mission(call: Call, start: StartMission) -> None:
@@ -77,7 +93,59 @@ def start_mission(call: Call, start: StartMission) -> None:
             with_mission(settings, mission)
         except ConfigError as error:
             raise CommandError(str(error), "name") from None
-    _request_mission(call, Mission(mission))
+    _request_drive(call, Mission(mission))
+
+
+def run_mission(call: Call, given: RunMission) -> None:
+    """Replace the drive request by the mission of a file, which begins anew.
+
+    Raises
+    ------
+    CommandError
+        The text is no mission, or this run cannot drive it.
+    """
+    mission = _parsed_mission(given.toml)
+    try:
+        with_mission(call.context.tuning.current, mission)
+    except ConfigError as error:
+        raise CommandError(str(error), "toml") from None
+    _request_drive(call, Mission(mission))
+
+
+def read_mission(_: Call, given: ReadMission) -> dict[str, Any]:
+    """Return what a mission file holds; its waypoints and their frame where it is a route, otherwise None for both.
+
+    Raises
+    ------
+    CommandError
+        The text is no mission.
+    """
+    mission = _parsed_mission(given.toml)
+    waypoints, frame = waypoints_of(mission) or (None, None)
+    return {"name": mission.name, "about": mission.about, "waypoints": waypoints, "frame": frame}
+
+
+def save_route(_: Call, asked: SaveRoute) -> str:
+    """Return a route as the text of a mission file.
+
+    Raises
+    ------
+    CommandError
+        The name is none that a mission can have.
+    """
+    try:
+        mission = route_config(asked.waypoints, asked.frame, asked.name)
+    except ValueError:
+        problem = f"{asked.name} cannot be a mission's name: use small letters, digits, - and _, 40 at most"
+        raise CommandError(problem, "name") from None
+    return mission_text(mission, "A route saved from the operator console; places are metres, headings degrees.")
+
+
+def _parsed_mission(toml: str) -> MissionConfig:
+    try:
+        return parse_text(MissionConfig, toml, "mission")
+    except ConfigError as error:
+        raise CommandError(str(error), "toml") from None
 
 
 def set_route(call: Call, asked: SetRoute) -> None:
@@ -88,7 +156,7 @@ def set_route(call: Call, asked: SetRoute) -> None:
     CommandError
         The robot does not know a map, and the waypoints are places there.
     """
-    _request_mission(call, route(asked.waypoints, asked.frame))
+    _request_drive(call, route(asked.waypoints, asked.frame))
 
 
 def edit_mission(call: Call, _: NoArguments) -> None:
@@ -99,11 +167,11 @@ def edit_mission(call: Call, _: NoArguments) -> None:
     CommandError
         There is none, or it is in no state for that.
     """
-    _request_mission(call, MISSION_EDITS[call.name])
+    _request_drive(call, MISSION_EDITS[call.name])
 
 
-def _request_mission(call: Call, asked: Mission | MissionEdit) -> None:
-    """Pass a mission or a change of it to the next cycle, unless that would refuse it."""
+def _request_drive(call: Call, asked: DriveInput) -> None:
+    """Pass what is to be driven, or a change of the mission, to the next cycle, unless that would refuse it."""
     state = call.context.robot.state
     if needs_map(asked) and state.perception.localized() is None:
         raise CommandError(NO_MAP)

@@ -7,7 +7,7 @@ JSON object of `id`, `type` (the command's name) and the arguments, and of `chal
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias, Union, get_origin, get_type_hints
@@ -40,6 +40,11 @@ Scalar: TypeAlias = Annotated[bool | int | float | Text | None, Field()]
 Degrees: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
 Waypoint: TypeAlias = tuple[Coordinate, Coordinate, Degrees | None]
 """A place x, y, m, and the final heading there in degrees, None for any."""
+Waypoints: TypeAlias = Annotated[tuple[Waypoint, ...], Field(min_length=1, max_length=STEPS_MAX)]
+FrameName: TypeAlias = Annotated[Literal["odom", "map"], Field()]
+"""The frame of places."""
+FileName: TypeAlias = Annotated[str, Field(min_length=1, max_length=300)]
+"""Of a recording, as listed."""
 
 BOUNDS: Final[Mapping[str, Any]] = MappingProxyType({
     "x": Coordinate,
@@ -114,7 +119,45 @@ class AddBookmark:
 class OpenRecording:
     """Show this client a recording in place of the live run."""
 
-    file: Annotated[str, Field(min_length=1, max_length=300)]
+    file: FileName
+
+
+@dataclass(frozen=True, slots=True)
+class RenameRecording:
+    """Give a recording another name."""
+
+    file: FileName
+    to: FileName
+
+
+@dataclass(frozen=True, slots=True)
+class PinRecording:
+    """Keep a recording when the folder is full, or no longer."""
+
+    file: FileName
+    pinned: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DeleteRecording:
+    """Delete a recording for good."""
+
+    file: FileName
+
+
+@dataclass(frozen=True, slots=True)
+class MakeFiles:
+    """Make a report or a map of a recording."""
+
+    kind: Annotated[Literal["report", "map"], Field()]
+    file: FileName
+
+
+@dataclass(frozen=True, slots=True)
+class CancelJob:
+    """End what is being made."""
+
+    job: Number
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +189,44 @@ class StartMission:
 
 
 @dataclass(frozen=True, slots=True)
+class SetGoal:
+    """Drive to a place, m; `heading` is the final one there, rad, None for any."""
+
+    x: Coordinate
+    y: Coordinate
+    heading: Annotated[float | None, Field(ge=-1e6, le=1e6)] = None
+    frame: FrameName = "odom"
+
+
+@dataclass(frozen=True, slots=True)
+class SaveRoute:
+    """Ask for a route as a mission file."""
+
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+    waypoints: Waypoints
+    frame: FrameName
+
+
+@dataclass(frozen=True, slots=True)
+class ReadMission:
+    """Ask for what a mission file holds, given as its text."""
+
+    toml: Annotated[str, Field(max_length=TOML_MAX)]
+
+
+@dataclass(frozen=True, slots=True)
+class RunMission:
+    """Start a mission, given as the text of its file."""
+
+    toml: Annotated[str, Field(max_length=TOML_MAX)]
+
+
+@dataclass(frozen=True, slots=True)
 class SetRoute:
     """Drive to these places in turn; the drive goes on where the route is the same as far as it has come."""
 
-    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1, max_length=STEPS_MAX)]
-    frame: Annotated[Literal["odom", "map"], Field()]
+    waypoints: Waypoints
+    frame: FrameName
 
 
 class Message(NamedTuple):
@@ -201,7 +277,7 @@ class MessageReader:
     ----------
     types : mapping of str to type
         The dataclass of each command's arguments, by the command's name. Its fields without a default are the
-        arguments.
+        arguments, and so are those with bounds of their own, which a message may leave out if they have a default.
 
     Raises
     ------
@@ -228,24 +304,32 @@ class MessageReader:
         except ValidationError as error:
             raise _malformed(error, text) from None
         of = self._types[wire.type]
-        arguments = of(*(getattr(wire, name) for name in _arguments(of)))
+        arguments = of(**{name: getattr(wire, name) for name in _arguments(of)})
         return Message(wire.id, wire.type, arguments, wire.challenge)
 
 
-def _arguments(of: type) -> Iterable[str]:
-    """Return the names of the fields that a message gives."""
-    return (f.name for f in fields(of) if f.default is MISSING and f.default_factory is MISSING)
+def _arguments(of: type) -> dict[str, Any]:
+    """Return the default of each field that a message gives; `...` where it must be given."""
+    hints = get_type_hints(of, include_extras=True)
+    required = {f.name: ... for f in fields(of) if f.default is MISSING and f.default_factory is MISSING}
+    optional = {f.name: f.default for f in fields(of) if f.name not in required and _has_bounds(hints[f.name])}
+    return {**required, **optional}
+
+
+def _has_bounds(hint: Any) -> bool:  # noqa: ANN401 - any type hint
+    return get_origin(hint) is Annotated
 
 
 def _wire_model(name: str, of: type) -> type[BaseModel]:
     """Return the model of a command's messages."""
     hints = get_type_hints(of, include_extras=True)
-    arguments = {key: BOUNDS.get(key, hints[key]) for key in _arguments(of)}
+    defaults = _arguments(of)
+    arguments = {key: BOUNDS.get(key, hints[key]) for key in defaults}
     for key, hint in arguments.items():
-        if hint is not bool and get_origin(hint) is not Annotated:
+        if hint is not bool and not _has_bounds(hint):
             raise TypeError(f"the argument {key} of {name} has no bounds: add it to BOUNDS")
     definitions: dict[str, Any] = {"type": (Literal[name], ...)}
-    definitions |= {key: (hint, ...) for key, hint in arguments.items()}
+    definitions |= {key: (hint, defaults[key]) for key, hint in arguments.items()}
     return create_model(name, __base__=_Envelope, **definitions)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any, Final
 
-from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from perception.edits import (
     ClearMap,
@@ -18,7 +17,7 @@ from perception.edits import (
     PlaceRobot,
     RejectObject,
 )
-from runtime.console.commands import async_commands, handlers
+from runtime.console.commands import async_commands, file_commands, handlers
 from runtime.console.commands import messages as arguments
 from runtime.console.commands.command import Command, Permission, always
 from runtime.console.commands.messages import MessageReader, NoArguments
@@ -39,10 +38,13 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("take_control", NoArguments, TOKEN, handlers.take_control),
     Command("release_control", NoArguments, CONTROL, handlers.release_control),
     Command("grant_control", arguments.GrantControl, CONTROL, handlers.grant_control),
-    Command("legs", Legs, CONTROL, handlers.request_drive, always),
-    Command("goal", Goal, CONTROL, handlers.request_drive, always),
+    Command("legs", Legs, CONTROL, handlers.follow_legs, always),
+    Command("goal", arguments.SetGoal, CONTROL, handlers.set_goal, always),
     Command("start_mission", arguments.StartMission, CONTROL, handlers.start_mission, always),
+    Command("run_mission", arguments.RunMission, CONTROL, handlers.run_mission, always),
+    Command("read_mission", arguments.ReadMission, TOKEN, handlers.read_mission),
     Command("set_route", arguments.SetRoute, CONTROL, handlers.set_route, always),
+    Command("save_route", arguments.SaveRoute, TOKEN, handlers.save_route),
     Command("hold_mission", NoArguments, CONTROL, handlers.edit_mission),
     Command("resume_mission", NoArguments, CONTROL, handlers.edit_mission, always),
     Command("skip_step", NoArguments, CONTROL, handlers.edit_mission, always),
@@ -75,6 +77,12 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("play_recording", arguments.PlayRecording, TOKEN, async_commands.play_recording),
     Command("step_recording", arguments.StepRecording, TOKEN, async_commands.step_recording),
     Command("close_recording", NoArguments, TOKEN, async_commands.close_recording),
+    Command("rename_recording", arguments.RenameRecording, CONTROL, file_commands.rename_recording),
+    Command("pin_recording", arguments.PinRecording, CONTROL, file_commands.pin_recording),
+    Command("delete_recording", arguments.DeleteRecording, CONTROL, file_commands.delete_recording),
+    Command("make_files", arguments.MakeFiles, TOKEN, file_commands.make_files),
+    Command("list_jobs", NoArguments, TOKEN, file_commands.list_jobs),
+    Command("cancel_job", arguments.CancelJob, TOKEN, file_commands.cancel_job),
 )
 
 COMMANDS: Final = MappingProxyType({command.name: command for command in _ALL})

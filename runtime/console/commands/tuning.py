@@ -13,7 +13,7 @@ import tomli_w
 
 from config.errors import UserError
 from config.layers import Location
-from config.load import MODELS_MAX, ConfigError, parse_model, with_value
+from config.load import MODELS_MAX, ConfigError, parse_text, with_value
 from config.model import ModelConfig
 from config.problems import shown
 from config.reload import Difference, ReloadResult, differences
@@ -92,7 +92,7 @@ class Tuning:
             The model is invalid, has the name of another one, or is one too many.
         """
         try:
-            model = parse_model(toml, "model")
+            model = parse_text(ModelConfig, toml, "model")
         except ConfigError as error:
             raise CommandError(str(error), "toml") from None
 

@@ -215,9 +215,11 @@ class FrameEncoder:
     def _drive_request(self, drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:
         """Return what is driven, as the page shows it."""
         match drive_request:
-            case Goal(x=x, y=y, frame=frame):
+            case Goal(x=x, y=y, frame=frame, heading=heading):
                 at = None if place is None else [round(place.x, 4), round(place.y, 4)]
-                return {"kind": "goal", "x": x, "y": y, "frame": frame, "at": at, "reached": drive_request.reached}
+                is_done = drive_request.reached and (heading is None or drive_request.aligned)
+                return {"kind": "goal", "x": x, "y": y, "heading": heading, "frame": frame, "at": at,
+                        "reached": is_done}  # fmt: skip
             case Teleoperate(v=v, w=w):
                 return {"kind": "teleoperate", "v": v, "w": w}
             case Mission():

@@ -12,6 +12,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -23,6 +24,7 @@ from runtime.console.commands.command_error import CommandError
 from runtime.console.http.auth import Auth
 from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import BACKLOG, ConnectionLimiter
+from runtime.console.http.downloads import send_file
 from runtime.console.http.log_forwarder import LogForwarder
 from runtime.console.http.static_files import StaticFile, security_headers
 from runtime.console.timed_coroutine import Timed, timed_coroutine
@@ -45,6 +47,8 @@ JOINS_BURST: Final = 32
 """New websockets at once: all pages of a run may be reloaded twice."""
 REST_MAX_S: Final = 0.1
 """Longest pause after a message, s; longer work was this process being suspended."""
+DOWNLOADS: Final = ("/recording", "/made")
+"""Paths of recordings and of files that jobs made."""
 WRONG_TOKEN: Final = "a wrong token, or none"  # noqa: S105 - a text
 
 
@@ -66,6 +70,8 @@ class ServerContext:
     """Gets the name of a part and the unexpected error in it."""
     report: Callable[[], Awaitable[bytes]]
     """Returns the report of the run so far; raises a CommandError."""
+    file_of: Callable[[str, str, str], Awaitable[Path | None]]
+    """Returns the path of the file that a request of `DOWNLOADS` means: its path, job and name."""
     watch_without_token: bool
     timed: Timed
     clock: Callable[[], float]
@@ -183,10 +189,12 @@ class Server:
         if path in context.files:
             file = context.files[path]
             return web.Response(body=file.body, headers={"Content-Type": file.content_type})
-        if path not in {"/report", "/log"}:
+        if path not in {"/report", "/log", *DOWNLOADS}:
             return web.Response(status=404, text="there is no such page")
         if not self._has_token(request):
             return self._refuse(request, HTTPStatus.FORBIDDEN, WRONG_TOKEN)
+        if path in DOWNLOADS:
+            return await self._download(request, host)
         if path == "/log":
             return web.Response(body=context.hub.log_lines, content_type="application/x-ndjson")
         try:
@@ -194,6 +202,20 @@ class Server:
         except CommandError as error:
             return web.Response(status=HTTPStatus.CONFLICT, text=str(error))
         return web.Response(body=page, content_type="text/html", charset="utf-8")
+
+    async def _download(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
+        """Send a recording, or a file that a job made."""
+        context = self._context
+        file = await context.file_of(request.path, request.query.get("job", ""), request.query.get("file", ""))
+        if file is None:
+            return web.Response(status=404, text="there is no such file: list the files again")
+        try:
+            sending = send_file(request, file, security_headers(host))
+            return await timed_coroutine(context.timed, CONSOLE_SEND, sending)
+        except OSError as error:
+            if isinstance(error, ConnectionError):
+                raise
+            return web.Response(status=HTTPStatus.CONFLICT, text=f"the file cannot be read: {error.strerror}")
 
     async def _open_websocket(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
         """Add a client and serve its websocket until it leaves; return the response, or why it is refused."""

@@ -215,6 +215,14 @@ export function drawGoal(f) {
   ctx.beginPath();
   ctx.arc(x, y, 4, 0, 2 * Math.PI);
   ctx.fill();
+  if (drive_request.heading !== null && drive_request.heading !== undefined) {
+    const heading = drive_request.heading + (drive_request.frame === "map" ? run.state.localized?.frame[2] ?? 0 : 0);
+    ctx.lineWidth = 3;
+    ctx.beginPath();
+    ctx.moveTo(x, y);
+    ctx.lineTo(x + 24 * Math.cos(heading), y - 24 * Math.sin(heading));
+    ctx.stroke();
+  }
   ctx.font = theme.font(12, 650);
   ctx.textAlign = "left";
   ctx.textBaseline = "middle";

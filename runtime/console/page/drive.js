@@ -41,19 +41,23 @@ export class Drive {
     this.teleoperation.stop("HALT");
   }
 
-  goal(x, y) {
-    return this.connection.request({ type: "goal", ...inMap(this.run.state.localized, x, y) });
+  // Drives to a place of the plane; the final heading in radians, null for any.
+  goal(x, y, heading = null) {
+    const { localized } = this.run.state, there = inMap(localized, x, y);
+    const turn = there.frame === "map" ? localized.frame[2] : 0;
+    return this.connection.request({ type: "goal", ...there, heading: heading === null ? null : heading - turn });
   }
 
   #goalByForm(event) {
     event.preventDefault();
     const error = byId("goal-error");
     const [x, y] = [byId("goal-x"), byId("goal-y")].map((input) => this.units.parse(input.value));
-    if (x === null || y === null) {
-      setText(error, "two numbers are wanted");
+    const given = byId("goal-heading").value.trim(), degrees = given === "" ? null : Number(given.replace("−", "-"));
+    if (x === null || y === null || Number.isNaN(degrees)) {
+      setText(error, "two numbers are wanted, and a heading in degrees or none");
       return;
     }
-    this.goal(x, y).then(() => setText(error, ""), (refusal) => setText(error, refusal.message));
+    this.goal(x, y, degrees === null ? null : (degrees * Math.PI) / 180).then(() => setText(error, ""), (refusal) => setText(error, refusal.message));
   }
 
   // A stop of the robot is shown also beside a recording; arming requires the live run on the screen.

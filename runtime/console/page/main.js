@@ -7,6 +7,7 @@ import { Connection } from "./connection.js";
 import { Drive } from "./drive.js";
 import { watchGrid } from "./draw_evidence.js";
 import { DriveMode } from "./drive_mode.js";
+import { Files } from "./files.js";
 import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
 import { Log } from "./log.js";
@@ -28,7 +29,10 @@ import { Teleoperation } from "./teleoperation.js";
 import { Theme } from "./theme.js";
 import { screenshot, Time } from "./time.js";
 import { hereTool, moveTool, placeTool } from "./tool_objects.js";
-import { goalTool, routeTool, tapeTool } from "./tool_points.js";
+import { Route } from "./route.js";
+import { RoutePanel } from "./route_panel.js";
+import { goalTool, tapeTool } from "./tool_points.js";
+import { routeTool } from "./tool_route.js";
 import { selectionBar, panTool, selectTool } from "./tool_select.js";
 import { Toolbox } from "./tools.js";
 import { Tour } from "./tour.js";
@@ -68,6 +72,7 @@ const theme = new Theme(() => {
 });
 
 const mapEdits = new MapEdits({ run, units, connection, notifications });
+const route = new Route({ run, connection, notifications });
 const drive = {}; // filled in below: the goal tool and the drive panel need each other
 const announce = (text) => setText(byId("announce"), text);
 const tools = new Toolbox({
@@ -77,10 +82,10 @@ const tools = new Toolbox({
     selectTool({ run, view, selection, redraw }),
     moveTool({ run, view, selection, mapEdits, redraw }),
     placeTool({ run, view, connection, notifications, redraw }),
-    goalTool({ sendGoal: (x, y) => drive.panel.goal(x, y).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan") }),
+    goalTool({ sendGoal: (x, y, heading) => drive.panel.goal(x, y, heading).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan"), redraw }),
     tapeTool({ units, announce, redraw }),
     hereTool({ run, connection, notifications, redraw, choose: (id) => tools.choose(id) }),
-    routeTool({ addWaypoint: (x, y, heading) => drive.mission.add(x, y, heading), redraw }),
+    routeTool({ route, view, redraw }),
   ],
 });
 scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), run, view, theme, units, selection, options });
@@ -88,7 +93,9 @@ watchPointers(front, view, () => tools.current);
 
 const teleoperation = new Teleoperation({ connection, run });
 drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools });
-drive.mission = new MissionPanel({ run, units, connection, notifications, tools });
+new MissionPanel({ run, units, connection, notifications });
+new RoutePanel({ route, run, units, connection, notifications, tools });
+route.on("changed", redraw);
 const alerts = new Alerts({ run, connection, seen: () => tabs?.shown === "log" });
 const status = new Status({ run, units, connection, notifications, alerts });
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
@@ -99,11 +106,14 @@ const ring = new Ring({ canvas: byId("ring"), text: byId("ring-text"), run, them
 const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), run, theme });
 const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot" });
 const chosen = selectionBar({ run, selection, connection, notifications });
+const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
+const files = new Files({ run, connection, notifications, address, play: (file, patience_ms) => time.openFile(file, patience_ms).then((isOpen) => isOpen && tabs.show("time")) });
 tabs = new Tabs((name) => {
   drawInstruments();
   alerts.look();
   prefer("tab", name);
   if (name === "time") time.shown();
+  if (name === "files") files.shown();
 });
 
 let instrumentsAsked = false;
@@ -216,7 +226,7 @@ byId("clear-map").addEventListener("click", () => notifications.confirm("Clear t
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
+watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 tabs.restore(preferred("tab", ""));
 tools.restore(preferred("tool", ""));

@@ -120,8 +120,18 @@ export class Time {
       this.notifications.toast("There is no recording to open");
       return;
     }
-    const data = await this.#ask({ type: "open_recording", file });
-    if (data === undefined) return;
+    await this.openFile(file);
+  }
+
+  // Shows a recording in place of the live run; returns whether it is open.
+  async openFile(file, patience_ms = undefined) {
+    let data;
+    try {
+      data = await this.connection.request({ type: "open_recording", file }, patience_ms);
+    } catch (error) {
+      this.notifications.showError(error);
+      return false;
+    }
     this.#file = file;
     byId("playback").hidden = false;
     byId("scrub").max = String(data?.duration_s ?? 1);
@@ -134,6 +144,7 @@ export class Time {
       this.run.beginSession({ ...this.#liveSession, ...data.about, parameters: this.#liveSession.parameters });
     }
     this.#follow({ s: 0, is_playing: false });
+    return true;
   }
 
   // While the slider is dragged, one request at a time: the newest position after the answer to the previous one.

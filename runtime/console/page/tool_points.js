@@ -1,23 +1,17 @@
-// Tools that take points: the goal to drive to, the waypoints of a route, and the measuring tape.
+// Tools that take points: the goal to drive to, and the measuring tape.
 
 import { drawTape, describeTape } from "./tool_overlays.js";
+import { pressedHeading } from "./tool_route.js";
 
-export function goalTool({ sendGoal, after }) {
-  return {
-    id: "goal", sends: true, name: "Drive to a goal", icon: "i-goal",
-    up(at) {
-      sendGoal(at.x, at.y);
-      after();
-    },
-  };
-}
-
-// A click adds a waypoint; a drag from it gives the final heading there.
-export function routeTool({ addWaypoint, redraw }) {
+// A click gives the place, a drag from it the final heading there.
+export function goalTool({ sendGoal, after, redraw }) {
   let from = null, to = null;
-  const heading = () => (from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 12 ? Math.atan2(to.y - from.y, to.x - from.x) : null);
+  const stop = () => {
+    from = to = null;
+    redraw();
+  };
   return {
-    id: "route", sends: true, name: "Add waypoints to a route; drag for the final heading", icon: "i-route",
+    id: "goal", sends: true, name: "Drive to a goal; drag for the final heading", icon: "i-goal",
     down(at) {
       from = to = at;
     },
@@ -27,14 +21,12 @@ export function routeTool({ addWaypoint, redraw }) {
     },
     up(at) {
       if (!from) return;
-      to = at;
-      addWaypoint(from.x, from.y, heading());
-      from = to = null;
+      sendGoal(from.x, from.y, pressedHeading(from, at));
+      stop();
+      after();
     },
-    cancel() {
-      from = to = null;
-    },
-    draw: (f) => heading() !== null && drawTape(f, from, to),
+    cancel: stop,
+    draw: (f) => pressedHeading(from, to) !== null && drawTape(f, from, to),
   };
 }
 

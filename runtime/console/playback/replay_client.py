@@ -19,16 +19,17 @@ import orjson
 
 from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import EncodedFrame
-from runtime.console.playback.replay_worker import ANSWER, HEADER, SPEED_MAX, SPEED_MIN
+from runtime.console.playback.replay_worker import ANSWER, HEADER, PROGRESS, SPEED_MAX, SPEED_MIN
 from runtime.console.protocols import Viewer
-from runtime.recording.storage import find_recording, list_recordings
+from runtime.recording.folder_files import describe_recordings
+from runtime.recording.storage import find_recording
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from runtime.support.length_format import Units
 
 WORKERS_MAX: Final = 3
 """Recordings open at a time: each worker holds the whole of perception in memory."""
 OPEN_MAX_S: Final = 30.0
-"""A long recording is indexed in a few seconds; on a busy machine it takes several times that."""
+"""Longest time without progress while a recording is indexed."""
 REPORT_MAX_S: Final = 300.0
 STEP_MAX: Final = 100_000
 """Cycles of one step: more than an hour of a run."""
@@ -71,23 +72,31 @@ class ReplayProcess:
             It cannot be opened; the process has ended then.
         """
         try:
-            async with asyncio.timeout(OPEN_MAX_S):
-                _, _, (body, _, _) = await self._read()
+            async with asyncio.timeout(OPEN_MAX_S) as patience:
+                description = await self._description()
+                while description.get("type") == PROGRESS:
+                    patience.reschedule(asyncio.get_running_loop().time() + OPEN_MAX_S)
+                    self._on_answer(description)
+                    description = await self._description()
         except TimeoutError:
             await self.close()
             raise ReplayError(
-                f"the recording did not open within {OPEN_MAX_S:.0f} s, likely because the machine is busy: try again"
+                f"the recording did not come on for {OPEN_MAX_S:.0f} s, likely because the machine is busy: try again"
             ) from None
         except (asyncio.IncompleteReadError, OSError):
             output = b"" if self._process.stderr is None else await self._process.stderr.read()
             await self.close()
             raise ReplayError(f"cannot replay the recording: {_last_line(output) or 'its process ended'}") from None
-        description: dict[str, Any] = orjson.loads(body)
         if "error" in description:
             await self.close()
             raise ReplayError(str(description["error"]))
         self._reader = asyncio.create_task(self._read_all(), name="replay reader")
         return description
+
+    async def _description(self) -> dict[str, Any]:
+        _, _, (body, _, _) = await self._read()
+        found: dict[str, Any] = orjson.loads(body)
+        return found
 
     @property
     def is_over(self) -> bool:
@@ -161,11 +170,12 @@ class ReplayClient:
 
     async def recordings(self) -> list[dict[str, Any]]:
         """Return the recordings that can be opened, newest first; `live` marks the one in progress."""
-        found = await asyncio.to_thread(list_recordings, self._folder)
+        found = await asyncio.to_thread(describe_recordings, self._folder)
         current = self._current()
         rows = [{**one._asdict(), "live": str(self._folder / one.file) == current} for one in found]
         if current is not None and not any(row["live"] for row in rows):
-            rows.insert(0, {"file": current, "bytes": None, "modified_s": None, "live": True})
+            rows.insert(0, {"file": current, "bytes": None, "modified_s": None, "duration_s": None, "state": "live",
+                            "pinned": False, "live": True})  # fmt: skip
         return rows
 
     async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:

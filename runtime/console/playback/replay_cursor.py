@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -52,6 +52,8 @@ class ReplayCursor:
     ----------
     recording : Recording
         Open for as long as the cursor is used.
+    on_chunk : callable
+        Gets the offset in the file of each chunk that is indexed.
 
     Attributes
     ----------
@@ -72,8 +74,9 @@ class ReplayCursor:
         The recording has no cycle.
     """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, on_chunk: Callable[[int], None] = lambda _: None) -> None:
         self._recording = recording
+        self._on_chunk = on_chunk
         self._index = _Index()
         self.bookmarks: list[tuple[float, str]] = []
         self.modes: list[tuple[float, ModeState]] = []
@@ -134,6 +137,7 @@ class ReplayCursor:
         index, finder = self._index, KeyframeFinder(self._recording)
         first_run_s: float | None = None
         for chunk_offset, messages in self._recording.chunks():
+            self._on_chunk(chunk_offset)
             for message in messages:
                 keyframe = finder.find(chunk_offset, message)
                 if keyframe is not None:

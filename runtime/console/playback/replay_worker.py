@@ -33,6 +33,9 @@ READ_BYTES: Final = 4096
 HEADER: Final = struct.Struct("!cIIIII")
 """Before each message to the client: its kind, source and number of a frame, and the lengths of three parts."""
 ANSWER, FRAME = b"a", b"f"
+PROGRESS: Final = "opening"
+"""Type of the answers that say how much of the recording has been read, before its description."""
+PROGRESS_PERIOD_S: Final = 0.25
 
 
 class PlaybackPosition(NamedTuple):
@@ -239,7 +242,7 @@ def run_worker(file: str, make: MakeFrameMaker) -> int:
     """
     try:
         with open_recording(Path(file)) as recording:
-            cursor = ReplayCursor(recording)
+            cursor = ReplayCursor(recording, _progress_writer(Path(file).stat().st_size, time.monotonic))
             emulated = recording.info.emulated
 
             def make_frames(settings: dict[str, Any]) -> FrameMaker:
@@ -255,6 +258,19 @@ def run_worker(file: str, make: MakeFrameMaker) -> int:
     except BrokenPipeError:  # the client has gone
         return 0
     return 0
+
+
+def _progress_writer(size: int, clock: Callable[[], float]) -> Callable[[int], None]:
+    """Return a function that gets how much of a file has been read, and writes that as an answer now and then."""
+    next_s = clock() + PROGRESS_PERIOD_S
+
+    def on_chunk(offset: int) -> None:
+        nonlocal next_s
+        if clock() >= next_s:
+            next_s = clock() + PROGRESS_PERIOD_S
+            _write_answer({"type": PROGRESS, "share": round(min(1.0, offset / max(1, size)), 3)})
+
+    return on_chunk
 
 
 def _serve(worker: ReplayWorker) -> None:

@@ -95,6 +95,23 @@ def test_a_route_goes_on_when_waypoints_are_added_behind_where_it_is() -> None:
     assert continued(robot.mission, route(places, "odom")).progress == Progress(), "the same again begins anew"
 
 
+def test_a_route_goes_on_from_a_present_waypoint_that_is_moved_or_removed() -> None:
+    places = ((1.0, 0.0, None), (1.0, 1.0, 90.0), (0.0, 1.0, None))
+    robot = MissionRobot(route(places, "odom"))
+    while robot.mission.progress.step == 0:
+        robot.cycle()
+    for _ in range(20):
+        robot.cycle()
+    moved = continued(robot.mission, route((places[0], (1.5, 1.0, None), places[2]), "odom"))
+    assert (state(moved), moved.progress.step_s) == (("waypoint-2", "running", None), 0.0), "towards the new place"
+    held = continued(edited(robot.mission, HOLD), route((places[0], places[2]), "odom"))
+    assert state(held)[:2] == ("waypoint-2", "held"), "a motion never begins by an edit of the route"
+    assert progress_problem(held) is None
+    over = continued(robot.mission, route(places[:1], "odom"))
+    assert state(over)[1:] == ("done", "the mission route is done: the operator removed what was left")
+    assert progress_problem(over) is None
+
+
 @pytest.mark.parametrize(
     "progress",
     [

@@ -24,7 +24,7 @@ from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
-from runtime.console.protocols import RecordingControl, ReplayControl
+from runtime.console.protocols import FileControl, RecordingControl, ReplayControl
 from runtime.cycle.callbacks import CALLBACKS
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Request
@@ -220,6 +220,7 @@ async def open_console(
     time: TimeControl | None = None,
     recording: RecordingControl | None = None,
     replay: ReplayControl | None = None,
+    files: FileControl | None = None,
     limits: Limits | None = None,
     emulated: bool = True,
     idle_period_s: float = NO_IDLE_FRAMES_S,
@@ -241,7 +242,7 @@ async def open_console(
     run = StubRun(settings, log)
     console = Console(
         run, log, KernelLoader(log), emulated=emulated, time=time,
-        recording=recording, replay=replay, limits=limits, clock=lambda: clock[0],
+        recording=recording, replay=replay, files=files, limits=limits, clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()
     with (

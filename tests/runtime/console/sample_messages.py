@@ -8,6 +8,7 @@ from behaviors.missions.mission import Mission, route
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.load import load_mission
+from config.route import mission_text
 from perception.edits import (
     ClearMap,
     ConfirmObject,
@@ -28,6 +29,8 @@ ROBOT_REQUESTS: list[tuple[dict[str, Any], object]] = [
     ({"type": "disarm"}, Request.DISARM),
     ({"type": "legs"}, Legs()),
     ({"type": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
+    ({"type": "goal", "x": 1, "y": 0, "heading": 1.5, "frame": "odom"}, Goal(1.0, 0.0, heading=1.5)),
+    ({"type": "run_mission", "toml": mission_text(load_mission("mow"), "")}, Mission(load_mission("mow"))),
     ({"type": "start_mission", "name": "patrol"}, Mission(load_mission("patrol"))),
     (
         {"type": "set_route", "waypoints": [[1, 0, None], [1, 1.5, 90]], "frame": "odom"},
@@ -67,7 +70,15 @@ ASYNC_COMMANDS: list[tuple[dict[str, Any], str]] = [
 ]
 """With what the stub of time control, recording and replay notes."""
 OTHERS: list[dict[str, Any]] = [
+    {"type": "rename_recording", "file": "run.mcap", "to": "dock"},
+    {"type": "pin_recording", "file": "run.mcap", "pinned": True},
+    {"type": "delete_recording", "file": "run.mcap"},
+    {"type": "make_files", "kind": "map", "file": "run.mcap"},
+    {"type": "list_jobs"},
+    {"type": "cancel_job", "job": 1},
     {"type": "hold_mission"},
+    {"type": "read_mission", "toml": "name = 1"},
+    {"type": "save_route", "name": "a", "waypoints": [[1, 0, None]], "frame": "odom"},
     {"type": "resume_mission"},
     {"type": "skip_step"},
     {"type": "take_control"},

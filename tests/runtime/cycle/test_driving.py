@@ -45,6 +45,20 @@ def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
     assert hold_reason(script) == ""
 
 
+def test_a_goal_with_a_final_heading_is_turned_to_there_once() -> None:
+    script = driving("behaviors.move_to_goal.success_radius_m=0.2")
+    goal = Goal(0.0, 2.0, heading=-math.pi / 2 - 6.0 * math.pi)
+    script.request_drive(goal)
+    turn = script.move_to(Pose(0.0, 1.9, math.pi / 2 + 0.1)).command
+    assert isinstance(turn, Twist)
+    assert (turn.v, turn.w > 0.0) == (0.0, True), "it turns on the spot, the short way round"
+    assert hold_reason(script) == ""
+    assert script.state.drive_request == replace(goal, reached=True)
+    assert script.move_to(Pose(0.0, 1.9, -math.pi / 2 + 0.04)).command == STANDSTILL
+    assert hold_reason(script) == "the goal (0.00 m, 2.00 m), heading -1170°, is reached"
+    assert script.move_to(Pose(0.0, 1.9, 0.0)).command == STANDSTILL, "turned away it does not turn back"
+
+
 def test_teleoperation_drives_while_velocities_arrive_and_stops_within_a_quarter_second() -> None:
     script = driving()
     begin_s = script.run_s + PERIOD_S

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +17,19 @@ from tests.recorded import record
 def test_the_map_of_a_recording_is_a_world_that_can_be_loaded(
     hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out, grid = tmp_path / "map.toml", tmp_path / "map.pgm"
-    assert run_command(["map", str(hall_run), "--out", str(out), "--grid", str(grid)]) == DONE
+    out, grid, geojson = (tmp_path / f"map.{suffix}" for suffix in ("toml", "pgm", "geojson"))
+    command = ["map", str(hall_run), "--out", str(out), "--grid", str(grid), "--geojson", str(geojson)]
+    assert run_command(command) == DONE
     world = load_world(str(out))
-    first, second = capsys.readouterr().out.splitlines()
+    first, features, second = capsys.readouterr().out.splitlines()
     assert first == f"{out}: {len(world.drum)} drums, 0 polygons, {len(world.wall)} walls"
     assert len(world.drum) > 0
     assert second.startswith(f"{grid}: ")
     assert grid.read_bytes().startswith(b"P5\n")
     assert (tmp_path / "map.yaml").exists()
+    found = json.loads(geojson.read_text("utf-8"))
+    assert features == f"{geojson}: {len(found['features'])} features"
+    assert (len(found["features"]), found["frame"]) == (len(world.drum) + len(world.wall), "odom")
 
 
 @pytest.mark.promise("P28")

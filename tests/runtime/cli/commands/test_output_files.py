@@ -57,7 +57,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "report": ("report", "my.mcap", "--world my_world.toml", "--out {0}"),
     "report of a ring log": ("report", "my.csv", "--robot my_robot.toml", "--out {0}"),
     "figures": ("figures", "my.csv", "--model my_model.toml", "--out folder"),
-    "map": ("map", "my.csv", "--set models=['my_model.toml']", "--out {0}", "--grid {1}"),
+    "map": ("map", "my.csv", "--set models=['my_model.toml']", "--out {0}", "--grid {1}", "--geojson {2}"),
     "calibrate": ("calibrate", "my.csv", "--robot my_robot.toml", "--out {0}"),
     "tables": ("export", "my.csv", "--to csv", "--out folder"),
     "ring log": ("export", "my.mcap", "--to ringlog", "--out {0}"),

@@ -8,6 +8,7 @@ import pytest
 
 from config.errors import UserError
 from config.load import ConfigError, load_settings
+from config.settings import GoalConfig
 from runtime.cli.commands.run_settings import reload_settings, settings_of_files, with_port
 
 BACKWARDS = "ring.firing={sets=[[10, 12, 14]]}"
@@ -38,3 +39,19 @@ def test_a_reload_keeps_robot_room_and_port_of_the_command_line() -> None:
 def test_a_port_that_no_settings_can_hold_is_refused() -> None:
     with pytest.raises(UserError, match="its path is not UTF-8"):
         with_port(load_settings(), os.fsdecode(b"/dev/\xff"))
+
+
+def test_a_goal_of_the_command_line_takes_the_place_of_the_files_goal_or_mission() -> None:
+    def goal_of(text: str, run: str | None = None, map_file: str | None = None) -> GoalConfig | None:
+        settings = settings_of_files(run, [], None, None, map_file, None, goal=text, no_console=False)
+        assert settings.mission is None
+        return settings.goal
+
+    assert goal_of("-1,2.5") == GoalConfig(x_m=-1.0, y_m=2.5)
+    assert goal_of("1,2,-90", map_file="room") == GoalConfig(x_m=1.0, y_m=2.0, heading_deg=-90.0, frame="map")
+    for wrong in ("1", "1,2,3,4", "a,b", "1,2,400", "nan,1", "1,2,", "1e9,0"):
+        with pytest.raises(UserError, match="expected X,Y in metres"):
+            goal_of(wrong)
+    with pytest.raises(UserError, match="exclude each other"):
+        settings_of_files(None, [], None, None, None, "patrol", goal="1,2", no_console=False)
+    assert reload_settings(None, [], None, None, None, goal="1,2").goal == GoalConfig(x_m=1.0, y_m=2.0)

@@ -1,0 +1,53 @@
+"""Handlers of the commands on files: recordings that are named, kept and deleted, and what is made of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from runtime.console.commands.command import Call
+from runtime.console.commands.command_error import CommandError
+from runtime.console.commands.messages import (
+    CancelJob,
+    DeleteRecording,
+    MakeFiles,
+    NoArguments,
+    PinRecording,
+    RenameRecording,
+)
+from runtime.console.protocols import NOT_AVAILABLE, FileControl
+
+
+async def rename_recording(call: Call, given: RenameRecording) -> str:
+    """Give a recording another name; return that."""
+    return await _files(call).rename(given.file, given.to)
+
+
+async def pin_recording(call: Call, given: PinRecording) -> None:
+    """Keep a recording when the folder is full, or no longer."""
+    await _files(call).pin(given.file, pinned=given.pinned)
+
+
+async def delete_recording(call: Call, given: DeleteRecording) -> None:
+    """Delete a recording for good."""
+    await _files(call).delete(given.file)
+
+
+async def make_files(call: Call, given: MakeFiles) -> int:
+    """Begin to make a report or a map of a recording; return the job's number."""
+    return await _files(call).make(given.kind, given.file)
+
+
+def list_jobs(call: Call, _: NoArguments) -> list[dict[str, Any]]:
+    """Return what is being made, and what was made of which files can be had."""
+    return _files(call).jobs.listed()
+
+
+def cancel_job(call: Call, given: CancelJob) -> None:
+    """End what is being made."""
+    _files(call).jobs.cancel(given.job)
+
+
+def _files(call: Call) -> FileControl:
+    if call.context.files is None:
+        raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
+    return call.context.files

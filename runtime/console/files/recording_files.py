@@ -1,0 +1,103 @@
+"""The recordings that pages may name, keep, delete, download and have something made of."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from config.errors import UserError
+from runtime.console.commands.command_error import CommandError
+from runtime.console.files.jobs import Jobs, Kind
+from runtime.recording.folder_files import delete_recording, pin_recording, rename_recording
+from runtime.recording.storage import find_recording
+
+T = TypeVar("T")
+
+
+class RecordingFiles:
+    """The recordings of a folder and the one in progress; the disk is waited for in threads.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recordings.
+    current : callable
+        Returns the file of the recording in progress, None while nothing is recorded.
+    jobs : Jobs
+        Makes reports and maps.
+    """
+
+    def __init__(self, folder: Path, current: Callable[[], str | None], jobs: Jobs) -> None:
+        self._folder = folder
+        self._current = current
+        self.jobs = jobs
+
+    async def find(self, file: str) -> Path:
+        """Return the path of a recording as listed.
+
+        Raises
+        ------
+        CommandError
+            There is no such recording.
+        """
+        path = Path(file) if file == self._current() else await asyncio.to_thread(find_recording, self._folder, file)
+        if path is None:
+            raise CommandError(f"there is no recording {file!r} in {self._folder}: list the recordings again")
+        return path
+
+    async def rename(self, file: str, to: str) -> str:
+        """Give a recording another name, and return that. See `runtime.recording.folder_files`.
+
+        Raises
+        ------
+        CommandError
+            It was not done.
+        """
+        self._refuse_live(file)
+        return await _in_thread(partial(rename_recording, self._folder, file, to))
+
+    async def pin(self, file: str, *, pinned: bool) -> None:
+        """Keep a recording when the folder is full, or no longer.
+
+        Raises
+        ------
+        CommandError
+            It was not done.
+        """
+        await _in_thread(partial(pin_recording, self._folder, file, pinned=pinned))
+
+    async def delete(self, file: str) -> None:
+        """Delete a recording.
+
+        Raises
+        ------
+        CommandError
+            It was not done.
+        """
+        self._refuse_live(file)
+        await _in_thread(partial(delete_recording, self._folder, file))
+
+    async def make(self, kind: Kind, file: str) -> int:
+        """Begin to make something of a recording, and return the job's number.
+
+        Raises
+        ------
+        CommandError
+            There is no such recording, or another job is under way.
+        """
+        return self.jobs.start(kind, file, await self.find(file))
+
+    def _refuse_live(self, file: str) -> None:
+        """Refuse the recording in progress also where the file system has no locks."""
+        if str(self._folder / file) == self._current():
+            raise CommandError(f"{file} is being written: stop recording first")
+
+
+async def _in_thread(work: Callable[[], T]) -> T:
+    try:
+        return await asyncio.to_thread(work)
+    except UserError as error:
+        raise CommandError(str(error)) from error

@@ -1,0 +1,187 @@
+// The recordings as files: the list with length, size and state; play, download, rename, pin, delete; and reports and
+// maps that are made of them, with how far each is.
+
+import { byId, el, setText } from "./dom.js";
+
+const OPEN_MAX_MS = 600_000;
+const LONG = { report: "Report", map: "Map" };
+
+export const base = (file) => String(file ?? "").split("/").at(-1);
+
+// 3725 s as "1 h 02 min", 65 s as "1 min 05 s".
+export function duration(s) {
+  if (s === null || s === undefined) return "length unknown";
+  if (s < 60) return `${s.toFixed(1)} s`;
+  const two = (n) => String(Math.floor(n)).padStart(2, "0");
+  return s < 3600 ? `${Math.floor(s / 60)} min ${two(s % 60)} s` : `${Math.floor(s / 3600)} h ${two((s % 3600) / 60)} min`;
+}
+
+const size = (bytes) => (bytes === null ? "size unknown" : bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+const when = (unix_s) => (unix_s === null ? "" : new Date(1000 * unix_s).toLocaleString([], { dateStyle: "medium", timeStyle: "short" }));
+const state = ({ live, state: of }) => (live ? "this run, up to now" : of === "live" ? "being written" : of === "incomplete" ? "cut off" : "complete");
+
+export class Files {
+  #rows = [];
+  #chosen = null;
+  #jobs = new Map();
+  #recording = undefined;
+  #shown = "";
+
+  constructor({ run, connection, notifications, address, play }) {
+    Object.assign(this, { run, connection, notifications, address, play });
+    const on = (id, act) => byId(id).addEventListener("click", act);
+    on("files-again", () => this.list(notifications.showError));
+    on("file-play", () => this.#play());
+    on("file-report", () => this.make("report", this.#chosen));
+    on("file-map", () => this.make("map", this.#chosen));
+    on("file-pin", () => this.#change({ type: "pin_recording", file: this.#chosen, pinned: !this.#row.pinned }));
+    on("file-delete", () => this.#delete());
+    on("map-make", () => this.#makeOfRun());
+    byId("file-rename").addEventListener("submit", (event) => this.#rename(event));
+    connection.on("job", (job) => this.#follow(job));
+    connection.on("opening", ({ share }) => setText(byId("file-opening"), `Opening: ${Math.round(100 * share)} %`));
+    run.on("state", () => this.#refresh());
+  }
+
+  // Request the lists when the panel is shown.
+  shown() {
+    this.list();
+    this.connection.request({ type: "list_jobs" }).then((jobs) => {
+      for (const job of [...(jobs ?? [])].reverse()) this.#follow(job, { quiet: true });
+    }, () => {});
+  }
+
+  async list(refused = () => {}) {
+    try {
+      this.#rows = (await this.connection.request({ type: "list_recordings" })) ?? [];
+    } catch (error) {
+      refused(error);
+      return;
+    }
+    if (!this.#rows.some(({ file }) => file === this.#chosen)) this.#chosen = null;
+    this.#refresh();
+  }
+
+  get #row() {
+    return this.#rows.find(({ file }) => file === this.#chosen) ?? null;
+  }
+
+  #refresh() {
+    const { controller } = this.run.state, recording = this.run.robot?.recording?.file ?? null;
+    if (recording !== this.#recording && this.#recording !== undefined && !byId("panel-files").hidden) this.list();
+    this.#recording = recording;
+    const shown = JSON.stringify([this.#rows, this.#chosen, controller, this.run.watchesRecording]);
+    if (shown === this.#shown) return;
+    this.#shown = shown;
+    const focused = document.activeElement?.id;
+    setText(byId("files-count"), String(this.#rows.length));
+    byId("files-empty").hidden = this.#rows.length > 0;
+    byId("files").replaceChildren(...this.#rows.map((row, i) => el("li", {}, el("button", { type: "button", class: "file", id: `file-row-${i}`,
+      "aria-pressed": String(row.file === this.#chosen), onclick: () => this.#choose(row.file) },
+      el("strong", {}, base(row.file)), el("span", {}, [row.live ? null : duration(row.duration_s), row.live ? null : size(row.bytes), state(row), row.pinned ? "pinned" : null].filter(Boolean).join(", "))))));
+    const row = this.#row;
+    byId("file").hidden = row === null;
+    if (focused?.startsWith("file-row-")) byId(focused)?.focus();
+    if (row === null) return;
+    const isLive = row.live || row.state === "live", inFolder = !row.file.includes("/");
+    setText(byId("file-name"), base(row.file));
+    const facts = [["recorded", when(row.modified_s)], ["length", duration(row.duration_s)], ["size", size(row.bytes)], ["state", state(row)], ["when the folder is full", row.pinned ? "stays: it is pinned" : "may go, the oldest first"]];
+    byId("file-facts").replaceChildren(...facts.filter(([, value]) => value !== "").flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
+    byId("file-download").href = this.address("/recording", { file: row.file });
+    byId("file-new-name").value = base(row.file).replace(/\.mcap$/, "");
+    setText(byId("file-error"), "");
+    setText(byId("file-pin"), row.pinned ? "Unpin" : "Pin");
+    byId("file-pin").disabled = !controller || !inFolder;
+    for (const id of ["file-new-name", "file-rename-do", "file-delete"]) byId(id).disabled = !controller || isLive || !inFolder;
+  }
+
+  #choose(file) {
+    this.#chosen = file === this.#chosen ? null : file;
+    this.#refresh();
+  }
+
+  async #play() {
+    setText(byId("file-opening"), "Opening …");
+    byId("file-play").disabled = true;
+    try {
+      await this.play(this.#chosen, OPEN_MAX_MS);
+    } finally {
+      byId("file-play").disabled = false;
+      setText(byId("file-opening"), "");
+    }
+  }
+
+  async #change(message) {
+    try {
+      const answer = await this.connection.request(message);
+      setText(byId("file-error"), "");
+      return answer ?? true;
+    } catch (error) {
+      setText(byId("file-error"), error.message);
+      return null;
+    } finally {
+      await this.list();
+    }
+  }
+
+  async #rename(event) {
+    event.preventDefault();
+    const file = this.#chosen;
+    let name;
+    try {
+      name = await this.connection.request({ type: "rename_recording", file, to: byId("file-new-name").value.trim() || "?" });
+    } catch (error) {
+      setText(byId("file-error"), error.message);
+      return;
+    }
+    this.#chosen = name;
+    this.notifications.toast(`${file} is ${name} now`);
+    await this.list();
+  }
+
+  #delete() {
+    const row = this.#row;
+    this.notifications.confirm(`Delete ${row.file}?`, el("p", {}, `${duration(row.duration_s)}, ${size(row.bytes)}. It is deleted for good; download it first if it may be of use.`), [
+      ["Keep it", null],
+      ["Delete it", () => void this.#change({ type: "delete_recording", file: row.file }).then((done) => done && this.notifications.toast(`${row.file} is deleted`))],
+    ]);
+  }
+
+  // Begins to make a report or a map; what becomes of it comes as messages.
+  make(kind, file) {
+    return this.connection.request({ type: "make_files", kind, file }).catch(this.notifications.showError);
+  }
+
+  async #makeOfRun() {
+    await this.list(this.notifications.showError);
+    const live = this.#rows.find((row) => row.live);
+    if (live) await this.make("map", live.file);
+    else this.notifications.toast("This run is not being recorded, and its map is made from the recording: press Record in the tab Time");
+  }
+
+  #follow(job, { quiet = false } = {}) {
+    const was = this.#jobs.get(job.job);
+    this.#jobs.set(job.job, job);
+    const running = [...this.#jobs.values()].find(({ over }) => !over);
+    byId("job").hidden = running === undefined;
+    if (running) {
+      setText(byId("job-text"), `${LONG[running.kind]} of ${base(running.file)}: ${running.what}${running.share > 0 ? `, ${Math.round(100 * running.share)} %` : ""}`);
+      if (running.share > 0) byId("job-share").value = running.share;
+      else byId("job-share").removeAttribute("value");
+      byId("job-cancel").onclick = () => this.connection.request({ type: "cancel_job", job: running.job }).catch(this.notifications.showError);
+    }
+    if (!job.over || was?.over) return;
+    byId("made").replaceChildren(...[...this.#jobs.values()].filter(({ made }) => made.length > 0).reverse().map((done) => this.#made(done)));
+    byId("made-part").hidden = byId("made").children.length === 0;
+    if (quiet) return;
+    this.notifications.toast(job.error === null ? `${LONG[job.kind]} of ${base(job.file)}: ready in the tab Files` : `${LONG[job.kind]} of ${base(job.file)}: ${job.error}`);
+  }
+
+  #made({ job, kind, file, made }) {
+    return el("li", {}, el("span", {}, `${LONG[kind]} of ${base(file)}`), ...made.map((name) => {
+      const isPage = name.endsWith(".html");
+      return el("a", { class: "button small", href: this.address("/made", { job, file: name }), ...(isPage ? { target: "_blank", rel: "noopener" } : { download: name }),
+        "aria-label": `${isPage ? "Open" : "Download"} ${name}` }, isPage ? "Open" : name.split(".").at(-1).toUpperCase());
+    }));
+  }
+}
