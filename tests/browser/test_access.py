@@ -12,7 +12,7 @@ from tests.browser.open_page import DESKTOP, PHONE, PROJECTOR, Opened, Opener, u
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Plot", "Log")
+PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Plot", "Files", "Log")
 MODES = ("READY", "SAFE_STOP", "FAULT", "CONNECTING")
 AA = 4.5
 AA_LARGE = 3.0
@@ -93,7 +93,7 @@ async def test_panels_tools_and_help_are_reached_with_keys_alone(server: FakeSer
     opened = await scene(server, opener, DESKTOP)
     page = opened.page
     await page.locator("#tab-objects").focus()
-    for panel in ("drive", "layers", "tune", "time", "plot", "log", "objects"):
+    for panel in ("drive", "layers", "tune", "time", "plot", "files", "log", "objects"):
         await page.keyboard.press("ArrowRight")
         await expect(page.locator(f"#panel-{panel}")).to_be_visible()
         await expect(page.locator(f"#tab-{panel}")).to_be_focused()

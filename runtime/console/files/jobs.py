@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Literal, TypeAlias
 
 from runtime.console.commands.command_error import CommandError
@@ -26,7 +27,9 @@ KEPT: Final = 8
 """Jobs whose files are kept; those of older ones are deleted."""
 JOB_MAX_S: Final = 1800.0
 """A job that takes longer is ended: the command line has no limit."""
-SUFFIXES: Final = {"report": (".html",), "map": (".toml", ".pgm", ".yaml", ".geojson")}
+SUFFIXES: Final[Mapping[Kind, tuple[str, ...]]] = MappingProxyType(
+    {"report": (".html",), "map": (".toml", ".pgm", ".yaml", ".geojson")}
+)
 """Of the files that each kind makes."""
 
 

@@ -107,7 +107,7 @@ const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: 
 const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot" });
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
-const files = new Files({ run, connection, notifications, address, play: (file, patience_ms) => time.openFile(file, patience_ms).then((isOpen) => isOpen && tabs.show("time")) });
+const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")) });
 tabs = new Tabs((name) => {
   drawInstruments();
   alerts.look();

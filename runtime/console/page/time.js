@@ -124,10 +124,10 @@ export class Time {
   }
 
   // Shows a recording in place of the live run; returns whether it is open.
-  async openFile(file, patience_ms = undefined) {
+  async openFile(file, timeout_ms = undefined) {
     let data;
     try {
-      data = await this.connection.request({ type: "open_recording", file }, patience_ms);
+      data = await this.connection.request({ type: "open_recording", file }, timeout_ms);
     } catch (error) {
       this.notifications.showError(error);
       return false;

@@ -72,10 +72,10 @@ class ReplayProcess:
             It cannot be opened; the process has ended then.
         """
         try:
-            async with asyncio.timeout(OPEN_MAX_S) as patience:
+            async with asyncio.timeout(OPEN_MAX_S) as limit:
                 description = await self._description()
                 while description.get("type") == PROGRESS:
-                    patience.reschedule(asyncio.get_running_loop().time() + OPEN_MAX_S)
+                    limit.reschedule(asyncio.get_running_loop().time() + OPEN_MAX_S)
                     self._on_answer(description)
                     description = await self._description()
         except TimeoutError:

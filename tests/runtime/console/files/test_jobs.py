@@ -19,28 +19,28 @@ PROGRAM = "tests.runtime.console.files.stub_job"
 
 @asynccontextmanager
 async def jobs_of() -> AsyncIterator[tuple[Jobs, list[dict[str, Any]]]]:
-    jobs, told = Jobs(program=PROGRAM), list[dict[str, Any]]()
-    jobs.tell = told.append
+    jobs, sent = Jobs(program=PROGRAM), list[dict[str, Any]]()
+    jobs.tell = sent.append
     try:
-        yield jobs, told
+        yield jobs, sent
     finally:
         await jobs.close()
 
 
-async def over(told: list[dict[str, Any]], number: int) -> dict[str, Any]:
+async def over(sent: list[dict[str, Any]], number: int) -> dict[str, Any]:
     async with asyncio.timeout(TIMEOUT_S):
-        while not any(one["over"] for one in told if one["job"] == number):
+        while not any(one["over"] for one in sent if one["job"] == number):
             await asyncio.sleep(0.005)
-    return next(one for one in told if one["over"] and one["job"] == number)
+    return next(one for one in sent if one["over"] and one["job"] == number)
 
 
 async def test_a_job_says_how_far_it_is_and_what_it_made(tmp_path: Path) -> None:
-    async with jobs_of() as (jobs, told):
+    async with jobs_of() as (jobs, sent):
         number = jobs.start("map", "run.mcap", tmp_path / "run.mcap")
         with pytest.raises(CommandError, match=r"a map of run\.mcap is being made: wait for it, or cancel it"):
             jobs.start("report", "run.mcap", tmp_path / "run.mcap")
-        done = await over(told, number)
-        assert [(one["share"], one["what"]) for one in told[:-1]] == [(0.25, "reading"), (0.5, "drawing the map")]
+        done = await over(sent, number)
+        assert [(one["share"], one["what"]) for one in sent[:-1]] == [(0.25, "reading"), (0.5, "drawing the map")]
         assert (done["made"], done["error"]) == (["run.toml", "run.pgm", "run.geojson"], None)
         assert jobs.listed() == [done]
         made = jobs.path_of(number, "run.toml")
@@ -52,33 +52,33 @@ async def test_a_job_says_how_far_it_is_and_what_it_made(tmp_path: Path) -> None
 
 
 async def test_a_job_that_fails_says_why(tmp_path: Path) -> None:
-    async with jobs_of() as (jobs, told):
-        done = await over(told, jobs.start("report", "broken.mcap", tmp_path / "broken.mcap"))
+    async with jobs_of() as (jobs, sent):
+        done = await over(sent, jobs.start("report", "broken.mcap", tmp_path / "broken.mcap"))
         assert (done["error"], done["made"], done["what"]) == ("broken.mcap: holds no cycle", [], "failed")
 
 
 async def test_a_job_is_cancelled_and_another_can_begin(tmp_path: Path) -> None:
-    async with jobs_of() as (jobs, told):
+    async with jobs_of() as (jobs, sent):
         number = jobs.start("map", "endless.mcap", tmp_path / "endless.mcap")
         async with asyncio.timeout(TIMEOUT_S):
-            while not told:
+            while not sent:
                 await asyncio.sleep(0.005)
         jobs.cancel(number)
-        assert (await over(told, number))["error"] == "cancelled"
+        assert (await over(sent, number))["error"] == "cancelled"
         with pytest.raises(CommandError, match="nothing to cancel"):
             jobs.cancel(number)
-        assert (await over(told, jobs.start("report", "a.mcap", tmp_path / "a.mcap")))["made"] == ["a.html"]
+        assert (await over(sent, jobs.start("report", "a.mcap", tmp_path / "a.mcap")))["made"] == ["a.html"]
         jobs.start("map", "endless.mcap", tmp_path / "endless.mcap")  # ends with the console
 
 
 async def test_files_of_old_jobs_are_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.console.files.jobs.KEPT", 1)
     assert KEPT == 8
-    async with jobs_of() as (jobs, told):
+    async with jobs_of() as (jobs, sent):
         first = jobs.start("report", "a.mcap", tmp_path / "a.mcap")
-        await over(told, first)
+        await over(sent, first)
         made = jobs.path_of(first, "a.html")
         assert made is not None
         second = jobs.start("report", "b.mcap", tmp_path / "b.mcap")
-        await over(told, second)
+        await over(sent, second)
         assert (made.exists(), jobs.path_of(first, "a.html")) == (False, None)
