@@ -285,8 +285,24 @@ class FakeServer:
                 return TOML
             case "list_recordings":
                 return [
-                    {"file": "now.mcap", "bytes": None, "modified_s": None, "live": True},
-                    {"file": "2026-01-02-first.mcap", "bytes": 1_500_000, "modified_s": 1.0, "live": False},
+                    {
+                        "file": "now.mcap",
+                        "bytes": None,
+                        "modified_s": None,
+                        "duration_s": None,
+                        "state": "live",
+                        "pinned": False,
+                        "live": True,
+                    },
+                    {
+                        "file": "2026-01-02-first.mcap",
+                        "bytes": 1_500_000,
+                        "modified_s": 1.0,
+                        "duration_s": 3725.0,
+                        "state": "complete",
+                        "pinned": False,
+                        "live": False,
+                    },
                 ]
             case "open_recording":
                 self.playback = {"s": 0.0, "is_playing": False, "speed": 1.0}

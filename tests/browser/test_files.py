@@ -1,0 +1,102 @@
+"""Recordings and maps as files: the list, what can be done with one, with keys too, and how far long work is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from playwright.async_api import expect
+
+from tests.browser.fake_server import TOKEN, FakeServer
+from tests.browser.open_page import Opened, Opener
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+FIRST = "2026-01-02-first.mcap"
+DESKTOP, SMALL, PHONE = (1440, 900), (1024, 768), (390, 844)
+
+
+def job(**changes: Any) -> dict[str, Any]:
+    about = {"type": "job", "job": 1, "kind": "map", "file": FIRST, "share": 0.0, "what": "starting", "made": [],
+             "error": None, "over": False}  # fmt: skip
+    return about | changes
+
+
+async def files_of(opened: Opened) -> None:
+    await opened.tab("Files")
+    await opened.says("#files", FIRST)
+
+
+async def test_a_recording_is_described_renamed_pinned_and_deleted(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await files_of(opened)
+    await opened.says("#file-row-0", "this run, up to now")
+    await opened.says("#file-row-1", "1 h 02 min, 1.5 MB, complete")
+    await page.locator("#file-row-0").press("Enter")
+    await expect(page.locator("#file-delete")).to_be_disabled()
+    await page.locator("#file-row-1").press("Enter")
+    await expect(page.locator("#file-row-1")).to_be_focused()
+    link = await page.locator("#file-download").get_attribute("href")
+    assert link == f"/recording?file={FIRST}&token={TOKEN}"
+
+    server.data["rename_recording"] = "dock.mcap"
+    await page.locator("#file-new-name").fill("dock")
+    await page.locator("#file-new-name").press("Enter")
+    assert await server.wait("rename_recording") == {"file": FIRST, "to": "dock"}
+    await opened.says("#toasts", "dock.mcap")
+    server.refusals["rename_recording"] = ("there is a recording dock.mcap already: choose another name", None)
+    await page.locator("#file-row-1").press("Enter")
+    await page.locator("#file-rename-do").press("Enter")
+    await opened.says("#file-error", "choose another name")
+    await page.locator("#file-pin").press("Enter")
+    assert await server.wait("pin_recording") == {"file": FIRST, "pinned": True}
+
+    await page.locator("#file-delete").press("Enter")
+    await opened.says("#dialog-title", f"Delete {FIRST}?")
+    await page.get_by_role("button", name="Keep it").press("Enter")
+    await page.locator("#file-delete").press("Enter")
+    await opened.save_screenshot("files-delete")
+    await page.get_by_role("button", name="Delete it").press("Enter")
+    assert await server.wait("delete_recording") == {"file": FIRST}
+    assert len(server.of("delete_recording")) == 1, "nothing is deleted unasked"
+
+
+async def test_long_work_says_how_far_it_is_and_what_it_made(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await files_of(opened)
+    await page.locator("#file-row-1").click()
+    await page.locator("#file-map").click()
+    assert await server.wait("make_files") == {"kind": "map", "file": FIRST}
+    await server.send(job(share=0.42, what="reading"))
+    await opened.says("#job-text", f"Map of {FIRST}: reading, 42 %")
+    for name, size in {"1440": DESKTOP, "1024": SMALL, "390": PHONE}.items():
+        await page.set_viewport_size({"width": size[0], "height": size[1]})
+        await opened.save_screenshot(f"files-{name}")
+    await page.locator("#job-cancel").press("Enter")
+    assert await server.wait("cancel_job") == {"job": 1}
+    await server.send(job(over=True, error="cancelled"))
+    await expect(page.locator("#job")).to_be_hidden()
+    await opened.says("#toasts", "cancelled")
+    await server.send(job(job=2, over=True, share=1.0, what="done", made=["first.toml", "first.geojson"]))
+    await opened.says("#made", f"Map of {FIRST}")
+    links = [await a.get_attribute("href") for a in await page.locator("#made a").all()]
+    assert links == [f"/made?job=2&file=first.{suffix}&token={TOKEN}" for suffix in ("toml", "geojson")]
+
+    await server.send({"type": "opening", "share": 0.25})
+    await opened.says("#file-opening", "Opening: 25 %")
+    await page.locator("#file-play").click()
+    assert await server.wait("open_recording") == {"file": FIRST}
+    await opened.says("#banner-playback", FIRST)
+    await expect(page.locator("#panel-time")).to_be_visible()
+
+
+async def test_who_only_watches_can_look_but_change_nothing(server: FakeServer, opener: Opener) -> None:
+    server.controller = 99
+    opened = await opener.open(server.url)
+    await files_of(opened)
+    await opened.page.locator("#file-row-1").click()
+    for name in ("file-pin", "file-delete", "file-rename-do"):
+        await expect(opened.page.locator(f"#{name}")).to_be_disabled()
+    await expect(opened.page.locator("#file-play")).to_be_enabled()
