@@ -80,6 +80,8 @@ class Hall:
     objects: int = 6
     seed: int = 1
     moving: bool = True
+    walls: tuple[tuple[float, float, float, float], ...] = ()
+    """Ends of walls, which have the numbers from 101 on."""
     places: list[tuple[float, float]] = field(init=False)
     _shape: list[list[float]] = field(init=False)
 
@@ -137,6 +139,12 @@ class Hall:
                 "number": i + 1, "model": "drum" if i < 6 or i % 5 else "wall", "x": x + 0.01, "y": y - 0.01,
                 "theta": 0.0, "sigma": spread, "covariance": [spread**2, 0.4 * spread**2, 0.6 * spread**2],
                 "probability": min(0.999, probability), "support": 40 + i, "score": 0.9,
+            })  # fmt: skip
+        for i, (x1, y1, x2, y2) in enumerate(self.walls):
+            out.append({
+                "number": 101 + i, "model": "wall", "x": (x1 + x2) / 2, "y": (y1 + y2) / 2,
+                "theta": math.atan2(y2 - y1, x2 - x1), "sigma": 0.01, "covariance": [0.1, 0.0, 0.0001],
+                "probability": 0.98, "support": 60, "score": 0.98, "ends": [x1, y1, x2, y2],
             })  # fmt: skip
         return out
 

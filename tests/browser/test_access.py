@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from typing import Any, Literal
 
 import pytest
@@ -14,6 +15,9 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Plot", "Files", "Log")
 MODES = ("READY", "SAFE_STOP", "FAULT", "CONNECTING")
+AXE = """async () => (await axe.run(document, { resultTypes: ['violations'] })).violations
+    .filter(({ impact }) => impact !== 'minor')
+    .map(({ id, impact, nodes }) => [id, impact, nodes.map((node) => [node.target, node.failureSummary])])"""
 AA = 4.5
 AA_LARGE = 3.0
 
@@ -89,6 +93,36 @@ async def test_it_fits_every_screen_and_every_control_has_a_name(
         assert box["height"] >= 190
 
 
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+async def test_axe_finds_nothing_on_any_tab(server: FakeServer, opener: Opener, size: tuple[int, int]) -> None:
+    """Check every panel, drive mode, a dialog and the tour by the rules of axe-core, in both colour schemes."""
+    opened = await scene(server, opener, size, real_time=True, first_visit=True)
+    page = opened.page
+    await page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8"))
+
+    found = {}
+
+    async def check(what: str) -> None:
+        found[what] = await page.evaluate(AXE)
+
+    await check("tour")
+    await page.get_by_role("button", name="Skip").click()
+    for scheme in ("light", "dark"):
+        await page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+        for tab in await page.get_by_role("tab").all():
+            if await tab.is_visible():
+                await tab.click()
+                await check(f"{scheme} {await tab.inner_text()}")
+    await page.keyboard.press("?")
+    await check("keys")
+    await page.keyboard.press("Escape")
+    await opened.tab("Drive")
+    await page.get_by_role("button", name="Drive mode", exact=True).click()
+    await check("drive mode")
+    assert not {what: violations for what, violations in found.items() if violations}
+    assert len(found) > 16
+
+
 async def test_panels_tools_and_help_are_reached_with_keys_alone(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESKTOP)
     page = opened.page
@@ -134,7 +168,7 @@ async def test_description_motion_colours_and_origin(server: FakeServer, opener:
     """Read the map's description, reduce motion, change the colours, and list what was loaded."""
     opened = await scene(server, opener, DESKTOP, calm=True)
     page = opened.page
-    await opened.says("#map-text", "6 objects: drum at 7.0, 4.0 ft")
+    await opened.says("#map-text", "Objects: 6; drum at 7.0, 4.0 ft")
 
     moving = (
         "() => [...document.querySelectorAll('*')]"

@@ -49,12 +49,43 @@ async def test_objects_are_listed_as_text_in_feet_or_metres(server: FakeServer, 
     await expect(page.locator("#units")).to_have_text("ft")
 
 
-@pytest.mark.parametrize("hall", [Hall(segments=60, objects=12)], ids=["walls"])
-async def test_objects_without_a_model_are_shown(server: FakeServer, opener: Opener) -> None:
+@pytest.mark.parametrize("hall", [Hall(segments=60, walls=((1.5, 0.8, 2.7, 0.8),))], ids=["wall"])
+async def test_a_wall_is_an_object_and_what_it_hides_is_not_certain(server: FakeServer, opener: Opener) -> None:
+    server.cycle = 170
+    server.deleted = set(range(1, 61))
     opened = await opener.open(server.url)
-    await expect(opened.page.locator("#objects li")).to_have_count(12)
-    await opened.says("#objects", "wall")
-    await opened.save_screenshot("walls")
+    page = opened.page
+    await opened.steady()
+    await expect(page.locator("#objects-count")).to_have_text("6, and 1 wall")
+    wall = page.locator("#object-101")
+    await expect(wall).to_contain_text("98 %")
+    await expect(wall).to_contain_text("3.94 ft long")
+    await expect(page.locator("#object-1")).to_contain_text("hidden")
+    await expect(page.locator("#object-2")).to_contain_text("97 %")
+    await page.locator("#object-1").click()
+    await opened.says("#object-facts", "behind wall 101, where no reading checks it; before: probability 97 %")
+    before = await opened.picture()
+
+    await page.locator("#tool-select").click()
+    await page.mouse.click(*await opened.screen(1.7, 0.82))
+    await expect(page.locator("#object-name")).to_have_text("101 wall")
+    assert await opened.picture() != before, "the picked wall looks like any other"
+    await opened.says("#object-facts", "4.92, 2.62 to 8.86, 2.62 ft")
+    for name in ("Confirm", "Move and turn"):
+        await expect(page.get_by_role("button", name=name, exact=True)).to_be_hidden()
+    await opened.save_screenshot("wall")
+    await page.get_by_role("button", name="Reject").click()
+    assert await server.wait("reject_object") == {"object": 101}
+    assert [m["object"] for m in server.of("evidence")] == [1], "a wall has no readings to list"
+
+    server.refusals["evidence"] = ("object 2 no longer exists", None)
+    await page.locator("#object-2").click()
+    await opened.says("#evidence", "no longer exists")
+    for _ in range(3):
+        await opened.run_for(1500)
+        await server.advance()
+        await opened.sync()
+    assert [m["object"] for m in server.of("evidence")] == [1, 2], "what was refused is not asked again each second"
 
 
 async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None:

@@ -82,6 +82,16 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await page.locator("#play-speed").select_option("4")
     await page.get_by_role("button", name="Play", exact=True).click()
     assert await server.wait("play_recording") == {"speed": 4}
+    server.playback = {"s": 9.0, "is_playing": True, "speed": 4.0}
+    await opened.says("#time-text", "2026-01-02-first.mcap, × 4:")
+    for s in (11.0, 13.0):
+        await opened.run_for(2000)
+        server.playback = {"s": s, "is_playing": True, "speed": 4.0}
+        await opened.sync()
+    await opened.says("#time-text", "× 4 (this machine reaches × 1.0)")
+    await opened.says("#fact-age", "a recording")
+    for tool in ("goal", "route", "move", "place"):
+        await expect(page.locator(f"#tool-{tool}")).to_be_disabled()
     await page.get_by_role("button", name="Hold").click()
     assert await server.wait("play_recording", 2) == {"speed": 0}
     await page.get_by_role("button", name="On one cycle").click()

@@ -2,6 +2,7 @@
 // it grew from, and for the one that is picked the readings that speak for and against it.
 
 import { textWithHalo, overlap } from "./scene.js";
+import { isWall } from "./walls.js";
 
 const CHI2_95 = 5.991;
 const SURE = 0.8; // below this the outline is dashed
@@ -69,8 +70,9 @@ export function ellipseOf(covariance) {
 
 export const percent = (share) => `${share > 0.995 && share < 1 ? "> 99" : Math.round(100 * share)} %`;
 
-// What an operator has said counts more than a number.
+// What an operator has said counts more than a number; behind a wall no reading checks the number.
 export function certainty(object) {
+  if (object.hidden_by !== null && !object.confirmed) return "hidden";
   if (object.placed && !object.confirmed) return "placed";
   return `${object.confirmed ? "✓ " : ""}${percent(object.probability ?? object.score)}`;
 }
@@ -95,16 +97,19 @@ export function drawModels(f) {
   const sure = new Path2D(), unsure = new Path2D(), picked = new Path2D();
   const walls = new Path2D(), unsureWalls = new Path2D();
   for (const object of run.state.objects) {
-    if (object.ends) {
-      const [x1, y1, x2, y2] = object.ends, path = (object.probability ?? object.score) >= SURE ? walls : unsureWalls;
-      path.moveTo(x1, y1);
-      path.lineTo(x2, y2);
+    const isSure = (object.probability ?? object.score) >= SURE && object.hidden_by === null;
+    const isPicked = object.number !== null && object.number === selection.object;
+    if (isWall(object)) {
+      const [x1, y1, x2, y2] = object.ends;
+      for (const path of [isSure ? walls : unsureWalls, isPicked ? picked : null]) {
+        path?.moveTo(x1, y1);
+        path?.lineTo(x2, y2);
+      }
       continue;
     }
     const model = run.model(object.model);
-    const chance = object.probability ?? object.score;
-    outlinePath(chance >= SURE ? sure : unsure, model, object, px);
-    if (object.number !== null && object.number === selection.object) outlinePath(picked, model, object, px);
+    outlinePath(isSure ? sure : unsure, model, object, px);
+    if (isPicked) outlinePath(picked, model, object, px);
   }
   f.inWorld();
   ctx.strokeStyle = theme.ink;
@@ -132,8 +137,9 @@ export function drawEllipses(f) {
   const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;
   const path = new Path2D(), magnified = new Path2D(), centres = new Path2D();
-  for (const { x, y, covariance, ends } of run.state.objects) {
-    if (ends) continue; // a wall is a line; the covariance of its place is its length
+  for (const object of run.state.objects) {
+    if (isWall(object)) continue; // the covariance of a wall's place is its length
+    const { x, y, covariance } = object;
     const arm = 3.5 * px;
     centres.moveTo(x - arm, y);
     centres.lineTo(x + arm, y);

@@ -20,7 +20,7 @@ const TABLE = [
   ["arcs", "front", "arcs of recent echoes", drawArcs, true, "M8 16c6-8 18-8 24 0M12 18c5-6 11-6 16 0", "echo"],
   ["beams", "front", "beams firing now", drawBeams, true, "M20 19 6 4c8-4 20-4 28 0Z", "echo"],
   ["evidence", "front", "readings of the selected object", drawEvidence, true, "M5 14c6-8 14-8 18 0M29 6l7 7m0-7-7 7", "stop"],
-  ["models", "front", "models (dashed: uncertain)", drawModels, true, "M20 3a7 7 0 1 1-.1 0Z", "model"],
+  ["models", "front", "models and walls (dashed: uncertain, or hidden by a wall)", drawModels, true, "M20 3a7 7 0 1 1-.1 0Z", "model"],
   ["ellipses", "front", "95 % ellipses of their positions (dotted: magnified)", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
   ["areas", "front", "vacant areas: nothing stands here", drawAreas, true, "M20 2a8 8 0 1 1-.1 0ZM14 4l12 12M26 4 14 16", "muted", "2 3"],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],

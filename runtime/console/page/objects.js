@@ -4,6 +4,7 @@
 import { byId, el, setAttribute, setText } from "./dom.js";
 import { certainty, ellipseOf, percent } from "./draw_objects.js";
 import { degrees } from "./units.js";
+import { countObjects, isWall } from "./walls.js";
 
 const EVIDENCE_EVERY_MS = 1000;
 
@@ -32,8 +33,7 @@ export class Objects {
 
   refresh() {
     const { objects, waiting } = this.run.state;
-    const walls = objects.filter(({ ends }) => ends).length, others = objects.length - walls;
-    const counted = walls > 0 ? `${others}, and ${walls} wall${walls > 1 ? "s" : ""}` : `${others}`;
+    const counted = countObjects(objects);
     setText(byId("objects-count"), waiting > 0 ? `${counted}, ${waiting} near ones have no room` : counted);
     byId("objects-empty").hidden = objects.length > 0;
     const seen = new Set();
@@ -83,7 +83,9 @@ export class Objects {
   #onSelected() {
     this.run.evidence = this.#refused = null;
     this.#asked_ms = -Infinity;
-    byId("evidence").replaceChildren();
+    const picked = this.selection.object === null ? null : this.run.object(this.selection.object);
+    const why = this.run.watchesRecording ? "The readings are shown in the live run only." : picked !== null && isWall(picked) ? "The outline segments along a wall are its readings." : null;
+    byId("evidence").replaceChildren(...(why === null ? [] : [el("p", { class: "hint" }, why)]));
     this.refresh();
     const { object } = this.selection;
     if (object === null) this.#list.removeAttribute("aria-activedescendant");
@@ -103,19 +105,21 @@ export class Objects {
       return;
     }
     setText(byId("object-name"), `${object.number} ${object.model}`);
+    const [x1, y1, x2, y2] = object.ends ?? [];
+    const chance = object.probability === null || object.probability === undefined ? `fit ${percent(object.score)}` : `probability ${percent(object.probability)}`;
     const facts = [
       ["state", object.confirmed ? "confirmed by an operator" : object.placed ? "placed by an operator; no reading supports it yet" : "recognised"],
-      ["certainty", object.probability === null || object.probability === undefined
-        ? `fit ${percent(object.score)}` : `probability ${percent(object.probability)}`],
-      ["place", this.units.place(object.x, object.y, 3)],
+      ["certainty", object.hidden_by === null ? chance : `behind wall ${object.hidden_by}, where no reading checks it; before: ${chance}`],
+      ["place", isWall(object) ? `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}` : this.units.place(object.x, object.y, 3)],
       ["turned by", degrees(object.theta)],
-      ["uncertainty", `± ${this.units.length(object.sigma, 3)}`],
+      isWall(object) ? ["length", this.units.length(Math.hypot(x2 - x1, y2 - y1))] : ["uncertainty", `± ${this.units.length(object.sigma, 3)}`],
     ];
-    if (object.covariance) {
+    if (object.covariance && !isWall(object)) {
       const { major, minor, angle } = ellipseOf(object.covariance);
       facts.push(["95 % ellipse", `${this.units.number(major, 3)} × ${this.units.length(minor, 3)} at ${degrees(angle)}`]);
     }
     facts.push(["readings", `${object.support}`]);
+    for (const id of ["object-confirm", "object-move"]) byId(id).hidden = isWall(object); // a wall is where its readings are
     const list = byId("object-facts");
     if (list.children.length !== 2 * facts.length) list.replaceChildren(...facts.flatMap(() => [el("dt"), el("dd")]));
     facts.forEach(([name, text], i) => {
@@ -127,7 +131,8 @@ export class Objects {
   #askEvidence() {
     const now = performance.now();
     const { object } = this.selection;
-    if (object === null || object === this.#refused || this.run.watchesRecording || this.run.object(object) === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
+    const picked = object === null ? null : this.run.object(object);
+    if (picked === null || isWall(picked) || object === this.#refused || this.run.watchesRecording || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
     this.#asking = true;
     this.#asked_ms = now;
     this.connection.request({ type: "evidence", object }).then((data) => {
@@ -173,6 +178,6 @@ export class Objects {
 // Describes the map in a sentence, for screen readers.
 export function describeMap(run, units) {
   const { objects, pose } = run.state;
-  const named = objects.slice(0, 12).map((object) => `${object.model} at ${units.place(object.x, object.y, 1)}`).join("; ");
-  return `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}. ${objects.length} objects${named ? `: ${named}` : ""}. ${run.segments.size} segments.`;
+  const named = objects.filter((object) => !isWall(object)).slice(0, 12).map((object) => `${object.model} at ${units.place(object.x, object.y, 1)}`).join("; ");
+  return `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}. Objects: ${countObjects(objects)}${named ? `; ${named}` : ""}. ${run.segments.size} segments.`;
 }

@@ -5,6 +5,7 @@ import { byId, download, el, setAttribute, setText } from "./dom.js";
 import { History, numericFields } from "./history.js";
 import { prefer, preferred } from "./preferences.js";
 import { fitted } from "./theme.js";
+import { isWall } from "./walls.js";
 
 const LANES_MAX = 8;
 const LEFT = 46;
@@ -55,7 +56,7 @@ export class Plots {
     const isOther = before !== null && (state.playback === null) !== (before.playback === null);
     if (isOther || (state.playback === null && before !== null && state.robot_s < before.robot_s)) this.#history.clear();
     this.#last = state;
-    const walls = state.objects.filter(({ ends }) => ends).length;
+    const walls = state.objects.filter(isWall).length;
     const counts = { segments: this.run.segments.size, objects: state.objects.length - walls, walls };
     this.#history.add(state.robot_s, { ...state, counts });
     const now = performance.now();

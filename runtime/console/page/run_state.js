@@ -1,6 +1,7 @@
 // The state of the run, assembled from the frames received. Nothing here draws or sends.
 
 import { Emitter } from "./emitter.js";
+import { hidingWall } from "./walls.js";
 
 const TRAIL_STEP_M = 0.02;
 const TRAIL_MAX = 6000;
@@ -56,6 +57,11 @@ export class RunState extends Emitter {
     return this.state.objects.find((object) => object.number === number) ?? null;
   }
 
+  // Within this of its place lies an object, m; of what has no model not much is known.
+  radius(object) {
+    return this.model(object.model)?.arc_radius_m ?? 0.1;
+  }
+
   // The frame of a sensor in the plane, as the ring stands now.
   sensor(index) {
     const mount = this.session?.ring?.mounts?.[index];
@@ -77,6 +83,7 @@ export class RunState extends Emitter {
     const switched = !this.fresh || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
     this.archived = frame.archived ?? this.archived;
     state.objects = [...state.objects, ...this.archived].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // frames list them by score, which changes
+    for (const object of state.objects) object.hidden_by = hidingWall(state, object, this.radius(object))?.number ?? null;
     this.state = state;
     if (jumped) this.#forgetTime();
     this.#applySegments(frame.segments);

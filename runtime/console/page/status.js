@@ -47,6 +47,8 @@ export class Status {
     });
     connection.on("closed", ({ opened }) => this.#lost(opened));
     setInterval(() => this.#age(), 200);
+    const facts = byId("facts"); // on a phone they scroll sideways, by keys too
+    new ResizeObserver(() => (facts.scrollWidth > facts.clientWidth ? setAttribute(facts, "tabindex", 0) : facts.removeAttribute("tabindex"))).observe(facts);
   }
 
   get #isOld() {

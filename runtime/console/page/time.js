@@ -2,6 +2,7 @@
 
 import { byId, download, el, setAttribute, setText } from "./dom.js";
 import { Pace, paceText } from "./pace.js";
+import { countObjects } from "./walls.js";
 
 const clock = (s) => `${s.toFixed(1)} s`;
 
@@ -195,7 +196,7 @@ export function screenshot({ scene, view, run, theme, units }) {
   ctx.font = theme.font(13);
   ctx.textBaseline = "middle";
   const { robot_s, mode, cycle, objects } = run.state;
-  const text = `${run.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}, ${objects.length} objects, in ${units.word}`;
+  const text = `${run.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}, objects: ${countObjects(objects)}, in ${units.word}`;
   ctx.fillText(text, 12, view.height + foot / 2);
   canvas.toBlob((blob) => download(`echolocate-${robot_s.toFixed(1)}s.png`, blob));
 }

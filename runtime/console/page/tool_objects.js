@@ -3,6 +3,7 @@
 import { byId, el } from "./dom.js";
 import { drawPreview } from "./tool_overlays.js";
 import { objectAt } from "./tool_select.js";
+import { isWall } from "./walls.js";
 
 const HANDLE_PX = 20;
 const ARM_PX = 30;
@@ -24,7 +25,8 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
   let held = null; // {pose, dx, dy, turning}
 
   const send = (number, pose) => mapEdits.move(number, pose);
-  const picked = () => (selection.object === null ? null : run.object(selection.object));
+  const standing = (object) => (object === null || isWall(object) ? null : object); // walls are not moved
+  const picked = () => (selection.object === null ? null : standing(run.object(selection.object)));
   const poseOf = ({ x, y, theta }) => ({ x, y, theta });
   const drop = () => {
     held = null;
@@ -41,7 +43,7 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
           return;
         }
       }
-      const hit = objectAt(run, view, at);
+      const hit = standing(objectAt(run, view, at));
       selection.pick(hit?.number ?? null);
       held = hit === null ? null : { pose: poseOf(hit), dx: hit.x - at.x, dy: hit.y - at.y, turning: false, model: hit.model, began: at };
       redraw();
@@ -63,7 +65,7 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
     key(event, spot) {
       const object = picked();
       if (event.key === "Enter") {
-        selection.pick(objectAt(run, view, spot())?.number ?? null);
+        selection.pick(standing(objectAt(run, view, spot()))?.number ?? null);
         return true;
       }
       if (object === null) return false;

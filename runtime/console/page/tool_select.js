@@ -3,6 +3,7 @@
 import { byId, setText } from "./dom.js";
 import { nearestSegment } from "./draw_segments.js";
 import { drawLasso } from "./tool_overlays.js";
+import { distanceToLine, isWall } from "./walls.js";
 
 const CLICK_PX = 4;
 const REACH_PX = 12;
@@ -19,7 +20,7 @@ export function objectAt(run, view, { x, y, touch }) {
   for (const object of run.state.objects) {
     if (object.number === null || object.number === undefined) continue;
     const radius = run.model(object.model)?.arc_radius_m ?? 0;
-    const away = Math.hypot(object.x - x, object.y - y);
+    const away = isWall(object) ? distanceToLine(object.ends, x, y) : Math.hypot(object.x - x, object.y - y);
     if (away < Math.max(radius, (touch ? TOUCH_PX : REACH_PX) / view.scale) && away < nearest) [best, nearest] = [object, away];
   }
   return best;
@@ -39,6 +40,8 @@ export function selectTool({ run, view, selection, redraw }) {
     if (segment !== null) {
       if (at.shift) selection.toggle(segment.number);
       else selection.choose([segment.number]);
+      const behind = objectAt(run, view, at); // a wall lies under its segments
+      if (behind !== null && isWall(behind)) selection.pick(behind.number);
       return;
     }
     const object = objectAt(run, view, at);

@@ -98,7 +98,10 @@ export function extent(run) {
     add(s.x1, s.y1);
     add(s.x2, s.y2);
   }
-  for (const object of run.state.objects) add(object.x, object.y, 0.4);
+  for (const { x, y, ends } of run.state.objects) {
+    if (ends) [ends.slice(0, 2), ends.slice(2)].forEach(([ex, ey]) => add(ex, ey, 0));
+    else add(x, y, 0.4);
+  }
   const truth = run.session?.truth;
   for (const [dx, dy, r] of truth?.drums ?? []) add(dx, dy, r);
   for (const [x1, y1, x2, y2] of truth?.walls ?? []) {
