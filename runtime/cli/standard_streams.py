@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import select
 import sys
 from collections.abc import Iterator
 from typing import Final, TextIO
@@ -17,6 +18,8 @@ from config.errors import FAILED, UserError
 
 STANDARD: Final = (0, 1, 2)
 """Descriptors of standard input, output and error."""
+FULL_PIPE_WAIT_S: Final = 1.0
+"""How long a line on standard error waits for a reader that does not read."""
 ESCAPED: Final = "backslashreplace"
 """How characters are written that the stream's character set does not have."""
 
@@ -56,12 +59,21 @@ class StandardOutput(io.TextIOWrapper):
 
 
 class StandardError(io.TextIOWrapper):
-    """Standard error, which loses what cannot be written: there is no other place to report that."""
+    """Standard error, which loses what cannot be written: there is no other place to report that.
+
+    A pipe that is full and has a reader which does not read would hold the program, and its end, for ever.
+    """
+
+    _patience_s = FULL_PIPE_WAIT_S
 
     def write(self, text: str, /) -> int:
         """Write a text, or lose it."""
         with contextlib.suppress(OSError):
-            super().write(text)
+            if select.select([], [self.fileno()], [], self._patience_s)[1]:
+                super().write(text)
+                self._patience_s = FULL_PIPE_WAIT_S
+            else:
+                self._patience_s = 0.0
         return len(text)
 
     def flush(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -54,6 +55,22 @@ def test_full_output_is_one_line_of_error(arguments: str, measured: Callable[[st
 def test_a_stream_that_takes_nothing_changes_no_exit_code(redirection: str, arguments: str, code: int) -> None:
     done = shell(redirection, arguments)
     assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
+
+
+def test_a_pipe_that_is_never_read_holds_no_end() -> None:
+    """The pipe is full before the call, and stays so."""
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    with contextlib.suppress(BlockingIOError):
+        while os.write(write, b" " * 4096):
+            pass
+    os.set_blocking(write, True)
+    try:
+        wrong = [sys.executable, *WRONG.split()]
+        assert subprocess.call(wrong, env=child_environment(), stderr=write, timeout=600) == WRONG_CALL
+    finally:
+        os.close(read)
+        os.close(write)
 
 
 def test_what_the_character_set_lacks_is_escaped() -> None:
