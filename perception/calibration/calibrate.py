@@ -15,7 +15,7 @@ from drivers.messages import Firing
 from perception.calibration.beam_fit import BeamFit, Looks, fit_beams
 from perception.calibration.drive import Drive, Scales, drive_of
 from perception.calibration.geometry_fit import Geometry, GeometryFit, Priors, RangeNoise, fit_geometry, sensors_at
-from perception.calibration.surfaces import UNSURE_RAD, Echoes, find_surfaces, most_voted_wall
+from perception.calibration.surfaces import UNSURE_RAD, Beams, Echoes, Surfaces, find_surfaces, most_voted_wall
 from perception.kernel import Floats
 
 PRIORS: Final = Priors()
@@ -26,6 +26,12 @@ ROUNDS: Final = 2
 """Rounds of places and directions, each with the other's result."""
 TURN_SCALES: Final = (1.0, *(1.0 + sign * 0.005 * k for k in range(1, 11) for sign in (1, -1)))
 """Turn scales that are tried first: a wall is smeared over two turns by twice the error."""
+TURN_STARTS: Final = 5
+"""Turn scales from which a rough fit begins, those under which a wall looks sharpest."""
+TURN_STARTS_APART: Final = 0.015
+"""They are at least so far apart."""
+SURFACE_SHARE: Final = 0.05
+"""Share of the readings that one surface more must explain: a wrong turn scale shows ghosts of a wall."""
 ECHOES_MAX: Final = 3000
 """Echoes that are enough for that."""
 LOOK_MAX_RAD: Final = math.radians(45.0)
@@ -97,11 +103,11 @@ def calibrate(
     nominal, half_angle = np.array(ring.mounts), math.radians(ring.beam_half_angle_deg)
     firing, sensor = np.nonzero(np.isfinite(drive.ranges))
     echoes = Echoes(firing, sensor, drive.ranges[firing, sensor])
-    start = _first_guess(drive, echoes, nominal, half_angle, radii, synchro=synchro)
-    if start is None:
-        return None
     # At first, readings count only so far within the beam that the sensor hears the surface for sure.
     angles, inside = nominal[:, 2], max(0.5 * half_angle, half_angle - UNSURE_RAD)
+    start = _first_guess(drive, echoes, nominal, inside, half_angle, radii, way_m, synchro=synchro)
+    if start is None:
+        return None
     for _ in range(ROUNDS):
         fit = fit_geometry(drive, echoes, angles, inside, start, PRIORS, way_m, synchro=synchro)
         beam_fit = fit_beams(_looks(drive, fit, nominal[:, 2], synchro=synchro), len(nominal))
@@ -111,22 +117,43 @@ def calibrate(
 
 
 def _first_guess(
-    drive: Drive, echoes: Echoes, nominal: Floats, half_angle: float, radii: Sequence[float], *, synchro: bool
-) -> Geometry | None:
-    """Return the surfaces at the turn scale under which most readings lie on one line; None if there are none."""
+    drive: Drive, echoes: Echoes, nominal: Floats, inside: float, ring_half_angle: float, radii: Sequence[float],
+    way_m: float | None, *, synchro: bool,
+) -> Geometry | None:  # fmt: skip
+    """Return scales and surfaces near the best ones, with the nominal mounts; None if there are no surfaces.
+
+    Where everything in a beam echoes, a wall looks as sharp under a turn scale that is a few percent wrong, and a fit
+    from there ends in a wrong minimum. So a rough fit begins at each of a few, and that which explains most readings
+    wins.
+    """
     bends = np.zeros(drive.knots)
     few = echoes.chosen(slice(None, None, 1 + len(echoes.sensor) // ECHOES_MAX))
 
-    def sharpness(scales: Scales) -> int:
-        beams = sensors_at(drive.path(scales, bends, synchro=synchro), few, nominal[:, :2], nominal[:, 2])
-        return most_voted_wall(beams, few.range_m, half_angle)[0]
+    def beams(turn: float, readings: Echoes) -> Beams:
+        path = drive.path(Scales(turn=turn), bends, synchro=synchro)
+        return sensors_at(path, readings, nominal[:, :2], nominal[:, 2])
 
-    scales = max((Scales(turn=turn) for turn in TURN_SCALES), key=sharpness)
-    beams = sensors_at(drive.path(scales, bends, synchro=synchro), echoes, nominal[:, :2], nominal[:, 2])
-    surfaces = find_surfaces(beams, echoes.range_m, half_angle, WALLS_MAX, radii)
-    if not len(surfaces.walls) + len(surfaces.drums):
-        return None
-    return Geometry(scales, surfaces, nominal[:, :2], bends)
+    def sharpness(turn: float) -> int:
+        return most_voted_wall(beams(turn, few), few.range_m, ring_half_angle)[0]
+
+    tried: list[float] = []
+    for turn in sorted(TURN_SCALES, key=sharpness, reverse=True):
+        if all(abs(turn - other) >= TURN_STARTS_APART for other in tried):
+            tried.append(turn)
+    best: tuple[float, Geometry] | None = None
+    for turn in tried[:TURN_STARTS]:
+        surfaces = find_surfaces(beams(turn, echoes), echoes.range_m, ring_half_angle, WALLS_MAX, radii)
+        count = len(surfaces.walls) + len(surfaces.drums)
+        if not count:
+            continue
+        start = Geometry(Scales(turn=turn), surfaces, nominal[:, :2], bends)
+        rough = fit_geometry(drive, few, nominal[:, 2], inside, start, PRIORS, way_m, synchro=synchro)
+        explained, fitted = float(rough.readings.sum()) - SURFACE_SHARE * len(few.sensor) * count, rough.geometry
+        if best is None or explained > best[0]:
+            drums = np.column_stack([fitted.surfaces.drums[:, :2], surfaces.drums[:, 2]])
+            found = Surfaces(fitted.surfaces.walls, drums)
+            best = explained, Geometry(fitted.scales, found, nominal[:, :2], bends)
+    return best[1] if best is not None else None
 
 
 def _looks(drive: Drive, fit: GeometryFit, angles: Floats, *, synchro: bool) -> Looks:

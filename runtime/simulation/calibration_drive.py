@@ -23,7 +23,8 @@ SPEED_M_S: Final = 0.15
 WAY_M: Final = 4.0
 AWAY_RAD: Final = 0.6
 """The way leads away from the wall by this angle."""
-DRUM: Final = DrumConfig(x_m=2.6, y_m=-0.6, radius_m=0.29)
+DRUM: Final = DrumConfig(x_m=2.6, y_m=-0.87, radius_m=0.29)
+"""The way passes it at 0.2 m: only its near echoes show how large the ring is all round."""
 WALL: Final = WallConfig(x1_m=-3.0, y1_m=1.1, x2_m=7.0, y2_m=1.3)
 BODY: Final = BodyConfig(radius_m=0.25, speed_max_m_s=0.5, turn_max_rad_s=1.5)
 ANGLE_ERROR_DEG: Final = 3.0
