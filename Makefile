@@ -15,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # As pip does; a company's registry may have a certificate of its own.
 export UV_SYSTEM_CERTS ?= 1
 
-.PHONY: run test check lint kernels tests compiled interpreted coverage boundscheck promises mutants soak bench docs clean
+.PHONY: run test check lint kernels tests compiled interpreted coverage boundscheck promises mutants soak ros2 bench docs clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -68,11 +68,20 @@ promises: $(VENV)/test.stamp
 
 # Long forms of tests, fuzzers, new random examples (`make tests` repeats the same ones), and 1.5 h of driving in virtual
 # time that checks memory growth, late compilation and full garbage collections.
-soak: $(VENV)/soak.stamp
+soak: $(VENV)/soak.stamp ros2
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
-	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
+	$(BIN)/python -m pytest -m "soak and not ros2" --promises=docs/promises-soak.md
 	@$(BIN)/python -m bench.growth $(SOAK)
 	@$(BIN)/python -m bench.budget $(SOAK)
+
+# The bridge to ROS 2 beside real nodes. ROS is 260 MB and starts every Python of its environment anew, so it has its own.
+ros2: $(VENV)-ros2/stamp
+	$(VENV)-ros2/bin/python -m pytest -m ros2 --promises=docs/promises-soak.md
+
+$(VENV)-ros2/stamp: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-ros2
+	$(VENV)-ros2/bin/python -m pip install -q --disable-pip-version-check --editable ".[dev,ros2]"
+	@touch $@
 
 # Changes the code in one place at a time, checks that the tests detect it, and writes docs/mutants.md.
 mutants: $(VENV)/test.stamp
@@ -96,7 +105,7 @@ docs: $(VENV)/docs.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 
 clean:
-	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
+	rm -rf $(VENV) $(VENV)-ros2 build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
 
 # uv takes a third of pip's time. Where it is not installed, pip fetches it; where that fails, pip installs everything.
 define install

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from config.arcos import ArcosConfig
 from config.rflex import RflexConfig
+from config.ros2 import Ros2Config
 from config.strict import Strict, TomlList
 
 SOUND_SPEED_M_S = 343.0
@@ -17,7 +18,7 @@ SOUND_SPEED_M_S = 343.0
 SENSORS_MAX = 255
 """Largest number of sensors in a ring, and of sets in a firing pattern; bounds the memory for a faulty file."""
 
-_WITHOUT_LISTENERS: Final = ("arcos", "rflex")
+_WITHOUT_LISTENERS: Final = ("arcos", "rflex", "ros2")
 """Shipped drivers of rings whose sensors hear only their own echoes."""
 
 SensorSet: TypeAlias = Annotated[TomlList[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
@@ -187,7 +188,8 @@ class LinkConfig(Strict):
     """The serial line to the robot and its timeouts."""
 
     port: str | None = None
-    """Serial port of the robot, as /dev/ttyUSB0, or socket://host:port; without it a run starts the emulator."""
+    """Serial port of the robot, as /dev/ttyUSB0, socket://host:port, or "ros2" for the driver of that name; without
+    one a run starts the emulator."""
     baud: int = Field(default=115200, ge=300, le=4_000_000)
     """Speed of the line, bits per second."""
     reply_timeout_s: float = Field(default=0.1, ge=0.001, le=10.0)
@@ -246,6 +248,8 @@ class RobotConfig(Strict):
     """Of the driver "arcos", for the Pioneer family."""
     rflex: RflexConfig = RflexConfig()
     """Of the driver "rflex", for the B21r, ATRV-Jr and Magellan."""
+    ros2: Ros2Config = Ros2Config()
+    """Of the driver "ros2", for robots that run ROS 2."""
 
     @model_validator(mode="after")
     def _can_listen(self) -> RobotConfig:

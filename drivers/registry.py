@@ -11,14 +11,15 @@ The entry point names an object with the functions of `DriverFamily`; a module w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, TypedDict, cast
 
 from config.robot import CalibrationConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import DriverError
+from drivers.serial_port import OpenPort
 
 if TYPE_CHECKING:
     from config.robot import RobotConfig
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 GROUP: Final = "echolocate.drivers"
 
 SHIPPED: Final[Mapping[str, EntryPoint]] = MappingProxyType(
-    {name: EntryPoint(name, f"drivers.{name}.family", GROUP) for name in ("arcos", "denning", "rflex")}
+    {name: EntryPoint(name, f"drivers.{name}.family", GROUP) for name in ("arcos", "denning", "rflex", "ros2")}
 )
 
 
@@ -116,6 +117,28 @@ def make_device(
     world = _with_errors(world, config.calibration)
     family = _family(config.robot.driver)
     return family.make_device(config, world, seed, faults=faults, clock_start_us=clock_start_us)
+
+
+class LineOptions(TypedDict, total=False):
+    """How `drivers.link.Link` opens a line that is neither a serial port nor a TCP connection."""
+
+    opener: OpenPort
+    open_timeout_s: float
+
+
+def line_options(config: RobotConfig) -> LineOptions:
+    """Return how the robot's line is opened, as arguments of `drivers.link.Link`; none for a port or a connection.
+
+    A family that opens its line itself has a function `line_options` of the robot file.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
+    """
+    options: Callable[[RobotConfig], LineOptions] | None
+    options = getattr(_family(config.robot.driver), "line_options", None)
+    return LineOptions() if options is None else options(config)
 
 
 def _family(name: str) -> DriverFamily:

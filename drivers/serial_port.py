@@ -28,6 +28,10 @@ OPENING_ERRORS = (OSError, ValueError, OverflowError, termios.error)
 """The exceptions of the serial library if a port cannot be opened or configured."""
 
 
+class GatewayError(OSError):
+    """A line that a process of its own serves cannot be opened; the text is the whole message."""
+
+
 class LinkError(UserError):
     """The port cannot be opened: one line with what happened, the likely cause and the next action."""
 
@@ -49,6 +53,8 @@ def opening_error(config: LinkConfig, error: BaseException) -> LinkError:
     if config.port is not None and is_tcp(config.port):
         wrong = isinstance(error, ValueError | OverflowError | socket.gaierror)
         return LinkError(explain_tcp(config.port, error), WRONG_CALL if wrong else FAILED)
+    if isinstance(error, GatewayError):
+        return LinkError(" ".join(str(error).split()), FAILED)
     in_use = getattr(error, "errno", None) in _IN_USE
     return LinkError(explain(config, error), FAILED if in_use else WRONG_CALL)
 

@@ -81,6 +81,12 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "drivers/firmware/board/robot_config_esp32.py",
             "drivers/firmware/board/robot_config_pico.py",
         ),
+        "`make ros2` runs it beside real nodes, see test_real_nodes.py": (
+            "drivers/ros2/gateway.py",
+            "runtime/bridges/ros2/bridge.py",
+            "runtime/bridges/ros2/node.py",
+            "runtime/bridges/ros2/robot_listener.py",
+        ),
         "the scenes and oracles of tests/perception/bayes reach it": (
             "perception/bayes/alternatives.py",
             "perception/bayes/circle_posterior.py",

@@ -39,7 +39,7 @@ CONNECT_MAX_S: Final = 5.0
 KEPT_MAX: Final = 256
 """Messages that may wait to be taken."""
 RETRY_FIRST_S: Final = 0.25
-RETRY_MAX_S: Final = 4.0
+RETRY_MAX_S: Final = 2.0
 """Waits between attempts to connect; each is twice the one before."""
 
 _REFUSED: Final = MappingProxyType({

@@ -16,7 +16,7 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.link import Link
 from drivers.messages import Firing, Twist
-from drivers.registry import make_driver
+from drivers.registry import line_options, make_driver
 from perception.edits import Edit, Evidence
 from runtime.cycle.alerts import Alerts
 from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINK_RECEIVE
@@ -125,11 +125,9 @@ class RobotProcess:
         self._state = prepared_state(settings) if preparation is None else unprepared_state(settings)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self.timing_monitor.timed
+        on_opened, on_data = timed(LINE_OPENED, self._on_opened), timed(LINK_RECEIVE, self._on_data)
         self._link = Link(
-            settings.link,
-            timed(LINE_OPENED, self._on_opened),
-            timed(LINK_RECEIVE, self._on_data),
-            timed(LINE_LOST, self._on_closed),
+            settings.link, on_opened, on_data, timed(LINE_LOST, self._on_closed), **line_options(settings)
         )
         self._clock.on_change(self._link.release)
         self._connection = Connection(self._link, self._driver, self._send, self._clock)

@@ -93,7 +93,8 @@ def test_a_section_that_no_robot_file_may_have(tmp_path: Path) -> None:
     mine = write(tmp_path / "mine.toml", {**ROBOT, "cycle": {"rate_hz": 5}})
     run = write(tmp_path / "run.toml", {"robot": "mine.toml"})
     assert (
-        problem(run) == f"{mine}: cycle: unknown key; known here: robot, ring, body, link, calibration, arcos, rflex"
+        problem(run)
+        == f"{mine}: cycle: unknown key; known here: robot, ring, body, link, calibration, arcos, rflex, ros2"
     )
 
 

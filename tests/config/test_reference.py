@@ -36,6 +36,7 @@ def test_every_setting_of_a_run_is_listed_once() -> None:
         "ring.sensors",
         "arcos",
         "rflex",
+        "ros2",
         "calibration",
         "mission",
     }

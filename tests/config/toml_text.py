@@ -45,12 +45,24 @@ RFLEX = {
     "fail_safe_s": 0.5,
     "battery_low_v": 21.0,
 }
+ROS2 = {
+    "ranges": ["/sonar/s00", "/sonar/s01"],
+    "frames": ["sonar_00", "sonar_01"],
+    "odometry": "/odom",
+    "base_frame": "base_footprint",
+    "cmd_vel": "/cmd_vel",
+    "cmd_vel_stamped": False,
+    "odometry_period_s": 0.02,
+    "group_s": 0.01,
+    "deadman_s": 0.25,
+}
 ROBOT: dict[str, Any] = {
     "ring": REGULAR_RING,
     "body": BODY,
     "link": {"port": "/dev/ttyS0", "baud": 9600},
     "arcos": ARCOS,
     "rflex": RFLEX,
+    "ros2": ROS2,
 }
 MODEL: dict[str, Any] = {
     "name": "corner",

@@ -107,6 +107,13 @@ RFLEX: Final = Family(
     B21R, B21R.ring.model_copy(update={"firing": B21R.ring.firing.model_copy(update={"step_period_s": 0.04})}),
     connect_s=0.4, silent_s=0.5, deaf_s=1.0, halt_s=0.35, handshake_bytes=0, cut_stride=29,
 )  # fmt: skip
+ROS2: Final = Family(
+    DENNING.robot.model_copy(update={
+        "robot": DriverConfig(driver="ros2"), "body": DENNING.robot.body.model_copy(update={"synchro": False}),
+    }),
+    DENNING.other_ring, connect_s=0.2, silent_s=0.5, deaf_s=0.5, halt_s=0.15, handshake_bytes=0, cut_stride=29,
+)  # fmt: skip
+"""Without ROS, which tests/drivers/ros2 adds in plain data."""
 CHIRP_RING: Final = RingConfig.model_validate({
     "count": 12, "radius_m": 0.2, "beam_half_angle_deg": 15.0, "resolution_m": 0.001, "range_min_m": 0.05,
     "range_max_m": 4.0, "firing": {"preset": "thirds", "step_period_s": 0.05},
@@ -121,7 +128,7 @@ CHIRP: Final = Family(
 )  # fmt: skip
 """The example of docs/extending.md."""
 CHIRP_ENTRY: Final = EntryPoint("chirp", "tests.drivers.contract.example.family", GROUP)
-FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING, "rflex": RFLEX})
+FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING, "rflex": RFLEX, "ros2": ROS2})
 
 
 def is_near(twist: Twist, wanted: Twist) -> bool:

@@ -54,6 +54,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "settings": ("settings", "--out {0}"),
     "recover": ("recover", "my.mcap", "--out {0}"),
+    "robot with ROS": ("ros2-robot", "--radius 0.3", "--out {0}"),
     "report": ("report", "my.mcap", "--world my_world.toml", "--out {0}"),
     "report of a ring log": ("report", "my.csv", "--robot my_robot.toml", "--out {0}"),
     "figures": ("figures", "my.csv", "--model my_model.toml", "--out folder"),

@@ -1,0 +1,1 @@
+"""The ROS 2 bridge: a run as a node, with topics, frames and services as ROS users expect them."""

@@ -1,0 +1,120 @@
+"""The bridge's process: one connection to a run, one node of ROS, and what passes between them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from typing import Any
+
+from config.errors import UserError
+from runtime.bridges.console_client import ConsoleClient, ConsoleError, stay_connected
+from runtime.bridges.ros2.node import BridgeNode
+from runtime.bridges.ros2.operator import Operator
+from runtime.bridges.ros2.topics import Topics
+
+NO_RUN = "there is no connection to the run: start it, or look at the bridge's log"
+
+
+async def run_bridge(find: Callable[[], str], arguments: Sequence[str]) -> None:
+    """Bridge a run and ROS until cancelled; connect again whenever the run restarts.
+
+    Parameters
+    ----------
+    find : callable
+        Returns the start URL of the run.
+    arguments : sequence of str
+        Of ROS, as `--ros-args -r __ns:=/robot1`.
+    """
+    bridge = _Bridge(asyncio.get_running_loop())
+    node = bridge.node = BridgeNode(arguments, bridge)
+    try:
+        await stay_connected(find, bridge.serve, node.warn)
+    finally:
+        node.close()
+
+
+class _Bridge:
+    """Fulfils `runtime.bridges.ros2.node.Commands`: passes what ROS asks into the loop."""
+
+    node: BridgeNode
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._operator: Operator | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def serve(self, client: ConsoleClient) -> None:
+        """Serve one connection until it ends."""
+        node, topics = self.node, Topics(self.node.frames)
+        operator = self._operator = Operator(client, node.timeout_s, node.warn, time.monotonic)
+        driving = asyncio.create_task(operator.drive(), name="cmd_vel")
+        try:
+            async for message in client.messages():
+                match message["type"]:
+                    case "state":
+                        frames, outputs = topics.take(message, node.now_s())
+                        if topics.note is not None:
+                            node.warn(topics.note)
+                        node.publish(outputs, frames)
+                    case "session":
+                        topics.begin(message)
+                        node.publish_static(topics.static(round(1e9 * node.now_s())))
+                        node.info(f"connected to the run of {message['name'] or 'a robot'}")
+                        await operator.begin()
+                    case "role":
+                        await operator.yield_control()
+        finally:
+            self._operator = None
+            driving.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await driving
+
+    def velocity(self, v: float, w: float) -> None:
+        """Drive at a velocity."""
+        self._loop.call_soon_threadsafe(self._velocity, v, w)
+
+    def trigger(self, name: str, done: Callable[[bool, str], None]) -> None:
+        """Carry out arm, disarm or halt."""
+
+        async def work() -> None:
+            try:
+                answer = await self._connected().command(name)
+            except UserError as error:
+                done(False, str(error))  # noqa: FBT003 - whether it was done
+            else:
+                done(True, answer)  # noqa: FBT003 - whether it was done
+
+        self._begin(work())
+
+    def goal(self, x: float, y: float, heading_rad: float | None, frame: str) -> None:
+        """Drive to a place."""
+        self._begin(self._reporting("goal_pose", lambda operator: operator.goal(x, y, heading_rad, frame)))
+
+    def place(self, x: float, y: float, theta: float) -> None:
+        """Say where the robot is in the map."""
+        self._begin(self._reporting("initialpose", lambda operator: operator.place(x, y, theta)))
+
+    async def _reporting(self, topic: str, work: Callable[[Operator], Coroutine[Any, Any, None]]) -> None:
+        try:
+            await work(self._connected())
+        except UserError as error:
+            self.node.warn(f"{topic} is not carried out: {error}")
+
+    def _connected(self) -> Operator:
+        if self._operator is None:
+            raise ConsoleError(NO_RUN)
+        return self._operator
+
+    def _velocity(self, v: float, w: float) -> None:
+        if self._operator is not None:
+            self._operator.velocity(v, w)
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        def start() -> None:
+            task = self._loop.create_task(work)
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+        self._loop.call_soon_threadsafe(start)

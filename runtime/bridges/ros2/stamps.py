@@ -1,0 +1,51 @@
+"""ROS time of the robot's own clock.
+
+Ranges, odometry and frames of one state carry the robot's times, which are exact to each other; when a state arrives
+varies. So the offset between the two clocks is the smallest seen, and rises slowly in order to follow their drift.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+DRIFT: Final = 1e-3
+"""How fast the offset may rise, s/s: ten times the drift of two quartz clocks."""
+JUMP_S: Final = 0.5
+"""A clock that differs by more from what the other one says has jumped."""
+
+
+class StampClock:
+    """Converts times of the robot's clock to ROS time."""
+
+    def __init__(self) -> None:
+        self._offset_s = math.nan
+        self._ros_s = 0.0
+
+    def update(self, robot_s: float, ros_s: float, *, is_steady: bool) -> str | None:
+        """Take in that a state of this robot's time arrived; return the message if a clock has jumped.
+
+        Parameters
+        ----------
+        robot_s, ros_s : float
+            The robot's clock in the state, and ROS time when it arrived, s.
+        is_steady : bool
+            Whether the robot's time runs as fast as ROS time: not while an emulated run is paused or slowed down.
+        """
+        offset_s, before_s, elapsed_s = ros_s - robot_s, self._offset_s, ros_s - self._ros_s
+        self._ros_s = ros_s
+        if math.isnan(before_s) or not is_steady:
+            self._offset_s = offset_s
+            return None
+        if abs(offset_s - before_s) > JUMP_S:
+            self._offset_s = offset_s
+            return (
+                f"clock jump: ROS time and the robot's clock differ by {offset_s - before_s:+.2f} s from before; the "
+                f"robot restarted, or the time of ROS or of this machine was set: stamps follow the new time"
+            )
+        self._offset_s = min(offset_s, before_s + DRIFT * max(0.0, elapsed_s))
+        return None
+
+    def nanoseconds(self, robot_s: float) -> int:
+        """Return the ROS time of a time of the robot's clock, ns."""
+        return max(0, round(1e9 * (self._offset_s + robot_s)))

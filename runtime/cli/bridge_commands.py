@@ -1,0 +1,61 @@
+"""The commands that connect a run to other programs: `ros2`, `ros2-robot`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from runtime.cli.options import Flag, Force
+
+Connect = Annotated[
+    str | None, Parameter(help="Start URL of the run, with its token; by default that of the run on this machine.")
+]
+
+
+def ros2(
+    *ros: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    connect: Connect = None,
+    launch_file: Annotated[bool, Flag] = False,
+) -> int:
+    """Bridge a run and ROS 2: ranges, odometry, frames, objects out; velocities, goals, arm, disarm, halt in.
+
+    Parameters
+    ----------
+    ros
+        Arguments of ROS, as --ros-args -r __ns:=/robot1 -p cmd_vel_timeout:=0.2
+    launch_file
+        Print a launch file for `ros2 launch` instead.
+    """
+    from runtime.cli.commands.ros2 import bridge_ros2, print_launch_file
+
+    return print_launch_file() if launch_file else bridge_ros2(connect, ros)
+
+
+def ros2_robot_command(
+    *,
+    out: str,
+    radius: float,
+    speed: float = 0.3,
+    turn: float = 1.0,
+    seconds: float = 5.0,
+    force: Force = False,
+) -> int:
+    """Write the robot file of a robot that runs ROS 2, from its ranges, odometry and frames; nothing moves.
+
+    Parameters
+    ----------
+    out
+        File to write; then `echolocate run --robot FILE` runs the robot.
+    radius
+        Radius of its body, m.
+    speed
+        Largest speed to drive it at, m/s.
+    turn
+        Largest turning rate, rad/s.
+    seconds
+        How long to listen.
+    """
+    from runtime.cli.commands.ros2_robot import write_robot_file
+
+    return write_robot_file(out, radius_m=radius, speed_m_s=speed, turn_rad_s=turn, seconds=seconds, force=force)

@@ -1,0 +1,64 @@
+"""`echolocate ros2`: a bridge between a run and ROS 2, in a process of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import sys
+from collections.abc import Callable, Coroutine, Sequence
+from importlib.resources import files
+from importlib.util import find_spec
+from typing import Any, Final
+
+from config.errors import DONE, FAILED, UserError
+from runtime.cli.start_signals import handled_by_loop
+from runtime.support.console_address import find_console
+from runtime.support.user_folders import state_folder
+
+NO_ROS: Final = (
+    "ROS 2 is not installed here: source its setup.bash and run echolocate with its version of Python, or "
+    "pip install 'echolocate[ros2]'"
+)
+
+
+def bridge_ros2(connect: str | None, arguments: Sequence[str]) -> int:
+    """Bridge a run and ROS 2 until interrupted, and return the exit code.
+
+    Parameters
+    ----------
+    connect : str, optional
+        Start URL of the run; None for the run of this user on this machine.
+    arguments : sequence of str
+        Of ROS.
+
+    Raises
+    ------
+    UserError
+        ROS 2 is not installed, or an argument of it is wrong.
+    """
+    if find_spec("rclpy") is None:
+        raise UserError(NO_ROS, FAILED)
+    from runtime.bridges.ros2.bridge import run_bridge
+
+    asyncio.run(until_interrupted(run_bridge(console_finder(connect), arguments)))
+    return DONE
+
+
+def console_finder(connect: str | None) -> Callable[[], str]:
+    """Return a function that returns the start URL of the run: this one, or that of this machine's newest run."""
+    return (lambda: find_console(state_folder())) if connect is None else (lambda: connect)
+
+
+async def until_interrupted(work: Coroutine[Any, Any, None]) -> None:
+    """Do something until SIGINT or SIGTERM comes."""
+    task = asyncio.create_task(work)
+    ending = dict.fromkeys((signal.SIGINT, signal.SIGTERM), task.cancel)
+    with handled_by_loop(ending), contextlib.suppress(asyncio.CancelledError):
+        await task
+
+
+def print_launch_file() -> int:
+    """Print the launch file and return the exit code."""
+    sys.stdout.write((files("runtime.bridges.ros2") / "echolocate_launch.txt").read_text("utf-8"))
+    return DONE

@@ -1,0 +1,1 @@
+"""ROS 2 as a robot: its topics on the line of the ring-and-base protocol."""

@@ -1,0 +1,156 @@
+"""States as ROS messages, in plain data: what a robot's frames, ranges and objects look like to others."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+
+from config.load import load_settings
+from drivers.ros_tf import Frame
+from runtime.bridges.ros2.topics import DELETE, STRIP, Frames, Output, Topics
+from runtime.console.frames.session_info import session_info
+
+DRUM: dict[str, Any] = {
+    "number": 7, "model": "semicircle", "x": 2.0, "y": 1.0, "theta": 0.3, "sigma": 0.01,
+    "covariance": [4e-4, 1e-4, 9e-4], "probability": 0.99, "support": 40, "score": 0.99, "confirmed": False,
+    "placed": False, "ends": None,
+}  # fmt: skip
+WALL = {**DRUM, "number": None, "model": "wall", "ends": [0.0, 1.0, 2.0, 1.0]}
+
+
+def state(robot_s: float = 10.0, **changes: Any) -> dict[str, Any]:
+    ranges, ages = [None] * 24, [None] * 24
+    return {
+        "type": "state", "mode": "DRIVE", "reason": None, "hold_reason": None, "cycle": 3, "robot_s": robot_s,
+        "pose": [1.0, 2.0, 0.5], "ring_yaw": 0.2, "twist": [0.3, 0.1], "flags": ["BUMPER"], "ranges": ranges,
+        "age": ages, "objects": [], "localized": None, "sensors": [], "paused": False, "speed": 1.0, "playback": None,
+        "cycle_us": 500.0, "late_us": 3.0, "missed": 0, "late": 0, "quanta": 4, "clients": 1,
+        "link": {"frames": 9, "bad": 0, "lost": 0}, **changes,
+    }  # fmt: skip
+
+
+def topics(frames: Frames | None = None) -> Topics:
+    made = Topics(frames or Frames())
+    made.begin(session_info(load_settings("hallway"), name="denning", emulated=True, units="m"))
+    return made
+
+
+def of(outputs: list[Output], topic: str) -> list[dict[str, Any]]:
+    return [output.fields for output in outputs if output.topic == topic]
+
+
+def yaw(frame: Frame) -> float:
+    return 2.0 * math.atan2(frame.rotation[2], frame.rotation[3])
+
+
+def test_a_reading_is_published_once_with_its_own_time_and_no_echo_is_infinite() -> None:
+    made, first = topics(), state()
+    first["ranges"][3], first["age"][3] = 1.5, 0.04
+    first["ranges"][4], first["age"][4] = -1.0, 0.04
+    _, outputs = made.take(first, 100.0)
+    (near,), (far,) = of(outputs, "sonar/s03"), of(outputs, "sonar/s04")
+    assert near["header"] == {"stamp": {"sec": 99, "nanosec": 960_000_000}, "frame_id": "sonar_03"}
+    assert (near["range"], near["min_range"], near["max_range"]) == (1.5, 0.1524, 7.7724)
+    assert near["field_of_view"] == pytest.approx(math.radians(24.0))
+    assert far["range"] == math.inf, "REP 117"
+    second = state(10.05, ranges=first["ranges"], age=[a if a is None else a + 0.05 for a in first["age"]])
+    assert not [output for output in made.take(second, 100.05)[1] if output.topic.startswith("sonar/")]
+    second["age"][3] = 0.0
+    assert [output.topic for output in made.take(second, 100.05)[1] if output.topic.startswith("sonar/")] == [
+        "sonar/s03"
+    ]
+
+
+def test_frames_lead_from_the_map_to_every_sensor() -> None:
+    made = topics()
+    frames, outputs = made.take(state(), 100.0)
+    assert [(f.parent, f.child) for f in frames] == [("map", "odom"), ("odom", "base_link"), ("base_link", "ring")]
+    assert frames[1].translation == (1.0, 2.0, 0.0)
+    assert [yaw(frame) for frame in frames] == pytest.approx([0.0, 0.5, -0.3])
+    static = made.static(5)
+    assert [f.child for f in static] == [f"sonar_{k:02d}" for k in range(24)]
+    assert static[6].translation == pytest.approx((0.0, 0.381, 0.0))
+    assert yaw(static[6]) == pytest.approx(0.5 * math.pi)
+    (odometry,) = of(outputs, "odom")
+    assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("odom", "base_link")
+    assert odometry["twist"]["twist"] == {"linear": {"x": 0.3}, "angular": {"z": 0.1}}
+
+
+def test_a_known_room_moves_the_odometry_in_the_map() -> None:
+    localized = {"pose": [5.0, 1.0, 0.7], "covariance": [1.0, 2.0, 3.0, 4.0], "frame": [1.0, 0.0, 0.5 * math.pi]}
+    frames, outputs = topics().take(state(localized=localized), 100.0)
+    assert frames[0].translation == pytest.approx((0.0, 1.0, 0.0)), "the inverse of the map in odom"
+    assert yaw(frames[0]) == pytest.approx(-0.5 * math.pi)
+    (pose,) = of(outputs, "pose")
+    covariance = pose["pose"]["covariance"]
+    assert (covariance[0], covariance[1], covariance[6], covariance[7], covariance[35]) == (1.0, 2.0, 2.0, 3.0, 4.0)
+
+
+def test_a_prefix_is_before_every_frame_but_the_map() -> None:
+    made = topics(Frames(prefix="r1/"))
+    frames, _ = made.take(state(), 100.0)
+    names = [*itertools.chain(*((f.parent, f.child) for f in frames)), made.static(0)[0].child]
+    assert names == ["map", "r1/odom", "r1/odom", "r1/base_link", "r1/base_link", "r1/ring", "r1/sonar_00"]
+
+
+def test_objects_are_markers_that_keep_their_numbers_and_are_deleted() -> None:
+    made = topics()
+    _, outputs = made.take(state(objects=[DRUM, WALL]), 100.0)
+    (markers,) = of(outputs, "objects")
+    named = {(m["ns"], m["id"]): m for m in markers["markers"]}
+    assert named.keys() == {("semicircle", 7), ("semicircle label", 7), ("wall", 0)}
+    assert named["semicircle", 7]["scale"]["x"] == pytest.approx(0.6096)
+    assert named["wall", 0]["type"] == STRIP
+    assert named["wall", 0]["points"] == [{"x": 0.0, "y": 1.0}, {"x": 2.0, "y": 1.0}]
+    (pose,) = of(outputs, "object_poses")
+    assert pose["pose"]["covariance"][0] == 4e-4
+    assert not of(made.take(state(10.05), 100.05)[1], "objects"), "five times a second is enough"
+    (markers,) = of(made.take(state(10.2, objects=[WALL]), 100.2)[1], "objects")
+    assert {(m["ns"], m["id"]) for m in markers["markers"] if m["action"] == DELETE} == {
+        ("semicircle", 7), ("semicircle label", 7)
+    }  # fmt: skip
+
+
+def test_a_model_with_corners_is_its_outline() -> None:
+    made = Topics(Frames())
+    made.begin(session_info(load_settings("hallway", ["models=box"]), name=None, emulated=True, units="m"))
+    name = next(m["name"] for m in made._session["models"] if m["arc_radius_m"] is None)
+    _, outputs = made.take(state(objects=[{**DRUM, "model": name, "theta": 0.5 * math.pi}]), 100.0)
+    (markers,) = of(outputs, "objects")
+    (vx, vy), *_ = next(m["vertices"] for m in made._session["models"] if m["name"] == name)
+    first = markers["markers"][0]["points"][0]
+    assert (first["x"], first["y"]) == pytest.approx((2.0 - vy, 1.0 + vx))
+
+
+def test_the_mode_is_sent_when_it_changes_and_diagnostics_every_second() -> None:
+    made = topics()
+    runs = [made.take(state(10.0 + 0.05 * k), 100.0 + 0.05 * k)[1] for k in range(41)]
+    assert [k for k, outputs in enumerate(runs) if of(outputs, "mode")] == [0]
+    assert [k for k, outputs in enumerate(runs) if of(outputs, "/diagnostics")] == [0, 20, 40]
+    _, outputs = made.take(
+        state(12.1, mode="SAFE_STOP", reason="halted", sensors=[[3, "deaf", "hears nothing"]]), 103.0
+    )
+    assert of(outputs, "mode") == [{"data": "SAFE_STOP"}]
+    (array,) = of(outputs, "/diagnostics")
+    mode, ring, line = array["status"]
+    assert (mode["level"], mode["message"], mode["hardware_id"]) == (b"\x01", "SAFE_STOP: halted", "denning")
+    assert (ring["level"], ring["message"]) == (b"\x01", "sensor 3: deaf, hears nothing")
+    assert {"key": "frames", "value": "9"} in line["values"]
+
+
+def test_a_clock_that_jumped_is_a_note_and_readings_go_on() -> None:
+    made, first = topics(), state()
+    first["ranges"][0], first["age"][0] = 1.0, 0.0
+    made.take(first, 100.0)
+    first_note, again = made.note, state(0.1, ranges=first["ranges"], age=first["age"])
+    _, outputs = made.take(again, 100.05)
+    assert (first_note, made.note is None) == (None, False)
+    assert of(outputs, "sonar/s00")
+
+
+def test_nothing_is_published_before_the_session_nor_of_a_recording() -> None:
+    assert Topics(Frames()).take(state(), 1.0) == ([], [])
+    assert topics().take(state(playback={"s": 1.0}), 1.0) == ([], [])
