@@ -58,9 +58,13 @@ class RunSnapshot:
     echoes: int
     """Number of rows of `Timeline.echoes` up to this moment."""
     segments: Floats
-    """(n, 4): ends x, y, x, y (m) of the outline segments that the paper's front end finds."""
+    """(n, 4): ends x, y, x, y (m) of the outline segments in the run's own map."""
     clusters: tuple[Cluster, ...]
+    """Of these segments, as the paper's method groups them."""
     objects: tuple[DetectedObject, ...]
+    """The models recognised."""
+    walls: tuple[DetectedObject, ...] = ()
+    """The walls recognised; each has its `ends`."""
     grid: KnownCells | None = None
     """What the evidence grid holds; None where the settings keep none."""
 
@@ -132,8 +136,6 @@ class Timeline:
     """Evenly over the run; the last one is its end."""
     segments: Floats = field(default_factory=_no_rows)
     """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
-    walls: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    """(n, 4): ends x, y, x, y (m) of the walls recognised at the end."""
     map_view: MapView | None = None
     """Only of a run in a known room."""
     modes: list[ModeEntry] = field(default_factory=list)
@@ -171,6 +173,11 @@ class Timeline:
     def objects(self) -> tuple[DetectedObject, ...]:
         """The objects recognised at the end."""
         return self.snapshots[-1].objects if self.snapshots else ()
+
+    @property
+    def walls(self) -> tuple[DetectedObject, ...]:
+        """The walls recognised at the end."""
+        return self.snapshots[-1].walls if self.snapshots else ()
 
     @property
     def start_unix_ns(self) -> int:

@@ -1,12 +1,13 @@
 """Construction of a timeline from a replay: echoes, the path, and snapshots at even intervals.
 
-The paper's figures show outline segments and clusters whatever method recognised the objects, so the paper's front
-end processes the same firings here. Memory is bounded: the snapshots of a long run are farther apart.
+Segments and clusters are those that the console shows: the run's own segments, grouped as the paper's method does.
+Memory is bounded: the snapshots of a long run are farther apart.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from drivers.messages import Firing, Floats, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.localization.map_frame import turned_object
 from perception.mapping.grid.known_cells import known_cells
-from perception.paper.paper_method import PaperPerception
+from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array, mounts_at
 from runtime.analysis.timeline import ECHO, Cluster, Echoes, MapView, RunSnapshot, Timeline
@@ -35,20 +36,22 @@ class TimelineBuilder:
     ----------
     timeline : Timeline
         Filled, completely once `finish` was called.
+    interval_s : float
+        Time between two snapshots, at first.
     """
 
-    def __init__(self, timeline: Timeline) -> None:
+    def __init__(self, timeline: Timeline, interval_s: float = FIRST_INTERVAL_S) -> None:
         settings = timeline.settings
         self._timeline = timeline
         self._mounts, self._turning = mounts_array(settings.ring.mounts), settings.ring.turning
-        self._interval_s = FIRST_INTERVAL_S
+        self._interval_s = interval_s
         self._next_s = 0.0
         self._rows: list[Echoes] = []
         self._row_count = 0
         self._segments: dict[bytes, tuple[float, float, Floats]] = {}
         self._pose: Pose | None = None
         self._yaw = 0.0
-        self._front = PaperPerception(settings.ring, settings.models, settings.perception)
+        self._clusters = ClusterView(settings.perception)
         self._placed: list[tuple[Pose, Echoes]] = []
         self._near_map: dict[int | None, DetectedObject] = {}
         self._unplaced = 0
@@ -64,7 +67,6 @@ class TimelineBuilder:
         self._rows, self._row_count, self._segments, self._pose = [], 0, {}, None
         self._placed, self._near_map, self._unplaced = [], {}, 0
         self._timeline.snapshots, self._timeline.odometry = [], []
-        self._front.reset()
 
     def add_firing(self, t_s: float, firing: Firing) -> None:
         """Add the echoes of a firing received at `t_s`."""
@@ -78,7 +80,6 @@ class TimelineBuilder:
         rows["bearing"], rows["range_m"] = firing.ring_yaw + mounts[:, 2], firing.ranges_m[fired]
         self._rows.append(rows)
         self._row_count += len(rows)
-        self._front.observe(firing)
         self._pose, self._yaw = firing.pose, firing.ring_yaw
 
     def add_odometry(self, t_s: float, odometry: Odometry) -> None:
@@ -102,9 +103,6 @@ class TimelineBuilder:
         timeline = self._timeline
         if perception is not None and (not timeline.snapshots or timeline.snapshots[-1].t_s < timeline.seconds):
             self._add_snapshot(timeline.seconds, perception)
-        if perception is not None:
-            labelled = (*perception.labelled_objects(), *perception.archived_objects())
-            timeline.walls = np.array([seen.ends for seen in labelled if seen.ends is not None]).reshape(-1, 4)
         if perception is not None and perception.known_room is not None:
             timeline.map_view = self._map_view(perception)
         if self._rows:
@@ -126,12 +124,12 @@ class TimelineBuilder:
     def _map_view(self, perception: Perception) -> MapView:
         numbers = {seen.number for seen in perception.objects()}
         to = perception.odometry_from_map().inverse()
-        walls = [turned_object(to, seen).ends for seen in perception.labelled_objects()]
+        walls = tuple(turned_object(to, seen) for seen in walls_of(perception))
         return MapView(
             np.concatenate([np.empty(0, ECHO), *(rows for _, rows in self._placed)]),
             np.array([(pose.x, pose.y) for pose, _ in self._placed]).reshape(-1, 2),
             tuple(seen for number, seen in self._near_map.items() if number in numbers),
-            np.array([ends for ends in walls if ends is not None]).reshape(-1, 4),
+            wall_ends(walls),
         )
 
     def _add_snapshot(self, t_s: float, perception: Perception) -> None:
@@ -141,16 +139,25 @@ class TimelineBuilder:
             self._segments[key] = (first, t_s, row)
         if self._pose is None:
             return
-        snapshots, front = self._timeline.snapshots, self._front
+        snapshots = self._timeline.snapshots
         if len(snapshots) >= SNAPSHOTS_MAX:
             del snapshots[1::2]
             self._interval_s *= 2.0
         window = perception.occupancy()
         snapshots.append(
             RunSnapshot(
-                t_s, self._pose, self._yaw, self._row_count, front.segment_geometry()[:, :4], clusters_of(front),
-                perception.objects(), None if window is None else known_cells(window),
+                t_s, self._pose, self._yaw, self._row_count, rows[:, :4], self._clusters_of(rows),
+                perception.objects(), walls_of(perception), None if window is None else known_cells(window),
             )
+        )  # fmt: skip
+
+    def _clusters_of(self, segments: Floats) -> tuple[Cluster, ...]:
+        return tuple(
+            Cluster(
+                box.centre_x, box.centre_y, box.x - 0.5 * box.length, box.y - 0.5 * box.width,
+                box.x + 0.5 * box.length, box.y + 0.5 * box.width, box.segments,
+            )
+            for box in self._clusters.boxes(segments)
         )  # fmt: skip
 
 
@@ -163,14 +170,11 @@ def _turned_echoes(to: Pose, echoes: Echoes) -> Echoes:
     return turned
 
 
-def clusters_of(front: PaperPerception) -> tuple[Cluster, ...]:
-    """Return the present clusters, each with the bounding rectangle of its segments."""
-    clusters = []
-    for j in range(front.clusters.count):
-        rows = front.outline.segments[front.clusters.members(j)]
-        xs, ys = rows[:, (0, 2)], rows[:, (1, 3)]
-        x, y = front.clusters.centres[j].tolist()
-        clusters.append(
-            Cluster(x, y, float(xs.min()), float(ys.min()), float(xs.max()), float(ys.max()), len(rows))
-        )  # fmt: skip
-    return tuple(clusters)
+def walls_of(perception: Perception) -> tuple[DetectedObject, ...]:
+    """Return the walls that perception reports."""
+    return tuple(seen for seen in perception.labelled_objects() if seen.ends is not None)
+
+
+def wall_ends(walls: Sequence[DetectedObject]) -> Floats:
+    """Return the ends x, y, x, y of walls, m; shape (n, 4)."""
+    return np.array([wall.ends for wall in walls]).reshape(-1, 4)

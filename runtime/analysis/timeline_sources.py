@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,13 +12,14 @@ from typing import Final
 from config.errors import WRONG_CALL, UserError
 from config.load import load_settings, load_world
 from config.settings import Settings
+from drivers.messages import Odometry
 from drivers.registry import make_driver
 from runtime.analysis.timeline import BookmarkEntry, LogEntry, ModeEntry, Timeline
-from runtime.analysis.timeline_builder import TimelineBuilder
+from runtime.analysis.timeline_builder import FIRST_INTERVAL_S, TimelineBuilder
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, RawMessage, decode
+from runtime.recording.channels import BOOKMARK, KEYFRAME, LOG, SERIAL, SUMMARY, RawMessage, decode
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
-from runtime.recording.replayer import Replayer, ReplayStep
+from runtime.recording.replayer import Replayer, ReplayStep, keyframe_cycle
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer
 from runtime.recording.ring_log_units import plausible_firings
@@ -27,6 +29,10 @@ from runtime.recording.verification import Verifier
 Progress = Callable[[], None]
 LOG_LINES_MAX: Final = 1000
 """Log lines kept."""
+SKIMMED_KEYFRAMES_MIN: Final = 12
+"""A recording with fewer keyframes is replayed whole: they would be too few for a history of the run."""
+SKIMMED_INTERVAL_S: Final = 2.0
+"""Time between two snapshots before the first keyframe and after the last one, of a recording that is skimmed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +54,11 @@ class TimelineSource:
 
 
 def load_timeline(
-    source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress = lambda: None
+    source: TimelineSource,
+    prepare: Callable[[Settings], None],
+    on_step: Progress = lambda: None,
+    *,
+    skim: bool = False,
 ) -> Timeline:
     """Return the timeline of a recording or a ring log.
 
@@ -60,6 +70,9 @@ def load_timeline(
         Called with the settings before perception starts: compiles kernels.
     on_step : callable
         Called after each message or firing, for a progress bar.
+    skim : bool
+        Take what perception knew from the keyframes of a long recording, and replay only what follows the last one.
+        What lies between them is read, but is neither perceived nor compared again.
 
     Raises
     ------
@@ -76,14 +89,28 @@ def load_timeline(
         )
     with open_recording(path) as recording:
         prepare(recording.settings)
+        skimmed = between_keyframes(recording) if skim else range(0)
+        with contextlib.suppress(*((RecordingError,) if skimmed else ())):
+            return _of_recording(recording, source, on_step, skimmed)
+        # A keyframe is damaged or of another version; the cycles may all be there.
         return _of_recording(recording, source, on_step)
 
 
-def _of_recording(recording: Recording, source: TimelineSource, on_step: Progress) -> Timeline:
+def between_keyframes(recording: Recording) -> range:
+    """Return the cycles between the first and the last keyframe; none of a recording that has only few keyframes."""
+    cycles = [keyframe_cycle(message) for message in recording.messages() if message.topic == KEYFRAME]
+    return range(min(cycles) + 1, max(cycles) + 1) if len(cycles) >= SKIMMED_KEYFRAMES_MIN else range(0)
+
+
+def _of_recording(
+    recording: Recording, source: TimelineSource, on_step: Progress, skimmed: range = range(0)
+) -> Timeline:
     world = recording.world if source.world is None else load_world(source.world)
     info = recording.info
     timeline = Timeline(recording.path, recording.settings, world, versions=info.versions, started=info.started)
-    collector, verifier, replayer = _Collector(timeline), Verifier(), Replayer(recording)
+    interval_s = SKIMMED_INTERVAL_S if skimmed else FIRST_INTERVAL_S
+    collector, verifier = _Collector(timeline, interval_s), Verifier()
+    replayer = Replayer(recording, skimmed=skimmed)
     for found in replayer:
         verifier.check(found, replayer)
         collector.add(found, replayer.state)
@@ -101,11 +128,11 @@ def _of_recording(recording: Recording, source: TimelineSource, on_step: Progres
 
 
 class _Collector:
-    """Fills a timeline from the steps of a replay."""
+    """Fills a timeline from the steps of a replay; cycles that are skimmed have no state, but the keyframes do."""
 
-    def __init__(self, timeline: Timeline) -> None:
+    def __init__(self, timeline: Timeline, interval_s: float) -> None:
         self._timeline = timeline
-        self._builder = TimelineBuilder(timeline)
+        self._builder = TimelineBuilder(timeline, interval_s)
         self._driver = make_driver(timeline.settings)
         self._driver.line_opened(0.0)
         self._has_bytes = False
@@ -118,7 +145,12 @@ class _Collector:
         """Add one step of the replay, and the state it left."""
         message = found.message
         if found.replayed is not None and state is not None:
-            self._add_cycle(found.replayed, message.log_ns, state)
+            self._add_cycle(found.replayed, message.log_ns, state.odometry)
+            self._end_cycle(state)
+        elif found.skimmed and found.recorded is not None:
+            self._add_cycle(found.recorded, message.log_ns, found.recorded.inputs.received.odometry)
+        elif message.topic == KEYFRAME and found.keyframe is None and state is not None:
+            self._end_cycle(state)  # the state after the last cycle, which was skimmed
         elif message.topic == SERIAL["in"]:
             self._add_bytes(message)
         elif message.topic == LOG and len(self._log) < LOG_LINES_MAX:
@@ -136,7 +168,7 @@ class _Collector:
             self._driver.receive(data, run_s)
         self._driver.take_received()
 
-    def _add_cycle(self, record: CycleRecord, log_ns: int, state: State) -> None:
+    def _add_cycle(self, record: CycleRecord, log_ns: int, odometry: Odometry | None) -> None:
         timeline, builder, run_s = self._timeline, self._builder, record.inputs.run_s
         if self._first_run_s is None:
             self._first_run_s = run_s
@@ -148,13 +180,16 @@ class _Collector:
             builder.restart(t_s)
         for firing in record.inputs.received.firings:
             builder.add_firing(t_s, firing)
-        if state.odometry is not None:
-            builder.add_odometry(t_s, state.odometry)
+        if odometry is not None:
+            builder.add_odometry(t_s, odometry)
         modes, mode = timeline.modes, record.mode
         if not modes or (modes[-1].mode, modes[-1].reason) != (mode.mode.value, mode.reason):
             modes.append(ModeEntry(t_s, mode.mode.value, mode.reason))
+        timeline.seconds = t_s
+
+    def _end_cycle(self, state: State) -> None:
         self._state = state
-        builder.end_cycle(t_s, state.perception)
+        self._builder.end_cycle(self._timeline.seconds, state.perception)
 
     def finish(self) -> None:
         """Complete the timeline."""

@@ -28,6 +28,7 @@ from runtime.console.frames.session_info import session_info
 from runtime.console.http.auth import SCHEME, Auth, is_loopback, new_token, url_host
 from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import listen
+from runtime.console.http.report_tab import ReportTab
 from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
 from runtime.console.protocols import NOT_AVAILABLE, FileControl, RecordingControl, ReplayControl, Run
@@ -229,7 +230,7 @@ class Console:
             on_message=self.dispatcher.receive,
             on_leave=self._on_leave,
             on_fault=self._run.health.report,
-            report=self._report,
+            report=ReportTab(self._report, self._clock),
             file_of=self._file_of,
             watch_without_token=self._config.watch_without_token,
             timed=self._run.timing_monitor.timed,

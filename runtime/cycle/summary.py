@@ -41,6 +41,8 @@ class ObjectRow(TypedDict):
     """Probability that it is this model."""
     covariance: NotRequired[tuple[float, float, float]]
     """xx, xy, yy of the position, m²."""
+    number: NotRequired[int]
+    """As on the page; of the same sequence as those of walls."""
 
 
 class WallRow(TypedDict):
@@ -55,6 +57,7 @@ class WallRow(TypedDict):
     """Standard error across the wall, the mean over its length, m."""
     sigma_angle: float
     """rad"""
+    number: int | None
 
 
 class CornerRow(TypedDict):
@@ -170,6 +173,8 @@ def object_row(seen: DetectedObject) -> ObjectRow:
         row["probability"] = seen.probability
     if seen.covariance is not None:
         row["covariance"] = seen.covariance
+    if seen.number is not None:
+        row["number"] = seen.number
     return row
 
 
@@ -212,6 +217,7 @@ def perceived_rows(
             rows["walls"].append({
                 "x1": x1, "y1": y1, "x2": x2, "y2": y2, "probability": seen.score,
                 "sigma_offset": math.sqrt(max(0.0, across)), "sigma_angle": seen.sigma_theta or 0.0,
+                "number": seen.number,
             })  # fmt: skip
         elif seen.model in CORNER_KINDS:
             rows["corners"].append({

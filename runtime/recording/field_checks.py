@@ -38,7 +38,7 @@ PIECE_DELAY_MAX_US: Final = 10**15
 
 _OBJECT_TEXT: Final = ("model",)
 _OBJECT_COUNT: Final = ("support",)
-_OPTIONAL: Final = ("probability", "covariance")
+_OPTIONAL: Final = ("probability", "covariance", "number")
 _COVARIANCE: Final = 3
 
 
@@ -278,6 +278,8 @@ def check_object(row: Mapping[str, Any]) -> None:
             is_valid = isinstance(value, str)
         elif name in _OBJECT_COUNT:
             is_valid = type(value) is int and 0 <= value <= COUNT_MAX
+        elif name == "number":
+            is_valid = value is None or (type(value) is int and 0 <= value <= COUNT_MAX)
         elif name == "covariance":
             is_valid = isinstance(value, list) and len(value) == _COVARIANCE and all(map(_is_finite, value))
         elif name in ObjectRow.__annotations__:

@@ -56,6 +56,7 @@ class Recording:
 
     def __post_init__(self) -> None:
         self._scanner = McapScanner(self._data)
+        self._sensors = len(self.settings.ring.mounts)
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield every readable message in file order; may be called again."""
@@ -100,7 +101,7 @@ class Recording:
             A firing is of another ring: compiled code would read beyond its arrays.
         """
         record = decode(Cycle, message.data).record
-        sensors = len(self.settings.ring.mounts)
+        sensors = self._sensors
         for firing in record.inputs.received.firings:
             if len(firing.ranges_m) != sensors:
                 raise RecordingError(

@@ -76,11 +76,13 @@ class ReplayStep(NamedTuple):
     recorded: CycleRecord | None = None
     """If the message is a cycle: its record in the recording."""
     replayed: CycleRecord | None = None
-    """If the message is a cycle: its record now. None if the state before it is unknown."""
+    """If the message is a cycle: its record now. None if the state before it is unknown, or if it is skimmed."""
     elapsed_s: float = 0.0
     """What the replayed step took."""
     keyframe: Keyframe | None = None
     """If the message is a keyframe of the state that the replay has reached: that keyframe, to compare."""
+    skimmed: bool = False
+    """Whether the message is a cycle that was only read, as was asked for."""
 
 
 def fresh_state(settings: Settings) -> State:
@@ -116,6 +118,9 @@ class Replayer:
         Open as long as the iterator is used.
     start : KeyframePosition or Checkpoint, optional
         Start after this cycle, not at the beginning of the file. The whole file must have been read once before.
+    skimmed : range
+        Cycles that are read without being replayed, between two keyframes: among them the state is known at keyframes
+        only. So a long recording is read in a small part of the time.
 
     Attributes
     ----------
@@ -125,8 +130,11 @@ class Replayer:
         The settings in force, as the recording holds them. A new object with every change.
     """
 
-    def __init__(self, recording: Recording, start: KeyframePosition | Checkpoint | None = None) -> None:
+    def __init__(
+        self, recording: Recording, start: KeyframePosition | Checkpoint | None = None, skimmed: range = range(0)
+    ) -> None:
         self._recording = recording
+        self._skimmed = skimmed
         self._settings = recording.settings
         self.settings_data = recording.info.settings
         self.state: State | None = None
@@ -231,6 +239,9 @@ class Replayer:
 
     def _cycle(self, message: RawMessage) -> ReplayStep:
         record = self._recording.decode_cycle(message)
+        if record.cycle in self._skimmed:
+            self.state = None
+            return ReplayStep(message, record, skimmed=True)
         if self.state is None or record.cycle != self.state.cycle + 1:
             self.state = None
             return ReplayStep(message, record)

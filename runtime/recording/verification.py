@@ -163,6 +163,10 @@ class Verifier:
         result, last, self._last = self.result, self._last, recorded
         if last is not None and recorded.cycle != last.cycle + 1:
             result.add_gap(last.cycle + 1, recorded.cycle - 1)
+        if found.skimmed:
+            result.cycles += 1
+            result.refinement_stops[recorded.refinement] += 1
+            return
         if found.replayed is None:
             if last is None:
                 result.add_gap(1, recorded.cycle - 1)

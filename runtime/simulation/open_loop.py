@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypedDict
+
+import numpy as np
 
 from config.model import ModelConfig
 from config.settings import Settings
@@ -115,9 +117,10 @@ def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> 
 def match_objects(
     world: WorldConfig, seen: Iterable[DetectedObject], models: Iterable[ModelConfig]
 ) -> tuple[list[DrumRow], list[BoxRow], int]:
-    """Match objects of round models with drums, others with boxes; return both rows and the number of false objects.
+    """Match round objects with drums, others with boxes and polygons; return the rows and the number of false ones.
 
-    Objects that are of none of the models, such as walls, are ignored.
+    Objects that are of none of the models, such as walls, are ignored. The rows of the polygons follow those of the
+    boxes, with the middle of the vertices as their place.
 
     Parameters
     ----------
@@ -133,10 +136,12 @@ def match_objects(
     known = [s for s in seen if s.model in is_round]
     radii = [model.arc_radius_m for model in models if model.arc_radius_m is not None]
     wanted = [d for d in world.drum if not radii or any(abs(d.radius_m - r) < RADIUS_TOLERANCE_M for r in radii)]
-    world = world.model_copy(update={"drum": tuple(wanted)})
+    polygons = () if all(is_round.values()) else world.polygon
+    world = world.model_copy(update={"drum": tuple(wanted), "polygon": polygons})
     drums, false_drums = match_drums(world, [(s.x, s.y) for s in known if is_round[s.model]])
-    angular = [s for s in known if not is_round[s.model]]
-    places = [(box.x_m, box.y_m) for box in world.box]
+    middles = {model.name: np.mean(model.vertices_m, axis=0).tolist() for model in models}
+    angular = [_about_its_middle(s, *middles[s.model]) for s in known if not is_round[s.model]]
+    places = angular_places(world)
     match = nearest_pairs(places, [(s.x, s.y) for s in angular])
     boxes: list[BoxRow] = []
     for i, place in enumerate(places):
@@ -146,10 +151,25 @@ def match_objects(
                 "truth": place,
                 "estimate": None if found is None else (found.x, found.y),
                 "error": None if found is None else math.dist(place, (found.x, found.y)),
-                "angle_error": None if found is None else angle_error(world.box[i], found.theta),
+                "angle_error": (
+                    None if found is None or i >= len(world.box) else angle_error(world.box[i], found.theta)
+                ),
             }
         )
     return drums, boxes, false_drums + len(angular) - len(match)
+
+
+def _about_its_middle(seen: DetectedObject, x: float, y: float) -> DetectedObject:
+    """Return an object of a model whose vertices have this mean, with its position at that mean."""
+    c, s = math.cos(seen.theta), math.sin(seen.theta)
+    return replace(seen, x=seen.x + c * x - s * y, y=seen.y + s * x + c * y)
+
+
+def angular_places(world: WorldConfig) -> list[tuple[float, float]]:
+    """Return the places (m) of a world's boxes, then those of its polygons: the mean of the vertices."""
+    boxes = [(box.x_m, box.y_m) for box in world.box]
+    polygons = [np.mean(polygon.vertices_m, axis=0).tolist() for polygon in world.polygon]
+    return [*boxes, *((x, y) for x, y in polygons)]
 
 
 def angle_error(box: BoxConfig, theta: float) -> float:

@@ -1,4 +1,4 @@
-"""A run as tables: echoes, segments, objects, odometry; metres, radians and seconds, in the odometry's frame."""
+"""A run as tables: echoes, segments, objects, walls, odometry; metres, radians, seconds, in the odometry's frame."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from runtime.analysis.timeline import Timeline
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 """Columns by name, all of the same length. None means unknown."""
 
-NAMES: Final = ("echoes", "segments", "objects", "odometry")
+NAMES: Final = ("echoes", "segments", "objects", "walls", "odometry")
 """Tables, and files without their suffix."""
 FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
 
 
 def tables(timeline: Timeline) -> dict[str, Table]:
     """Return the tables of a run by name."""
-    found = (_echoes(timeline), _segments(timeline), _objects(timeline), _odometry(timeline))
+    found = (_echoes(timeline), _segments(timeline), _objects(timeline), _walls(timeline), _odometry(timeline))
     return dict(zip(NAMES, found, strict=True))
 
 
@@ -56,6 +56,7 @@ def _objects(timeline: Timeline) -> Table:
     seen = [(m.t_s, o) for m in timeline.snapshots for o in m.objects]
     return {
         "t_s": [t for t, _ in seen],
+        "number": [o.number for _, o in seen],
         "model": [o.model for _, o in seen],
         "x_m": [float(o.x) for _, o in seen],
         "y_m": [float(o.y) for _, o in seen],
@@ -67,6 +68,20 @@ def _objects(timeline: Timeline) -> Table:
         "covariance_xx_m2": [None if o.covariance is None else o.covariance[0] for _, o in seen],
         "covariance_xy_m2": [None if o.covariance is None else o.covariance[1] for _, o in seen],
         "covariance_yy_m2": [None if o.covariance is None else o.covariance[2] for _, o in seen],
+    }
+
+
+def _walls(timeline: Timeline) -> Table:
+    """Return one row for each wall at each snapshot."""
+    seen = [(m.t_s, wall, wall.ends) for m in timeline.snapshots for wall in m.walls if wall.ends is not None]
+    places = {name: [ends[i] for _, _, ends in seen] for i, name in enumerate(("x1_m", "y1_m", "x2_m", "y2_m"))}
+    return {
+        "t_s": [t for t, _, _ in seen],
+        "number": [wall.number for _, wall, _ in seen],
+        **places,
+        "sigma_rad": [wall.sigma_theta for _, wall, _ in seen],
+        "support": [int(wall.support) for _, wall, _ in seen],
+        "probability": [wall.probability for _, wall, _ in seen],
     }
 
 
@@ -120,7 +135,8 @@ def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
     import pyarrow.parquet as pq
 
     whole = pa.int64()
-    kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole}
+    kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole,
+             "number": whole}  # fmt: skip
     paths = []
     for name, table in tables(timeline).items():
         schema = pa.schema(

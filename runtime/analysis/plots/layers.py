@@ -26,6 +26,7 @@ from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotat
 from runtime.analysis.plots.plot_style import CLUSTER, ECHO, FREE, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
 from runtime.analysis.timeline import BookmarkEntry, Cluster, Echoes, Timeline
 from runtime.simulation.evaluation import nearest_pairs
+from runtime.simulation.open_loop import angular_places
 from runtime.support.length_format import Units, format_length
 
 ARCS_MAX: Final = 4000
@@ -51,12 +52,16 @@ def draw_world(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
     polygons = PolyCollection(outlines, facecolor=TRUTH, edgecolor=MUTED, linewidth=1.0, alpha=0.55, zorder=1)
     polygons.set_gid("truth")
     axes.add_collection(polygons)
+    handles = []
+    if closed:
+        handles.append(Line2D([], [], marker="o", markersize=9, linestyle="", markerfacecolor=TRUTH,
+                              markeredgecolor=MUTED, label="truth"))  # fmt: skip
     if lines:
         walls = LineCollection([frame.world(points) for points in lines], color=MUTED, linewidth=2.5, zorder=1)
         walls.set_gid("truth-walls")
         axes.add_collection(walls)
-    return [Line2D([], [], marker="o", markersize=9, linestyle="", markerfacecolor=TRUTH, markeredgecolor=MUTED,
-                   label="truth")]  # fmt: skip
+        handles.append(Line2D([], [], color=MUTED, linewidth=2.5, label="true wall"))
+    return handles
 
 
 def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -> list[Line2D]:
@@ -87,7 +92,11 @@ def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) 
     axes.add_patch(body)
     nose = frame.points(rotated(np.array([[0.0, 0.0], [radius_m, 0.0]]), last.x, last.y, last.theta))
     axes.plot(nose[:, 0], nose[:, 1], color=ROBOT, linewidth=1.6, zorder=5, gid="heading")
-    return [line]
+    return [
+        line,
+        Line2D([], [], marker="o", markersize=9, linestyle="", markerfacecolor="none", markeredgecolor=ROBOT,
+               markeredgewidth=1.6, label="robot at the end, its heading"),
+    ]  # fmt: skip
 
 
 def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame) -> list[Line2D]:
@@ -224,6 +233,28 @@ def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Fr
     return [handles[label] for label in sorted(handles)]
 
 
+def draw_walls(axes: Axes, walls: Sequence[DetectedObject], frame: Frame) -> list[Line2D]:
+    """Draw the recognised walls from end to end, each with its number.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    walls : sequence of DetectedObject
+        In the odometry's frame.
+    frame : Frame
+        Coordinates of the figure.
+    """
+    style: Any = {"color": MODEL, "linewidth": 2.2, "linestyle": (0, (6, 1.5))}
+    for index, wall in enumerate(walls, 1):
+        ends = frame.points(np.array(wall.ends).reshape(2, 2))
+        axes.plot(ends[:, 0], ends[:, 1], zorder=5, gid=f"wall-{index}", **style)
+        if wall.number is not None:
+            x, y = ends.mean(axis=0)
+            _label(axes, str(wall.number), (x, y), 0.0, up=y < axes.viewLim.intervaly.mean())
+    return [Line2D([], [], label="recognised wall, its number", **style)] if walls else []
+
+
 def draw_objects(
     axes: Axes,
     objects: Sequence[DetectedObject],
@@ -274,7 +305,7 @@ def draw_objects(
             error = "" if one is None else f"\n{format_length(one.error_m, units, 3)} {units}"
             _label(
                 axes,
-                f"{number if one is None else one.name}{error}",
+                f"{seen.number or number if one is None else one.name}{error}",
                 (x, y),
                 reach / frame.unit_m,
                 up=y >= axes.viewLim.intervaly.mean(),
@@ -282,7 +313,11 @@ def draw_objects(
     if not objects:
         return []
     kind = "matched model, + its position" + (", its error" if known else "")
-    return [Line2D([], [], color=MODEL, linewidth=2.2, marker="+", markeredgecolor=INK, label=kind)]
+    handles = [Line2D([], [], color=MODEL, linewidth=2.2, marker="+", markeredgecolor=INK, label=kind)]
+    if any(seen.covariance is not None for seen in objects):
+        handles.append(Line2D([], [], marker="o", markersize=5, linestyle="", color=MODEL, alpha=0.6,
+                              label="95 % ellipse of a position"))  # fmt: skip
+    return handles
 
 
 def _label(axes: Axes, text: str, at: tuple[float, float], reach: float, *, up: bool) -> None:
@@ -306,8 +341,9 @@ def match_to_truth(objects: Sequence[DetectedObject], timeline: Timeline) -> dic
     if timeline.world is None:
         return {}
     placed = [timeline.start.compose(Pose(o.x, o.y, o.theta)) for o in objects]
-    drums, boxes = timeline.world.drum, timeline.world.box
-    truth = [(d.x_m, d.y_m) for d in drums] + [(b.x_m, b.y_m) for b in boxes]
-    names = [f"drum {i}" for i in range(1, len(drums) + 1)] + [f"box {i}" for i in range(1, len(boxes) + 1)]
+    world = timeline.world
+    truth = [*((d.x_m, d.y_m) for d in world.drum), *angular_places(world)]
+    counted = {"drum": len(world.drum), "box": len(world.box), "polygon": len(world.polygon)}
+    names = [f"{what} {i}" for what, count in counted.items() for i in range(1, count + 1)]
     pairs = nearest_pairs(truth, [(p.x, p.y) for p in placed])
     return {j: MatchedObject(names[i], math.dist(truth[i], (placed[j].x, placed[j].y))) for i, j in pairs.items()}

@@ -22,6 +22,7 @@ from runtime.analysis.plots.layers import (
     draw_objects,
     draw_path,
     draw_segments,
+    draw_walls,
     draw_world,
     received_echoes,
 )
@@ -32,8 +33,8 @@ from runtime.support.length_format import Units, format_length
 NAMES: Final = ("raw", "segments", "clusters", "models")
 """The figures, in the paper's order."""
 HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
-ROOM_IN: Final = 1.2
-"""Height for title, axis label and legend."""
+ROOM_IN: Final = 1.5
+"""Height for the title and the line below it, axis label and legend."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,15 +99,18 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
         )
 
     def models(axes: Axes) -> list[Line2D]:
-        return draw_segments(axes, last.segments, frame, faint=True) + draw_objects(
-            axes, last.objects, timeline, frame, units
-        )
+        handles = draw_segments(axes, last.segments, frame, faint=True) + draw_walls(axes, last.walls, frame)
+        return handles + draw_objects(axes, last.objects, timeline, frame, units)
 
     layers = (
         ("Raw data", f"{count:,} echoes in {timeline.seconds:.0f} s{few}", raw),
         ("Segments", f"{len(last.segments):,} outline segments in the map", segments),
-        ("Clusters", f"{len(last.clusters)} clusters of outline segments", clusters),
-        ("Matched models", f"{len(last.objects)} recognised, by {method}", models),
+        ("Clusters", f"{counted(len(last.clusters), 'cluster')} of outline segments", clusters),
+        (
+            "Matched models",
+            f"{counted(len(last.objects), 'model')} and {counted(len(last.walls), 'wall')} recognised, by {method}",
+            models,
+        ),
     )
     drawn = {}
     for at, (name, (title, line, draw)) in enumerate(zip(NAMES, layers, strict=True)):
@@ -125,16 +129,21 @@ def _figure(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[L
     timeline, frame = canvas.timeline, canvas.frame
     handles = draw(axes)
     handles += draw_world(axes, timeline, frame)
-    poses = [m.pose for m in timeline.snapshots]
+    poses = [*(odometry.pose for _, odometry in timeline.odometry), *(m.pose for m in timeline.snapshots[-1:])]
     handles += draw_path(axes, poses, frame, timeline.settings.body.radius_m)
     handles += draw_bookmarks(axes, timeline.bookmarks, frame)
-    axes.set_title(title)
-    axes.set_title(line, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11.0, fontweight="bold")
+    axes.set_title(line, loc="left", fontsize=8.5, fontweight="normal", color=MUTED)
     legend(figure, handles)
     return figure
 
 
+def counted(number: int, what: str) -> str:
+    """Return a number with its noun in the singular or plural."""
+    return f"{number:,} {what}" if number == 1 else f"{number:,} {what}s"
+
+
 def legend(figure: Figure, handles: Sequence[Line2D]) -> None:
     """Put the legend below the figure, where it hides nothing."""
-    columns = {4: 2, 7: 4}.get(len(handles), min(len(handles), 3))
+    columns = {4: 2, 7: 4, 8: 4}.get(len(handles), min(len(handles), 3))
     figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)

@@ -47,7 +47,7 @@ def history_figure(timeline: Timeline, units: Units) -> Figure:
     periods.plot(times_s, gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
                 gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
     periods.set(xlabel="t (s)", ylabel="between cycles (ms)")
-    periods.set_ylim(bottom=0.0)
+    periods.set_ylim(0.0, 1.1 * float(gaps.max()) if len(gaps) else None)
     for number, mark in enumerate(timeline.bookmarks, 1):
         for row, panel in enumerate(panels, 1):
             panel.axvline(

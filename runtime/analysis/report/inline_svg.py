@@ -24,7 +24,9 @@ VARIABLES: Final = MappingProxyType(
         ROBOT: "--robot",
     }
 )
+TAG: Final = re.compile(r"<[^>]*>")
 DIGITS: Final = re.compile(r"(\d\.\d\d)\d+")
+"""Of coordinates, inside tags: the text between them is for people, and a tick of 0.0025 is not 0.00."""
 COLOUR: Final = re.compile("|".join(map(re.escape, VARIABLES)))
 FONT: Final = re.compile(r"font: ([^;\"]*?)'DejaVu Sans'[^;\"]*")
 
@@ -48,7 +50,7 @@ def inlined(svg: str, prefix: str, label: str) -> str:
     svg = re.sub(r"\bid=\"", f'id="{prefix}-', svg)
     svg = re.sub(r"href=\"#", f'href="#{prefix}-', svg)
     svg = re.sub(r"url\(#", f"url(#{prefix}-", svg)
-    svg = DIGITS.sub(r"\1", svg)
+    svg = TAG.sub(lambda tag: DIGITS.sub(r"\1", tag[0]), svg)
     svg = FONT.sub(r"font: \1system-ui, sans-serif", svg)
     svg = COLOUR.sub(lambda found: f"var({VARIABLES[found[0]]})", svg)
     svg = re.sub(r"\n\s*", "\n", svg)

@@ -30,10 +30,10 @@ LOG_SHOWN: Final = 40
 CAPTIONS: Final = MappingProxyType(
     {
         "raw": "Every echo as the arc on which its reflection may lie.",
-        "segments": "Outline segments: tangents to the arcs of two readings of one sensor.",
+        "segments": "Outline segments, as on the page: tangents to the arcs of two readings of one sensor.",
         "clusters": "Clusters of outline segments by minimum distance, as rectangles with an X at the centre.",
         "grid": "The evidence grid around the robot at the end: what each cell has answered, from any direction.",
-        "models": "Models at their matched poses, over the true world if it is known.",
+        "models": "Models at their matched poses and walls from end to end, over the true world if it is known.",
     }
 )
 
@@ -45,6 +45,7 @@ def page(timeline: Timeline, units: Units) -> str:
         (
             _head(timeline, units),
             section("Objects", _table_2(timeline, units), _others(timeline, units)),
+            section("Walls", _walls(timeline, units)),
             section("Figures", _pictures(timeline, units)),
             section("Bookmarks", *_bookmarks(timeline, units)),
             section("Timing", *_timing(timeline)),
@@ -88,6 +89,7 @@ def _head(timeline: Timeline, units: Units) -> str:
             tiles.append(tile(f"{format_length(max(errors), units, 3)} {units}", "worst error"))
     else:
         tiles.append(tile(str(len(timeline.objects)), "objects recognised"))
+    tiles.append(tile(str(len(timeline.walls)), "walls recognised"))
     back = int(np.isfinite(timeline.echoes["range_m"]).sum())
     tiles.append(tile(f"{back:,}", f"echoes of {len(timeline.echoes):,} readings"))
     tiles.append(tile(f"{timeline.cycles:,}", "cycles" if timeline.modes else "firings"))
@@ -104,10 +106,12 @@ def _table_2(timeline: Timeline, units: Units) -> str:
         return note("The true world is not known, so there are no errors.")
     drums, boxes, false = matches
     heads = ["", f"truth ({units})", f"estimate ({units})", f"error ({units})"]
+    of_boxes = 0 if timeline.world is None else len(timeline.world.box)
     rows = []
     for what, number, row in [
         *(("drum", i, row) for i, row in enumerate(drums, 1)),
-        *(("box", i, row) for i, row in enumerate(boxes, 1)),
+        *(("box", i, row) for i, row in enumerate(boxes[:of_boxes], 1)),
+        *(("polygon", i, row) for i, row in enumerate(boxes[of_boxes:], 1)),
     ]:
         estimate, error = row["estimate"], row["error"]
         rows.append(
@@ -135,7 +139,7 @@ def _others(timeline: Timeline, units: Units) -> str:
         return note("Nothing was recognised.")
     heads = ["", f"x ({units})", f"y ({units})", "heading (°)", f"σ ({units})", "support", "score"]
     known = match_to_truth(timeline.objects, timeline)
-    names = [known[j].name if j in known else str(j + 1) for j in range(len(timeline.objects))]
+    names = [known[j].name if j in known else str(o.number or j + 1) for j, o in enumerate(timeline.objects)]
     rows = [
         [
             f"{name}, {o.model}",
@@ -151,6 +155,33 @@ def _others(timeline: Timeline, units: Units) -> str:
     return note("As the run itself reports them, in the odometry's frame, named as in the figure:") + table(
         heads, rows
     )
+
+
+def _walls(timeline: Timeline, units: Units) -> str:
+    heads = [
+        "",
+        f"from ({units})",
+        f"to ({units})",
+        f"length ({units})",
+        "σ of its direction (°)",
+        "support",
+        "score",
+    ]
+    rows = [
+        [
+            f"{wall.number}, {wall.model}",
+            format_point(x1, y1, units),
+            format_point(x2, y2, units),
+            format_length(math.hypot(x2 - x1, y2 - y1), units),
+            f"{math.degrees(wall.sigma_theta or 0.0):.2f}",
+            str(wall.support),
+            f"{wall.score:.3f}",
+        ]
+        for wall in timeline.walls
+        for x1, y1, x2, y2 in [wall.ends or (0.0, 0.0, 0.0, 0.0)]
+    ]
+    said = "Each straight piece between openings, in the odometry's frame, with the number that it has on the page:"
+    return note(said) + table(heads, rows) if rows else ""
 
 
 def _pictures(timeline: Timeline, units: Units) -> str:

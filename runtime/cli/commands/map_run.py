@@ -40,6 +40,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
     from runtime.analysis.export.shapes import firing_scans
     from runtime.analysis.export.world_file import round_names, world_of, world_text
     from runtime.analysis.map_changes import MapChange, compare_with_map
+    from runtime.analysis.timeline_builder import wall_ends
 
     use_kernel_cache()
     console, output = plain_console(stderr=True), plain_console()
@@ -48,7 +49,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
     timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
     settings, view, changes = timeline.settings, timeline.map_view, list[MapChange]()
     known = settings.perception.localization.known_room
-    objects, walls = (timeline.objects, timeline.walls) if view is None else (view.objects, view.walls)
+    objects, walls = (timeline.objects, wall_ends(timeline.walls)) if view is None else (view.objects, view.walls)
     if len(objects) + len(walls) > ITEMS_MAX:
         raise UserError(f"{source.file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
     world, echoes = world_of(objects, walls, settings.models), timeline.echoes

@@ -25,7 +25,11 @@ def plain_console(*, stderr: bool = False) -> Console:
 
 
 def read_timeline(
-    source: TimelineSource, console: Console, check_outputs: Callable[[], None] = lambda: None
+    source: TimelineSource,
+    console: Console,
+    check_outputs: Callable[[], None] = lambda: None,
+    *,
+    skim: bool = False,
 ) -> Timeline:
     """Return the timeline of a recording or ring log, with a progress bar.
 
@@ -38,6 +42,8 @@ def read_timeline(
     check_outputs : callable
         Called once the settings have been read, before perception starts: raises a UserError if the command's files
         cannot be written.
+    skim : bool
+        As of `timeline_sources.load_timeline`.
 
     Raises
     ------
@@ -52,7 +58,7 @@ def read_timeline(
         prepare_kernels(settings, console)
 
     with progress(console, "reading", recording_extent(Path(source.file)).messages) as step:
-        timeline = load_timeline(source, prepare, step)
+        timeline = load_timeline(source, prepare, step, skim=skim)
     if timeline.last is None:
         raise UserError(f"{source.file}: holds no echo and no odometry: nothing to show", FAILED)
     return timeline

@@ -29,7 +29,8 @@ def write_report(source: TimelineSource, out: str | None, *, force: bool, units:
     """
     console = plain_console(stderr=True)
     target = Path(source.file).with_suffix(".html") if out is None else Path(out)
-    timeline = read_timeline(source, console, partial(check_outputs, {"--out": target}, source.inputs, force=force))
+    check = partial(check_outputs, {"--out": target}, source.inputs, force=force)
+    timeline = read_timeline(source, console, check, skim=True)
     write_page(timeline, target, console, units=units)
     plain_console().print(str(target))
     return DONE

@@ -24,6 +24,9 @@ StartLimitIntervalSec=0
 Type=notify
 NotifyAccess=main
 ExecStart={command}
+# Reads the run file again: what a running robot may change takes effect at once. It neither arms nor moves the robot,
+# and a file with an error changes nothing; the log says which it was.
+ExecReload=/bin/kill -HUP $MAINPID
 {where}{user}
 # The group that may open serial ports.
 SupplementaryGroups=dialout

@@ -26,6 +26,7 @@ from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import BACKLOG, ConnectionLimiter
 from runtime.console.http.downloads import send_file
 from runtime.console.http.log_forwarder import LogForwarder
+from runtime.console.http.report_tab import AGAIN_S, ReportTab
 from runtime.console.http.static_files import StaticFile, security_headers
 from runtime.console.timed_coroutine import Timed, timed_coroutine
 from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
@@ -68,8 +69,8 @@ class ServerContext:
     on_leave: Callable[[Client], None]
     on_fault: Callable[[str, BaseException], None]
     """Gets the name of a part and the unexpected error in it."""
-    report: Callable[[], Awaitable[bytes]]
-    """Returns the report of the run so far; raises a CommandError."""
+    report: ReportTab
+    """Of the run so far."""
     file_of: Callable[[str, str, str], Awaitable[Path | None]]
     """Returns the path of the file that a request of `DOWNLOADS` means: its path, job and name."""
     watch_without_token: bool
@@ -152,6 +153,7 @@ class Server:
                 await asyncio.gather(*closing, return_exceptions=True)
         for client in list(self._websockets):
             client.disconnect()
+        await self._context.report.close()
         if self._web is not None:
             await self._web.shutdown(CLOSE_MAX_S)
 
@@ -198,10 +200,11 @@ class Server:
         if path == "/log":
             return web.Response(body=context.hub.log_lines, content_type="application/x-ndjson")
         try:
-            page = await context.report()
+            status, page = await context.report.answer(wait="wait" in request.query)
         except CommandError as error:
             return web.Response(status=HTTPStatus.CONFLICT, text=str(error))
-        return web.Response(body=page, content_type="text/html", charset="utf-8")
+        again = {"Refresh": str(AGAIN_S)} if status == HTTPStatus.ACCEPTED else None
+        return web.Response(status=status, body=page, content_type="text/html", charset="utf-8", headers=again)
 
     async def _download(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
         """Send a recording, or a file that a job made."""

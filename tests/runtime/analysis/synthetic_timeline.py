@@ -17,6 +17,8 @@ SETTINGS = load_settings("hallway")
 ERROR_M = 0.01
 START_NS = 1_700_000_000_000_000_000
 SECONDS = 3.0
+WALL = DetectedObject("wall", 1.5, 1.5, 0.0, 0.9, 40, 0.97, 0.97, (0.75, 0.0, 0.0), 7, sigma_theta=0.01)
+"""Number 7, 3 m long."""
 
 
 def synthetic_timeline(*, with_world: bool = True) -> Timeline:
@@ -39,7 +41,10 @@ def synthetic_timeline(*, with_world: bool = True) -> Timeline:
     timeline.echoes = _echoes(drums)
     for k in range(4):
         pose = Pose(0.3 * k, 0.0, 0.0)
-        timeline.snapshots.append(RunSnapshot(float(k), pose, 0.0, 4 * k, edges[:k], clusters[:k], objects[:k]))
+        walls = (WALL,) if k == 3 else ()
+        timeline.snapshots.append(
+            RunSnapshot(float(k), pose, 0.0, 4 * k, edges[:k], clusters[:k], objects[:k], walls)
+        )
         timeline.odometry.append((float(k), Odometry(5.0 + k, pose, 0.0, Twist(0.3, 0.0), Flags.NONE, 0)))
     timeline.segments = np.column_stack([np.zeros(3), np.full(3, SECONDS), edges, np.full(3, -1.57)])
     timeline.cycle_unix = [(0.05 * k, START_NS + 50_000_000 * k) for k in range(60)]

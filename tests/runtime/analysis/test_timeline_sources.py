@@ -10,8 +10,13 @@ import pytest
 from config.errors import WRONG_CALL, UserError
 from config.load import load_world
 from config.settings import Settings
+from runtime.analysis import timeline_sources
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
+from runtime.cycle.step import CycleRecord, State
+from runtime.recording import replayer
+
+REPLAY_CYCLE = replayer.replay_cycle
 
 
 def ignore(_settings: Settings) -> None:
@@ -32,6 +37,32 @@ def test_a_recording_is_replayed_whole(timeline: Timeline) -> None:
     assert len(timeline.cycle_gaps_s) == 279
     assert sum(timeline.refinement_stops.values()) == 280
     assert timeline.counts is not None, "bytes of the line are recorded"
+
+
+def test_a_long_recording_is_read_from_its_keyframes(
+    hall_run: Path, timeline: Timeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is between the first and the last keyframe is read, not replayed; the end is the same to the bit."""
+    replayed = list[int]()
+    monkeypatch.setattr(timeline_sources, "SKIMMED_KEYFRAMES_MIN", 3)
+
+    def counting(state: State, record: CycleRecord, settings: Settings) -> CycleRecord:
+        replayed.append(record.cycle)
+        return REPLAY_CYCLE(state, record, settings)
+
+    monkeypatch.setattr(replayer, "replay_cycle", counting)
+    read = load_timeline(TimelineSource(str(hall_run)), ignore, skim=True)
+    assert len(replayed) < 0.5 * timeline.cycles
+    assert (read.cycles, read.seconds, read.notes) == (timeline.cycles, timeline.seconds, [])
+    assert (read.objects, read.walls) == (timeline.objects, timeline.walls)
+    np.testing.assert_array_equal(read.snapshots[-1].segments, timeline.snapshots[-1].segments)
+    np.testing.assert_array_equal(read.echoes, timeline.echoes)
+    assert (read.modes, read.counts, read.refinement_stops) == (
+        timeline.modes, timeline.counts, timeline.refinement_stops
+    )  # fmt: skip
+    times = [snapshot.t_s for snapshot in read.snapshots]
+    assert times == sorted(times)
+    assert len(times) > 5
 
 
 def test_a_ring_log_has_echoes_and_objects_and_no_modes(hall_log: Path, timeline: Timeline) -> None:

@@ -13,7 +13,7 @@ import pytest
 from runtime.analysis.export.csv_tables import tables, write_csv, write_parquet
 from tests.runtime.analysis.synthetic_timeline import START_NS, synthetic_timeline
 
-TABLES = {"echoes", "segments", "objects", "odometry"}
+TABLES = {"echoes", "segments", "objects", "walls", "odometry"}
 RUN = synthetic_timeline()
 
 
@@ -34,6 +34,9 @@ def test_csv(tmp_path: Path) -> None:
     ]
     assert all(float(r["first_seen_s"]) <= float(r["last_seen_s"]) for r in read["segments"])
     assert [float(r["v_m_s"]) for r in read["odometry"]] == [0.3] * 4
+    (wall,) = read["walls"]
+    assert (wall["t_s"], wall["number"]) == (str(RUN.seconds), "7")
+    assert [float(wall["x1_m"]), float(wall["x2_m"])] == pytest.approx([0.0, 3.0])
 
 
 def test_parquet(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_a_hall_of_the_paper_is_named_by_its_figures() -> None:
     assert paper_figures(other) == (10, 11, 12, 13)
     assert paper_figures(synthetic_timeline(with_world=False)) is None
     with styled():
-        titles = [figure.axes[0].get_title("left") for figure in pictures(RUN, "m").values()]
+        titles = [figure.get_suptitle() for figure in pictures(RUN, "m").values()]
     assert titles == [
         f"{name}, as the paper's Figure {k}"
         for k, name in enumerate(("Raw data", "Segments", "Clusters", "Matched models"), 6)

@@ -24,3 +24,11 @@ def test_fonts_are_those_of_the_page() -> None:
         '<svg role="img" aria-label="x"><text style="font: 8.5px system-ui, sans-serif; fill: var(--ink)">a</text>'
         "</svg>"
     )
+
+
+def test_the_labels_of_an_axis_keep_their_digits() -> None:
+    """Ticks of 0.0010, 0.0015 and 0.0020 were all shown as 0.00."""
+    svg = '<svg><g transform="translate(1.23456 2)"><text>0.0015</text></g></svg>'
+    assert inlined(svg, "p", "x") == (
+        '<svg role="img" aria-label="x"><g transform="translate(1.23 2)"><text>0.0015</text></g></svg>'
+    )

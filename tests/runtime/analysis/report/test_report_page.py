@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
+from dataclasses import replace
 
 import pytest
 
+from config.model import ModelConfig
+from config.world import PolygonConfig
+from drivers.messages import Pose
+from perception.detected_object import DetectedObject
 from runtime.analysis.report import report_page
 from runtime.analysis.report.report_page import page
 from runtime.analysis.timeline import ModeEntry
@@ -40,7 +46,7 @@ def test_page_shows_the_run(shown: str) -> None:
     assert shown.count("<svg") == 5
     drums = re.findall(r"<td>drum \d</td><td>\(([^)]*)\)</td>", shown)
     assert drums == ["1.00, 4.00", "4.00, 4.00", "7.00, 4.00", "1.00, -4.00", "4.00, -4.00", "7.00, -4.00"]
-    errors = re.findall(r"\(-?[\d.]+, -?[\d.]+\)</td><td>([\d.]+)</td>", shown)
+    errors = re.findall(r"\(-?[\d.]+, -?[\d.]+\)</td><td>([\d.]+)</td></tr>", shown)
     assert errors == ["0.033"] * 3
     named = re.findall(r"<td>(drum \d), semicircle</td>", shown)
     assert named == ["drum 1", "drum 2", "drum 3"], "each has its name of Table 2"
@@ -89,3 +95,29 @@ def test_page_shows_the_summary_and_why_the_robot_stopped() -> None:
     assert "1,832" in text
     assert "bumper &lt;contact&gt;" in shown
     assert "never stopped" not in text
+
+
+def test_walls_are_numbered_and_counted(shown: str) -> None:
+    assert '<div class="tile"><b>1</b><span>walls recognised</span></div>' in shown
+    rows = re.findall(r"<tr><td>7, wall</td><td>\((.*?)\)</td><td>\((.*?)\)</td><td>(.*?)</td>", shown)
+    assert rows == [("0.00, 4.92", "9.84, 4.92", "9.84")], "ends and length, ft"
+    assert 'id="models-wall-1"' in shown
+    assert "recognised wall, its number" in shown
+
+
+def test_a_polygon_of_ones_own_model_is_not_counted_false() -> None:
+    """A table of one's own, whose model's origin is a corner, stands in the world as a polygon."""
+    run = synthetic_timeline()
+    bench_top = ModelConfig(
+        name="bench_top", vertices_m=((0.0, 0.0), (1.2, 0.0), (1.2, 0.6), (0.0, 0.6)), closed=True
+    )
+    polygon = PolygonConfig(vertices_m=((2.0, 3.0), (2.0, 4.2), (1.4, 4.2), (1.4, 3.0)))
+    assert run.world is not None
+    run.world = run.world.model_copy(update={"polygon": (polygon,)})
+    run.settings = run.settings.model_copy(update={"models": (*run.settings.models, bench_top)})
+    corner = run.start.inverse().compose(Pose(2.0, 3.0, math.pi / 2))
+    seen = DetectedObject("bench_top", corner.x, corner.y, corner.theta, 0.01, 30, 0.9)
+    run.snapshots[-1] = replace(run.snapshots[-1], objects=(*run.snapshots[-1].objects, seen))
+    shown = page(run, "m")
+    assert re.search(r"<td>polygon 1</td><td>\(1.70, 3.60\)</td><td>\(1.70, 3.60\)</td><td>0.000</td>", shown)
+    assert "<b>4 of 7</b><span>objects found, 0 false</span>" in shown

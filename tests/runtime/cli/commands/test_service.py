@@ -23,6 +23,7 @@ def test_the_unit_that_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[
     shared = "run hallway --port /dev/ttyUSB0 --headless --set console.keep_token=true"
     assert f"{shared} --set behaviors.arbiter.base_velocity_m_s=0.2" in start
     assert "--arm" not in printed.out
+    assert "ExecReload=/bin/kill -HUP $MAINPID" in lines
     for line in ("Type=notify", "WatchdogSec=2", "Restart=on-failure", "DynamicUser=yes", "KillSignal=SIGTERM"):
         assert line in lines
     if shutil.which("systemd-analyze") is not None:
