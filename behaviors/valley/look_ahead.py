@@ -134,7 +134,7 @@ def _children(
 
     Steps along the way in force cost less, so that another of almost the same cost does not replace it.
     """
-    goal, kept = search.goal or (0.0, 0.0), np.array(search.way).reshape(-1, 2)
+    goal = search.goal or (0.0, 0.0)
     room_max_m = body_radius_m + config.safety_m
     step_m = min(config.look_ahead_step_m, distance)
     comfort_m = body_radius_m + config.comfort_m
@@ -142,7 +142,7 @@ def _children(
     radius_m = room_m(cells, body_radius_m, room_max_m) if number == 0 else room_max_m
     blocked, near = map(bytes, crossed(cells, np.array([radius_m, max(radius_m, comfort_m)]), np.full(2, step_m)))
     target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
-    found = []
+    found, same = [], (SAME * step_m) ** 2
     for c in candidates(blocked, target, math.radians(config.wide_valley_deg) / SECTOR_RAD):
         turned_rad = apart(c, node.direction) * SECTOR_RAD
         cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
@@ -150,7 +150,7 @@ def _children(
         x, y = node.x + step_m * math.cos(angle), node.y + step_m * math.sin(angle)
         if c == target and step_m == distance:
             x, y = goal
-        if len(kept) and float(((kept - (x, y)) ** 2).sum(axis=1).min()) < (SAME * step_m) ** 2:
+        if any((kx - x) ** 2 + (ky - y) ** 2 < same for kx, ky in search.way):
             cost_m *= 1.0 - config.keep_share
         cost_m += config.turn_cost_m_per_rad * turned_rad
         found.append(Node(x, y, c, node.cost_m + cost_m, number))

@@ -65,10 +65,11 @@ def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: Fol
     config : FollowValleyConfig
         From which probability on a cell counts, and from which it is sure.
     """
-    dx, dy = percept.obstacles[:, 0] - x, percept.obstacles[:, 1] - y
-    certainties = np.ones(len(dx))
     window = percept.occupancy
-    if window is not None:
+    if window is None:
+        table = np.empty((4, len(percept.obstacles)))
+        cells = 0
+    else:
         rows, columns = window.occupied.shape
         left, low = (x - window.x_m) / window.cell_m, (y - window.y_m) / window.cell_m
         reach = reach_m / window.cell_m
@@ -76,15 +77,19 @@ def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: Fol
         part = window.occupied[
             row : max(row, min(rows, int(low + reach) + 1)), column : max(column, min(columns, int(left + reach) + 1))
         ]
-        at_row, at_column = np.nonzero(part > config.occupied_probability)
-        span = config.sure_probability - config.occupied_probability
-        sure = (part[at_row, at_column].astype(np.float64) - config.occupied_probability) / span
-        certainties = np.concatenate([np.minimum(sure, 1.0), certainties])
-        dx = np.concatenate([(at_column + (column + 0.5 - left)) * window.cell_m, dx])
-        dy = np.concatenate([(at_row + (row + 0.5 - low)) * window.cell_m, dy])
-    distances = np.hypot(dx, dy)
-    near = distances < reach_m
-    return Cells(dx[near], dy[near], distances[near], certainties[near])
+        at_row, at_column = (part > config.occupied_probability).nonzero()
+        cells = len(at_row)
+        table = np.empty((4, cells + len(percept.obstacles)))
+        np.add(at_column, column + 0.5 - left, out=table[0, :cells])
+        np.add(at_row, row + 0.5 - low, out=table[1, :cells])
+        table[:2, :cells] *= window.cell_m
+        sure = np.subtract(part[at_row, at_column], np.float64(config.occupied_probability), out=table[3, :cells])
+        sure /= config.sure_probability - config.occupied_probability
+        np.minimum(sure, 1.0, out=sure)
+    np.subtract(percept.obstacles.T, ((x,), (y,)), out=table[:2, cells:])
+    table[3, cells:] = 1.0
+    distances = np.hypot(table[0], table[1], out=table[2])
+    return Cells(*table.compress(distances < reach_m, axis=1))
 
 
 def room_m(cells: Cells, body_radius_m: float, room_max_m: float) -> float:
@@ -123,28 +128,30 @@ def crossed(cells: Cells, radii_m: Floats, ways_m: Floats, shares: Floats | None
         Shape (n, SECTORS).
     """
     discs = len(radii_m)
-    if len(cells.distances) == 0:
+    ends = radii_m + ways_m if shares is None else radii_m + np.multiply.outer(shares, ways_m)
+    cell, disc = (cells.distances[:, None] < ends).nonzero()
+    if len(cell) == 0:
         return np.zeros((discs, SECTORS), dtype=np.bool_)
-    radii, ways = radii_m[:, None], ways_m[:, None]
-    d = np.maximum(cells.distances, radii + 1e-9)
-    squares, reaches = d * d, radii * radii
-    is_beyond = squares > ways * ways + reaches
-    # Passed on the way: asin(R/d), the enlargement of VFH+. Beside its end: the law of cosines; beyond it: none.
-    cosines = (squares + (ways * ways - reaches)) / (2.0 * ways * d)
-    half = np.where(is_beyond, np.arccos(np.minimum(cosines, 1.0)), np.arcsin(radii / d))
+    radii, ways = radii_m[disc], ways_m[disc]
+    d = np.maximum(cells.distances[cell], radii + 1e-9)
+    squares, corners = d * d, (ways_m * ways_m + radii_m * radii_m)[disc]
+    # Passed on the way: asin(R/d), the enlargement of VFH+. Beside its end: the law of cosines.
+    beside = (squares > corners).nonzero()[0]
+    half = np.arcsin(radii / d)
+    if len(beside):
+        way, radius, far = ways[beside], radii[beside], d[beside]
+        cosines = (squares[beside] + (way * way - radius * radius)) / (2.0 * way * far)
+        half[beside] = np.arccos(np.minimum(cosines, 1.0))
     half *= 1.0 / SECTOR_RAD
-    middle = np.arctan2(cells.dy, cells.dx) / SECTOR_RAD
-    first, last = np.ceil(middle - half).astype(np.int64), np.floor(middle + half).astype(np.int64)
-    reached = (last >= first) & ~(is_beyond & (cosines > 1.0))
-    if shares is not None:
-        reached &= cells.distances < radii + ways * shares
-    # Each run adds 1 where it begins and takes it away behind its end, on a line twice round for each disc.
-    rows = (np.arange(discs) * LINE + SECTORS)[:, None]
-    begins = np.bincount((first + rows)[reached], minlength=discs * LINE)
-    ends = np.bincount((last + rows)[reached] + 1, minlength=discs * LINE)
-    counts = (begins - ends).cumsum().reshape(discs, LINE)
-    covered: Sectors = (counts[:, :SECTORS] > 0) | (counts[:, SECTORS : 2 * SECTORS] > 0)
-    covered[:, 0] |= counts[:, 2 * SECTORS] > 0
+    middle = (np.arctan2(cells.dy, cells.dx) / SECTOR_RAD)[cell]
+    # Each run adds 1 where it begins and takes it away behind its end, on a line twice round for each disc; a run
+    # without a sector ends before it begins, and adds nothing.
+    middle += disc * LINE + SECTORS
+    begins = np.bincount(np.ceil(middle - half).astype(np.intp), minlength=discs * LINE)
+    ends_at = np.bincount(np.floor(middle + half).astype(np.intp) + 1, minlength=discs * LINE)
+    counts = (begins - ends_at).cumsum().reshape(discs, LINE) > 0
+    covered: Sectors = counts[:, :SECTORS] | counts[:, SECTORS : 2 * SECTORS]
+    covered[:, 0] |= counts[:, 2 * SECTORS]
     return covered
 
 
