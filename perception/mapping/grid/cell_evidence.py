@@ -29,6 +29,8 @@ PLACES: Final = 1 << 15
 """Places are numbered modulo this."""
 CERTAIN: Final = 3 * NAT
 """Greatest evidence for and against, so that contradiction is soon seen."""
+NOWHERE: Final = 0
+"""The place of evidence that was never renewed; no place has this number."""
 FADING_PLACES: Final = 50
 """Evidence loses one unit for each so many places: 1 nat on 5 km of way, on which odometry has drifted through the
 window; the faint evidence of one echo is gone after a few hundred metres."""
@@ -67,8 +69,8 @@ def base_elsewhere(cell: Cells, own: int, place: int) -> int:
     """Return the greatest evidence of a cell in any looking direction but one, without this place's readings."""
     most = 0
     for k in range(OCTANTS):
-        if k != own:
-            kept = cell[k]
+        kept = cell[k]
+        if k != own and kept[STAMP] != NOWHERE:
             value = int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)
             most = max(most, value)
     return most

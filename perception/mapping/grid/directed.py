@@ -30,6 +30,7 @@ from perception.mapping.grid.cell_evidence import (
     FREE,
     HIT,
     NAT,
+    NOWHERE,
     PLACES,
     STAMP,
     UNDIRECTED,
@@ -271,16 +272,17 @@ def fill_probability(
         for column in range(count):
             ix = int(corner[0]) + column
             cell = cells[iy & (count - 1), ix & (count - 1)]
-            if cell[UNDIRECTED, STAMP] == 0:
+            if cell[UNDIRECTED, STAMP] == NOWHERE:
                 out[row, column] = odds[CERTAIN]
                 continue
             if math.isnan(from_x):
                 most = 0
                 least = 0
                 for k in range(OCTANTS if mirrors > 0.0 else 0):
-                    value = evidence_now(cell[k], place)
-                    most = max(most, value)
-                    least = min(least, value)
+                    if cell[k, STAMP] != NOWHERE:
+                        value = evidence_now(cell[k], place)
+                        most = max(most, value)
+                        least = min(least, value)
                 directed = max(0, most - FAINT) if most > 0 else least
                 value = int(mirrors * directed + (1.0 - mirrors) * evidence_now(cell[UNDIRECTED], place))
             else:
@@ -329,7 +331,7 @@ class DirectedGrid:
         """Enter a firing; see `EvidenceGrid.observe`."""
         if not self.window.follow(firing.pose, (self.cells,)):
             return
-        self._place = 1 + place % (PLACES - 1)  # 0 is that of a cell without evidence
+        self._place = 1 + place % (PLACES - 1)  # never NOWHERE
         mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_readings(
             self.cells, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
