@@ -37,6 +37,7 @@ __all__ = [
     "with_goal",
     "with_known_room",
     "with_mission",
+    "with_room",
     "with_value",
 ]
 
@@ -226,9 +227,28 @@ def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) ->
     ConfigError
         The world cannot be read, is invalid, or has no surface; or drift is to be corrected otherwise.
     """
-    surfaces = load_world(name_or_path).model_dump(mode="json", include={"drum", "wall", "box", "polygon"})
-    location = ("perception", "localization", "known_room")
-    return with_value(settings, f"map {os.fspath(name_or_path)}", location, surfaces)
+    return with_room(settings, load_world(name_or_path), f"map {os.fspath(name_or_path)}")
+
+
+def with_room(settings: Settings, room: WorldConfig | None, name: str) -> Settings:
+    """Return the settings with the surfaces of a world as the known room, or without a known room.
+
+    Parameters
+    ----------
+    settings
+        Complete settings.
+    room
+        The world; None for no known room.
+    name
+        Of the map in error messages.
+
+    Raises
+    ------
+    ConfigError
+        The world has no surface; or drift is to be corrected otherwise.
+    """
+    surfaces = None if room is None else room.model_dump(mode="json", include={"drum", "wall", "box", "polygon"})
+    return with_value(settings, name, ("perception", "localization", "known_room"), surfaces)
 
 
 def with_goal(settings: Settings, goal: GoalConfig) -> Settings:

@@ -37,9 +37,11 @@ LIVE_SETTINGS: Final = frozenset(
         "ring.firing",
     }
 )
-"""Settings and sections that a running process can apply. All others size an array, open a port or describe the robot
-itself, so they need a restart, as does a new setting until it is listed here. Models can be appended, see
-`Difference.live`."""
+"""Settings and sections that a running process can apply at any time. All others size an array, open a port or
+describe the robot itself, so they need a restart, as does a new setting until it is listed here. Models can be
+appended, see `Difference.live`."""
+MAP: Final = frozenset({"perception.localization.known_room"})
+"""The known room. It can be applied to a robot that stands: all places in the map mean something else then."""
 
 
 MODELS: Final = ("models",)
@@ -60,15 +62,19 @@ class Difference:
 
     @property
     def live(self) -> bool:
-        """Whether a running process can apply the change.
+        """Whether a running process can apply the change at any time.
 
         Appended models are further hypotheses, and the existing state stays valid. Removing or changing a model needs
         a restart, because existing objects refer to it.
         """
         if self.location == MODELS and isinstance(self.before, tuple) and isinstance(self.after, tuple):
             return self.before == self.after[: len(self.before)]
+        return self.is_of(LIVE_SETTINGS)
+
+    def is_of(self, sections: frozenset[str]) -> bool:
+        """Return whether the change lies in one of these settings or sections."""
         keys = [str(key) for key in self.location]
-        return any(".".join(keys[:n]) in LIVE_SETTINGS for n in range(1, len(keys) + 1))
+        return any(".".join(keys[:n]) in sections for n in range(1, len(keys) + 1))
 
     def __str__(self) -> str:
         return f"{self.path}: {_shown(self.before)} → {_shown(self.after)}"
@@ -86,7 +92,7 @@ class ReloadResult:
     """Why the new settings were refused, one line each; empty if they were applied."""
 
 
-def reload(current: Settings, propose: Callable[[], Settings]) -> ReloadResult:
+def reload(current: Settings, propose: Callable[[], Settings], also: frozenset[str] = frozenset()) -> ReloadResult:
     """Return the settings in force after an attempt to change them.
 
     Parameters
@@ -95,13 +101,15 @@ def reload(current: Settings, propose: Callable[[], Settings]) -> ReloadResult:
         Settings in force so far; never modified.
     propose
         Loads and validates the new settings; raises ConfigError if they are invalid.
+    also
+        Settings and sections that can be applied now besides `LIVE_SETTINGS`.
     """
     try:
         proposed = propose()
     except ConfigError as error:
         return ReloadResult(current, problems=error.problems)
     changed = tuple(differences(current, proposed))
-    fixed = tuple(f"{d}: needs a restart" for d in changed if not d.live)
+    fixed = tuple(f"{d}: needs a restart" for d in changed if not (d.live or d.is_of(also)))
     if fixed:
         return ReloadResult(current, problems=fixed)
     return ReloadResult(proposed, changed) if changed else ReloadResult(current)

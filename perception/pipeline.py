@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
+from config.world import WorldConfig
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
@@ -77,9 +78,12 @@ class Perception:
         corrects = config.localization.correct_drift
         self.map_frame = MapFrame(ring, models) if corrects else None
         """Corrects drift, where the settings say so; what `method` holds is in the filter's frame then."""
-        known_room = config.localization.known_room
-        self.known_room = None if known_room is None else KnownRoom(room_of(known_room), ring)
+        self._ring = ring
+        self.known_room: KnownRoom | None = None
         """Finds the robot in the room of the settings, where there is one."""
+        self.room: WorldConfig | None = None
+        """That room."""
+        self._set_room(config.localization.known_room)
         has_grid = method is None and config.grid.method != "off"
         self.grid = EvidenceGrid(ring, config.grid) if has_grid else None
         """The evidence grid in the odometry's frame, where the settings have one."""
@@ -258,7 +262,7 @@ class Perception:
 
     def _place_robot(self, edit: PlaceRobot) -> str | None:
         if self.known_room is None:
-            return "there is no known room: start with --map"
+            return "there is no known room: start with --map, or load a map"
         refused = invalid_pose(edit.x, edit.y, edit.theta)
         if refused is None:
             self.known_room.assume(Pose(edit.x, edit.y, edit.theta))
@@ -330,6 +334,12 @@ class Perception:
     def apply_settings(self, config: PerceptionConfig) -> None:
         """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
         self.method.apply_settings(config)
+        if config.localization.known_room != self.room:
+            self._set_room(config.localization.known_room)
+
+    def _set_room(self, room: WorldConfig | None) -> None:
+        """Look for the robot's place in a room, as at the start of a run there; None forgets the room."""
+        self.room, self.known_room = room, None if room is None else KnownRoom(room_of(room), self._ring)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Recognise these models: the present ones, and possibly further ones after them."""

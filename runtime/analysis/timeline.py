@@ -102,8 +102,10 @@ class BookmarkEntry:
 
 @dataclass(slots=True, eq=False)
 class MapView:
-    """What a run perceived in the frame of the map in which it was driven, while it knew its place there."""
+    """What a run perceived in the frame of its (last) map, while it knew its place there."""
 
+    known: WorldConfig
+    """That map, as it was given."""
     echoes: Echoes
     """The readings of that time."""
     way: Floats

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from config.world import WorldConfig
 from drivers.messages import Firing, Floats, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.localization.map_frame import turned_object
@@ -54,6 +55,7 @@ class TimelineBuilder:
         self._clusters = ClusterView(settings.perception)
         self._placed: list[tuple[Pose, Echoes]] = []
         self._near_map: dict[int | None, DetectedObject] = {}
+        self._room: WorldConfig | None = None
         self._unplaced = 0
 
     @property
@@ -103,8 +105,8 @@ class TimelineBuilder:
         timeline = self._timeline
         if perception is not None and (not timeline.snapshots or timeline.snapshots[-1].t_s < timeline.seconds):
             self._add_snapshot(timeline.seconds, perception)
-        if perception is not None and perception.known_room is not None:
-            timeline.map_view = self._map_view(perception)
+        if perception is not None and perception.room is not None:
+            timeline.map_view = self._map_view(perception, perception.room)
         if self._rows:
             timeline.echoes = np.concatenate(self._rows)
         if self._segments:
@@ -113,6 +115,8 @@ class TimelineBuilder:
     def _place_in_map(self, perception: Perception) -> None:
         """Keep the readings since the last cycle, and the objects nearby, in the map frame as it is known now."""
         rows, self._unplaced = self._rows[self._unplaced :], len(self._rows)
+        if perception.room is not self._room:  # another map: places in it mean others
+            self._placed, self._near_map, self._room = [], {}, perception.room
         here = perception.localized()
         if here is None or here.status != "tracking":
             return
@@ -121,11 +125,12 @@ class TimelineBuilder:
         for seen in perception.near_objects():
             self._near_map[seen.number] = turned_object(to, seen)
 
-    def _map_view(self, perception: Perception) -> MapView:
+    def _map_view(self, perception: Perception, known: WorldConfig) -> MapView:
         numbers = {seen.number for seen in perception.objects()}
         to = perception.odometry_from_map().inverse()
         walls = tuple(turned_object(to, seen) for seen in walls_of(perception))
         return MapView(
+            known,
             np.concatenate([np.empty(0, ECHO), *(rows for _, rows in self._placed)]),
             np.array([(pose.x, pose.y) for pose, _ in self._placed]).reshape(-1, 2),
             tuple(seen for number, seen in self._near_map.items() if number in numbers),

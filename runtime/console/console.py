@@ -110,7 +110,7 @@ class Console:
         default = Limits(clients=config.clients_max, command_age_max_s=config.command_age_max_s)
         self._limits = default if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
-        self._shown_models = settings.models
+        self._shown = _in_session(settings)
         self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
@@ -266,9 +266,9 @@ class Console:
         self._console_log.note("configuration changed from the console", changed=[str(one) for one in changed])
 
     def _show_settings(self, settings: Settings) -> None:
-        before, self._shown_models = self._shown_models, settings.models
+        before, self._shown = self._shown, _in_session(settings)
         self._publisher.adopt(settings)
-        if settings.models != before:
+        if self._shown != before:
             self.hub.begin_session(self._session())
         else:
             self.hub.broadcast({"type": "parameters", "parameters": parameters(settings)})
@@ -327,3 +327,8 @@ class Console:
 
 async def _as_coroutine(work: Callable[[], Awaitable[None]]) -> None:
     await work()
+
+
+def _in_session(settings: Settings) -> tuple[object, ...]:
+    """Return what the session information has of the settings that a running process may change."""
+    return settings.models, settings.perception.localization.known_room

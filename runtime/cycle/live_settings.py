@@ -49,13 +49,15 @@ class LiveSettings:
         """Register a callback that gets the new settings after every change."""
         self._subscribers.append(call)
 
-    def check(self, propose: Callable[[], Settings]) -> ReloadResult:
+    def check(self, propose: Callable[[], Settings], also: frozenset[str] = frozenset()) -> ReloadResult:
         """Return the effect of a change: its differences, or the problems for which it is refused.
+
+        See `config.reload.reload` for its arguments.
 
         `propose` returns the new settings as a whole and raises ConfigError where they are invalid. Changes nothing,
         so that it may run in a thread.
         """
-        return reload(self._current, propose)
+        return reload(self._current, propose, also)
 
     def apply(self, settings: Settings, *, can_undo: bool) -> tuple[Difference, ...]:
         """Put settings in force that `check` has accepted; return what changed.

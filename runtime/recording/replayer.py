@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from config.reload import differences
+from config.reload import MAP, differences
 from config.settings import Settings
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
@@ -201,7 +201,7 @@ class Replayer:
         settings = parse_settings(data)
         # An emulator's port is known only after the start. It has no effect on a replay.
         changed = (d for d in differences(self._settings, settings) if not d.path.startswith("link."))
-        fixed = next((d for d in changed if not d.live), None)
+        fixed = next((d for d in changed if not (d.live or d.is_of(MAP))), None)
         if fixed is not None:
             raise RecordingError(
                 f"{self._recording.path}: the settings change during the run, which no run can: {fixed}"

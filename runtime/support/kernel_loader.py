@@ -95,9 +95,11 @@ class KernelLoader:
                 self._log.info(f"compiling the kernels for {part}, once; the change takes effect afterwards")
                 await self._compile_part(part)
             if uncompiled_parts(folder, parts):
+                what = "a known room" if KNOWN_ROOM in parts else "a model without arc_radius_m"
+                start = "`--map FILE`" if KNOWN_ROOM in parts else "such a model, e.g. `--set models=box`"
                 return (
-                    "models: the kernels for a model without arc_radius_m could not be compiled during the run, "
-                    "likely for lack of memory, disk or time: start with such a model, e.g. `--set models=box`"
+                    f"the kernels for {what} could not be compiled during the run, likely for lack of memory, disk "
+                    f"or time: start with {start}"
                 )
             before = compiled_signatures()
             await asyncio.to_thread(warm_up, proposed, parts)

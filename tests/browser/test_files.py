@@ -100,3 +100,32 @@ async def test_who_only_watches_can_look_but_change_nothing(server: FakeServer, 
     for name in ("file-pin", "file-delete", "file-rename-do"):
         await expect(opened.page.locator(f"#{name}")).to_be_disabled()
     await expect(opened.page.locator("#file-play")).to_be_enabled()
+
+
+async def test_a_map_is_loaded_forgotten_and_the_robot_placed_in_it(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await files_of(opened)
+    await opened.says("#map-known", "Disarm the robot to load or forget a map")
+    await expect(page.locator("#map-load")).to_be_disabled()
+    server.mode = "READY"
+    await expect(page.locator("#map-load")).to_be_enabled()
+    chosen = {"name": "hall.toml", "mimeType": "text/plain", "buffer": b"[[wall]]"}
+    server.refusals["load_map"] = ("map: wall 0: x1_m is missing", "toml")
+    await page.locator("#map-load").set_input_files(chosen)  # type: ignore[arg-type]
+    await opened.says("#map-error", "x1_m is missing")
+    server.refusals.clear()
+    await page.locator("#map-load").set_input_files(chosen)  # type: ignore[arg-type]
+    assert await server.wait("load_map", 2) == {"toml": "[[wall]]"}
+    await opened.says("#toasts", "hall.toml is the map now")
+    await page.locator("#here-x").fill("10")
+    await page.locator("#here-y").fill("-1")
+    await page.locator("#here-heading").fill("90")
+    await page.locator("#here-heading").press("Enter")
+    placed = await server.wait("place_robot")
+    assert placed == pytest.approx({"x": 3.048, "y": -0.3048, "theta": 1.5708}, abs=1e-4)
+    await page.locator("#map-here").press("Enter")
+    await expect(page.locator("#tool-here")).to_have_attribute("aria-checked", "true")
+    await opened.save_screenshot("files-map")
+    await page.locator("#map-forget").press("Enter")
+    assert await server.wait("load_map", 3) == {"toml": None}

@@ -48,14 +48,13 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
     files = {"--out": out, "--grid": grid, "--grid (its YAML)": beside, "--geojson": geojson}
     timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
     settings, view, changes = timeline.settings, timeline.map_view, list[MapChange]()
-    known = settings.perception.localization.known_room
     objects, walls = (timeline.objects, wall_ends(timeline.walls)) if view is None else (view.objects, view.walls)
     if len(objects) + len(walls) > ITEMS_MAX:
         raise UserError(f"{source.file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
     world, echoes = world_of(objects, walls, settings.models), timeline.echoes
     half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)
     head = f"Map of {utf8(Path(source.file).name)}: what was recognised, in the frame of its odometry (m)."
-    if view is not None and known is not None:
+    if view is not None:
         if not len(view.echoes):
             raise UserError(
                 f"{source.file}: the robot never knew its place in the map; drive farther, or check that it is the "
@@ -63,7 +62,9 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
                 FAILED,
             )
         echoes = view.echoes
-        changes, world = compare_with_map(known, world, round_names(objects, settings.models), echoes, half_angle_rad)
+        changes, world = compare_with_map(
+            view.known, world, round_names(objects, settings.models), echoes, half_angle_rad
+        )
         head = f"The map of {utf8(Path(source.file).name)}, corrected by what that run found (m)."
     with writing("--out", out):
         Path(out).write_text(world_text(world, (head,)), encoding="utf-8")

@@ -13,6 +13,7 @@ from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import (
     AddBookmark,
+    LoadMap,
     LoadModel,
     NoArguments,
     OpenRecording,
@@ -23,6 +24,7 @@ from runtime.console.commands.messages import (
     StepRecording,
 )
 from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl
+from runtime.cycle.modes import Mode
 from runtime.timing.time_control import TimeControl
 
 Part = TypeVar("Part")
@@ -31,6 +33,17 @@ Part = TypeVar("Part")
 async def load_model(call: Call, model: LoadModel) -> dict[str, str]:
     """Recognise a further model; return its name."""
     return {"name": (await call.context.tuning.add_model(model.toml)).name}
+
+
+async def load_map(call: Call, given: LoadMap) -> None:
+    """Find the robot in a known room from now on; refused while it drives."""
+    robot = call.context.robot
+
+    def refusal() -> str | None:
+        is_driving = robot.state.mode.mode is Mode.DRIVE
+        return "the robot drives, and places in the map would mean others: disarm it first" if is_driving else None
+
+    await call.context.tuning.set_map(given.toml, refusal)
 
 
 async def pause(call: Call, _: NoArguments) -> None:

@@ -87,6 +87,13 @@ class LoadModel:
 
 
 @dataclass(frozen=True, slots=True)
+class LoadMap:
+    """Find the robot in a known room, given as the text of its world file; null forgets the room that is known."""
+
+    toml: Annotated[str | None, Field(max_length=MESSAGE_MAX_BYTES)]
+
+
+@dataclass(frozen=True, slots=True)
 class SetParameter:
     """Change one setting; `path` is its dotted name."""
 

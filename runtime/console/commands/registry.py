@@ -62,6 +62,7 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("evidence", arguments.GetEvidence, TOKEN, handlers.get_evidence),
     Command("show_grid", NoArguments, TOKEN, handlers.show_grid),
     Command("load_model", arguments.LoadModel, CONTROL, async_commands.load_model, always, survives_stop=True),
+    Command("load_map", arguments.LoadMap, CONTROL, async_commands.load_map, always, survives_stop=True),
     Command("set_parameter", arguments.SetParameter, CONTROL, handlers.set_parameter, always, survives_stop=True),
     Command("undo_parameter", NoArguments, CONTROL, handlers.undo_parameter, always, survives_stop=True),
     Command("save_toml", NoArguments, TOKEN, handlers.save_toml),

@@ -13,11 +13,12 @@ import tomli_w
 
 from config.errors import UserError
 from config.layers import Location
-from config.load import MODELS_MAX, ConfigError, parse_text, with_value
+from config.load import MODELS_MAX, ConfigError, parse_text, with_room, with_value
 from config.model import ModelConfig
 from config.problems import shown
-from config.reload import Difference, ReloadResult, differences
+from config.reload import MAP, Difference, ReloadResult, differences
 from config.settings import Settings
+from config.world import WorldConfig
 from runtime.console.commands.command_error import CommandError
 from runtime.cycle.live_settings import LiveSettings, PrepareSettings
 from runtime.support.pattern_check import refuse_undrivable
@@ -107,6 +108,42 @@ class Tuning:
             raise CommandError(problem, "toml")
         self._apply("toml", proposed)
         return model
+
+    async def set_map(self, toml: str | None, refusal: Callable[[], str | None]) -> None:
+        """Find the robot in a known room from now on, as after a start with `--map`.
+
+        Parameters
+        ----------
+        toml
+            The room as a world file; None forgets the room that is known.
+        refusal
+            Returns why no map can be changed now, None if one can.
+
+        Raises
+        ------
+        CommandError
+            The world is invalid or has no surface, drift is corrected otherwise, or the map cannot be changed now.
+        """
+
+        def proposed() -> Settings:
+            room = None if toml is None else parse_text(WorldConfig, toml, "map")
+            return with_room(self.current, room, "map")
+
+        def result() -> Settings:
+            why = refusal()
+            if why is not None:
+                raise CommandError(why, "toml")
+            checked = self._live_settings.check(proposed, MAP)
+            if checked.problems:
+                raise CommandError("; ".join(checked.problems), "toml")
+            return checked.settings
+
+        problem = await self._prepare(self.current, result())
+        if problem is not None:
+            raise CommandError(problem, "toml")
+        changed = self._live_settings.apply(result(), can_undo=False)
+        if changed:
+            self._on_change(changed)
 
     def undo(self) -> tuple[Difference, ...]:
         """Undo the last change; return what changed.

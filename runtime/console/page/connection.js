@@ -10,7 +10,7 @@ const MESSAGE_MAX = 65_536;
 // Refused while a recording is shown: its object numbers and poses are not those of the live run.
 const LIVE_ONLY = new Set([
   "arm", "legs", "goal", "teleoperate", "start_mission", "run_mission", "set_route", "resume_mission", "skip_step", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
-  "confirm_object", "lift_area", "undo_edit", "clear_map", "evidence", "place_robot",
+  "confirm_object", "lift_area", "undo_edit", "clear_map", "evidence", "place_robot", "load_map",
 ]);
 // With more than this unsent the network is stalled: a command sent now would move the robot too late.
 const CONGESTED_BYTES = 4096;

@@ -12,6 +12,7 @@ import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
 import { Log } from "./log.js";
 import { MapEdits } from "./map_edits.js";
+import { MapFile } from "./map_file.js";
 import { MissionPanel } from "./mission.js";
 import { Notifications } from "./notifications.js";
 import { describeMap, Objects } from "./objects.js";
@@ -108,6 +109,7 @@ const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot"
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
 const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")) });
+new MapFile({ run, units, connection, notifications, tools });
 tabs = new Tabs((name) => {
   drawInstruments();
   alerts.look();

@@ -76,6 +76,7 @@ OTHERS: list[dict[str, Any]] = [
     {"type": "make_files", "kind": "map", "file": "run.mcap"},
     {"type": "list_jobs"},
     {"type": "cancel_job", "job": 1},
+    {"type": "load_map", "toml": "wall = 1"},
     {"type": "hold_mission"},
     {"type": "read_mission", "toml": "name = 1"},
     {"type": "save_route", "name": "a", "waypoints": [[1, 0, None]], "frame": "odom"},

@@ -9,6 +9,7 @@ import pytest
 
 from config.load import load_settings
 from config.settings import Settings
+from runtime.cycle.modes import Mode, ModeState
 from tests.runtime.console.console_case import open_console
 
 GAIN = "behaviors.avoid_static_obstacle.avoid_obstacle_gain"
@@ -128,3 +129,50 @@ async def test_a_further_model_begins_a_session_and_is_not_undone() -> None:
         assert not (await page.ask(type="undo_parameter"))["ok"]
         case.cycles()
         assert (await other.next("state"))["segments"]["whole"], "a new session sends all segments"
+
+
+ROOM = "drum = [{x_m = 1.0, y_m = 2.0, radius_m = 0.3}]\n[[wall]]\nx1_m = -3.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n"
+
+
+async def test_a_map_is_loaded_while_the_robot_stands_shown_to_all_and_forgotten() -> None:
+    async with open_console() as case:
+        page, other = await case.page(), await case.page()
+        assert (await page.ask(type="load_map", toml=ROOM))["ok"]
+        session = await other.next("session")
+        assert session["known_room"]["drums"] == [[1.0, 2.0, 0.3]]
+        (settings,) = case.run.asked
+        assert isinstance(settings, Settings)
+        room = settings.perception.localization.known_room
+        assert room is not None
+        assert len(room.wall) == 1
+        perception = case.run.state.perception
+        assert perception.known_room is None
+        perception.apply_settings(settings.perception)
+        found = perception.known_room
+        assert (found is not None, perception.localized().status) == (True, "localizing")  # type: ignore[union-attr]
+        perception.apply_settings(settings.perception)
+        assert perception.known_room is found, "the same map again loses no place"
+        assert (await page.ask(type="load_map", toml=None))["ok"]
+        assert (await other.next("session"))["known_room"] is None
+        perception.apply_settings(case.console.tuning.current.perception)
+        assert perception.localized() is None
+
+
+async def test_a_map_that_cannot_be_is_refused_and_so_is_any_while_the_robot_drives() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        for toml, error in (
+            ("wall = 1", "map: wall"),
+            ("", "surface"),
+            ("a = [", "map"),
+            ("start = {x_m = 1.0}", ""),
+        ):
+            answer = await page.ask(type="load_map", toml=toml)
+            assert (answer["ok"], answer["field"]) == (False, "toml"), answer
+            assert error in answer["error"]
+        case.run.state.mode = ModeState(Mode.DRIVE)
+        assert "the robot drives" in (await page.ask(type="load_map", toml=ROOM))["error"]
+        assert case.run.asked == []
+    async with open_console("perception.localization.correct_drift=true") as case:
+        page = await case.page()
+        assert "exclude each other" in (await page.ask(type="load_map", toml=ROOM))["error"]
