@@ -29,9 +29,9 @@ BACKWARDS_M_S = -0.05
 AGAIN_S = 5.0
 """After so long without a change an operator tries again, s."""
 NEAR_M = 0.1
-KNOWN_DRUMS = f"""run.state.objects.filter((o) => o.model === 'semicircle'
+KNOWN_DRUMS = f"""run.state.objects.filter((o) => o.model === 'drum'
     && run.session.truth.drums.some(([x, y]) => Math.hypot(o.x - x, o.y - y) < {NEAR_M})).length"""
-"""Recognised where they are; what the paper calls a drum is a semicircle to the method."""
+"""Recognised where they are."""
 
 
 async def drives(robot: Run, opened: Opened, expression: str, what: str) -> None:

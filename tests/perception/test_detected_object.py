@@ -16,7 +16,7 @@ def test_objects_hold_what_their_method_knows(seen: Perception) -> None:
     objects = seen.objects()
     assert len(objects) >= 4
     for o in objects:
-        assert o.model in {"semicircle", "box"}
+        assert o.model in {"drum", "box"}
         assert all(math.isfinite(v) for v in (o.x, o.y, o.theta))
         assert 0.0 < o.sigma < 0.1
         assert 0.0 < o.score <= 1.0

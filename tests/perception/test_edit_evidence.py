@@ -44,7 +44,7 @@ REFUSED: list[tuple[Edit, str]] = [
     (DeleteSegments((1, 2**80)), "invalid number"),
     (PinSegments((-(2**80),), pinned=True), "invalid number"),
     (PlaceModel("chair", 0.0, 0.0, 0.0), "no model is called chair"),
-    (PlaceModel("semicircle", math.nan, 0.0, 0.0), "invalid pose"),
+    (PlaceModel("drum", math.nan, 0.0, 0.0), "invalid pose"),
     (PlaceModel("box", 0.0, math.inf, 0.0), "invalid pose"),
     (PlaceModel("box", 0.0, 1e9, 0.0), "invalid pose"),
     (MoveObject(1, 0.0, 0.0, math.nan), "invalid pose"),
@@ -98,7 +98,7 @@ def test_evidence_agrees_with_the_objects_and_changes_nothing(seen: Perception) 
                 )  # fmt: skip
                 assert math.dist(end, (o.x, o.y)) < 0.9, "the reading ends near the object"
             assert len(heard) == pytest.approx(o.support, abs=0.2 * o.support + 3)
-            if o.model == "semicircle":
+            if o.model == "drum":
                 names = [name for name, _ in evidence.rivals]
                 assert set(names) <= {"post", "barrel", "edge", "wall", "corner"}
                 assert len(names) >= 3
@@ -144,7 +144,7 @@ def test_a_snapshot_holds_the_edited_state(seen: Perception, firings: list[Firin
     objects, listed = seen.objects(), seen.segments().numbers.tolist()
     edits: list[Edit] = [
         DeleteSegments(tuple(listed[:4])), PinSegments(tuple(listed[5:9]), pinned=True),
-        PlaceModel("semicircle", 0.5, 0.2, 0.0), PlaceModel("box", -0.5, 0.3, 0.2),
+        PlaceModel("drum", 0.5, 0.2, 0.0), PlaceModel("box", -0.5, 0.3, 0.2),
         MoveObject(number_of(objects[0]), objects[0].x + 0.05, objects[0].y, 0.0),
         ConfirmObject(number_of(objects[1])), RemoveObject(number_of(objects[2])),
     ]  # fmt: skip
@@ -182,7 +182,7 @@ def test_models_are_added_while_perception_runs(seen: Perception, firings: list[
     for firing in again(firings):
         hear(seen, firing)
     found = there(seen)
-    assert found.model in {"semicircle"}
+    assert found.model in {"drum"}
     assert {o.model for o in seen.objects() if o.placed} == {"bollard", "crate"}
     other = Perception(chosen.ring, models, chosen.perception)
     other.restore(seen.snapshot())
@@ -192,16 +192,16 @@ def test_models_are_added_while_perception_runs(seen: Perception, firings: list[
 @pytest.mark.compiled
 def test_every_edit_in_turn_on_the_first_objects(reached_drums: Perception, firings: list[Firing]) -> None:
     """The Bayesian method: each edit takes effect, and a restored snapshot reports the same objects."""
-    drum = next(o for o in reached_drums.objects() if o.model == "semicircle")
+    drum = next(o for o in reached_drums.objects() if o.model == "drum")
     numbers = reached_drums.segments().numbers.tolist()
     pins, doomed = tuple(numbers[:3]), tuple(numbers[3:6])
     for edit in (
-        PinSegments(pins, pinned=True), DeleteSegments(doomed), PlaceModel("semicircle", -0.3, 0.2, 0.0),
+        PinSegments(pins, pinned=True), DeleteSegments(doomed), PlaceModel("drum", -0.3, 0.2, 0.0),
         PlaceModel("box", -0.2, -0.3, 0.3), MoveObject(number_of(drum), drum.x + 0.05, drum.y, 0.0),
     ):  # fmt: skip
         assert reached_drums.edit(edit) is None
     drums, boxes = (
-        {o.number: o for o in reached_drums.objects() if o.placed and o.model == m} for m in ("semicircle", "box")
+        {o.number: o for o in reached_drums.objects() if o.placed and o.model == m} for m in ("drum", "box")
     )
     (placed_drum,) = drums.keys() - {drum.number}
     (box,) = boxes

@@ -136,7 +136,7 @@ def test_a_placed_model_relaxes_onto_the_readings(seen: Perception, off_x: float
     assert at(seen, DRUM) is None
     if is_bayes(seen):
         return  # it forgot the readings with the object: see below
-    assert seen.edit(PlaceModel("semicircle", rested.x + off_x, rested.y + off_y, rested.theta + 0.1)) is None
+    assert seen.edit(PlaceModel("drum", rested.x + off_x, rested.y + off_y, rested.theta + 0.1)) is None
     settle(seen)
     found = there(seen)
     assert (found.placed, found.confirmed) == (True, False)
@@ -145,7 +145,7 @@ def test_a_placed_model_relaxes_onto_the_readings(seen: Perception, off_x: float
     assert found.number not in {None, rested.number}
 
 
-@pytest.mark.parametrize("model", ["semicircle", "box"])
+@pytest.mark.parametrize("model", ["drum", "box"])
 def test_a_placed_model_is_reported_at_once_and_stays(seen: Perception, firings: list[Firing], model: str) -> None:
     """It is placed on the driven path, where many readings show free space."""
     before = {o.number for o in seen.objects()}
@@ -238,7 +238,7 @@ def test_a_confirmed_object_is_reported_whatever_its_evidence(
     assert number not in {o.number for o in seen.objects()}
     assert seen.edit(ConfirmObject(number)) is None
     (found,) = [o for o in seen.objects() if o.number == number]
-    assert (found.model, found.confirmed, found.placed) == ("semicircle", True, False)
+    assert (found.model, found.confirmed, found.placed) == ("drum", True, False)
     assert found.probability is not None
     assert found.probability < 0.8
     for firing in firings[EARLY:]:

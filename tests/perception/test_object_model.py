@@ -43,6 +43,6 @@ def test_a_straight_outline_faces_across() -> None:
 def test_the_shipped_semicircle_is_as_wide_as_its_arc() -> None:
     config = load_model("semicircle")
     shape = ObjectModel.from_config(config)
-    assert shape.name == "semicircle"
+    assert shape.name == "drum"
     assert config.arc_radius_m is not None
     assert shape.sides[:, 3].sum() == pytest.approx(math.pi * config.arc_radius_m, rel=0.02)

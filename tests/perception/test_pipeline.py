@@ -90,4 +90,4 @@ def test_of_two_models_the_better_fit_is_reported() -> None:
     for firing in drive(load_world("hallway")):
         perception.observe(firing)
         settle(perception)
-    assert [o.model for o in perception.objects()].count("semicircle") == 6
+    assert [o.model for o in perception.objects()].count("drum") == 6

@@ -8,7 +8,7 @@ const SLACK = 200; // old frames are thinned out once in so many
 // What the places of a short list hold.
 const PLACES = { pose: ["x", "y", "heading"], frame: ["x", "y", "heading"], twist: ["v", "w"], covariance: ["xx", "xy", "yy", "heading"] };
 // Positions in a list say nothing from one frame to the next; these are drawn on the map.
-const LEFT_OUT = new Set(["firing", "clusters", "areas", "sensors", "segments", "archived", "steps", "way", "number", "hidden_by"]);
+const LEFT_OUT = new Set(["firing", "clusters", "areas", "sensors", "segments", "archived", "steps", "way", "number", "hidden_by", "robot_s", "host_s"]);
 
 // Yields the parts of a field by name: objects by their number, vectors by their schema, numbers by what they hold.
 function* parts(value, name) {

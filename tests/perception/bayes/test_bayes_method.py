@@ -123,7 +123,7 @@ def test_an_empty_map_has_no_objects_and_nothing_to_refine() -> None:
 
 def test_an_object_is_shifted_with_the_readings_kept_for_it() -> None:
     perception = perception_of_both_models()
-    assert perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0)) is None
+    assert perception.edit(PlaceModel("drum", 1.0, 0.0, 0.0)) is None
     (number,) = (o.number for o in perception.objects())
     (row,) = np.flatnonzero(perception.memory.circles["number"] == number)
     kept = perception.memory.circles["bins"]["readings"][row]
@@ -138,10 +138,10 @@ def test_an_object_is_shifted_with_the_readings_kept_for_it() -> None:
 
 def test_a_placed_object_is_reported_until_the_map_is_reset() -> None:
     perception = perception_of_both_models()
-    assert perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0)) is None
+    assert perception.edit(PlaceModel("drum", 1.0, 0.0, 0.0)) is None
     assert perception.edit(PlaceModel("box", -1.0, 0.0, 0.0)) is None
     assert sorted((o.model, o.x, o.placed) for o in perception.objects()) == [
-        ("box", -1.0, True), ("semicircle", 1.0, True),
+        ("box", -1.0, True), ("drum", 1.0, True),
     ]  # fmt: skip
     assert perception.counts.hypotheses == 2
     numbers = {o.model: o.number for o in perception.objects()}
@@ -159,7 +159,7 @@ def test_a_placed_object_is_reported_until_the_map_is_reset() -> None:
 def test_a_changed_object_is_reported_anew_and_an_unchanged_one_is_the_same_object() -> None:
     perception = perception_of_both_models()
     for x in (1.0, 3.0):
-        perception.edit(PlaceModel("semicircle", x, 0.0, 0.0))
+        perception.edit(PlaceModel("drum", x, 0.0, 0.0))
     first = {o.number: o for o in perception.objects()}
     perception.edit(ConfirmObject(2))
     second = {o.number: o for o in perception.objects()}
@@ -170,17 +170,17 @@ def test_a_changed_object_is_reported_anew_and_an_unchanged_one_is_the_same_obje
 def test_added_models_are_reported_by_their_names() -> None:
     perception = perception_of_both_models()
     keg = BOXES.models[0].model_copy(update={"name": "keg", "arc_radius_m": 0.2})
-    perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0))
+    perception.edit(PlaceModel("drum", 1.0, 0.0, 0.0))
     assert perception.edit(PlaceModel("keg", 3.0, 0.0, 0.0)) is not None
     perception.set_models((*BOXES.models, keg))
     assert perception.edit(PlaceModel("keg", 3.0, 0.0, 0.0)) is None
-    assert sorted((o.model, o.x) for o in perception.objects()) == [("keg", 3.0), ("semicircle", 1.0)]
+    assert sorted((o.model, o.x) for o in perception.objects()) == [("drum", 1.0), ("keg", 3.0)]
 
 
 def test_a_firing_takes_as_many_quanta_as_configured_and_circles_and_polygons_alternate() -> None:
     """Every track always has unseen evidence, so the quanta of a firing are all used."""
     perception = perception_of_both_models(quanta_per_firing=2, polygon_quanta_per_firing=1)
-    perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0))
+    perception.edit(PlaceModel("drum", 1.0, 0.0, 0.0))
     perception.edit(PlaceModel("box", -1.0, 0.0, 0.0))
     memory, silence = perception.memory, np.full(SENSORS, np.nan)
     order: list[str] = []

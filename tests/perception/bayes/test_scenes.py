@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from config.load import load_settings
+from config.load import load_model, load_settings
 from config.world import DrumConfig, WorldConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
@@ -173,9 +173,9 @@ def test_every_object_has_a_label() -> None:
     for firing in readings(SETTINGS.ring, hall, 0):
         perceive(perception, firing)
     names = [found.model for found in perception.labelled_objects()]
-    assert names.count("semicircle") == 6
+    assert names.count("drum") == 6
     assert names.count("wall") >= 2
-    assert set(names) <= {"semicircle", "wall", "inside corner", "edge", "post", "barrel", "unknown"}
+    assert set(names) <= {"drum", "wall", "inside corner", "edge", "post", "barrel", "unknown"}
     for found in perception.labelled_objects():
         assert found.probability is not None
         assert 0.0 <= found.probability <= 1.0
@@ -185,8 +185,9 @@ def test_every_object_has_a_label() -> None:
 
 
 def test_circles_of_several_radii_are_distinguished() -> None:
-    models = load_settings("hallway", models=("semicircle", "drum")).models
-    small = models[0].model_copy(update={"name": "keg", "arc_radius_m": 0.2})
+    half, whole = load_model("semicircle"), load_model("drum").model_copy(update={"name": "cask"})
+    models = (half, whole)
+    small = half.model_copy(update={"name": "keg", "arc_radius_m": 0.2})
     drums = tuple(
         DrumConfig(x_m=x * FT, y_m=y * FT, radius_m=r)
         for x, y, r in ((1, 4, 0.2), (4, 4, 0.3048), (7, 4, 0.2), (1, -4, 0.3048), (4, -4, 0.2), (7, -4, 0.3048))
@@ -199,7 +200,7 @@ def test_circles_of_several_radii_are_distinguished() -> None:
     for drum in drums:
         nearest = min(seen, key=lambda o: math.dist((o.x, o.y), (drum.x_m, drum.y_m)))
         assert math.dist((nearest.x, nearest.y), (drum.x_m, drum.y_m)) < 0.01 * FT
-        assert nearest.model == ("keg" if drum.radius_m == 0.2 else "semicircle")
+        assert nearest.model == ("keg" if drum.radius_m == 0.2 else "drum")
 
 
 def test_after_a_reset_a_drive_gives_bit_identical_objects() -> None:

@@ -41,7 +41,7 @@ def changed(**sections: dict[str, Any]) -> PerceptionConfig:
 
 def test_another_gamma_relaxes_everything_again_to_another_pose(firings: list[Firing]) -> None:
     perception = perceived(firings)
-    assert perception.edit(PlaceModel("semicircle", 0.3, 1.2, 0.0)) is None
+    assert perception.edit(PlaceModel("drum", 0.3, 1.2, 0.0)) is None
     settle(perception)  # type: ignore[arg-type]
     rested, placed = perception.candidates.rows["pose"].copy(), perception.placements.rows["pose"].copy()
     perception.apply_settings(SHIPPED.perception)

@@ -51,7 +51,7 @@ def test_exactly_six_drums_are_found_within_the_errors_of_table_2() -> None:
     assert len(objects) == 6
     assert np.mean(errors) <= TABLE_2_MEAN_FT
     assert max(errors) <= TABLE_2_MAX_FT
-    assert all(o.model == "semicircle" and 0.0 < o.score <= 1.0 and 0.0 < o.sigma < 0.1 for o in objects)
+    assert all(o.model == "drum" and 0.0 < o.score <= 1.0 and 0.0 < o.sigma < 0.1 for o in objects)
 
 
 @pytest.mark.compiled

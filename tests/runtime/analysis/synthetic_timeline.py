@@ -29,7 +29,7 @@ def synthetic_timeline(*, with_world: bool = True) -> Timeline:
     start = Pose(world.start.x_m, world.start.y_m, 0.0).inverse()
     drums = [start.compose(Pose(d.x_m, d.y_m, 0.0)) for d in world.drum[:3]]
     objects = tuple(
-        DetectedObject("semicircle", p.x + ERROR_M, p.y, -1.5, 0.01, 9 + k, 0.9, covariance=(1e-4, 0.0, 1e-4))
+        DetectedObject("drum", p.x + ERROR_M, p.y, -1.5, 0.01, 9 + k, 0.9, covariance=(1e-4, 0.0, 1e-4))
         for k, p in enumerate(drums)
     )
     edges = np.array([(p.x - 0.1, p.y - 0.3, p.x + 0.1, p.y - 0.3) for p in drums])

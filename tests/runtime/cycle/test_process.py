@@ -84,7 +84,7 @@ def test_a_flood_of_edits_is_spread_over_cycles(monkeypatch: pytest.MonkeyPatch)
     """In the order in which they came; what is too much is refused."""
     taken: list[tuple[Edit, ...]] = []
     accepted: list[bool] = []
-    flood = [PlaceModel("semicircle", 0.01 * k, 1.0, 0.0) for k in range(100)]
+    flood = [PlaceModel("drum", 0.01 * k, 1.0, 0.0) for k in range(100)]
 
     def on_cycle(record: CycleRecord, _state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
         taken.append(record.inputs.edits)

@@ -57,7 +57,7 @@ class Operator:
             yield PinSegments(tuple(numbers[:6]), pinned=True)
             yield DeleteSegments(tuple(numbers[8:14]))
         elif cycle == 170:
-            yield PlaceModel("semicircle", 0.4, 0.1, 0.5)
+            yield PlaceModel("drum", 0.4, 0.1, 0.5)
             yield PlaceModel("box", -0.4, 0.2, 0.5)
         elif cycle in {240, 320} and objects:
             first = objects[0]

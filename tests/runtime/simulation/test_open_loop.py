@@ -23,7 +23,7 @@ def seen(model: str, x_ft: float, y_ft: float, theta: float = 0.0) -> DetectedOb
 def test_a_drum_is_no_box_and_a_box_no_drum() -> None:
     models = [load_model(name) for name in ("semicircle", "box")]
     world = halls("boxes_45")[0].world
-    there = [seen("box", 1.1, 4.0, math.radians(139.0)), seen("semicircle", 4.0, 4.0), seen("wall", 0.0, 0.0)]
+    there = [seen("box", 1.1, 4.0, math.radians(139.0)), seen("drum", 4.0, 4.0), seen("wall", 0.0, 0.0)]
     drums, boxes, false = match_objects(world, there, models)
     assert drums == []
     assert false == 1
@@ -38,7 +38,7 @@ def test_a_drum_is_no_box_and_a_box_no_drum() -> None:
 
 
 def test_two_estimates_of_one_drum_are_one_and_a_false_one() -> None:
-    twice = [seen("semicircle", 1.2, 4.0), seen("semicircle", 1.0, 4.1), seen("semicircle", 1.0, 5.2)]
+    twice = [seen("drum", 1.2, 4.0), seen("drum", 1.0, 4.1), seen("drum", 1.0, 5.2)]
     drums, _, false = match_objects(halls("clean")[0].world, twice, [load_model("semicircle")])
     assert drums[0]["error"] == pytest.approx(0.1 * FT)
     assert false == 2

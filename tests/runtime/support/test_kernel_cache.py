@@ -308,9 +308,9 @@ sys.exit(" ".join(late))
 @pytest.mark.parametrize(
     ("sets", "models", "further"),
     [
-        ("perception.method=bayes", "semicircle", "drum"),
+        ("perception.method=bayes", "semicircle", "keg.toml"),
         ("perception.method=bayes", "semicircle box", "hexagon.toml"),
-        ("perception.localization.correct_drift=true", "semicircle", "drum"),
+        ("perception.localization.correct_drift=true", "semicircle", "keg.toml"),
         ("perception.method=paper", "semicircle", "box"),
     ],
 )
@@ -320,6 +320,7 @@ def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_e
     """The emulator's kernels may still load: it is another process when it matters."""
     hexagon = [[math.cos(a), math.sin(a)] for a in (k * math.pi / 3.0 for k in range(6))]
     (tmp_path / "hexagon.toml").write_text(f'name = "hexagon"\nclosed = true\nvertices_m = {hexagon}\n')
+    (tmp_path / "keg.toml").write_text(f'name = "keg"\nclosed = true\narc_radius_m = 1.0\nvertices_m = {hexagon}\n')
     further = str(tmp_path / further) if "." in further else further
     done = subprocess.run(
         [sys.executable, "-c", COMPILED_LATER, sets, models, further],

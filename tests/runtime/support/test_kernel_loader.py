@@ -15,7 +15,7 @@ import structlog
 from structlog.testing import LogCapture
 
 from config.errors import UserError
-from config.load import load_settings
+from config.load import load_model, load_settings
 from config.settings import Settings
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_loader
@@ -24,7 +24,8 @@ from runtime.support.kernel_loader import KernelLoader, KernelPreparation
 from tests.hil.running import ROOT
 
 ROUND = load_settings("hallway")
-DRUMS = load_settings("hallway", models=["semicircle", "drum"])
+KEG = load_model("drum").model_copy(update={"name": "keg"})
+DRUMS = ROUND.model_copy(update={"models": (*ROUND.models, KEG)})
 BOXES = load_settings("hallway", models=["semicircle", "box"])
 
 

@@ -17,7 +17,7 @@ from runtime.analysis.timeline import ECHO, Timeline
 from tests.runtime.analysis.synthetic_timeline import SETTINGS, synthetic_timeline
 
 MODEL = SETTINGS.models[0]
-SEEN = DetectedObject("semicircle", 2.0, 1.0, math.pi, 0.0, 9, 1.0)
+SEEN = DetectedObject("drum", 2.0, 1.0, math.pi, 0.0, 9, 1.0)
 
 
 def curve_points(curves: Floats) -> Floats:

@@ -24,6 +24,6 @@ def test_every_setting_has_its_path_and_value() -> None:
     settings = load_settings("hallway", ["behaviors.arbiter.base_velocity_m_s=0.25"])
     rows = dict(flattened(settings))
     assert rows["behaviors.arbiter.base_velocity_m_s"] == "0.25"
-    assert rows["models.0.name"] == "semicircle"
+    assert rows["models.0.name"] == "drum"
     assert "link.port" not in rows, "unset values are left out"
     assert settings_list(settings).count("<div>") == len(flattened(settings))

@@ -48,7 +48,7 @@ def test_page_shows_the_run(shown: str) -> None:
     assert drums == ["1.00, 4.00", "4.00, 4.00", "7.00, 4.00", "1.00, -4.00", "4.00, -4.00", "7.00, -4.00"]
     errors = re.findall(r"\(-?[\d.]+, -?[\d.]+\)</td><td>([\d.]+)</td></tr>", shown)
     assert errors == ["0.033"] * 3
-    named = re.findall(r"<td>(drum \d), semicircle</td>", shown)
+    named = re.findall(r"<td>(drum \d), drum</td>", shown)
     assert named == ["drum 1", "drum 2", "drum 3"], "each has its name of Table 2"
     assert text.count("not found") == 3
     assert "3 of 6" in text
@@ -73,7 +73,7 @@ def test_page_without_a_known_world() -> None:
     unknown = page(synthetic_timeline(with_world=False), "m")
     assert "The true world is not known" in unknown
     assert PageReader(unknown).open == []
-    assert "<td>1, semicircle</td>" in unknown
+    assert "<td>1, drum</td>" in unknown
 
 
 @pytest.mark.usefixtures("_no_figures")

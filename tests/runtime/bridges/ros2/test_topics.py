@@ -14,7 +14,7 @@ from runtime.bridges.ros2.topics import DELETE, STRIP, Frames, Output, Topics
 from runtime.console.frames.session_info import session_info
 
 DRUM: dict[str, Any] = {
-    "number": 7, "model": "semicircle", "x": 2.0, "y": 1.0, "theta": 0.3, "sigma": 0.01,
+    "number": 7, "model": "drum", "x": 2.0, "y": 1.0, "theta": 0.3, "sigma": 0.01,
     "covariance": [4e-4, 1e-4, 9e-4], "probability": 0.99, "support": 40, "score": 0.99, "confirmed": False,
     "placed": False, "ends": None,
 }  # fmt: skip
@@ -101,8 +101,8 @@ def test_objects_are_markers_that_keep_their_numbers_and_are_deleted() -> None:
     _, outputs = made.take(state(objects=[DRUM, WALL]), 100.0)
     (markers,) = of(outputs, "objects")
     named = {(m["ns"], m["id"]): m for m in markers["markers"]}
-    assert named.keys() == {("semicircle", 7), ("semicircle label", 7), ("wall", 0)}
-    assert named["semicircle", 7]["scale"]["x"] == pytest.approx(0.6096)
+    assert named.keys() == {("drum", 7), ("drum label", 7), ("wall", 0)}
+    assert named["drum", 7]["scale"]["x"] == pytest.approx(0.6096)
     assert named["wall", 0]["type"] == STRIP
     assert named["wall", 0]["points"] == [{"x": 0.0, "y": 1.0}, {"x": 2.0, "y": 1.0}]
     (pose,) = of(outputs, "object_poses")
@@ -110,7 +110,7 @@ def test_objects_are_markers_that_keep_their_numbers_and_are_deleted() -> None:
     assert not of(made.take(state(10.05), 100.05)[1], "objects"), "five times a second is enough"
     (markers,) = of(made.take(state(10.2, objects=[WALL]), 100.2)[1], "objects")
     assert {(m["ns"], m["id"]) for m in markers["markers"] if m["action"] == DELETE} == {
-        ("semicircle", 7), ("semicircle label", 7)
+        ("drum", 7), ("drum label", 7)
     }  # fmt: skip
 
 

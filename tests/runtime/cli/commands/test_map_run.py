@@ -63,7 +63,7 @@ def test_a_run_in_a_known_room_corrects_its_map_and_names_the_changes(
     assert run_command(["map", str(log), "--out", str(out), "--grid", str(grid)]) == DONE
     written, *said, _ = capsys.readouterr().out.splitlines()
     assert written == f"{out}: 3 drums, 0 polygons, 4 walls"
-    assert [line.split(" at ")[0] for line in said] == ["new: semicircle", "moved: semicircle", "gone: drum"]
+    assert [line.split(" at ")[0] for line in said] == ["new: drum", "moved: drum", "gone: drum"]
     drums = sorted((round(drum.y_m, 1), drum.x_m) for drum in load_world(str(out)).drum)
     assert np.array(drums) == pytest.approx(np.array([(-1.2, 2.1), (1.2, 0.4), (1.2, 2.1)]), abs=0.02)
     assert grid.read_bytes().startswith(b"P5\n")

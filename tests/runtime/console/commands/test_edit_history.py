@@ -38,7 +38,7 @@ def seen() -> Perception:
     assert isinstance(perception.method, PaperPerception)
     ends = np.array([[0.1 * k, 1.0, 0.1 * k + 0.1, 1.0, np.pi / 2] for k in range(12)])
     perception.method.outline.add(ends, 3.0)
-    for edit in (PinSegments((2, 3), pinned=True), PlaceModel("semicircle", 1.0, 1.0, 0.2), AREA):
+    for edit in (PinSegments((2, 3), pinned=True), PlaceModel("drum", 1.0, 1.0, 0.2), AREA):
         assert perception.edit(edit) is None
     return perception
 
@@ -57,7 +57,7 @@ def state_of(perception: Perception) -> dict[str, Any]:
 @pytest.mark.parametrize(
     "edit",
     [DeleteSegments((1, 2, 5)), PinSegments((2, 7), pinned=True), PinSegments((2, 7), pinned=False),
-     PlaceModel("semicircle", 4.1, 4.0, 0.0), MoveObject(PLACED, 2.0, 2.0, 1.0), ConfirmObject(PLACED),
+     PlaceModel("drum", 4.1, 4.0, 0.0), MoveObject(PLACED, 2.0, 2.0, 1.0), ConfirmObject(PLACED),
      RejectObject(PLACED), MarkVacant(0.0, 0.0, 1.0), LiftArea(1)],
     ids=lambda edit: edit.kind,
 )  # fmt: skip

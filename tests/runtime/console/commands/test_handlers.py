@@ -48,7 +48,7 @@ async def test_a_mission_is_held_resumed_and_skipped_where_that_is_possible() ->
 
 
 async def test_a_mission_that_this_run_cannot_drive_is_refused() -> None:
-    async with open_console() as case:
+    async with open_console('models=["box"]') as case:
         page = await case.page()
         for name, why in (
             ("patrl", "no mission is named patrl"), ("../missions/patrol", "no mission is named"),

@@ -96,7 +96,7 @@ async def test_settings_from_a_file_are_shown_and_end_undo() -> None:
         ("vertices_m = [", "line 1"),
         ('name = "box"\nclosed = true\nvertices_m = [[0.0, 0.0], [1.0, 0.0]]', "a closed outline needs"),
         ("", "name: missing"),
-        ('name = "semicircle"\nclosed = false\nvertices_m = [[0.0, 0.0], [1.0, 0.0]]', "two models are named"),
+        ('name = "drum"\nclosed = false\nvertices_m = [[0.0, 0.0], [1.0, 0.0]]', "two models are named"),
     ],
 )
 async def test_an_invalid_model_is_refused(toml: str, error: str) -> None:
@@ -122,10 +122,10 @@ async def test_a_further_model_begins_a_session_and_is_not_undone() -> None:
         for one in (page, other):
             sessions = [message for message in one.received if message["type"] == "session"]
             session = sessions[1] if len(sessions) > 1 else await one.next("session")
-            assert [model["name"] for model in session["models"]] == ["semicircle", "crate"]
+            assert [model["name"] for model in session["models"]] == ["drum", "crate"]
             assert session["role"] == ("control" if one is page else "watch")
         assert (await page.ask(type="undo_parameter"))["data"] == {"path": GAIN, "value": 1.0}
-        assert [model.name for model in case.console.tuning.current.models] == ["semicircle", "crate"]
+        assert [model.name for model in case.console.tuning.current.models] == ["drum", "crate"]
         assert not (await page.ask(type="undo_parameter"))["ok"]
         case.cycles()
         assert (await other.next("state"))["segments"]["whole"], "a new session sends all segments"

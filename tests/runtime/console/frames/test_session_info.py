@@ -14,7 +14,7 @@ async def test_the_session_message_describes_robot_models_and_world() -> None:
         assert session["emulated"] is True
         assert len(session["ring"]["mounts"]) == 24
         assert len(session["truth"]["drums"]) == 6
-        assert session["models"][0]["name"] == "semicircle"
+        assert session["models"][0]["name"] == "drum"
         assert session["period_s"] == 0.05
         paths = {parameter["path"] for parameter in session["parameters"]}
         assert {"behaviors.avoid_static_obstacle.avoid_obstacle_gain", "cycle.perception_budget_s"} <= paths
