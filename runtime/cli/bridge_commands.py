@@ -1,4 +1,4 @@
-"""The commands that connect a run to other programs: `ros2`, `ros2-robot`."""
+"""The commands that connect a run to other programs: `ros2`, `ros2-robot`, `foxglove`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from runtime.cli.options import Flag, Force
+from runtime.cli.options import Count, Flag, Force
 
 Connect = Annotated[
     str | None, Parameter(help="Start URL of the run, with its token; by default that of the run on this machine.")
@@ -16,7 +16,7 @@ Connect = Annotated[
 def ros2(
     *ros: Annotated[str, Parameter(allow_leading_hyphen=True)],
     connect: Connect = None,
-    launch_file: Annotated[bool, Flag] = False,
+    print_launch: Annotated[bool, Flag] = False,
 ) -> int:
     """Bridge a run and ROS 2: ranges, odometry, frames, objects out; velocities, goals, arm, disarm, halt in.
 
@@ -24,12 +24,12 @@ def ros2(
     ----------
     ros
         Arguments of ROS, as --ros-args -r __ns:=/robot1 -p cmd_vel_timeout:=0.2
-    launch_file
+    print_launch
         Print a launch file for `ros2 launch` instead.
     """
     from runtime.cli.commands.ros2 import bridge_ros2, print_launch_file
 
-    return print_launch_file() if launch_file else bridge_ros2(connect, ros)
+    return print_launch_file() if print_launch else bridge_ros2(connect, ros)
 
 
 def ros2_robot_command(
@@ -59,3 +59,29 @@ def ros2_robot_command(
     from runtime.cli.commands.ros2_robot import write_robot_file
 
     return write_robot_file(out, radius_m=radius, speed_m_s=speed, turn_rad_s=turn, seconds=seconds, force=force)
+
+
+def foxglove(
+    *,
+    connect: Connect = None,
+    host: str = "127.0.0.1",
+    port: Count = 8766,
+    allow_set: Annotated[bool, Flag] = False,
+    print_layout: Annotated[bool, Flag] = False,
+) -> int:
+    """Serve a live run to Foxglove, with the topics of `export --to foxglove`.
+
+    Parameters
+    ----------
+    host
+        Address to listen on. Foxglove's protocol has no token: any program that reaches this port sees the run.
+    port
+        TCP port.
+    allow_set
+        Let Foxglove change settings of the run.
+    print_layout
+        Print a layout to import into Foxglove instead.
+    """
+    from runtime.cli.commands.foxglove import serve_live, write_layout
+
+    return write_layout() if print_layout else serve_live(connect, host, port, allow_set=allow_set)

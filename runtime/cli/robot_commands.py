@@ -20,6 +20,7 @@ def run(
     record: str | None = None,
     no_record: Annotated[bool, Flag] = False,
     no_console: Annotated[bool, Flag] = False,
+    foxglove: Annotated[bool, Flag] = False,
     json: JsonFile = None,
     force: Force = False,
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
@@ -53,6 +54,8 @@ def run(
         Record nothing.
     no_console
         Do not serve the operator console.
+    foxglove
+        Serve the run to Foxglove as well, from a process of its own; see `echolocate foxglove`.
     map_file
         The known room in which the robot finds itself: a world file, or the name of a shipped one.
     robot
@@ -86,8 +89,8 @@ def run(
     emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults, force=force)
     return run_robot(
         config, sets, robot=robot, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
-        map_file=map_file, mission=mission, goal=goal, no_record=no_record, no_console=no_console, json_file=json,
-        force=force, emulator=emulator, units=units,
+        map_file=map_file, mission=mission, goal=goal, no_record=no_record, no_console=no_console, foxglove=foxglove,
+        json_file=json, force=force, emulator=emulator, units=units,
     )  # fmt: skip
 
 

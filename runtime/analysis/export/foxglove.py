@@ -124,21 +124,21 @@ class _RunExporter:
         if self._timeline.world is None:
             return
         closed, lines = world_outlines(self._timeline.world)
-        loops = [_line(points.tolist(), TRUTH, closed=True) for points in closed]
-        walls = [_line(points.tolist(), TRUTH, closed=False) for points in lines]
-        entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="world", id="truth", lines=[*loops, *walls])
+        loops = [line(points.tolist(), TRUTH, closed=True) for points in closed]
+        walls = [line(points.tolist(), TRUTH, closed=False) for points in lines]
+        entity = fx.SceneEntity(timestamp=stamp(at), frame_id="world", id="truth", lines=[*loops, *walls])
         self._truth.log(fx.SceneUpdate(entities=[entity]), log_time=at)
 
     def _frame(self, parent: str, child: str, pose: Pose, at: int) -> None:
         frame = fx.FrameTransform(
-            timestamp=_stamp(at), parent_frame_id=parent, child_frame_id=child,
-            translation=fx.Vector3(x=pose.x, y=pose.y, z=0.0), rotation=_quaternion(pose.theta),
+            timestamp=stamp(at), parent_frame_id=parent, child_frame_id=child,
+            translation=fx.Vector3(x=pose.x, y=pose.y, z=0.0), rotation=quaternion(pose.theta),
         )  # fmt: skip
         self._frames.log(fx.FrameTransforms(transforms=[frame]), log_time=at)
 
     def _write_pose(self, pose: Pose, at: int) -> None:
         self._frame("odom", "base", pose, at)
-        message = fx.PoseInFrame(timestamp=_stamp(at), frame_id="odom", pose=_placed(pose.x, pose.y, pose.theta))
+        message = fx.PoseInFrame(timestamp=stamp(at), frame_id="odom", pose=placed(pose.x, pose.y, pose.theta))
         self._pose.log(message, log_time=at)
 
     def _write_scan(self, scan: FiringScan, at: int) -> None:
@@ -147,7 +147,7 @@ class _RunExporter:
         radius, sensors = even_radius(ring), len(ring.mounts)
         if radius is not None:
             message = fx.LaserScan(
-                timestamp=_stamp(at), frame_id="odom", pose=_placed(scan.x, scan.y, scan.yaw), start_angle=0.0,
+                timestamp=stamp(at), frame_id="odom", pose=placed(scan.x, scan.y, scan.yaw), start_angle=0.0,
                 end_angle=2.0 * math.pi * (sensors - 1) / sensors, ranges=whole_ring(sensors, radius, scan),
             )  # fmt: skip
             self._ring.log(message, log_time=at)
@@ -155,7 +155,7 @@ class _RunExporter:
         half = math.radians(ring.beam_half_angle_deg)
         for row in scan.rows:
             message = fx.LaserScan(
-                timestamp=_stamp(at), frame_id="odom", pose=_placed(row["x"], row["y"], row["bearing"]),
+                timestamp=stamp(at), frame_id="odom", pose=placed(row["x"], row["y"], row["bearing"]),
                 start_angle=-half, end_angle=half, ranges=[row["range_m"]] * ARC_POINTS,
             )  # fmt: skip
             self._ring.log(message, log_time=at)
@@ -164,40 +164,40 @@ class _RunExporter:
         ends = snapshot.segments.reshape(-1, 2).tolist()
         many = fx.LinePrimitive(
             type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True,
-            points=[fx.Point3(x=x, y=y) for x, y in ends], color=_colour(SEGMENT),
+            points=[fx.Point3(x=x, y=y) for x, y in ends], color=colour(SEGMENT),
         )  # fmt: skip
-        _scene(self._segments, "segments", [many] if ends else [], [], at)
+        scene(self._segments, "segments", [many] if ends else [], [], at)
         boxes = []
         for c in snapshot.clusters:
             corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
-            boxes.append(_line(corners, CLUSTER, closed=True))
+            boxes.append(line(corners, CLUSTER, closed=True))
             for up in (CROSS_M, -CROSS_M):
                 stroke = [(c.x - CROSS_M, c.y - up), (c.x + CROSS_M, c.y + up)]
-                boxes.append(_line(stroke, CLUSTER, closed=False))
-        _scene(self._clusters, "clusters", boxes, [], at)
+                boxes.append(line(stroke, CLUSTER, closed=False))
+        scene(self._clusters, "clusters", boxes, [], at)
         shapes, texts = [], []
         for number, seen in enumerate(snapshot.objects, 1):
             points, closed = outline(seen, self._models.get(seen.model), whole=self._whole)
-            shapes.append(_line(points.tolist(), MODEL, closed=closed))
+            shapes.append(line(points.tolist(), MODEL, closed=closed))
             text = fx.TextPrimitive(
-                pose=_placed(seen.x, seen.y, 0.0, HEIGHT_M), billboard=True, font_size=0.15, color=_colour(MODEL),
+                pose=placed(seen.x, seen.y, 0.0, HEIGHT_M), billboard=True, font_size=0.15, color=colour(MODEL),
                 text=f"{number} {seen.model} {seen.score:.2f}",
             )  # fmt: skip
             texts.append(text)
-        _scene(self._objects, "models", shapes, texts, at)
+        scene(self._objects, "models", shapes, texts, at)
         if snapshot.grid is not None and snapshot.grid.percent.size:
             self._grid.log(_grid(snapshot.grid, at), log_time=at)
 
     def _write_log_entry(self, entry: LogEntry, at: int) -> None:
         levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
         level = levels.get(entry.level, fx.LogLevel.Info)
-        self._log.log(fx.Log(timestamp=_stamp(at), level=level, message=entry.text, name="echolocate"), log_time=at)
+        self._log.log(fx.Log(timestamp=stamp(at), level=level, message=entry.text, name="echolocate"), log_time=at)
 
 
 def _grid(known: KnownCells, at: int) -> fx.Grid:
     """Return the evidence grid: per cent occupied in each cell, −1 where nothing is known."""
     return fx.Grid(
-        timestamp=_stamp(at), frame_id="odom", pose=_placed(known.x_m, known.y_m, 0.0),
+        timestamp=stamp(at), frame_id="odom", pose=placed(known.x_m, known.y_m, 0.0),
         column_count=known.percent.shape[1], cell_size=fx.Vector2(x=known.cell_m, y=known.cell_m),
         row_stride=known.percent.shape[1], cell_stride=1,
         fields=[fx.PackedElementField(name="occupied", offset=0, type=fx.PackedElementFieldNumericType.Int8)],
@@ -205,36 +205,51 @@ def _grid(known: KnownCells, at: int) -> fx.Grid:
     )  # fmt: skip
 
 
-def _scene(
+def scene(
     channel: ch.SceneUpdateChannel,
     name: str,
     lines: list[fx.LinePrimitive],
     texts: list[fx.TextPrimitive],
     at: int,
 ) -> None:
-    """Replace an entity as a whole, so that elements that are gone disappear."""
-    entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="odom", id=name, lines=lines, texts=texts)
+    """Replace an entity as a whole at a time (ns), so that elements that are gone disappear.
+
+    Parameters
+    ----------
+    channel, name
+        Where, and the entity's id.
+    lines, texts
+        What it consists of, in the frame `odom`.
+    at
+        Nanoseconds since 1970.
+    """
+    entity = fx.SceneEntity(timestamp=stamp(at), frame_id="odom", id=name, lines=lines, texts=texts)
     channel.log(fx.SceneUpdate(entities=[entity]), log_time=at)
 
 
-def _line(points: Places, colour: Colour, *, closed: bool) -> fx.LinePrimitive:
+def line(points: Places, rgb: Colour, *, closed: bool) -> fx.LinePrimitive:
+    """Return a line through points (m), or the loop that they close."""
     kind = fx.LinePrimitiveLineType.LineLoop if closed else fx.LinePrimitiveLineType.LineStrip
     places = [fx.Point3(x=x, y=y) for x, y in points]
-    return fx.LinePrimitive(type=kind, thickness=LINE_PX, scale_invariant=True, points=places, color=_colour(colour))
+    return fx.LinePrimitive(type=kind, thickness=LINE_PX, scale_invariant=True, points=places, color=colour(rgb))
 
 
-def _stamp(at: int) -> fx.Timestamp:
+def stamp(at: int) -> fx.Timestamp:
+    """Return a time, ns since 1970."""
     return fx.Timestamp(sec=at // 1_000_000_000, nsec=at % 1_000_000_000)
 
 
-def _quaternion(yaw: float) -> fx.Quaternion:
+def quaternion(yaw: float) -> fx.Quaternion:
+    """Return a rotation about the vertical, rad."""
     x, y, z, w = yaw_quaternion(yaw)
     return fx.Quaternion(x=x, y=y, z=z, w=w)
 
 
-def _placed(x: float, y: float, yaw: float, z: float = 0.0) -> fx.Pose:
-    return fx.Pose(position=fx.Vector3(x=x, y=y, z=z), orientation=_quaternion(yaw))
+def placed(x: float, y: float, yaw: float, z: float = 0.0) -> fx.Pose:
+    """Return a pose from place (m) and direction (rad)."""
+    return fx.Pose(position=fx.Vector3(x=x, y=y, z=z), orientation=quaternion(yaw))
 
 
-def _colour(colour: Colour) -> fx.Color:
-    return fx.Color(r=colour[0], g=colour[1], b=colour[2], a=1.0)
+def colour(rgb: Colour) -> fx.Color:
+    """Return an opaque colour."""
+    return fx.Color(r=rgb[0], g=rgb[1], b=rgb[2], a=1.0)

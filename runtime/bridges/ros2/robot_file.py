@@ -38,13 +38,15 @@ class Heard:
     """Topic of the odometry."""
     base: str = "base_link"
     """The frame that it moves."""
+    cmd_vel: str = "cmd_vel"
+    """Topic for velocities."""
+    is_stamped: bool = True
+    """Whether they are `TwistStamped`."""
     odometry_s: list[float] = field(default_factory=list)
     """Its stamps."""
 
 
-def robot_file(
-    heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: float, stamped: bool
-) -> dict[str, Any]:
+def robot_file(heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: float) -> dict[str, Any]:
     """Return the tables of the robot file.
 
     Parameters
@@ -53,8 +55,6 @@ def robot_file(
         What was heard of the robot in some seconds.
     radius_m, speed_m_s, turn_rad_s : float
         Radius and limits of the body, which no topic says.
-    stamped : bool
-        Whether velocities are `TwistStamped`.
 
     Raises
     ------
@@ -94,7 +94,8 @@ def robot_file(
             "frames": names,
             "odometry": heard.odometry,
             "base_frame": heard.base,
-            "cmd_vel_stamped": stamped,
+            "cmd_vel": heard.cmd_vel,
+            "cmd_vel_stamped": heard.is_stamped,
             "odometry_period_s": round(max(0.001, period_s(heard.odometry_s) or 0.05), 4),
         },
     }

@@ -17,19 +17,25 @@ from runtime.bridges.ros2.robot_file import Heard
 SENSOR_DATA: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 STATIC: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DYNAMIC: Final = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+DISCOVERY_S: Final = 10.0
 RANGE, ODOMETRY, STAMPED = "sensor_msgs/msg/Range", "nav_msgs/msg/Odometry", "geometry_msgs/msg/TwistStamped"
 
 
-def listen(seconds: float) -> tuple[Heard, bool]:
-    """Return what is heard of a robot in some seconds, and whether its `cmd_vel` is a `TwistStamped`."""
+def listen(seconds: float) -> Heard:
+    """Return what is heard of a robot in some seconds.
+
+    The seconds begin with its first range and odometry, for which it waits 10 s: finding topics takes its time.
+    """
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("echolocate_listener")
-    heard, known, is_stamped = Heard(), set[str](), True
+    heard, known = Heard(), set[str]()
     for topic, qos in (("/tf", DYNAMIC), ("/tf_static", STATIC)):
         ros_tf.subscribe(node, topic, lambda message: _take_frames(heard, message), qos)
-    end_s = time.monotonic() + seconds
+    end_s, begins = time.monotonic() + DISCOVERY_S, True
     try:
         while (left_s := end_s - time.monotonic()) > 0.0:
+            if begins and heard.ranges and heard.odometry is not None:
+                end_s, begins = time.monotonic() + seconds, False
             for topic, kinds in node.get_topic_names_and_types():
                 if topic in known:
                     continue
@@ -39,13 +45,13 @@ def listen(seconds: float) -> tuple[Heard, bool]:
                 elif ODOMETRY in kinds and heard.odometry is None:
                     _subscribe_odometry(node, heard, topic)
                 elif topic.endswith("/cmd_vel"):
-                    is_stamped = STAMPED in kinds
+                    heard.cmd_vel, heard.is_stamped = topic, STAMPED in kinds
             for _ in range(50):
                 rclpy.spin_once(node, timeout_sec=min(0.01, left_s))
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
-    return heard, is_stamped
+    return heard
 
 
 def _take_frames(heard: Heard, message: bytes) -> None:

@@ -47,15 +47,15 @@ def write_robot_file(
         raise UserError(NO_ROS, FAILED)
     from runtime.bridges.ros2.robot_listener import listen
 
-    heard, is_stamped = listen(seconds)
-    text = robot_file_text(heard, radius_m, speed_m_s, turn_rad_s, stamped=is_stamped)
+    heard = listen(seconds)
+    text = robot_file_text(heard, radius_m, speed_m_s, turn_rad_s)
     with writing("--out", out):
         Path(out).write_text(text, "utf-8")
     sys.stdout.write(f"{out}: {len(heard.ranges)} sensors; run it with `echolocate run --robot {out}`\n")
     return DONE
 
 
-def robot_file_text(heard: Heard, radius_m: float, speed_m_s: float, turn_rad_s: float, *, stamped: bool) -> str:
+def robot_file_text(heard: Heard, radius_m: float, speed_m_s: float, turn_rad_s: float) -> str:
     """Return the text of the robot file.
 
     Raises
@@ -66,9 +66,7 @@ def robot_file_text(heard: Heard, radius_m: float, speed_m_s: float, turn_rad_s:
     import tomli_w
 
     try:
-        tables: dict[str, Any] = robot_file(
-            heard, radius_m=radius_m, speed_m_s=speed_m_s, turn_rad_s=turn_rad_s, stamped=stamped
-        )
+        tables: dict[str, Any] = robot_file(heard, radius_m=radius_m, speed_m_s=speed_m_s, turn_rad_s=turn_rad_s)
         RobotConfig.model_validate(tables)
     except RobotFileError as error:
         raise UserError(str(error), FAILED) from error

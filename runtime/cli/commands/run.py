@@ -16,6 +16,7 @@ from rich.console import Console
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.settings import Settings
 from runtime import VERSION
+from runtime.cli.commands.foxglove import check_foxglove, foxglove_beside
 from runtime.cli.commands.offer import plugged_in
 from runtime.cli.commands.output_files import check_outputs, refuse_existing
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
@@ -92,6 +93,7 @@ def run_robot(
     goal: str | None,
     no_record: bool,
     no_console: bool,
+    foxglove: bool,
     json_file: str | None,
     force: bool,
     emulator: EmulatorOptions,
@@ -103,7 +105,7 @@ def run_robot(
     ----------
     config, sets, robot, port, arm, seconds, headless, record, map_file, mission, no_record, no_console, json_file
         As of `runtime.cli.robot_commands.run`.
-    goal, force, units
+    foxglove, goal, force, units
         As of `runtime.cli.robot_commands.run`.
     emulator : EmulatorOptions
         Used without a port.
@@ -115,6 +117,8 @@ def run_robot(
     """
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
+    if foxglove:
+        check_foxglove(no_console=no_console)
     settings = settings_of_files(
         config, sets, emulator.world, robot, map_file, mission, goal=goal, no_console=no_console
     )
@@ -178,7 +182,7 @@ def run_robot(
                 return await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
-                    emulated=port is None, preparation=preparation,
+                    foxglove=foxglove, emulated=port is None, preparation=preparation,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
                         robot=robot, map_file=map_file, mission=mission, goal=goal, no_console=no_console,
@@ -222,6 +226,7 @@ async def run_process(
     log_status: LogStatus,
     arm: bool,
     seconds: float | None,
+    foxglove: bool,
     emulated: bool,
     preparation: KernelPreparation | None,
     reload: Callable[[], Settings],
@@ -246,6 +251,8 @@ async def run_process(
         Of the run's log.
     arm, seconds
         As of `runtime.cycle.process.RobotProcess.run`.
+    foxglove : bool
+        Whether the run is served to Foxglove.
     emulated : bool
         Whether the robot is emulated.
     preparation : KernelPreparation, optional
@@ -288,6 +295,8 @@ async def run_process(
             stack.callback(log_status.listeners.remove, page.hub.on_log)
             listeners.append(page.on_cycle)
             stack.enter_context(announced(page.url, state_folder()))
+            if foxglove:
+                await stack.enter_async_context(foxglove_beside(page.url, log))
             if view is not None:
                 for line in page.hints():
                     console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Tests of the commands `ros2` and `ros2-robot`: what a user can get wrong before ROS is needed."""
+"""Tests of the commands `ros2`, `ros2-robot` and `foxglove`: what a user can get wrong before ROS is needed."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ pytestmark = pytest.mark.usefixtures("bad_files")
 WRONG: Calls = [
     (["ros2", "--connect"], "--connect"),
     (["ros2-robot", "--out", "x.toml"], "--radius"),
+    (["foxglove", "--port", "many"], "many"),
     (["ros2-robot", "--radius", "0.3"], "--out"),
     (["ros2-robot", "--radius", "0", "--out", "x.toml"], "--radius"),
 ]

@@ -24,12 +24,14 @@ def heard() -> Heard:
         frames={frame.child: frame for frame in frames},
         odometry="/odom",
         base="base",
+        cmd_vel="/r1/cmd_vel",
+        is_stamped=False,
         odometry_s=[1.0, 1.02, 1.04],
     )
 
 
 def test_the_file_is_valid_and_lists_the_sensors_with_their_places() -> None:
-    tables = robot_file(heard(), radius_m=0.3, speed_m_s=0.4, turn_rad_s=1.0, stamped=False)
+    tables = robot_file(heard(), radius_m=0.3, speed_m_s=0.4, turn_rad_s=1.0)
     config = RobotConfig.model_validate(tables)
     make_driver(config)
     assert config.ros2.frames == ("us0", "us1")
@@ -38,6 +40,7 @@ def test_the_file_is_valid_and_lists_the_sensors_with_their_places() -> None:
     assert (config.ring.range_min_m, config.ring.range_max_m) == (0.05, 4.0)
     assert config.ring.firing.step_period_s == pytest.approx(0.1)
     assert (config.ros2.odometry_period_s, config.ros2.cmd_vel_stamped) == (0.02, False)
+    assert config.ros2.cmd_vel == "/r1/cmd_vel"
 
 
 @pytest.mark.parametrize(
@@ -54,7 +57,7 @@ def test_what_is_missing_is_said_in_a_line(change: dict[str, object], message: s
     for name, value in change.items():
         setattr(part, name, value)
     with pytest.raises(RobotFileError, match=message):
-        robot_file(part, radius_m=0.3, speed_m_s=0.4, turn_rad_s=1.0, stamped=True)
+        robot_file(part, radius_m=0.3, speed_m_s=0.4, turn_rad_s=1.0)
 
 
 def test_frames_in_a_circle_lead_nowhere() -> None:

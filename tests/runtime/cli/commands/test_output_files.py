@@ -161,7 +161,18 @@ def test_a_summary_in_the_folder_is_no_file_of_the_run(inputs: Path, capfd: pyte
 
 
 def test_every_command_that_writes_a_file_is_tried() -> None:
-    writing_none = {"check", "service", "probe", "ring-test", "--help", "-h", "--version", "--install-completion"}
+    writing_none = {
+        "check",
+        "service",
+        "probe",
+        "ring-test",
+        "ros2",
+        "foxglove",
+        "--help",
+        "-h",
+        "--version",
+        "--install-completion",
+    }
     own_guard = {"firmware"}
     """It keeps each file that was changed: see test_firmware."""
     assert {words[0] for words in CALLS.values()} == set(app) - writing_none - own_guard

@@ -17,7 +17,7 @@ from runtime.support.user_folders import state_folder
 
 
 def test_the_launch_file_is_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_command(["ros2", "--launch-file"]) == DONE
+    assert run_command(["ros2", "--print-launch"]) == DONE
     tree = ast.parse(capsys.readouterr().out)
     assert "generate_launch_description" in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 

@@ -16,18 +16,18 @@ from tests.runtime.bridges.ros2.test_robot_file import heard
 
 
 def test_the_text_is_a_robot_file() -> None:
-    text = robot_file_text(heard(), 0.3, 0.4, 1.0, stamped=True)
+    text = robot_file_text(heard(), 0.3, 0.4, 1.0)
     assert text.startswith("# A robot with ROS 2")
     assert RobotConfig.model_validate(tomllib.loads(text)).link.port == "ros2"
 
 
 def test_what_is_missing_or_impossible_is_one_line() -> None:
     with pytest.raises(UserError, match="no sensor_msgs/Range"):
-        robot_file_text(Heard(), 0.3, 0.4, 1.0, stamped=True)
+        robot_file_text(Heard(), 0.3, 0.4, 1.0)
     wide = heard()
     wide.ranges = dict.fromkeys(wide.ranges, (0.1, 4.0, 6.0))
     with pytest.raises(UserError, match=r"the robot's ring\.beam_half_angle_deg: ") as caught:
-        robot_file_text(wide, 0.3, 0.4, 1.0, stamped=True)
+        robot_file_text(wide, 0.3, 0.4, 1.0)
     assert "\n" not in str(caught.value)
 
 
