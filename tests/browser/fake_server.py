@@ -29,6 +29,7 @@ HEARTBEAT_S: Final = 1.0
 KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 RECORDED: Final = {"mode": "DRIVE", "reason": None, "link": None, "late": None, "missed": None, "clients": 0,
+                   "phases": {}, "cycle_us": None, "late_us": None,
                    "recording": None, "paused": False, "speed": 1.0}  # fmt: skip
 """Fields of a frame of a recording, in which the robot drove."""
 HALTED: Final = "halted by the operator; re-arm to continue"

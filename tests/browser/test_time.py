@@ -90,6 +90,8 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
         await opened.sync()
     await opened.says("#time-text", "× 4 (this machine reaches × 1.0)")
     await opened.says("#fact-age", "a recording")
+    await opened.drawn()
+    await expect(page.locator("#phases-legend")).to_have_text("not recorded")
     for tool in ("goal", "route", "move", "place"):
         await expect(page.locator(f"#tool-{tool}")).to_be_disabled()
     await page.get_by_role("button", name="Hold").click()

@@ -100,7 +100,7 @@ export class Charts {
   #lateLegend;
   #run;
   #theme;
-  #names = [];
+  #names = null;
   #values = [];
 
   constructor({ phases, late, legend, lateLegend, run, theme }) {
@@ -143,14 +143,14 @@ export class Charts {
   }
 
   #updateLegend(names, phases) {
-    if (names.join() !== this.#names.join()) {
+    if (names.join() !== this.#names?.join()) {
       this.#names = names;
       this.#values = names.map(() => el("b"));
       this.#legend.replaceChildren(...names.map((name, k) => {
         const swatch = el("i");
         swatch.style.background = `var(--phase-${k % 6})`;
         return el("span", {}, swatch, `${name} `, this.#values[k]);
-      }), el("span", {}, "✕ missed  ▼ late"));
+      }), el("span", {}, names.length > 0 ? "✕ missed  ▼ late" : "not recorded"));
     }
     names.forEach((name, k) => setText(this.#values[k], ((phases[name] ?? 0) / 1000).toFixed(2)));
   }

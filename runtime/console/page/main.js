@@ -97,7 +97,7 @@ drive.panel = new Drive({ run, units, connection, notifications, teleoperation, 
 new MissionPanel({ run, units, connection, notifications });
 new RoutePanel({ route, run, units, connection, notifications, tools });
 route.on("changed", redraw);
-const alerts = new Alerts({ run, connection, seen: () => tabs?.shown === "log" });
+const alerts = new Alerts({ run, connection, seen: () => byId("log").offsetParent !== null });
 const status = new Status({ run, units, connection, notifications, alerts });
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
 const parameters = new Parameters({ run, connection, notifications });

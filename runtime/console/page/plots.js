@@ -58,7 +58,7 @@ export class Plots {
     this.#last = state;
     const walls = state.objects.filter(isWall).length;
     const counts = { segments: this.run.segments.size, objects: state.objects.length - walls, walls };
-    this.#history.add(state.robot_s, { ...state, counts });
+    this.#history.add(state.robot_s, { ...state, counts, clusters: null });
     const now = performance.now();
     if (this.shown() && now - this.#listed.at_ms > LISTED_EVERY_MS) {
       this.#listed.at_ms = now;

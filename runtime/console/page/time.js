@@ -62,7 +62,7 @@ export class Time {
     const emulated = (this.#liveSession ?? this.run.session)?.emulated ?? false;
     const at = `${clock(robot_s)}, cycle ${cycle}`;
     const then = `in ${mode.replace("_", " ")}${reason ? ` (${reason})` : ""}`;
-    const goes = playback === null && !paused ? speed : null;
+    const goes = emulated && playback === null && !paused ? speed : null;
     const reached = this.#pace.measure(robot_s, host_s, goes);
     const played = this.#playPace.measure(playback?.s ?? 0, performance.now() / 1000, playback?.is_playing ? playback.speed : null);
     const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 || reached !== null ? `, ${paceText(speed, reached)}` : ""}`;
