@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable, Coroutine, Sequence
-from typing import Any
+from typing import Any, Final
 
 from config.errors import UserError
 from runtime.bridges.console_client import ConsoleClient, ConsoleError, stay_connected
@@ -14,7 +14,8 @@ from runtime.bridges.ros2.node import BridgeNode
 from runtime.bridges.ros2.operator import Operator
 from runtime.bridges.ros2.topics import Topics
 
-NO_RUN = "there is no connection to the run: start it, or look at the bridge's log"
+GRID_PERIOD_S: Final = 1.0
+NO_RUN: Final = "there is no connection to the run: start it, or look at the bridge's log"
 
 
 async def run_bridge(find: Callable[[], str], arguments: Sequence[str]) -> None:
@@ -35,6 +36,14 @@ async def run_bridge(find: Callable[[], str], arguments: Sequence[str]) -> None:
         node.close()
 
 
+async def _ask_for_grid(client: ConsoleClient) -> None:
+    """Ask for the evidence grid, again and again, until the connection ends."""
+    with contextlib.suppress(ConsoleError):
+        while True:
+            await asyncio.sleep(GRID_PERIOD_S)
+            await client.request("show_grid")
+
+
 class _Bridge:
     """Fulfils `runtime.bridges.ros2.node.Commands`: passes what ROS asks into the loop."""
 
@@ -49,7 +58,7 @@ class _Bridge:
         """Serve one connection until it ends."""
         node, topics = self.node, Topics(self.node.frames)
         operator = self._operator = Operator(client, node.timeout_s, node.warn, time.monotonic)
-        driving = asyncio.create_task(operator.drive(), name="cmd_vel")
+        work = asyncio.gather(operator.drive(), _ask_for_grid(client) if node.publishes_grid else asyncio.sleep(0.0))
         try:
             async for message in client.messages():
                 match message["type"]:
@@ -63,13 +72,15 @@ class _Bridge:
                         node.publish_static(topics.static(round(1e9 * node.now_s())))
                         node.info(f"connected to the run of {message['name'] or 'a robot'}")
                         await operator.begin()
+                    case "grid":
+                        node.publish(topics.grid(message, round(1e9 * node.now_s())), ())
                     case "role":
                         await operator.yield_control()
         finally:
             self._operator = None
-            driving.cancel()
+            work.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await driving
+                await work
 
     def velocity(self, v: float, w: float) -> None:
         """Drive at a velocity."""

@@ -95,6 +95,7 @@ class BridgeNode:
         self.timeout_s = float(self._parameter("cmd_vel_timeout", 0.15))
         self._age_max_s = float(self._parameter("cmd_vel_age_max", 0.5))
         self._publishes_tf = bool(self._parameter("publish_tf", True))  # noqa: FBT003 - a value
+        self.publishes_grid = bool(self._parameter("publish_grid", True))  # noqa: FBT003 - a value
         if self._publishes_tf:
             self._tf = ros_tf.create_publisher(self._node, "/tf", FRAMES)
             self._tf_static = ros_tf.create_publisher(self._node, "/tf_static", LATCHED)

@@ -7,6 +7,8 @@ those of `echolocate export --to rosbag2`; lengths are metres, angles radians. R
 from __future__ import annotations
 
 import math
+from array import array
+from base64 import b64decode
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -121,6 +123,20 @@ class Topics:
         if self._is_due("diagnostics", ros_s, DIAGNOSTICS_S):
             outputs.append(self._diagnostics(state, round(1e9 * ros_s)))
         return self._transforms(state, at), outputs
+
+    def grid(self, message: Message, at: int) -> list[Output]:
+        """Return the evidence grid as a map in odometry's frame at a time (ns); nothing of a run that keeps none."""
+        if not message["on"] or not message["columns"]:
+            return []
+        info = {
+            "resolution": message["cell"],
+            "width": message["columns"],
+            "height": message["rows"],
+            "origin": _pose(message["x"], message["y"], 0.0),
+        }
+        cells = array("b", b64decode(message["cells"]))
+        fields = {"header": _header(self._odom, at), "info": info, "data": cells}
+        return [Output("grid", "nav_msgs/OccupancyGrid", fields)]
 
     def _is_due(self, what: str, ros_s: float, period_s: float) -> bool:
         """Return whether something that is published this often is due; after a clock that went back it is."""

@@ -24,6 +24,7 @@ pytestmark = [
     pytest.mark.filterwarnings("default::DeprecationWarning"),  # of ROS's own packages
 ]
 
+GRID = ("--set", "perception.grid.method=directed")
 STOP_MAX_S = 0.3
 CPU_MAX = 0.15
 
@@ -35,7 +36,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
     folder = tmp_path_factory.mktemp("ros2")
     with ExitStack() as stack:
-        stack.enter_context(program(folder, "run", "--headless", "--no-record", "--seconds", "300"))
+        stack.enter_context(program(folder, "run", "--headless", "--no-record", "--seconds", "300", *GRID))
         bridge = stack.enter_context(program(folder, "ros2"))
         (folder / "bridge.pid").write_text(str(bridge.pid))
         node = Node()
@@ -57,7 +58,7 @@ def latched() -> Any:
 @pytest.mark.usefixtures("run")
 def test_others_see_the_robot_within_two_seconds(measured: Callable[[str], None]) -> None:
     from diagnostic_msgs.msg import DiagnosticArray
-    from nav_msgs.msg import Odometry
+    from nav_msgs.msg import OccupancyGrid, Odometry
     from rclpy.qos import qos_profile_sensor_data
     from sensor_msgs.msg import Range
     from visualization_msgs.msg import MarkerArray
@@ -69,20 +70,22 @@ def test_others_see_the_robot_within_two_seconds(measured: Callable[[str], None]
         for sensor in range(24):
             node.look(f"sonar/s{sensor:02d}", Range, qos_profile_sensor_data)
         node.look("odom", Odometry, 10)
+        node.look("grid", OccupancyGrid, latched())
         node.look("objects", MarkerArray, 10)
         node.look("/diagnostics", DiagnosticArray, 10)
         ros_tf.subscribe(node.node, "/tf", node.keep("/tf"), 100)
         ros_tf.subscribe(node.node, "/tf_static", node.keep("/tf_static"), latched())
         node.began_s = time.monotonic()
-        node.until(lambda: len(node.first_s) == 29, 20.0, "all topics")
+        node.until(lambda: len(node.first_s) == 30, 20.0, "all topics")
         worst_s = max(node.first_s.values())
         assert worst_s < 2.0
         parents = {f.child: f.parent for t in ("/tf", "/tf_static") for f in ros_tf.decode(node.newest[t])}
         assert [parents[name] for name in ("sonar_05", "ring", "base_link", "odom")] == [
             "ring", "base_link", "odom", "map"
         ]  # fmt: skip
+        assert max(node.newest["grid"].data) > 50
         assert any(marker.type == 3 for marker in node.newest["objects"].markers)
-        measured(f"24 ranges, odometry, frames, objects and diagnostics seen within {worst_s:.2f} s")
+        measured(f"24 ranges, odometry, frames, objects, grid and diagnostics seen within {worst_s:.2f} s")
     finally:
         node.close()
 

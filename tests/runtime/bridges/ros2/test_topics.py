@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import math
 from typing import Any
@@ -139,6 +140,19 @@ def test_the_mode_is_sent_when_it_changes_and_diagnostics_every_second() -> None
     assert (mode["level"], mode["message"], mode["hardware_id"]) == (b"\x01", "SAFE_STOP: halted", "denning")
     assert (ring["level"], ring["message"]) == (b"\x01", "sensor 3: deaf, hears nothing")
     assert {"key": "frames", "value": "9"} in line["values"]
+
+
+def test_the_grid_is_a_map_where_it_is_kept() -> None:
+    made = topics()
+    assert made.grid({"on": False, "columns": 0, "rows": 0, "cells": ""}, 5) == []
+    cells = base64.b64encode(bytes([0, 100, 255, 50, 7, 255])).decode()
+    message = {"on": True, "x": -1.0, "y": 2.0, "cell": 0.05, "columns": 3, "rows": 2, "cells": cells}
+    ((topic, kind, fields),) = made.grid(message, 5)
+    assert (topic, kind, fields["header"]["frame_id"]) == ("grid", "nav_msgs/OccupancyGrid", "odom")
+    assert fields["data"].tolist() == [0, 100, -1, 50, 7, -1]
+    info = fields["info"]
+    assert (info["resolution"], info["width"], info["height"]) == (0.05, 3, 2)
+    assert (info["origin"]["position"]["x"], info["origin"]["position"]["y"]) == (-1.0, 2.0)
 
 
 def test_a_clock_that_jumped_is_a_note_and_readings_go_on() -> None:
