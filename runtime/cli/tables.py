@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from runtime.cli.terminal import page_text
 from runtime.simulation.first_fix import EARLY_FIX_M
 from runtime.support.length_format import Units, format_length, format_point
 
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
-    from runtime.cycle.summary import ObjectRow, PoseRow, RunSummary
+    from runtime.cycle.summary import ObjectRow, PoseRow, RunSummary, WallRow
     from runtime.simulation.budget_sweep import BudgetRow
     from runtime.simulation.drift_trials import DriftRow
     from runtime.simulation.evaluation import DrumRow, Outcome, Spread
@@ -105,16 +106,34 @@ def _summary_line(found: str, outcome: Outcome, units: Units) -> str:
 def objects_table(objects: list[ObjectRow], units: Units, frame: str = "odometry") -> Table:
     """Return what was seen, in the frame of this name."""
     table = Table(title=f"objects, in the {frame}'s frame", title_justify="left")
-    for heading in ("model", f"x ({units})", f"y ({units})", "heading (°)", "support", "score"):
+    for heading in ("no.", "model", f"x ({units})", f"y ({units})", "heading", "support", "score"):
         table.add_column(heading, justify="right")
     for seen in objects:
         table.add_row(
+            str(seen.get("number", "–")),
             seen["model"],
-            format_length(seen["x"], units),
-            format_length(seen["y"], units),
-            f"{seen['theta'] * 57.29578:.0f}",
+            page_text.number(seen["x"], units),
+            page_text.number(seen["y"], units),
+            page_text.degrees(seen["theta"]),
             str(seen["support"]),
             f"{seen['score']:.2f}",
+        )
+    return table
+
+
+def walls_table(walls: Sequence[WallRow], units: Units, frame: str = "odometry") -> Table:
+    """Return the walls with their ends, in the frame of this name."""
+    table = Table(title=f"walls, in the {frame}'s frame", title_justify="left")
+    for heading in ("no.", f"from ({units})", f"to ({units})", f"length ({units})", "probability"):
+        table.add_column(heading, justify="right")
+    for wall in walls:
+        x1, y1, x2, y2 = wall["x1"], wall["y1"], wall["x2"], wall["y2"]
+        table.add_row(
+            str(wall["number"] or "–"),
+            f"{page_text.number(x1, units)}, {page_text.number(y1, units)}",
+            f"{page_text.number(x2, units)}, {page_text.number(y2, units)}",
+            page_text.number(math.dist((x1, y1), (x2, y2)), units),
+            page_text.percent(wall["probability"]),
         )
     return table
 
@@ -215,11 +234,11 @@ def timing_table(summary: RunSummary) -> Table:
 
 
 def timing_line(summary: RunSummary) -> str:
-    """Return how well a run kept its time, and by whose fault it did not, in one line."""
+    """Return how well a run kept its time, and what kept it from that, in one line."""
     timing = summary["timing"]
     line = (
         f"{summary['cycles']} cycles, {timing['following']:.0%} of them with the ring; {summary['late']} late, "
         f"{timing['missed']} missed, {timing['overruns']} overruns"
     )
     by = ", ".join(f"{cause} ({count})" for cause, count in timing["faults"].items())
-    return f"{line}; by fault of: {by}" if by else line
+    return f"{line}; caused by: {by}" if by else line

@@ -67,7 +67,12 @@ class StallSampler:
     def _take_sample(self, _number: int, frame: FrameType | None) -> None:
         functions = []
         while frame is not None and not frame.f_code.co_filename.startswith(self._loop_files):
-            functions.append(frame.f_code.co_qualname)
+            functions.append(readable(frame.f_code.co_qualname))
             frame = frame.f_back
         # No function outside the loop's own code: the loop is asleep.
         self.sample = StackSample(functions[-1], functions[0]) if functions else None
+
+
+def readable(qualified: str) -> str:
+    """Return the name of a function for people: an inner one as "inner in outer"."""
+    return " in ".join(reversed(qualified.split(".<locals>.")))

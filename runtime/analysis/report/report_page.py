@@ -145,7 +145,7 @@ def _others(timeline: Timeline, units: Units) -> str:
             f"{name}, {o.model}",
             format_length(o.x, units, 3),
             format_length(o.y, units, 3),
-            f"{math.degrees(o.theta):.0f}",
+            f"{math.degrees(math.remainder(o.theta, math.tau)):.0f}",
             format_length(o.sigma, units, 4),
             str(o.support),
             f"{o.score:.3f}",

@@ -16,7 +16,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
-from runtime.cli.tables import objects_table
+from runtime.cli.tables import objects_table, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
 from runtime.recording.replay_summary import ReplaySummary
@@ -176,6 +176,8 @@ def replay_again(
         write_json(json_file, summary)
     output = plain_console()
     output.print(objects_table(summary["objects"], units))
+    if summary["walls"]:
+        output.print(walls_table(summary["walls"], units))
     for region in recording.corrupt_regions:
         console.print(str(region))
     for first, last in result.missing:

@@ -23,7 +23,7 @@ from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.commands.run_settings import reload_settings, settings_of_files, with_port
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import ending_the_start, handled_by_loop
-from runtime.cli.tables import objects_table, timing_line, timing_table
+from runtime.cli.tables import objects_table, timing_line, timing_table, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
@@ -200,6 +200,8 @@ def run_robot(
         write_json(json_file, summary)
     output = EscapingConsole()
     output.print(objects_table(summary["objects"], units))
+    if summary["walls"]:
+        output.print(walls_table(summary["walls"], units))
     output.print(timing_table(summary))
     output.print(timing_line(summary))
     if log_status.lost:

@@ -14,6 +14,7 @@ from perception.pipeline import DetectedObject
 ARROWS: Final = "→↗↑↖←↙↓↘"
 CELL_ASPECT: Final = 2.0
 """Height of a character cell divided by its width, on usual terminals."""
+LINE_STEPS_MAX: Final = 1000
 MARGIN_M: Final = 0.6
 """Space around the outermost points."""
 
@@ -78,6 +79,21 @@ class Plan:
             angle = 2.0 * math.pi * k / steps
             self.mark(x + radius * math.cos(angle), y + radius * math.sin(angle), character, style)
 
+    def line(self, x1: float, y1: float, x2: float, y2: float, character: str, style: str) -> None:
+        """Draw a line of characters from (x1, y1) to (x2, y2), m.
+
+        Parameters
+        ----------
+        x1, y1, x2, y2 : float
+            The ends, m.
+        character, style : str
+            As of `mark`.
+        """
+        steps = min(LINE_STEPS_MAX, max(1, math.ceil(math.dist((x1, y1), (x2, y2)) / self._cell)))
+        for k in range(steps + 1):
+            share = k / steps
+            self.mark(x1 + share * (x2 - x1), y1 + share * (y2 - y1), character, style)
+
     def text(self) -> Text:
         """Return the raster as text."""
         text = Text(no_wrap=True)
@@ -121,11 +137,14 @@ def draw_plan(
     for x, y in trail:
         plan.mark(x, y, "·", "dim")
     for seen in objects:
+        if seen.ends is not None:
+            plan.line(*seen.ends, "=", "green")
+            continue
         plan.circle(seen.x, seen.y, size_m.get(seen.model, 0.3), "o", "green")
     for x, y in places:
         plan.mark(x, y, "•", "yellow")
-    for number, seen in enumerate(objects, 1):
-        plan.mark(seen.x, seen.y, str(number % 10), "bold green")
+    for index, seen in enumerate(objects, 1):
+        plan.mark(seen.x, seen.y, str((seen.number or index) % 10), "bold green")
     eighth = round(pose.theta / (math.pi / 4)) % 8
     plan.mark(pose.x, pose.y, ARROWS[eighth], "bold cyan")
     return plan.text()

@@ -20,25 +20,22 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
+from rich.console import Console
 from rich.live import Live
-from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
 from config.settings import Settings
 from drivers.driver import RobotDriver
-from drivers.messages import Floats, LinkCounts, Pose
+from drivers.messages import Floats, LinkCounts, Pose, Twist
 from perception.detected_object import DetectedObject, MapCounts
 from perception.localization.drift_correction import LocalizedPose
-from runtime.cli.tables import objects_table
+from runtime.cli.terminal.page_text import localized_place, object_row, twist
 from runtime.cli.terminal.plan import draw_plan
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
-from runtime.cycle.summary import object_row
 from runtime.support.health import Worker
-from runtime.support.length_format import Units, format_length, format_point
+from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 
 EVERY_CYCLES: Final = 5
@@ -51,6 +48,17 @@ STYLES: Final = MappingProxyType(
 )
 BARS: Final = " ▁▂▃▄▅▆▇█"
 FAULTS_SHOWN: Final = 3
+WARNINGS_MAX: Final = 3
+ROOMY_ROWS: Final = 14
+"""From so many lines left on, the counts are all shown beside the objects."""
+PLAN_ROWS_MIN: Final = 4
+"""A plan of fewer lines shows nothing."""
+LEGEND: Final = "→ robot   • outline segments   o objects   = walls"
+KEY_LINES: Final = (
+    "keys  a arm   space halt   p pause   s step   q quit", "a arm  ␣ halt  p pause  s step  q quit",
+    "a arm ␣ halt q quit", "a ␣halt q",
+)  # fmt: skip
+"""The longest that fits is shown."""
 KEYS_MAX: Final = 64
 KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
 
@@ -78,6 +86,8 @@ class Snapshot:
     """Why sensors are masked."""
     localized: LocalizedPose | None = None
     """The robot in the map frame; None where that is odometry's."""
+    twist: Twist | None = None
+    """Of the robot, by its odometry."""
 
 
 class View:
@@ -139,6 +149,7 @@ class View:
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
             stats.cycles, stats.late, stats.cycle_us(), stats.lag_us(), stats.missed, tuple(stats.causes.items()),
             tuple(report.reason for report in state.perception.sensor_reports()), state.perception.localized(),
+            None if state.odometry is None else state.odometry.twist,
         )  # fmt: skip
         self._wake.set()
 
@@ -165,49 +176,81 @@ class View:
                 if snapshot is not None:
                     live.update(self.picture(snapshot), refresh=True)
 
-    def picture(self, snapshot: Snapshot) -> Group:
-        """Return the view of a snapshot."""
-        mode = snapshot.mode
-        head = Text.assemble((f" {mode.mode.value} ", STYLES.get(mode.mode.value, "bold black on yellow")))
-        head.append(f"  {mode.reason or ''}")
-        columns = max(20, min(self._console.width - 4, 100))
-        plan: Text | str = "waiting for odometry"
-        if snapshot.pose is not None:
-            plan = draw_plan(
-                snapshot.pose, snapshot.trail, snapshot.segments, snapshot.objects, self._size_m, columns, 18
-            )
-        rows = [object_row(seen) for seen in snapshot.objects]
-        legend = "→ robot   • outline segments   o objects   a arm   space halt   p pause   s step   q quit"
-        parts: list[RenderableType] = [
-            head,
-            Panel(plan, subtitle=legend),
-            objects_table(rows, self._units),
-            self._numbers(snapshot),
-        ]
-        if self.console_url is not None:
-            parts.append(Text(f"console  {self.console_url}", overflow="fold"))
-        return Group(*parts)
+    def picture(self, snapshot: Snapshot) -> Text:
+        """Return the view of a snapshot, which fits the terminal.
 
-    def _numbers(self, snapshot: Snapshot) -> Table:
-        grid = Table.grid(padding=(0, 2))
-        grid.add_row("ring", self._ring(snapshot.ranges))
-        grid.add_row("map", map_text(snapshot.map_counts))
+        What a person needs comes first: mode, address, keys, warnings, objects. Counts and the plan get what is left.
+        """
+        width, left = max(1, self._console.width), max(0, self._console.height - 1)
+        parts: list[list[Text]] = []
+        for lines in (self._head(snapshot, width), self._warnings(snapshot)):
+            parts.append(lines[:left])
+            left -= len(parts[-1])
+        counts = self._counts(snapshot)
+        # Objects give way to nothing but the head; counts to objects; the plan to both.
+        objects = self._objects(snapshot, left - (len(counts) if left >= ROOMY_ROWS else 0))
+        left -= len(objects)
+        counts = counts[:left]
+        left -= len(counts)
+        plan = list[Text]()
+        if snapshot.pose is None:
+            plan = [Text("waiting for odometry")][:left]
+        elif left > PLAN_ROWS_MIN:
+            drawn = draw_plan(
+                snapshot.pose, snapshot.trail, snapshot.segments, snapshot.objects, self._size_m, width, left - 1
+            )
+            plan = [*list(drawn.split())[: left - 1], Text(LEGEND, style="dim")]
+        lines = [line for part in (*parts, plan, objects, counts) for line in part]
+        for line in lines:
+            line.truncate(width, overflow="ellipsis")
+        return Text("\n", no_wrap=True).join(lines)
+
+    def _head(self, snapshot: Snapshot, width: int) -> list[Text]:
+        """Return mode, the address of the console (whole, on as many lines as it needs), and the keys."""
+        mode = snapshot.mode
+        name = mode.mode.value.replace("_", " ")  # as on the page
+        head = Text.assemble((f" {name} ", STYLES.get(mode.mode.value, "bold black on yellow")))
+        head.append("" if snapshot.twist is None else f" {twist(snapshot.twist.v, snapshot.twist.w, self._units)}")
+        head.append(f"  {mode.reason or ''}")
+        url = self.console_url or ""
+        address = [Text(url[k : k + width], style="bold") for k in range(0, len(url), width)]
+        return [head, *address, Text(next((keys for keys in KEY_LINES if len(keys) <= width), KEY_LINES[-1]))]
+
+    def _warnings(self, snapshot: Snapshot) -> list[Text]:
+        return [Text(f"masked  {reason}", style="yellow") for reason in snapshot.sensors[:WARNINGS_MAX]]
+
+    def _objects(self, snapshot: Snapshot, rows: int) -> list[Text]:
+        """Return a line for each object as on the page, and how many have no room."""
+        objects = snapshot.objects
+        if rows < 1 or not objects:
+            return []
+        walls = sum(seen.ends is not None for seen in objects)
+        shown = min(len(objects), rows - 1)
+        count = f"objects  {len(objects) - walls}, and {walls} wall{'s' * (walls > 1)}" if walls else (
+            f"objects  {len(objects)}")  # fmt: skip
+        more = f"; {len(objects) - shown} have no room here" if shown < len(objects) else ""
+        cells = [object_row(seen, self._units) for seen in objects[:shown]]
+        wide = [max((len(row[k]) for row in cells), default=0) for k in range(4)]
+        lines = [
+            Text(f"{no:>{wide[0]}} {name:<{wide[1]}}  {sure:>{wide[2]}}  {where:<{wide[3]}}  {size}")
+            for no, name, sure, where, size in cells
+        ]
+        return [Text(count + more, style="bold"), *lines]
+
+    def _counts(self, snapshot: Snapshot) -> list[Text]:
+        counts, took, lag = snapshot.counts, snapshot.cycle_us, snapshot.lag_us
+        rows = [("ring", self._ring(snapshot.ranges)), ("map", map_text(snapshot.map_counts))]
         if snapshot.localized is not None:
-            grid.add_row("place", place_text(snapshot.localized, self._units))
-        for reason in snapshot.sensors:
-            grid.add_row("masked", reason)
-        counts = snapshot.counts
-        grid.add_row("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost")
-        took, lag = snapshot.cycle_us, snapshot.lag_us
-        grid.add_row(
-            "cycle",
-            f"{snapshot.cycles}, {snapshot.late} late, {snapshot.missed} missed; takes {millis(took)}; "
-            f"begins {millis(lag)} after it is due",
-        )
+            rows.append(("place", localized_place(snapshot.localized, self._units)))
+        rows += [
+            ("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost"),
+            ("cycle", f"{snapshot.cycles}, {snapshot.late} late, {snapshot.missed} missed; takes {millis(took)}"),
+            ("", f"begins {millis(lag)} after it is due"),
+        ]
         if snapshot.faults:
             worst = sorted(snapshot.faults, key=lambda fault: -fault[1])[:FAULTS_SHOWN]
-            grid.add_row("late by", ", ".join(f"{cause}: {count}" for cause, count in worst))
-        return grid
+            rows.append(("late by", ", ".join(f"{cause}: {count}" for cause, count in worst)))
+        return [Text(f"{name:<8}{value}") for name, value in rows]
 
     def _ring(self, ranges: Floats) -> str:
         """Return a bar per sensor, higher for a nearer echo, or a dot without an echo."""
@@ -224,19 +267,6 @@ def map_text(counts: MapCounts) -> str:
     if counts.archived:
         text += f", {counts.archived} objects left behind"
     return f"{text}; {counts.waiting} near ones have no room" if counts.waiting else text
-
-
-def place_text(here: LocalizedPose, units: Units) -> str:
-    """Return the robot's place in the map frame, as one line."""
-    said = f"{here.status} {here.probability:.0%}"
-    sigma_x, sigma_y, sigma_theta = np.sqrt(np.diag(here.covariance)).tolist()
-    if not np.isfinite(sigma_x):
-        return f"unknown, {said}"
-    place, sigma = format_point(here.pose.x, here.pose.y, units), format_length(max(sigma_x, sigma_y), units, 3)
-    return (
-        f"{place} ± {sigma} {units}, "
-        f"{np.degrees(here.pose.theta) % 360.0:.1f}° ± {np.degrees(sigma_theta):.1f}°, {said}"
-    )
 
 
 def millis(quantiles: Quantiles) -> str:

@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 
-from runtime.timing.stall_sampler import StallSampler
+from runtime.timing.stall_sampler import StallSampler, readable
 
 
 def hold(sampler: StallSampler) -> None:
@@ -65,3 +65,8 @@ def test_nothing_is_sampled_outside_the_main_thread_or_where_the_signal_is_in_us
     finally:
         signal.signal(signal.SIGALRM, previous)
     assert found == [(signal.SIG_DFL, 0.0), (signal.SIG_IGN, 0.0)]
+
+
+def test_inner_functions_have_readable_names() -> None:
+    assert readable("run_robot.<locals>.whole") == "whole in run_robot"
+    assert readable("Console._on_leave") == "Console._on_leave"

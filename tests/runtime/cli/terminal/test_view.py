@@ -5,8 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
+import json
 import os
 import pty
+import re
+import shutil
+import subprocess
 import sys
 import termios
 import threading
@@ -20,15 +24,18 @@ import pytest
 from rich.console import Console
 
 from config.load import load_settings
-from drivers.messages import Floats, LinkCounts, Pose
+from drivers.messages import Floats, LinkCounts, Pose, Twist
 from drivers.registry import make_driver
 from perception.detected_object import DetectedObject, MapCounts
 from perception.localization.drift_correction import LocalizedPose
+from runtime import console as page_folder
+from runtime.cli.terminal import page_text
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
+from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats
 
 SETTINGS = load_settings("hallway")
@@ -43,9 +50,10 @@ def seen(x: float, y: float, model: str = "semicircle") -> DetectedObject:
     return DetectedObject(model, x, y, 0.5, 0.01, 39, 0.9)
 
 
-def printed(snapshot: Snapshot, width: int = 100) -> str:
-    console = Console(record=True, width=width, file=io.StringIO(), color_system=None)
+def printed(snapshot: Snapshot, width: int = 100, height: int = 50, url: str | None = None) -> str:
+    console = Console(record=True, width=width, height=height, file=io.StringIO(), color_system=None)
     view = View(SETTINGS, console, "ft")
+    view.console_url = url
     console.print(view.picture(snapshot))
     return console.export_text()
 
@@ -74,13 +82,97 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
     )  # fmt: skip
     text = printed(snapshot)
     for piece in (
-        "SAFE_STOP", "bumper contact: free the robot", "→", "•",
+        "SAFE STOP", "bumper contact: free the robot", "→", "•",
         "1 segments, 7 hypotheses, 12 objects left behind; 3 near ones have no room",
         "1832 frames, 3 bad, 2 lost",
         "520, 9 late, 4 missed", "outside the process: 7, refine: 2",
         "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
     ):  # fmt: skip
         assert piece in text, piece
+
+
+URL = "http://127.0.0.1:8374/?token=qT3xYw0s1uBhVJYkz0cH4nR2mFpL8dXe"
+BUSY = replace(
+    EMPTY,
+    mode=ModeState(Mode.SAFE_STOP, 1.0, "no echoes for 0.6 s: check the ring's power and cable; then re-arm"),
+    pose=Pose(1.0, 0.0, 0.0), trail=[(0.1 * k, 0.0) for k in range(40)],
+    segments=np.array([[0.9, 1.0 + 0.1 * k, 1.1, 1.0, 0.0] for k in range(30)]), map_counts=MapCounts(304, 9, 7),
+    objects=(
+        DetectedObject("semicircle", -1.005, 1.2192, 0.5, 0.0123, 39, 0.999, 0.999, number=3),
+        DetectedObject("wall", 3.0, 2.0, 0.0, 0.9, 50, 0.97, 0.97, (3.0, 0.0, 0.0), 12, sigma_theta=0.01),
+        *(DetectedObject("post", 0.2 * k, 3.0, 0.0, 0.02, 12, 0.8, 0.8, number=20 + k) for k in range(14)),
+    ),
+    sensors=("sensor 4 has been silent for 30 s", "sensor 9 repeats 0.91 m"), counts=LinkCounts(1832, 3, 2),
+    cycles=520, late=9, faults=(("refine", 2),), twist=Twist(-0.2, -0.1),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (200, 60), (40, 16), (100, 10)])
+def test_what_a_person_needs_fits_the_terminal(size: tuple[int, int]) -> None:
+    width, height = size
+    lines = printed(BUSY, width, height, URL).rstrip("\n").split("\n")
+    assert len(lines) < height, "nothing scrolls away"
+    assert max(map(len, lines)) <= width
+    assert lines[0].startswith(" SAFE STOP  −0.66 ft/s ↻ 6°/s  no echo")
+    assert URL in "".join(line.rstrip() for line in lines)
+    assert any("space halt" in line or "␣ halt" in line for line in lines)
+    assert sum(line.startswith("masked") for line in lines) == 2
+    if height > 10:
+        assert any("3 semicircle" in line and "> 99 %" in line for line in lines)
+    if height >= 24:
+        text = "\n".join(lines)
+        for piece in (
+            "objects  15, and 1 wall", "−3.30, 4.00 ft, 29°  ", "± 0.040 ft", "0.00, 6.56 to 19.69, 6.56 ft",
+            "19.69 ft long", "1832 frames, 3 bad, 2 lost", "304 segments", "refine: 2",
+        ):  # fmt: skip
+            assert piece in text, piece
+        assert ("→" in text) == (height > 24 or "have no room" not in text)
+
+
+@pytest.mark.parametrize("size", [(0, 0), (1, 1), (20, 5), (5, 20), (80, 2)])
+def test_no_size_is_too_small(size: tuple[int, int]) -> None:
+    width, height = size
+    text = printed(BUSY, width, height, URL).rstrip("\n")
+    assert len(text.split("\n")) <= max(1, height - 1)
+    if size == (20, 5):
+        assert text.startswith(" SAFE STOP")
+
+
+def test_the_forms_are_those_of_the_page() -> None:
+    """Node runs the page's own code over the same values."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("needs node")
+    values = [0.0, -0.004, 1.005, 2.675, -12.3456, 0.0005, 3.14159, -85.0, 7.7724]
+    shares = [0.0, 0.004, 0.5, 0.994, 0.9951, 1.0]
+    page = Path(page_folder.__file__).parent / "page"
+    script = (
+        f"import {{Units, degrees}} from {json.dumps((page / 'units.js').as_uri())};"
+        f"const percent = {_percent(page)}; const units = new Units(); const out = [];"
+        f"for (const name of ['m', 'ft']) {{ units.choose(name); for (const v of {values})"
+        " out.push(units.number(v), units.length(v, 3), units.place(v, -v), degrees(v)); }"
+        f"for (const s of {shares}) out.push(percent(s)); console.log(JSON.stringify(out));"
+    )
+    done = subprocess.run([node, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
+    units: tuple[Units, ...] = ("m", "ft")
+    ours = [
+        form
+        for unit in units
+        for v in values
+        for form in (
+            page_text.number(v, unit), page_text.length(v, unit, 3), page_text.place(v, -v, unit),
+            page_text.degrees(v),
+        )
+    ]  # fmt: skip
+    assert json.loads(done.stdout) == [*ours, *map(page_text.percent, shares)]
+
+
+def _percent(page: Path) -> str:
+    """Return the page's function as its source has it."""
+    text = (page / "draw_objects.js").read_text(encoding="utf-8")
+    found = re.search(r"export const percent = (.*);", text)
+    assert found is not None
+    return found[1]
 
 
 class Terminal(io.StringIO):
@@ -98,9 +190,9 @@ def until(done: Callable[[], bool]) -> None:
 def test_the_place_in_the_map_is_shown_and_that_it_is_unknown() -> None:
     assert "place" not in printed(EMPTY)
     unknown = LocalizedPose(Pose(0.0, 0.0, 0.0), 0.0, np.diag([np.inf] * 3), "lost", 0.02)
-    assert "unknown, lost 2%" in printed(replace(EMPTY, localized=unknown))
+    assert "unknown, lost 2 %" in printed(replace(EMPTY, localized=unknown))
     known = LocalizedPose(Pose(3.048, 0.3048, np.pi), 0.0, np.diag([4e-4, 1e-4, 1e-4]), "tracking", 0.97)
-    assert "(10.00, 1.00) ± 0.066 ft, 180.0° ± 0.6°, tracking 97%" in printed(replace(EMPTY, localized=known))
+    assert "10.00, 1.00 ± 0.066 ft, 180° ± 0.6°, tracking 97 %" in printed(replace(EMPTY, localized=known))
 
 
 def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

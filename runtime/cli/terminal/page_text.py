@@ -1,0 +1,77 @@
+"""Numbers as the console's page writes them (its `units.js`, `objects.js`, `status.js`): same digits, same order."""
+
+from __future__ import annotations
+
+import math
+from decimal import ROUND_HALF_UP, Decimal
+
+from config.units import FOOT_M
+from perception.bayes.object_report import worst_sigma
+from perception.detected_object import DetectedObject
+from perception.localization.drift_correction import LocalizedPose
+from runtime.support.length_format import Units
+
+
+def number(metres: float, units: Units, digits: int = 2) -> str:
+    """Return a length without its unit, rounded as JavaScript's `toFixed` does, with a true minus sign."""
+    value = Decimal(metres if units == "m" else metres / FOOT_M)
+    rounded = (value + 0).quantize(Decimal(1).scaleb(-digits), ROUND_HALF_UP)
+    return f"{rounded:f}".replace("-", "\N{MINUS SIGN}")
+
+
+def length(metres: float, units: Units, digits: int = 2) -> str:
+    """Return a length with its unit."""
+    return f"{number(metres, units, digits)} {units}"
+
+
+def place(x: float, y: float, units: Units) -> str:
+    """Return a point, given in metres, with its unit."""
+    return f"{number(x, units)}, {number(y, units)} {units}"
+
+
+def degrees(radians: float) -> str:
+    """Return an angle in whole degrees from −180 to 180, however often the robot has turned."""
+    angle = math.floor(math.degrees(math.atan2(math.sin(radians), math.cos(radians))) + 0.5)
+    return f"{angle}°".replace("-", "\N{MINUS SIGN}")
+
+
+def percent(share: float) -> str:
+    """Return a probability in whole per cent."""
+    return f"{'> 99' if 0.995 < share < 1.0 else math.floor(100.0 * share + 0.5)} %"
+
+
+def certainty(seen: DetectedObject) -> str:
+    """Return what is known of an object: what an operator said of it counts more than a number."""
+    if seen.placed and not seen.confirmed:
+        return "placed"
+    return f"{'✓ ' if seen.confirmed else ''}{percent(seen.score if seen.probability is None else seen.probability)}"
+
+
+def object_row(seen: DetectedObject, units: Units) -> tuple[str, str, str, str, str]:
+    """Return number, name, certainty, place and uncertainty of an object, or the length of a wall."""
+    if seen.ends is None:
+        where = f"{place(seen.x, seen.y, units)}, {degrees(seen.theta)}"
+        size = f"± {length(seen.sigma, units, 3)}"
+    else:
+        x1, y1, x2, y2 = seen.ends
+        where = f"{number(x1, units)}, {number(y1, units)} to {place(x2, y2, units)}"
+        size = f"{length(math.hypot(x2 - x1, y2 - y1), units)} long"
+    return "–" if seen.number is None else str(seen.number), seen.model, certainty(seen), where, size
+
+
+def twist(v: float, w: float, units: Units) -> str:
+    """Return speed (m/s) and turning rate (rad/s) of the robot."""
+    turn = math.floor(math.degrees(w) + 0.5)
+    arrow = "↻ " if turn < 0 else "↺ " if turn > 0 else ""
+    return f"{number(v, units)} {units}/s {arrow}{abs(turn)}°/s"
+
+
+def localized_place(here: LocalizedPose, units: Units) -> str:
+    """Return the robot's place in the map frame, with the standard errors of its worst direction and its heading."""
+    said = f"{here.status} {math.floor(100.0 * here.probability + 0.5)} %"
+    covariance = here.covariance
+    if not math.isfinite(float(covariance.sum())):
+        return f"unknown, {said}"
+    sigma = worst_sigma(float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
+    at = f"{number(here.pose.x, units)}, {number(here.pose.y, units)} ± {length(sigma, units, 3)}"
+    return f"{at}, {degrees(here.pose.theta)} ± {math.degrees(math.sqrt(covariance[2, 2])):.1f}°, {said}"
