@@ -17,6 +17,7 @@ from runtime.cli.board_commands import firmware, probe_command, ring_test_comman
 from runtime.cli.bridge_commands import foxglove, ros2, ros2_robot_command
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.first_signals import EXIT_CODE_BASE
+from runtime.cli.init_commands import init_app
 from runtime.cli.recording_commands import calibrate, export, figures, map_command, recover, replay, report
 from runtime.cli.robot_commands import check, emulate, run, service, settings_command
 from runtime.cli.start_signals import ending_in_order
@@ -48,6 +49,8 @@ for title, commands in (
     group = Group.create_ordered(title)
     for command in commands:
         app.command(command, name=command.__name__.removesuffix("_command").replace("_", "-"), group=group)
+init_app.group = (Group.create_ordered("Files of your own"),)
+app.command(init_app)
 general = Group.create_ordered("General")
 app.register_install_completion_command(
     help="Complete commands and options in this shell (bash, zsh, fish); adds a line to its start-up file."

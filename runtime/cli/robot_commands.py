@@ -168,7 +168,13 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
 
 
 def service(
-    config: ConfigFile = None, /, *, port: str | None = None, user: str | None = None, sets: Sets = ()
+    config: ConfigFile = None,
+    /,
+    *,
+    port: str | None = None,
+    user: str | None = None,
+    own: Annotated[bool, Flag] = False,
+    sets: Sets = (),
 ) -> int:
     """Print a systemd unit that runs the robot's main process from boot on; it never arms the robot.
 
@@ -178,6 +184,8 @@ def service(
         Serial port of the robot, unless the run file names one.
     user
         User that runs it; by default one that systemd creates.
+    own
+        Print a unit for your own manager (systemctl --user), which needs no rights of an administrator.
     config
         Run file, or the name of a shipped one; None for the default settings.
     sets
@@ -185,7 +193,7 @@ def service(
     """
     from runtime.cli.commands.service import print_service
 
-    return print_service(config, sets, port=port, user=user)
+    return print_service(config, sets, port=port, user=user, own=own)
 
 
 def settings_command(text: str = "", /, *, out: str | None = None, force: Force = False) -> int:

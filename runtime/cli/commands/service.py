@@ -51,12 +51,21 @@ WantedBy=multi-user.target
 """
 
 
-def print_service(config: str | None, sets: Sequence[str], *, port: str | None, user: str | None) -> int:
+SYSTEM_ONLY: Final = (
+    "DynamicUser=", "User=", "SupplementaryGroups=", "# The group that", "StateDirectory=", "CacheDirectory=",
+    "Environment=XDG_", "LimitRTPRIO=", "LimitMEMLOCK=", "# For the settings",
+)  # fmt: skip
+"""Lines that the manager of a user cannot carry out: the user's own folders, groups and limits hold."""
+
+
+def print_service(
+    config: str | None, sets: Sequence[str], *, port: str | None, user: str | None, own: bool = False
+) -> int:  # fmt: skip
     """Print the unit and return the exit code.
 
     Parameters
     ----------
-    config, sets, port, user
+    config, sets, port, user, own
         As of `runtime.cli.robot_commands.service`.
 
     Raises
@@ -70,7 +79,10 @@ def print_service(config: str | None, sets: Sequence[str], *, port: str | None, 
         raise UserError("a service needs the robot's serial port: set --port or link.port", WRONG_CALL)
     if any(not text.isprintable() for text in (port, user or "", *sets)):
         raise UserError("a unit file may contain printable characters only: choose other names", WRONG_CALL)
-    sys.stdout.write(systemd_unit(service_command(config, sets, port), port, user))
+    if own and user is not None:
+        raise UserError("--own is a unit for the manager of the user who installs it: leave out --user", WRONG_CALL)
+    unit = systemd_unit(service_command(config, sets, port), port, user)
+    sys.stdout.write(own_unit(unit) if own else unit)
     return DONE
 
 
@@ -95,6 +107,15 @@ def systemd_unit(command: Sequence[str], port: str, user: str | None) -> str:
         where=where,
         user="DynamicUser=yes" if user is None else f"User={_escape_specifiers(user)}",
     )
+
+
+def own_unit(unit: str) -> str:
+    """Return a unit for the manager of a user (`systemctl --user`)."""
+    kept = "\n".join(line for line in unit.split("\n") if not line.startswith(SYSTEM_ONLY))
+    kept = kept.replace("WantedBy=multi-user.target", "WantedBy=default.target").replace(
+        "systemctl ", "systemctl --user "
+    )
+    return kept.replace("/etc/systemd/system/", "~/.config/systemd/user/")
 
 
 def service_command(config: str | None, sets: Sequence[str], port: str) -> list[str]:

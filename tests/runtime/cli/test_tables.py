@@ -61,10 +61,18 @@ def test_result_line() -> None:
 def test_objects() -> None:
     row: ObjectRow = {
         "model": "semicircle", "x": 0.3048, "y": -0.6096, "theta": -1.5707963, "sigma": 0.01, "support": 39,
-        "score": 0.951,
+        "score": 0.951, "number": 7,
     }  # fmt: skip
     (line,) = (line for line in shown(objects_table([row], "ft")) if "semicircle" in line)
-    assert [cell.strip() for cell in line.split("│")[1:-1]] == ["semicircle", "1.00", "-2.00", "-90", "39", "0.95"]
+    assert [cell.strip() for cell in line.split("│")[1:-1]] == [
+        "7",
+        "semicircle",
+        "1.00",
+        "−2.00",
+        "−90°",
+        "39",
+        "0.95",
+    ]
     assert any("x (m)" in line for line in shown(objects_table([], "m")))
 
 
@@ -93,7 +101,7 @@ def test_the_timing_table_and_the_causes_of_delays() -> None:
     assert text.count("0.17") == text.count("1.25") == text.count("8.00") == text.count("49.65") == 4
     assert timing_line(summary) == (
         "240 cycles, 100% of them with the ring; 7 late, 1 missed, 2 overruns; "
-        "by fault of: outside the process (6), callback Recorder.flush (1)"
+        "caused by: outside the process (6), callback Recorder.flush (1)"
     )
     timing["faults"] = {}
     assert timing_line(summary).endswith("2 overruns")

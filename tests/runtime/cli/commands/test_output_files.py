@@ -53,6 +53,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "--trajectory {1}",
     ),
     "settings": ("settings", "--out {0}"),
+    "init": ("init", "run {0}", "--yes"),
     "recover": ("recover", "my.mcap", "--out {0}"),
     "robot with ROS": ("ros2-robot", "--radius 0.3", "--out {0}"),
     "report": ("report", "my.mcap", "--world my_world.toml", "--out {0}"),

@@ -1,0 +1,292 @@
+"""`echolocate init`: first files of one's own, from options and answers; they pass `echolocate check`."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import orjson
+
+from config.errors import DONE, WRONG_CALL, UserError
+from config.files import one_line
+from config.load import load_any
+from config.settings import Settings
+from drivers.firing_pattern import FiringError
+from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.support.pattern_check import refuse_undrivable
+
+Given = Mapping[str, Any]
+T = TypeVar("T")
+DRIVERS: Final = ("denning", "arcos", "rflex", "ros2")
+ARRAY: Final = 8
+"""Sensors of an array of a Pioneer, and of a bank that is written for an rFLEX controller; of each, one fires."""
+AT_A_TIME: Final = ((8, "octets"), (4, "quadrants"), (3, "thirds"), (2, "opposite_pairs"), (1, "single"))
+SOUND_M_S: Final = 343.0
+CORNERS: Final = 16
+"""Of the outline of a round model."""
+
+
+class Questions:
+    """Asks for what no option gives, where a person can answer; otherwise takes the defaults.
+
+    Parameters
+    ----------
+    given : mapping
+        The options; None for one that was not given.
+    asks : bool
+        Whether to ask.
+    """
+
+    def __init__(self, given: Given, *, asks: bool) -> None:
+        self._given = given
+        self._asks = asks
+
+    def text(self, name: str, question: str, default: str) -> str:
+        """Return a text."""
+        return self._answer(name, question, default, str)
+
+    def number(self, name: str, question: str, default: float, low: float, high: float) -> float:
+        """Return a number from `low` to `high`; another answer is asked for again, another option refused."""
+
+        def parse(answer: str) -> float:
+            value = float(answer.replace(",", "."))
+            if not low <= value <= high:
+                raise ValueError(f"expected a number from {low:g} to {high:g}")
+            return value
+
+        return self._answer(name, question, default, parse)
+
+    def count(self, name: str, question: str, default: int, low: int, high: int) -> int:
+        """Return a whole number from `low` to `high`."""
+
+        def parse(answer: str) -> int:
+            value = int(answer)
+            if not low <= value <= high:
+                raise ValueError(f"expected a whole number from {low} to {high}")
+            return value
+
+        return self._answer(name, question, default, parse)
+
+    def choice(self, name: str, question: str, choices: tuple[str, ...]) -> str:
+        """Return one of the choices, the first by default."""
+
+        def parse(answer: str) -> str:
+            if answer not in choices:
+                raise ValueError(f"expected one of {', '.join(choices)}")
+            return answer
+
+        return self._answer(name, f"{question} ({', '.join(choices)})", choices[0], parse)
+
+    def _answer(self, name: str, question: str, default: T, parse: Callable[[str], T]) -> T:
+        given = self._given.get(name)
+        if given is not None:
+            try:
+                return parse(str(given))
+            except ValueError as error:
+                raise UserError(f"--{name.replace('_', '-')} {one_line(str(given))}: {error}", WRONG_CALL) from error
+        while self._asks:
+            sys.stderr.write(f"{question} [{default}]: ")
+            sys.stderr.flush()
+            line = sys.stdin.readline()
+            if not line:
+                raise UserError("the questions were not answered to their end; nothing was written", WRONG_CALL)
+            if not line.strip():
+                break
+            try:
+                return parse(line.strip())
+            except ValueError as error:
+                sys.stderr.write(f"  {one_line(str(error))}\n")
+        return default
+
+
+def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
+    """Write a robot file and return the exit code.
+
+    Parameters
+    ----------
+    file, given, yes, force
+        As of `runtime.cli.init_commands.robot`.
+    """
+    ask = _questions(file, given, yes=yes, force=force)
+    driver = ask.choice("driver", "The robot's protocol", DRIVERS)
+    name = ask.text("name", "What the robot is called", Path(file).stem)
+    most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}[driver]
+    sensors = ask.count("sensors", "Number of sensors, equally spaced", 16 if driver != "denning" else 24, 2, most)
+    if driver in {"arcos", "rflex"} and sensors % ARRAY:
+        raise UserError(f"--sensors {sensors}: the driver {driver} has arrays of {ARRAY}: give {ARRAY}, {2 * ARRAY} "
+                        f"or another multiple, and describe a smaller array in the file", WRONG_CALL)  # fmt: skip
+    body = ask.number("body_radius", "Radius of the body, m", 0.3, 0.01, 10.0)
+    ring = ask.number("ring_radius", "Distance of the sensors from the middle, m", body, 0.0, 10.0)
+    beam = ask.number("beam_half_angle", "Half the width of a beam, degrees", 12.0, 0.5, 80.0)
+    low = ask.number("range_min", "Least range of a sensor, m", 0.15, 0.0, 50.0)
+    high = ask.number("range_max", "Greatest range of a sensor, m", 5.0, low + 0.1, 100.0)
+    resolution = ask.number("resolution", "Step of the ranges, m (0: none)", 0.01, 0.0, 0.5)
+    speed = ask.number("speed_max", "Largest speed, m/s", 0.5, 0.01, 10.0)
+    turn = ask.number("turn_max", "Largest turning rate, rad/s", 1.0, 0.01, 20.0)
+    synchro = bool(given.get("synchro")) or (
+        driver not in {"ros2", "arcos"}
+        and ask.choice("wheels", "Do the wheels turn without the body?", ("no", "yes")) == "yes"
+    )
+    baud = ask.count(
+        "baud", "Speed of the line, bits per second", 38400 if driver == "arcos" else 115200, 300, 4000000
+    )
+    port = "ros2" if driver == "ros2" else ask.text("port", "Serial port (empty: named when it runs)", "")
+    preset = _preset(driver, sensors)
+    step_s = max(0.05 if driver == "denning" else 0.041, math.ceil(1100.0 * 2.0 * high / SOUND_M_S) * 1e-3)
+    own = {
+        "denning": "",
+        "arcos": "\n[arcos]  # mm and rad from the controller's counts: `echolocate calibrate` finds them\n"
+        "distance_factor = 1.0\nturn_factor = 0.0056\n",
+        "rflex": "\n[rflex]  # the controller's counts per metre and radian: `echolocate calibrate` finds them\n"
+        f"distance_factor = 101230.0\nangle_factor = 35343.888\nbanks = {[ARRAY] * (sensors // ARRAY)}\n",
+        "ros2": "\n[ros2]  # topics and frames: `echolocate ros2-robot` finds them\n"
+        f'ranges = ["sonar"]\nframes = {_json([f"sonar_{k}" for k in range(sensors)])}\n'
+        'odometry = "odom"\ncmd_vel = "cmd_vel"\n',
+    }[driver]
+    text = f"""# A robot of your own. `echolocate settings` lists every key; `echolocate check FILE` checks a file.
+
+[robot]
+name = {_json(name)}
+driver = {_json(driver)}
+{own}
+[ring]
+count = {sensors}  # sensor 0 looks forward, the others follow counter-clockwise; or list them as sensors = [...]
+radius_m = {ring:g}
+beam_half_angle_deg = {beam:g}
+resolution_m = {resolution:g}  # step of the reported ranges; 0 = none
+range_min_m = {low:g}
+range_max_m = {high:g}
+
+[ring.firing]
+preset = "{preset}"  # how many sensors fire at a time
+step_period_s = {step_s:.3f}  # sound needs {2.0 * high / SOUND_M_S:.4f} s to range_max_m and back
+
+[body]
+radius_m = {body:g}
+speed_max_m_s = {speed:g}
+turn_max_rad_s = {turn:g}
+synchro = {str(synchro).lower()}  # true: the wheels turn, body and ring do not
+
+[link]
+{f"port = {_json(port)}" if port else '# port = "/dev/ttyUSB0"  # or name it at the start: echolocate run --port'}
+baud = {baud}
+"""
+    return _write(file, text, force=force)
+
+
+def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:
+    """Write a world file and return the exit code; parameters as of `runtime.cli.init_commands.world`."""
+    ask = _questions(file, given, yes=yes, force=force)
+    width = ask.number("width", "Size of the room along x, m", 8.0, 1.0, 1000.0)
+    depth = ask.number("depth", "Size of the room along y, m", 6.0, 1.0, 1000.0)
+    drums = ask.count("drums", "Number of drums", 4, 0, 12)
+    radius = ask.number("drum_radius", "Radius of a drum, m", 0.3048, 0.02, 0.1 * min(width, depth)) if drums else 0.0
+    surfaces = ask.choice("surfaces", "How surfaces reflect", ("cone", "specular"))
+    x, y = 0.5 * width, 0.5 * depth
+    corners = [(-x, -y), (x, -y), (x, y), (-x, y)]
+    walls = "".join(
+        f"\n[[wall]]\nx1_m = {a[0]:g}\ny1_m = {a[1]:g}\nx2_m = {b[0]:g}\ny2_m = {b[1]:g}\n"
+        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
+    )
+    turns = [2.0 * math.pi * (k + 0.5) / drums for k in range(drums)]
+    stands = "".join(
+        f"\n[[drum]]\nx_m = {0.6 * x * math.cos(turn):.3f}\ny_m = {0.6 * y * math.sin(turn):.3f}\n"
+        f"radius_m = {radius:g}\n"
+        for turn in turns
+    )
+    text = f"""# A room of your own for the emulator: metres; x to the right, y up, headings counter-clockwise.
+{walls}{stands}
+[start]
+x_m = 0.0
+y_m = 0.0
+heading_deg = 0.0
+
+[acoustics]
+model = "{surfaces}"  # cone: each point of a surface answers; specular: surfaces are mirrors
+noise_m = 0.005
+"""
+    return _write(file, text, force=force)
+
+
+def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
+    """Write a model file and return the exit code; parameters as of `runtime.cli.init_commands.model`."""
+    ask = _questions(file, given, yes=yes, force=force)
+    name = ask.text("name", "What such an object is called", Path(file).stem)
+    if ask.choice("shape", "Its shape", ("round", "box")) == "round":
+        radius = ask.number("radius", "Its radius, m", 0.3048, 0.02, 10.0)
+        turns = [2.0 * math.pi * k / CORNERS for k in range(CORNERS)]
+        points = [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
+        arc = f"arc_radius_m = {radius:g}  # the true radius, which the corners approximate\n"
+    else:
+        x = 0.5 * ask.number("length", "Its length, m", 0.6, 0.02, 20.0)
+        y = 0.5 * ask.number("width", "Its width, m", 0.4, 0.02, 20.0)
+        points, arc = [(x, -y), (x, y), (-x, y), (-x, -y)], ""
+    rows = "".join(f"  [{x:.6g}, {y:.6g}],\n" for x, y in points)
+    text = f"""# An object of your own; the origin is the point whose position is reported.
+name = {_json(name)}
+closed = true
+{arc}vertices_m = [
+{rows}]
+"""
+    return _write(file, text, force=force)
+
+
+def write_run(file: str, given: Given, *, yes: bool, force: bool) -> int:
+    """Write a run file and return the exit code; parameters as of `runtime.cli.init_commands.run_file`."""
+    ask = _questions(file, given, yes=yes, force=force)
+    robot = ask.text("robot", "Robot file, or the name of a shipped one", "denning")
+    world = ask.text("world", "World file for the emulator, or the name of a shipped one", "hallway")
+    models = [one.strip() for one in ask.text("models", "Models, separated by commas", "semicircle").split(",")]
+    mission = ask.text("mission", "Mission file or name (-: none)", "-")
+    text = f"""# A run of your own. `echolocate run` drives the emulated robot; with --port, the real one.
+robot = {_json(robot)}
+world = {_json(world)}  # for the emulator only
+models = {_json(models)}
+{"# mission = " + _json("patrol") + "  # what to do once armed" if mission == "-" else "mission = " + _json(mission)}
+"""
+    return _write(file, text, force=force)
+
+
+def _questions(file: str, given: Given, *, yes: bool, force: bool) -> Questions:
+    check_outputs({"FILE": file}, force=force)  # before any question
+    return Questions(given, asks=not yes and sys.stdin.isatty())
+
+
+def _preset(driver: str, sensors: int) -> str:
+    """Return the pattern that fires as many sensors at a time as the robot can."""
+    at_a_time = {"arcos": sensors // ARRAY, "rflex": sensors // ARRAY, "ros2": 1}.get(driver, 8)
+    return next(name for count, name in AT_A_TIME if count <= at_a_time and sensors % count == 0)
+
+
+def _json(value: object) -> str:
+    """Return a text or a list of texts as TOML has it, which is as JSON has it."""
+    return orjson.dumps(value).decode()
+
+
+def _write(file: str, text: str, *, force: bool) -> int:
+    """Write a file once it is known to be good; an existing one is replaced only then.
+
+    Raises
+    ------
+    UserError
+        The values contradict each other, or the file cannot be written.
+    """
+    check_outputs({"FILE": file}, force=force)
+    draft = Path(file).with_name(f".{Path(file).name}.draft.toml")
+    try:
+        with writing("FILE", draft):
+            draft.write_text(text, encoding="utf-8")
+        checked = load_any(str(draft), ())
+        if isinstance(checked, Settings):
+            refuse_undrivable(checked)
+        draft.replace(file)
+    except (UserError, FiringError) as error:
+        said = str(error).replace(str(draft), file)
+        raise UserError(f"{said}; nothing was written", WRONG_CALL) from error
+    finally:
+        draft.unlink(missing_ok=True)
+    sys.stdout.write(f"{file}: written; look at it, then: echolocate check {file}\n")
+    return DONE

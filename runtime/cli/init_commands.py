@@ -1,0 +1,189 @@
+"""The commands that write a first file of one's own: `init robot`, `init world`, `init model`, `init run`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from runtime.cli.options import Flag, Force
+
+Yes = Annotated[bool, Parameter(negative="", show_default=False, help="Ask nothing; take the defaults.")]
+
+init_app = App(
+    name="init",
+    help="Write a first file of your own, with comments. What no option gives is asked for on a terminal.",
+)
+
+
+@init_app.command
+def robot(
+    file: str,
+    /,
+    *,
+    driver: Literal["denning", "arcos", "rflex", "ros2"] | None = None,
+    name: str | None = None,
+    sensors: int | None = None,
+    ring_radius: float | None = None,
+    beam_half_angle: float | None = None,
+    range_min: float | None = None,
+    range_max: float | None = None,
+    resolution: float | None = None,
+    body_radius: float | None = None,
+    speed_max: float | None = None,
+    turn_max: float | None = None,
+    synchro: Annotated[bool, Flag] = False,
+    baud: int | None = None,
+    port: str | None = None,
+    yes: Yes = False,
+    force: Force = False,
+) -> int:
+    """Write a robot file: a regular ring of sensors, the body, the line and the driver.
+
+    Parameters
+    ----------
+    file
+        The file to write, as my-robot.toml.
+    driver
+        The robot's protocol: denning (also rings that you build), arcos (Pioneer), rflex (B21r, Magellan) or ros2.
+    name
+        What the robot is called.
+    sensors
+        Number of sensors of the ring, equally spaced; the first looks forward.
+    ring_radius
+        Distance of the sensors from the middle, m.
+    beam_half_angle
+        Half the width of a sensor's beam, degrees.
+    range_min
+        Least range that a sensor reports, m.
+    range_max
+        Greatest range that a sensor reports, m.
+    resolution
+        Step of the reported ranges, m; 0 if they have none.
+    body_radius
+        Radius of the body, m.
+    speed_max
+        Largest speed, m/s.
+    turn_max
+        Largest turning rate, rad/s.
+    synchro
+        The wheels turn, the body with its ring does not.
+    baud
+        Speed of the line, bits per second.
+    port
+        Serial port of the robot, as /dev/ttyUSB0; by default a run names it.
+    """
+    from runtime.cli.commands.init_files import write_robot
+
+    given = {
+        "driver": driver, "name": name, "sensors": sensors, "ring_radius": ring_radius, "body_radius": body_radius,
+        "beam_half_angle": beam_half_angle, "range_min": range_min, "range_max": range_max, "resolution": resolution,
+        "speed_max": speed_max, "turn_max": turn_max, "synchro": synchro or None, "baud": baud, "port": port,
+    }  # fmt: skip
+    return write_robot(file, given, yes=yes, force=force)
+
+
+@init_app.command
+def world(
+    file: str,
+    /,
+    *,
+    width: float | None = None,
+    depth: float | None = None,
+    drums: int | None = None,
+    drum_radius: float | None = None,
+    surfaces: Literal["cone", "specular"] | None = None,
+    yes: Yes = False,
+    force: Force = False,
+) -> int:
+    """Write a world file for the emulator: a rectangular room with drums, the robot in its middle.
+
+    Parameters
+    ----------
+    file
+        The file to write, as my-room.toml.
+    width
+        Size of the room along x, m.
+    depth
+        Size of the room along y, m.
+    drums
+        Number of drums in it, 0 to 12.
+    drum_radius
+        Radius of a drum, m.
+    surfaces
+        How they reflect: cone (each point answers) or specular (as mirrors).
+    """
+    from runtime.cli.commands.init_files import write_world
+
+    given = {"width": width, "depth": depth, "drums": drums, "drum_radius": drum_radius, "surfaces": surfaces}
+    return write_world(file, given, yes=yes, force=force)
+
+
+@init_app.command
+def model(
+    file: str,
+    /,
+    *,
+    name: str | None = None,
+    shape: Literal["round", "box"] | None = None,
+    radius: float | None = None,
+    length: float | None = None,
+    width: float | None = None,
+    yes: Yes = False,
+    force: Force = False,
+) -> int:
+    """Write an object model: a round object, or one with a rectangular floor plan.
+
+    Parameters
+    ----------
+    file
+        The file to write, as bin.toml.
+    name
+        What such an object is called: letters, digits, - and _.
+    shape
+        Round or box.
+    radius
+        Of a round object, m.
+    length
+        Of a box, along its own x axis, m.
+    width
+        Of a box, along its own y axis, m.
+    """
+    from runtime.cli.commands.init_files import write_model
+
+    given = {"name": name, "shape": shape, "radius": radius, "length": length, "width": width}
+    return write_model(file, given, yes=yes, force=force)
+
+
+@init_app.command(name="run")
+def run_file(
+    file: str,
+    /,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    models: Annotated[str | None, Parameter(name="--model")] = None,
+    mission: str | None = None,
+    yes: Yes = False,
+    force: Force = False,
+) -> int:
+    """Write a run file: which robot drives, among what, what it recognises, and what it does.
+
+    Parameters
+    ----------
+    file
+        The file to write, as my-run.toml.
+    robot
+        Robot file, or the name of a shipped one.
+    world
+        World file for the emulator, or the name of a shipped one.
+    models
+        Object models to look for: files or names of shipped ones, separated by commas.
+    mission
+        What to do once armed: a mission file or the name of a shipped one; - for none.
+    """
+    from runtime.cli.commands.init_files import write_run
+
+    return write_run(
+        file, {"robot": robot, "world": world, "models": models, "mission": mission}, yes=yes, force=force
+    )

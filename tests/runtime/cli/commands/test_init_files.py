@@ -1,0 +1,88 @@
+"""First files of one's own: good by themselves, never in the place of another, from options or from answers."""
+
+from __future__ import annotations
+
+import io
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from config.errors import DONE, WRONG_CALL
+from runtime.cli.app import run_command
+
+
+class Person(io.StringIO):
+    """A terminal with a person's answers."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("robot", "--driver", "denning"),
+        ("robot", "--driver", "denning", "--sensors", "20", "--range-max", "3"),
+        ("robot", "--driver", "arcos", "--sensors", "16"),
+        ("robot", "--driver", "rflex", "--sensors", "24", "--port", "/dev/ttyUSB0"),
+        ("robot", "--driver", "ros2", "--sensors", "16"),
+        ("world", "--drums", "0"),
+        ("world", "--surfaces", "specular"),
+        ("model", "--name", "bin", "--shape", "round", "--radius", "0.2"),
+        ("model", "--shape", "box", "--length", "1.2"),
+        ("run", "--model", "drum, box", "--mission", "patrol"),
+    ],
+    ids=" ".join,
+)
+def test_what_is_written_is_good_and_is_never_overwritten(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    kind, *options = words
+    assert run_command(["init", kind, "mine.toml", *options]) == DONE
+    assert run_command(["check", "mine.toml"]) == DONE, capsys.readouterr().err
+    before = Path("mine.toml").read_text()
+    assert "# " in before, "it has comments"
+    assert run_command(["init", kind, "mine.toml"]) == WRONG_CALL or "exists" in capsys.readouterr().err
+    assert Path("mine.toml").read_text() == before
+    assert run_command(["init", kind, "mine.toml", "--force"]) == DONE
+    assert [path.name for path in Path().iterdir()] == ["mine.toml"], "no draft is left"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("robot", "--sensors", "1"), "--sensors 1: expected a whole number from 2 to 24"),
+        (("robot", "--driver", "arcos", "--sensors", "12"), "has arrays of 8"),
+        (("robot", "--range-max", "0.2"), "--range-max 0.2: expected a number from 0.25"),
+        (("robot", "--sensors", "5"), "the pattern does not look ahead"),
+        (("run", "--robot", "absent.toml"), "absent.toml"),
+        (("model", "--name", "a b"), "nothing was written"),
+    ],
+)
+def test_a_wrong_option_writes_nothing(words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    kind, *options = words
+    assert run_command(["init", kind, "mine.toml", *options]) == WRONG_CALL
+    assert said in capsys.readouterr().err
+    assert list(Path().iterdir()) == []
+
+
+def test_what_no_option_gives_is_asked_for_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", Person("box\n9999\n1.5\n\n"))
+    assert run_command(["init", "model", "table.toml", "--name", "table"]) == DONE
+    asked = capsys.readouterr().err
+    assert "Its shape (round, box) [round]: " in asked
+    assert "expected a number from 0.02 to 20" in asked, "it asks again"
+    written = tomllib.loads(Path("table.toml").read_text())
+    assert (written["name"], written["vertices_m"][0]) == ("table", [0.75, -0.2])
+    monkeypatch.setattr("sys.stdin", Person(""))
+    assert run_command(["init", "model", "other.toml"]) == WRONG_CALL
+    assert not Path("other.toml").exists()
