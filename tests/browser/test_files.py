@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -129,3 +130,38 @@ async def test_a_map_is_loaded_forgotten_and_the_robot_placed_in_it(server: Fake
     await opened.save_screenshot("files-map")
     await page.locator("#map-forget").press("Enter")
     assert await server.wait("load_map", 3) == {"toml": None}
+
+
+async def test_a_robot_is_described_with_a_picture_of_its_ring_and_saved(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.tab("Files")
+    await page.locator("#robot-part summary").press("Enter")
+    beams = page.locator("#robot-picture .beam")
+    await expect(beams).to_have_count(16)
+    await page.locator("#new-count").fill("8")
+    await expect(beams).to_have_count(8)
+    await expect(page.locator("#robot-picture")).to_have_attribute("aria-label", re.compile("8 sensors"))
+    await page.locator("#robot-each").press("Enter")  # the space bar is HALT
+    await expect(page.locator("#robot-sensors li")).to_have_count(8)
+    before = await beams.nth(0).get_attribute("d")
+    await page.get_by_label("direction (degrees) of sensor 0").fill("20")
+    assert await beams.nth(0).get_attribute("d") != before, "it is drawn as it is edited"
+    await page.get_by_role("button", name="Remove sensor 7").press("Enter")
+    await page.locator("#new-name").fill("Ring 7!")
+    server.data["robot_file"] = "# A robot\n"
+    for name, size in {"1440": DESKTOP, "1024": SMALL, "390": PHONE}.items():
+        await page.set_viewport_size({"width": size[0], "height": size[1]})
+        await page.locator("#robot-picture").scroll_into_view_if_needed()
+        await opened.save_screenshot(f"robot-{name}")
+    async with page.expect_download() as downloading:
+        await page.locator("#new-name").press("Enter")
+    assert (await downloading.value).suggested_filename == "ring-7-.toml"
+    asked = await server.wait("robot_file")
+    assert (asked["count"], len(asked["sensors"]), asked["sensors"][0]) == (None, 7, [0.2, 0, 20])
+    assert (asked["name"], asked["preset"], asked["synchro"]) == ("Ring 7!", "quadrants", False)
+    server.refusals["robot_file"] = ("ring.firing: the pattern does not look ahead", None)
+    await page.locator("#robot-save").press("Enter")
+    await opened.says("#robot-error", "does not look ahead")
+    await page.locator("#robot-this").press("Enter")
+    await expect(page.locator("#robot-sensors li")).to_have_count(24)

@@ -17,6 +17,7 @@ from pydantic_core import from_json
 
 from config.errors import UserError
 from config.mission_step import STEPS_MAX
+from config.robot import SENSORS_MAX
 from perception.edits import COORDINATE_MAX_M
 
 MESSAGE_MAX_BYTES: Final = 64 * 1024
@@ -33,6 +34,7 @@ FIELD_MAX: Final = 120
 
 Coordinate: TypeAlias = Annotated[float, Field(ge=-COORDINATE_MAX_M, le=COORDINATE_MAX_M)]
 Angle: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
+Size: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 Number: TypeAlias = Annotated[int, Field(ge=0, le=ID_MAX)]
 Text: TypeAlias = Annotated[str, Field(max_length=TEXT_MAX)]
 Scalar: TypeAlias = Annotated[bool | int | float | Text | None, Field()]
@@ -84,6 +86,28 @@ class LoadModel:
     """Recognise a further object model, given as the text of its TOML file."""
 
     toml: Annotated[str, Field(max_length=TOML_MAX)]
+
+
+@dataclass(frozen=True, slots=True)
+class DescribeRobot:
+    """Ask for a robot's file; lengths are m, angles degrees. What the file allows is checked with its text."""
+
+    name: Annotated[str, Field(max_length=64)]
+    driver: Annotated[str, Field(min_length=1, max_length=64)]
+    count: Annotated[int | None, Field(ge=0, le=1000)]
+    radius_m: Annotated[float | None, Field(ge=-1e6, le=1e6)]
+    sensors: Annotated[tuple[tuple[Size, Size, Size], ...] | None, Field(max_length=SENSORS_MAX)]
+    """x, y and direction of each, in place of count and radius."""
+    beam_half_angle_deg: Size
+    resolution_m: Size
+    range_min_m: Size
+    range_max_m: Size
+    preset: Annotated[str, Field(max_length=64)]
+    step_period_s: Size
+    body_radius_m: Size
+    speed_max_m_s: Size
+    turn_max_rad_s: Size
+    synchro: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from perception.edits import (
     PlaceRobot,
     RejectObject,
 )
-from runtime.console.commands import async_commands, file_commands, handlers
+from runtime.console.commands import async_commands, file_commands, handlers, robot_commands
 from runtime.console.commands import messages as arguments
 from runtime.console.commands.command import Command, Permission, always
 from runtime.console.commands.messages import MessageReader, NoArguments
@@ -62,6 +62,7 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("evidence", arguments.GetEvidence, TOKEN, handlers.get_evidence),
     Command("show_grid", NoArguments, TOKEN, handlers.show_grid),
     Command("load_model", arguments.LoadModel, CONTROL, async_commands.load_model, always, survives_stop=True),
+    Command("robot_file", arguments.DescribeRobot, TOKEN, robot_commands.robot_file),
     Command("load_map", arguments.LoadMap, CONTROL, async_commands.load_map, always, survives_stop=True),
     Command("set_parameter", arguments.SetParameter, CONTROL, handlers.set_parameter, always, survives_stop=True),
     Command("undo_parameter", NoArguments, CONTROL, handlers.undo_parameter, always, survives_stop=True),

@@ -21,6 +21,7 @@ import { Plots } from "./plots.js";
 import { watchPointers } from "./pointer.js";
 import { prefer, preferred } from "./preferences.js";
 import { Ring } from "./ring.js";
+import { RobotForm } from "./robot_form.js";
 import { Scene } from "./scene.js";
 import { Selection } from "./selection.js";
 import { watchSplitters } from "./splitters.js";
@@ -109,6 +110,7 @@ const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot"
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
 const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")) });
+new RobotForm({ run, connection, notifications });
 new MapFile({ run, units, connection, notifications, tools });
 tabs = new Tabs((name) => {
   drawInstruments();

@@ -69,7 +69,14 @@ ASYNC_COMMANDS: list[tuple[dict[str, Any], str]] = [
     ({"type": "close_recording"}, "close_recording"),
 ]
 """With what the stub of time control, recording and replay notes."""
+ROBOT: dict[str, Any] = {
+    "type": "robot_file", "name": "my robot", "driver": "denning", "count": 16, "radius_m": 0.2, "sensors": None,
+    "beam_half_angle_deg": 12, "resolution_m": 0.01, "range_min_m": 0.1, "range_max_m": 4, "preset": "quadrants",
+    "step_period_s": 0.05, "body_radius_m": 0.22, "speed_max_m_s": 0.5, "turn_max_rad_s": 1.5, "synchro": False,
+}  # fmt: skip
+"""A robot as the page describes it."""
 OTHERS: list[dict[str, Any]] = [
+    ROBOT,
     {"type": "rename_recording", "file": "run.mcap", "to": "dock"},
     {"type": "pin_recording", "file": "run.mcap", "pinned": True},
     {"type": "delete_recording", "file": "run.mcap"},
