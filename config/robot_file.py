@@ -1,4 +1,4 @@
-"""The text of a robot file from its tables, for whoever writes one: a form, a command."""
+"""The text of a robot file from its tables, for a form or a command that writes one."""
 
 from __future__ import annotations
 
