@@ -232,7 +232,7 @@ def _on_mission(
         remaining_m = math.inf if asked.remaining_m is None else asked.remaining_m
         beside = (r for r in asked.helpers if r.schema != VALLEY)
         goal_drive, responses, decision, hold_reason = drive_through_valley(
-            Response(SUM, x, y), remaining_m, goal_drive, others, run_s, (away, *beside), settings
+            Response(SUM, x, y), remaining_m, goal_drive, others, run_s, tuple(beside), settings
         )
     else:
         responses = (*asked.leads, *asked.helpers, away)

@@ -104,7 +104,7 @@ def drive_to_goal(
 
 def drive_through_valley(
     way: Response, distance_m: float, before: GoalDrive | None, percept: Percept, run_s: float,
-    pushes: tuple[Response, ...], settings: Settings,
+    beside: tuple[Response, ...], settings: Settings,
 ) -> tuple[GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
     """Return the drive for the next cycle, the responses, the decision, and why the robot holds, without a goal.
 
@@ -114,13 +114,15 @@ def drive_through_valley(
         Where other schemas lead; the robot takes the free valley nearest to it.
     distance_m : float
         How far it is to where they lead, m; infinite if they lead nowhere in particular.
-    before, percept, run_s, pushes, settings
+    beside : tuple of Response
+        Of other schemas.
+    before, percept, run_s, settings
         As of `drive_to_goal`.
     """
     now = GoalDrive(Progress.starting_at(percept.pose, 0.0, run_s)) if before is None else before
     config, radius_m = settings.behaviors.follow_valley, settings.body.radius_m
     response, valley = follow_valley(percept, way, distance_m, now.valley, Search(), radius_m, config)
-    responses = (response, avoid_static_obstacle(percept, radius_m, _underneath(settings.behaviors)), *pushes[1:])
+    responses = (response, avoid_static_obstacle(percept, radius_m, _underneath(settings.behaviors)), *beside)
     expected = tuple(r.schema for r in responses)
     decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
     is_closed = valley.direction_rad is None and math.hypot(way.x, way.y) > 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -63,6 +64,8 @@ class CommandContext:
     """The edits that can be undone."""
     is_teleoperated: bool = False
     """Whether the last drive request was a velocity from a client's teleoperation."""
+    grid: tuple[float, bytes] = (-math.inf, b"")
+    """The message of the evidence grid that was made last, and when, by `clock`."""
     armed_by: Client | None = None
     """The client that armed the robot last."""
 

@@ -20,7 +20,7 @@ from config.mission import MissionConfig
 from config.reload import Difference
 from config.route import mission_text, route_config, waypoints_of
 from perception.edits import Edit
-from runtime.console.commands.command import ANSWERED_LATER, Call, PendingEdit
+from runtime.console.commands.command import ANSWERED_LATER, Call, CommandContext, PendingEdit
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.edit_history import prepare_undo
 from runtime.console.commands.messages import (
@@ -45,6 +45,8 @@ MISSION_EDITS: Final[Mapping[str, MissionEdit]] = MappingProxyType({
     "skip_step": MissionEdit("skip"),
 })  # fmt: skip
 """What each command does to the mission under way."""
+GRID_PERIOD_S: Final = 0.5
+"""Least time between two messages of the evidence grid that are made."""
 
 
 def request_mode(call: Call, _: NoArguments) -> None:
@@ -283,9 +285,17 @@ def show_grid(call: Call, _: NoArguments) -> None:
     """
     client, replay = call.client, call.context.replay
     if client.is_live or replay is None:
-        client.send_newest("grid", orjson.dumps(grid_message(call.context.robot.state)))
+        client.send_newest("grid", _live_grid(call.context))
     else:
         replay.show_grid(client)
+
+
+def _live_grid(context: CommandContext) -> bytes:
+    """Return the message of the run's grid; it is made at most twice a second, however many clients ask how often."""
+    now_s = context.clock()
+    if now_s - context.grid[0] >= GRID_PERIOD_S:
+        context.grid = (now_s, orjson.dumps(grid_message(context.robot.state)))
+    return context.grid[1]
 
 
 def set_parameter(call: Call, change: SetParameter) -> list[dict[str, Any]]:

@@ -10,7 +10,10 @@ from behaviors.missions.mission import Mission, MissionEdit
 from config.load import load_mission
 from perception.edits import ConfirmObject, RejectObject
 from runtime.console.clients.control import REQUEST_TIMEOUT_S
+from runtime.console.commands import handlers
+from runtime.console.frames.grid_message import grid_message
 from runtime.cycle.inputs import Request
+from runtime.cycle.step import State
 from tests.runtime.console.console_case import open_console
 from tests.runtime.console.sample_messages import EDITS, ROBOT_REQUESTS
 
@@ -132,7 +135,14 @@ async def test_a_closed_page_leaves_a_goal_in_force() -> None:
         assert len(case.run.asked) == 2
 
 
-async def test_the_evidence_grid_is_sent_to_the_client_that_asks() -> None:
+async def test_the_evidence_grid_is_sent_to_the_client_that_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[State] = []
+
+    def counted(state: State) -> dict[str, Any]:
+        made.append(state)
+        return grid_message(state)
+
+    monkeypatch.setattr(handlers, "grid_message", counted)
     async with open_console() as case:
         page, other = await case.page(), await case.page()
         assert (await page.ask(type="show_grid"))["ok"]
@@ -140,6 +150,12 @@ async def test_the_evidence_grid_is_sent_to_the_client_that_asks() -> None:
         assert message == {"type": "grid", "on": False, "columns": 0, "rows": 0, "cells": ""}
         assert (await other.ask(type="save_toml"))["ok"]
         assert all(message["type"] != "grid" for message in other.received)
+        for _ in range(5):
+            assert (await other.ask(type="show_grid"))["ok"]
+        assert len(made) == 1, "it is not made more often than twice a second"
+        case.clock[0] += 0.6
+        assert (await other.ask(type="show_grid"))["ok"]
+        assert len(made) == 2
 
 
 async def test_the_evidence_for_an_object() -> None:
