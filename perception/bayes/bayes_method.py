@@ -37,7 +37,7 @@ from perception.bayes.polygon_association import associate_polygons
 from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
-from perception.bayes.segment_list import count_made, count_segments, drawn, mapped_segments
+from perception.bayes.segment_list import count_again, count_map, drawn, mapped_segments
 from perception.bayes.state import FREE, Memory
 from perception.bayes.state_migration import migrate
 from perception.bayes.track_archive import TrackArchive
@@ -58,9 +58,6 @@ from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
-UNKNOWN: Final = -1
-"""In place of a number of segments made: those in the map are to be counted."""
-
 
 class BayesPerception:
     """Detection of objects from echoes by comparing all explanations on the raw ranges.
@@ -75,7 +72,7 @@ class BayesPerception:
         The settings that a user may change.
     """
 
-    SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_counted_at", "_segment_count", "_readings")
+    SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_readings")
     """Attributes that are derived from the rest; they are not in a snapshot."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
@@ -91,9 +88,6 @@ class BayesPerception:
         self._sure = np.zeros(max(config.tracks_max, MAX_POLYGONS), np.int64)
         self._last_reported = zeros(Reported, config.tracks_max)
         self._reported = records(Reported, self._last_reported)
-        self._segment_count = 0
-        self._counted_at = UNKNOWN
-        """Number of segments made when those in the map were counted."""
         self._forget_derived()
         self._circles: dict[int, DetectedObject] = {}
         self._objects: tuple[DetectedObject, ...] | None = None
@@ -120,14 +114,9 @@ class BayesPerception:
     @property
     def counts(self) -> MapCounts:
         """The numbers of segments and tracks, tentative tracks included."""
-        made, tracks = count_made(self.memory.s, self.memory.tracks)
-        if made != self._counted_at or self._pins.count > 0:
-            # Beside new segments, only an edit or the renewal of a pin changes the map.
-            self._counted_at, self._segment_count = made, count_segments(self.memory.s)
+        held, made, tracks = count_map(self.memory.s, self.memory.tracks)
         archive = self._archive
-        return MapCounts(
-            self._segment_count, made, tracks, archive.circles.count + archive.polygons.count, archive.waiting
-        )
+        return MapCounts(held, made, tracks, archive.circles.count + archive.polygons.count, archive.waiting)
 
     def observe(self, firing: Firing) -> int:
         """Process one firing; return the number of outline segments that it completed."""
@@ -244,7 +233,6 @@ class BayesPerception:
     def edit(self, edit: MapEdit) -> str | None:
         """Apply a user's edit; return None, or the reason why it cannot be done."""
         self._objects = self._archived = self._archived_labels = None
-        self._counted_at = UNKNOWN
         match edit:
             case MoveObject(number) | ConfirmObject(number) | WithdrawConfirmation(number) | RemoveObject(number):
                 self._archive.take_up(self.memory, self.settings, self._sure_polygon, number)
@@ -252,7 +240,9 @@ class BayesPerception:
                 self._archive.make_room(self.memory, self.settings, self._sure_polygon)
             case ClearMap():
                 self._archive.clear()
-        return edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
+        refused = edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
+        count_again(self.memory)
+        return refused
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence of each reading kept for an object; None for an unknown number."""
@@ -316,11 +306,11 @@ class BayesPerception:
         """Drop what was derived from the memory, after the memory was restored from a snapshot."""
         self._archive.drop_caches()
         self._forget_derived()
+        count_again(self.memory)
 
     def _forget_derived(self) -> None:
         self._last_reported["x"] = np.nan
         self._objects = self._archived = self._archived_labels = None
-        self._counted_at = UNKNOWN
 
     def _name_models(self, models: Sequence[ModelConfig]) -> None:
         _, self._round = circle_models(models)

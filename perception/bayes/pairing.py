@@ -13,14 +13,14 @@ from perception.bayes.parameters import (
     BASELINE_MAX_M,
     BASELINE_MIN_M,
     BASELINES,
-    CELL_M,
     MAPPED_LENGTH_MIN_M,
     NEIGHBOUR_BASELINE_MAX_M,
     NEIGHBOUR_BASELINE_MIN_M,
 )
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import PairSegment
-from perception.bayes.segment_pairs import add_to_map, tangent
+from perception.bayes.segment_list import put_segment
+from perception.bayes.segment_pairs import tangent
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
@@ -136,9 +136,7 @@ def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
         Time of the firing, s.
     """
     s[0].segments_numbered += 1
-    add_to_map(
-        s[0].buckets, CELL_M, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s
-    )
+    put_segment(s, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s)
 
 
 @kernel

@@ -17,30 +17,15 @@ from numpy.typing import NDArray
 
 from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.parameters import CELL_M
-from perception.bayes.segment_list import mapped_segments
-from perception.bayes.segment_pairs import add_to_map
-from perception.bayes.state import Memory, StateRecord
-from perception.kernel import Ints, kernel
+from perception.bayes.segment_list import mapped_segments, put_segment
+from perception.bayes.state import Memory
+from perception.kernel import Ints
 from perception.records import zeros
 
 PINS_MAX: Final = 512
 """Greatest number of pinned segments."""
 UNPINNED_MIN: Final = 2
 """Places of a bucket that are never pinned."""
-
-
-@kernel
-def restore_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number: int, time_s: float) -> None:
-    """Put a pinned segment back into the outline map.
-
-    Parameters
-    ----------
-    s : (1,) State
-        Memory, updated.
-    x, y, nx, ny, number, time_s
-        As for `segment_pairs.add_to_map`.
-    """
-    add_to_map(s[0].buckets, CELL_M, x, y, nx, ny, number, time_s)
 
 
 class Pins:
@@ -64,7 +49,7 @@ class Pins:
         held = np.arange(BUCKET_CAPACITY) < buckets["count"][:, None]
         is_there = (held & (buckets["segments"]["number"] == self.numbers[:, None])).any(axis=1)
         for k in np.flatnonzero(~is_there):
-            restore_segment(memory.s, *self.segments[k].item())
+            put_segment(memory.s, *self.segments[k].item())
 
     def add(self, memory: Memory, numbers: Collection[int]) -> tuple[set[int], set[int]]:
         """Pin segments; return the numbers that are not in the map, and those that do not fit."""
@@ -162,7 +147,7 @@ def restore(memory: Memory, pins: Pins, rows: Sequence[Sequence[float]]) -> str 
     present = {int(n) for n in mapped_segments(memory)["number"] if int(n) in numbers}
     for number, x1, y1, x2, y2, normal, time_s, _ in sorted(rows, key=itemgetter(0)):
         if int(number) not in present:
-            restore_segment(
+            put_segment(
                 memory.s, 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.cos(normal), math.sin(normal), int(number), time_s
             )
     _, full = pins.add(memory, [int(row[0]) for row in rows if row[7] == 1.0])

@@ -1,13 +1,16 @@
-"""The outline map for display: copies of its segments in the order of its buckets, and how much the memory holds."""
+"""The outline map: how a segment gets into it, how many it holds, and copies of its segments for display."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.elements import BUCKET_CAPACITY
+from perception.bayes.parameters import CELL_M
+from perception.bayes.segment_pairs import add_to_map, bucket_index
 from perception.bayes.state import FREE, CircleTracks, Memory, StateRecord
 from perception.kernel import Floats, kernel
 
@@ -16,23 +19,37 @@ SHOWN_M: Final = 0.1
 
 
 @kernel
-def count_segments(s: StateRecord) -> int:
-    """Return the number of segments in the map; it looks at every bucket, 40 µs on a slow machine."""
-    segments = 0
-    for b in range(len(s[0].buckets)):
-        segments += min(s[0].buckets[b].count, BUCKET_CAPACITY)
-    return segments
+def put_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number: int, time_s: float) -> None:
+    """Put a segment into the outline map.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    x, y, nx, ny, number, time_s
+        As for `segment_pairs.add_to_map`.
+    """
+    buckets = s[0].buckets
+    bucket = buckets[bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), len(buckets))]
+    before = min(bucket.count, BUCKET_CAPACITY)
+    add_to_map(buckets, CELL_M, x, y, nx, ny, number, time_s)
+    s[0].segments_held += min(bucket.count, BUCKET_CAPACITY) - before
+
+
+def count_again(memory: Memory) -> None:
+    """Count the segments in the map, after others than `put_segment` changed it."""
+    memory.state["segments_held"] = np.minimum(memory.state["buckets"][0]["count"], BUCKET_CAPACITY).sum()
 
 
 @kernel
-def count_made(s: StateRecord, tracks: CircleTracks) -> tuple[int, int]:
-    """Return the number of segments made since the start, and of tracks, tentative ones included."""
+def count_map(s: StateRecord, tracks: CircleTracks) -> tuple[int, int, int]:
+    """Return the number of segments in the map, of those made since the start, and of tracks, tentative ones too."""
     held = 0
     for t in range(len(tracks)):
         held += tracks[t].status != FREE
     for t in range(len(s[0].polygons)):
         held += s[0].polygons[t].status != FREE
-    return s[0].segments_made, held
+    return s[0].segments_held, s[0].segments_made, held
 
 
 def mapped_segments(memory: Memory) -> NDArray[Any]:

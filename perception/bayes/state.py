@@ -300,6 +300,8 @@ class State(Record):
     noise_level: int
     """Index of the assumed noise in `Settings.noises`."""
     segments_made: int
+    segments_held: int
+    """Segments in the outline map: to count them anew would drive everything else out of the processor's caches."""
     refinements: int
     ring_x: float
     """Position of the ring at its last firing, m."""

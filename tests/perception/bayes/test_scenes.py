@@ -13,7 +13,7 @@ from config.load import load_model, load_settings
 from config.world import DrumConfig, WorldConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.pinned_segments import restore_segment
+from perception.bayes.segment_list import put_segment
 from perception.pipeline import Perception
 from runtime.simulation.first_fix import summarise_fixes
 from runtime.simulation.open_loop import HallOutcome, perceive, run_hall, run_scene
@@ -136,7 +136,7 @@ def with_a_map_of(segments: int, rng: np.random.Generator) -> Perception:
     assert isinstance(perception.method, BayesPerception)
     memory = perception.method.memory
     for x, y in rng.uniform(-60.0, 60.0, (segments, 2)):
-        restore_segment(memory.s, float(x), float(y), 1.0, 0.0, 0, 0.0)
+        put_segment(memory.s, float(x), float(y), 1.0, 0.0, 0, 0.0)
     return perception
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.elements import BUCKET_CAPACITY
-from perception.bayes.segment_list import SHOWN_M, drawn, mapped_segments
+from perception.bayes.segment_list import SHOWN_M, count_again, count_map, drawn, mapped_segments, put_segment
 from tests.perception.bayes.tracks import add_segment, new_memory, unit
 
 
@@ -22,6 +22,19 @@ def test_every_segment_in_the_map_is_listed_once_and_as_a_copy() -> None:
     assert sorted(listed["number"].tolist()) == [*range(4, BUCKET_CAPACITY + 4), 99]
     listed["number"] = 0
     assert 99 in mapped_segments(memory)["number"]
+
+
+def test_the_map_knows_how_many_segments_it_holds() -> None:
+    memory, rng = new_memory(), np.random.default_rng(3)
+    # Dense places fill their buckets; far ones take over the buckets of others.
+    for number, (x, y) in enumerate(np.concatenate([rng.normal(0.0, 2.0, (300, 2)), rng.normal(0.0, 2e3, (900, 2))])):
+        put_segment(memory.s, float(x), float(y), 1.0, 0.0, number, 0.0)
+        if number % 40 == 0:
+            assert count_map(memory.s, memory.tracks)[0] == len(mapped_segments(memory))
+    assert 300 < count_map(memory.s, memory.tracks)[0] == len(mapped_segments(memory)) < 1200
+    memory.state["buckets"]["count"][0, ::2] = 0
+    count_again(memory)
+    assert count_map(memory.s, memory.tracks)[0] == len(mapped_segments(memory)) > 0
 
 
 def test_a_segment_is_drawn_about_its_middle_at_right_angles_to_its_normal() -> None:
