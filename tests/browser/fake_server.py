@@ -28,9 +28,9 @@ LOOK_S: Final = 0.05
 HEARTBEAT_S: Final = 1.0
 KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
-RECORDED: Final = {"mode": "DRIVE", "reason": None, "link": None, "late": None, "missed": None, "clients": 0,
-                   "phases": {}, "cycle_us": None, "late_us": None,
-                   "recording": None, "paused": False, "speed": 1.0}  # fmt: skip
+RECORDED: Final[dict[str, Any]] = {"mode": "DRIVE", "reason": None, "link": None, "late": None,
+                                   "missed": None, "clients": 0, "phases": {}, "cycle_us": None, "late_us": None,
+                                   "recording": None, "paused": False, "speed": 1.0}  # fmt: skip
 """Fields of a frame of a recording, in which the robot drove."""
 HALTED: Final = "halted by the operator; re-arm to continue"
 

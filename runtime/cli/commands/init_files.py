@@ -13,6 +13,7 @@ import orjson
 from config.errors import DONE, WRONG_CALL, UserError
 from config.files import one_line
 from config.load import load_any
+from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
 from drivers.firing_pattern import FiringError
 from runtime.cli.commands.output_files import check_outputs, writing
@@ -21,8 +22,6 @@ from runtime.support.pattern_check import refuse_undrivable
 Given = Mapping[str, Any]
 T = TypeVar("T")
 DRIVERS: Final = ("denning", "arcos", "rflex", "ros2")
-ARRAY: Final = 8
-"""Sensors of an array of a Pioneer, and of a bank that is written for an rFLEX controller; of each, one fires."""
 AT_A_TIME: Final = ((8, "octets"), (4, "quadrants"), (3, "thirds"), (2, "opposite_pairs"), (1, "single"))
 SOUND_M_S: Final = 343.0
 CORNERS: Final = 16
@@ -130,51 +129,16 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
         driver not in {"ros2", "arcos"}
         and ask.choice("wheels", "Do the wheels turn without the body?", ("no", "yes")) == "yes"
     )
-    baud = ask.count(
-        "baud", "Speed of the line, bits per second", 38400 if driver == "arcos" else 115200, 300, 4000000
-    )
-    port = "ros2" if driver == "ros2" else ask.text("port", "Serial port (empty: named when it runs)", "")
+    usual = ARCOS_BAUD if driver == "arcos" else BAUD
+    baud = ask.count("baud", "Speed of the line, bits per second", usual, 300, 4000000)
+    port = "" if driver == "ros2" else ask.text("port", "Serial port (empty: named when it runs)", "")
     preset = _preset(driver, sensors)
     step_s = max(0.05 if driver == "denning" else 0.041, math.ceil(1100.0 * 2.0 * high / SOUND_M_S) * 1e-3)
-    own = {
-        "denning": "",
-        "arcos": "\n[arcos]  # mm and rad from the controller's counts: `echolocate calibrate` finds them\n"
-        "distance_factor = 1.0\nturn_factor = 0.0056\n",
-        "rflex": "\n[rflex]  # the controller's counts per metre and radian: `echolocate calibrate` finds them\n"
-        f"distance_factor = 101230.0\nangle_factor = 35343.888\nbanks = {[ARRAY] * (sensors // ARRAY)}\n",
-        "ros2": "\n[ros2]  # topics and frames: `echolocate ros2-robot` finds them\n"
-        f'ranges = ["sonar"]\nframes = {_json([f"sonar_{k}" for k in range(sensors)])}\n'
-        'odometry = "odom"\ncmd_vel = "cmd_vel"\n',
-    }[driver]
-    text = f"""# A robot of your own. `echolocate settings` lists every key; `echolocate check FILE` checks a file.
-
-[robot]
-name = {_json(name)}
-driver = {_json(driver)}
-{own}
-[ring]
-count = {sensors}  # sensor 0 looks forward, the others follow counter-clockwise; or list them as sensors = [...]
-radius_m = {ring:g}
-beam_half_angle_deg = {beam:g}
-resolution_m = {resolution:g}  # step of the reported ranges; 0 = none
-range_min_m = {low:g}
-range_max_m = {high:g}
-
-[ring.firing]
-preset = "{preset}"  # how many sensors fire at a time
-step_period_s = {step_s:.3f}  # sound needs {2.0 * high / SOUND_M_S:.4f} s to range_max_m and back
-
-[body]
-radius_m = {body:g}
-speed_max_m_s = {speed:g}
-turn_max_rad_s = {turn:g}
-synchro = {str(synchro).lower()}  # true: the wheels turn, body and ring do not
-
-[link]
-{f"port = {_json(port)}" if port else '# port = "/dev/ttyUSB0"  # or name it at the start: echolocate run --port'}
-baud = {baud}
-"""
-    return _write(file, text, force=force)
+    draft = RobotDraft(
+        name, driver, sensors, ring, None, beam, resolution, low, high, preset, step_s, body, speed, turn,
+        synchro, baud, port,
+    )  # fmt: skip
+    return _write(file, robot_text(draft), force=force)
 
 
 def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from dataclasses import asdict
 
 from config.errors import UserError
 from config.load import ConfigError, parse_text
 from config.robot import RobotConfig
-from config.robot_file import robot_text
+from config.robot_file import RobotDraft, robot_text
 from config.settings import Settings
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import DescribeRobot
 from runtime.support.pattern_check import refuse_undrivable
-
-HEAD: Final = ("A robot described in the operator console, m and degrees. `echolocate settings` lists every key.",)
 
 
 def robot_file(call: Call, given: DescribeRobot) -> str:
@@ -25,7 +23,7 @@ def robot_file(call: Call, given: DescribeRobot) -> str:
     CommandError
         A value is out of its bounds, the ring cannot fire so, or the robot would not see where it drives.
     """
-    text = robot_text(_tables(given), HEAD)
+    text = robot_text(RobotDraft(**asdict(given)))
     try:
         robot = parse_text(RobotConfig, text, "robot")
         settings = call.context.tuning.current.model_dump() | robot.model_dump()
@@ -35,27 +33,3 @@ def robot_file(call: Call, given: DescribeRobot) -> str:
     except (UserError, ValueError) as error:
         raise CommandError(str(error)) from None
     return text
-
-
-def _tables(given: DescribeRobot) -> dict[str, dict[str, Any]]:
-    sensors = given.sensors
-    is_regular = sensors is None
-    return {
-        "robot": {"name": given.name or None, "driver": given.driver},
-        "ring": {
-            "count": given.count if is_regular else None,
-            "radius_m": given.radius_m if is_regular else None,
-            "sensors": None if sensors is None else [{"x_m": x, "y_m": y, "angle_deg": a} for x, y, a in sensors],
-            "beam_half_angle_deg": given.beam_half_angle_deg,
-            "resolution_m": given.resolution_m,
-            "range_min_m": given.range_min_m,
-            "range_max_m": given.range_max_m,
-            "firing": {"preset": given.preset, "step_period_s": given.step_period_s},
-        },
-        "body": {
-            "radius_m": given.body_radius_m,
-            "speed_max_m_s": given.speed_max_m_s,
-            "turn_max_rad_s": given.turn_max_rad_s,
-            "synchro": given.synchro,
-        },
-    }
