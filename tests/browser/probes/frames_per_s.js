@@ -1,6 +1,6 @@
 // How many frames a second there are while the whole map, or in its place a hundred lines, is drawn anew in each.
 async (mode) => {
-  const { scene, view, world } = await import("/page/main.js");
+  const { scene, view, run } = await import("/page/main.js");
   const id = "control-under-test";
   let control = document.getElementById(id);
   if (control === null) {
