@@ -20,6 +20,7 @@ from drivers.arcos.codec import Decoder, decode_packet, encode
 from drivers.arcos.commands import Command, CommandNumber
 from drivers.arcos.frames import EncoderPacket, Packet, ResetNotice, Sip, SipFlags
 from drivers.arcos.handshake import CLOSE, STOP, Handshake, Stage
+from drivers.arcos.line_load import SIP_BYTES, traffic_of
 from drivers.arcos.pose_stamping import SIP_PERIOD_S, PoseStamper
 from drivers.arcos.supervision import Enabling, Halting, ReceiverMonitor
 from drivers.arcos.wire_units import (
@@ -32,6 +33,7 @@ from drivers.arcos.wire_units import (
     polling_of,
 )
 from drivers.driver import DriverError, LineState
+from drivers.line_budget import refuse_slow_line
 from drivers.messages import Identity, LinkCounts
 from drivers.session import Session
 
@@ -75,6 +77,7 @@ class ArcosDriver(Session[PoseStamper]):
             raise DriverError(finer)
         super().__init__(PoseStamper(config, self._discs))
         self._polling = polling_of(config, self._discs)
+        refuse_slow_line(config.link, SIP_BYTES / SIP_PERIOD_S, *traffic_of(self._polling, self._discs))
         self._handshake = Handshake(config.link, has_speed="://" not in (config.link.port or ""))
         self._limits = limits_of(config.body, None)
         self._decoder = Decoder(decode_packet)

@@ -14,6 +14,7 @@ from typing import Final
 from config.robot import RingConfig, RobotConfig
 from drivers import line_diagnostics
 from drivers.driver import LineState
+from drivers.line_budget import refuse_slow_line
 from drivers.messages import Flags, Identity, LinkCounts, Odometry, Twist
 from drivers.rflex import diagnostics
 from drivers.rflex.codec import (
@@ -26,6 +27,7 @@ from drivers.rflex.codec import (
     SonarReport,
     Status,
     encode,
+    frame_of,
     input_request,
     report_of,
     report_request,
@@ -74,6 +76,9 @@ class RflexDriver(Session[Measurements]):
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = pattern_of(config, config.ring)
+        axes = 2 * len(encode(frame_of(AxisReport(0, 0, 0, 0)))) / REPORT_PERIOD_S
+        ranges = SonarReport(0, tuple((0, 0) for _ in config.rflex.banks))
+        refuse_slow_line(config.link, axes, len(encode(frame_of(ranges))), 1e-6 * self._pattern.step_us)
         super().__init__(Measurements(config, sonar_ids(config)))
         self.stamper.set_pattern(self._pattern)
         self._decoder = Decoder()

@@ -27,6 +27,11 @@ from runtime.simulation.open_loop import BoxRow, match_objects
 from runtime.support.length_format import Units, format_length, format_point
 
 LOG_SHOWN: Final = 40
+STOPS: Final = MappingProxyType({
+    "budget": "the time for it was over", "quota": "as many quanta as allowed", "converged": "nothing is left to gain",
+    "nothing": "nothing was left to improve",
+})  # fmt: skip
+"""What ended the refinement of a cycle, in words."""
 CAPTIONS: Final = MappingProxyType(
     {
         "raw": "Every echo as the arc on which its reflection may lie.",
@@ -243,8 +248,10 @@ def _timing(timeline: Timeline) -> list[str]:
         whose = f"; caused by {by}" if by else ""
         parts.append(note(f"{summary['late']} cycles late, {summary.get('missed', 0)} missed{whose}."))
     if timeline.refinement_stops:
-        causes = ", ".join(f"{cause} {count}" for cause, count in sorted(timeline.refinement_stops.items()))
-        parts.append(note(f"Refinement ended by: {causes}."))
+        causes = ", ".join(
+            f"{STOPS.get(cause, cause)} {count:,}" for cause, count in sorted(timeline.refinement_stops.items())
+        )
+        parts.append(note(f"Cycles by what ended their refinement: {causes}."))
     return parts
 
 

@@ -8,9 +8,10 @@ import pytest
 
 from config.load import load_settings
 from config.robot import LinkConfig
-from drivers.denning.line_load import BAUDS, ODOMETRY_PERIOD_S, SHARE_MAX, refuse_overload, sent_bytes_s
+from drivers.denning.line_load import ODOMETRY_PERIOD_S, refuse_overload, sent_bytes_s
 from drivers.denning.wire_units import wire_pattern
 from drivers.firing_pattern import FiringError
+from drivers.line_budget import BAUDS, SHARE_MAX
 
 PATTERN = wire_pattern(load_settings("hallway").ring)
 

@@ -55,7 +55,9 @@ def test_page_shows_the_run(shown: str) -> None:
     assert "as the paper's Figure 6" in text
     assert "0.249 ft" in text, "the paper's own mean error"
     assert "The robot never stopped for a reason." in text
-    assert "Refinement ended by: budget 20, nothing 40." in text
+    assert (
+        "Cycles by what ended their refinement: the time for it was over 20, nothing was left to improve 40." in text
+    )
     assert "From cycle to cycle, ms: least 50.0" in text
     assert "sensor 7 never answers" in text
     assert "behaviors.arbiter.base_velocity_m_s" in text
