@@ -28,7 +28,7 @@ from runtime.support.length_format import Units, format_length, format_point
 
 LOG_SHOWN: Final = 40
 STOPS: Final = MappingProxyType({
-    "budget": "the time for it was over", "quota": "as many quanta as allowed", "converged": "nothing is left to gain",
+    "budget": "the time for it was over", "quota": "as many quanta as allowed", "converged": "nothing is to gain",
     "nothing": "nothing was left to improve",
 })  # fmt: skip
 """What ended the refinement of a cycle, in words."""
