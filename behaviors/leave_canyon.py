@@ -2,12 +2,14 @@
 
 A vector towards a goal leads into every box canyon in front of it, and holds the robot at the back. This schema takes
 over from move-to-goal while something closes the way: it goes round along it with a side that it keeps (Lumelsky &
-Stepanov, Algorithmica 2, 1987, proved that this arrives), until the robot is nearer to the goal than where it began
-and the goal's direction is free. What closes the way is
+Stepanov, Algorithmica 2, 1987, proved that this arrives), until the robot is nearer to the goal than ever before and
+the goal's direction is free. What closes the way is
 
 - echoes ahead;
 - the mouth of a known canyon (`perception.percept.Canyon`): a virtual wall for a goal that does not lie behind it;
 - what may be a canyon's back, far ahead (`behaviors.blocked_ahead`).
+
+A robot inside a known canyon leaves it, however free its goal's direction is there.
 
 Progress is state, and behaviours hold none: the detour is passed in and returned with each call. Ways are measured in
 metres, never in cycles, so that a robot that stands gives up nothing.
@@ -35,8 +37,8 @@ OPEN_SIDE_M: Final = 2.0
 """Nothing is presumed where neither side is free for this far beyond the robot's way: that is a corridor."""
 LEAVE_FREE_M: Final = 1.2
 """The detour ends where the goal's direction is free for this far, …"""
-PROGRESS_M: Final = 0.2
-"""… and the goal is nearer by this than where it began."""
+PROGRESS_M: Final = 0.4
+"""… and the goal is nearer by this than it has been before: so no detour ends where an earlier one began."""
 TURNED_BACK_RAD: Final = math.radians(150.0)
 """What was only presumed is given up if going round it leads back more than this."""
 PRESUMED_SHARE: Final = 0.7
@@ -48,6 +50,8 @@ LOOP_M: Final = 4.0
 SAME_PLACE_M: Final = 0.4
 """A robot that is back where the detour began after this way has gone all round, and tries the other side."""
 SAME_WALL_RAD: Final = math.radians(100.0)
+NEXT_WALL_RAD: Final = math.radians(135.0)
+"""A heading farther than this from the obstacle's direction leads along the next one, in a corner or at a back."""
 LOST_M: Final = 1.0
 """The obstacle is what is nearest within this angle of where it lay, and within this distance of the way."""
 FAR_M: Final = 1e6
@@ -64,10 +68,10 @@ class Detour:
     side: Literal[-1, 0, 1] = 0
     """Of the obstacle that is gone round: +1 it stays on the left, −1 on the right; 0 without a detour."""
     began_m: float = 0.0
-    """Distance to the goal where the detour began, …"""
+    """Least distance to the goal until the detour began, …"""
     began_x: float = 0.0
     began_y: float = 0.0
-    """… that place, …"""
+    """… the place where it did, …"""
     began_driven_m: float = 0.0
     """… and how far the robot had driven by then."""
     driven_m: float = 0.0
@@ -131,13 +135,14 @@ def leave_canyon(
     free = _free_m(points, pose, bearing, room)
     if to_goal < detour.nearest_m - NEARER_M:
         detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
+    is_held = any(holds(canyon, pose, goal, config) for canyon in percept.canyons)
     if detour.side == 0:
         if waits and detour.driven_m - detour.nearest_driven_m < STALL_M:
             free = _free_m(np.concatenate([NO_POINTS, *virtual]), pose, bearing, room)
-        if free >= min(to_goal, config.look_m):
+        if free >= min(to_goal, config.look_m) and not is_held:
             return None, detour
         detour = _begin(points, pose, goal, percept.canyons, detour, room, config)
-    elif to_goal < detour.began_m - PROGRESS_M and free >= _needed_m(detour, to_goal):
+    elif not is_held and to_goal < detour.began_m - PROGRESS_M and free >= _needed_m(detour, to_goal):
         return None, replace(detour, side=0, ahead=None, block=None)
     elif _is_round(detour, pose):
         side: Side = -1 if detour.side == 1 else 1
@@ -161,6 +166,12 @@ def is_closed(canyon: Canyon, pose: Pose, goal: tuple[float, float], config: Lea
     if canyon.probability < config.probability_min:
         return False
     return not (_is_inside(canyon, pose.x, pose.y) or _is_inside(canyon, *goal))
+
+
+def holds(canyon: Canyon, pose: Pose, goal: tuple[float, float], config: LeaveCanyonConfig) -> bool:
+    """Return whether the robot is inside a canyon that it must leave for its goal."""
+    is_sure = canyon.probability >= config.probability_min
+    return is_sure and _is_inside(canyon, pose.x, pose.y) and not _is_inside(canyon, *goal)
 
 
 def _is_inside(canyon: Canyon, x: float, y: float) -> bool:
@@ -229,8 +240,9 @@ def _begin(
     if detour.block is not None:
         sides = _open_sides(points, pose, bearing, room_m) or sides
     side = min(sides, key=cost)
+    began_m = min(to_goal, detour.nearest_m)
     return replace(
-        detour, side=side, began_m=to_goal, began_x=pose.x, began_y=pose.y, began_driven_m=detour.driven_m,
+        detour, side=side, began_m=began_m, began_x=pose.x, began_y=pose.y, began_driven_m=detour.driven_m,
         wall_rad=bearing,
     )  # fmt: skip
 
@@ -260,4 +272,7 @@ def _along(
     free = free_paths_m(points, pose, headings, room_m)
     is_free = free >= config.look_m
     chosen = int(is_free.argmax()) if is_free.any() else int(free.argmax())
-    return wall_rad, wrap_angle(float(headings[chosen]))
+    heading = float(headings[chosen])
+    if TURNS[chosen] > NEXT_WALL_RAD:
+        wall_rad = heading + 0.5 * math.pi * side
+    return wrap_angle(wall_rad), wrap_angle(heading)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import get_args
 
+import numpy as np
+
 from config.settings import Settings
 from perception.localization.expected_ranges import Reflection
 from runtime.simulation.false_canyon_trials import FalseCanyonTrial, corridor, try_path
@@ -49,6 +51,7 @@ def measure(
 
 def figures(trials: Sequence[FalseCanyonTrial], sure: float) -> Row:
     """Return the figures of these drives; a canyon is sure from this probability on."""
+    quanta_ms = 1e3 * np.array([taken for trial in trials for taken in trial.quanta_s] or [0.0])
     return {
         "drives": len(trials),
         "driven, m": sum(trial.driven_m for trial in trials),
@@ -56,4 +59,6 @@ def figures(trials: Sequence[FalseCanyonTrial], sure: float) -> Row:
         "sure ones": sum(trial.above(sure) for trial in trials),
         "drives with one": sum(len(trial.reported) > 0 for trial in trials),
         "canyons at the end": sum(trial.at_end for trial in trials),
+        "a place p50, ms": float(np.median(quanta_ms)),
+        "p99, ms": float(np.quantile(quanta_ms, 0.99)),
     }

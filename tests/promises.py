@@ -208,7 +208,8 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P33": Promise(
             "A dead end is neither invented nor a trap",
             "a corridor with doorways of 1.1 m and more, 1 % noise, 5 % drop-outs, 3 % strays: no canyon reported, "
-            "one in a dead end (soak: twenty corridors and twenty halls of drums, by both models of reflection)",
+            "one in a dead end (soak: twenty corridors and twenty halls of drums, by both models of reflection; ten "
+            "drives to the goal behind the dead end of the shipped office: all arrive, no contact)",
         ),
     }
 )  # fmt: skip

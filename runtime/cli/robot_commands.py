@@ -61,7 +61,7 @@ def run(
     robot
         Robot file, or the name of a shipped one; None for that of the run file.
     world
-        Emulated robot: world file, or the name of a shipped one.
+        Emulated robot: world file, or the name of a shipped one; without CONFIG its shipped run is driven.
     mission
         What to do once armed: a mission file, or the name of a shipped one; None for that of the run file.
     goal

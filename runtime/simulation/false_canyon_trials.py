@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias
 
@@ -21,7 +22,6 @@ from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose
 from perception.percept import Canyon
 from perception.pipeline import Perception
-from runtime.simulation.open_loop import perceive
 from runtime.simulation.random_halls import ACOUSTICS
 
 DOORWAY_M: Final = (1.1, 1.6)
@@ -57,11 +57,14 @@ class FalseCanyonTrial:
         Each canyon when it was surest, by number.
     at_end : int
         Canyons in the last report.
+    quanta_s : list of float
+        Thread time of each place that was examined, s.
     """
 
     driven_m: float = 0.0
     reported: dict[int, Canyon] = field(default_factory=dict)
     at_end: int = 0
+    quanta_s: list[float] = field(default_factory=list)
 
     def add(self, canyons: tuple[Canyon, ...]) -> None:
         """Take the report after a firing."""
@@ -172,7 +175,19 @@ def try_path(
     for k, place in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
         pose = Pose(*place, yaw)
         ranges = sonar.fire(pose, yaw, sensors(pattern.masks[k % len(pattern.masks)]))
-        perceive(perception, Firing(k * pattern.step_period_s, pose, yaw, ranges))
+        _perceive(perception, Firing(k * pattern.step_period_s, pose, yaw, ranges), trial.quanta_s)
         trial.add(perception.canyons())
     trial.driven_m = float(driven[-1])
     return trial
+
+
+def _perceive(perception: Perception, firing: Firing, quanta_s: list[float]) -> None:
+    """Process a firing, refine until convergence, and append what the canyon's quanta took."""
+    perception.observe(firing)
+    while perception.can_refine:
+        is_place = perception.canyon_map.is_due and not perception.method.can_refine
+        began_s = time.thread_time()
+        if not perception.refine():
+            return
+        if is_place:
+            quanta_s.append(time.thread_time() - began_s)

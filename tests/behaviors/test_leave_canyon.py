@@ -108,3 +108,38 @@ def test_the_same_state_gives_the_same_answer() -> None:
     assert leave_canyon(percept, (5.0, 0.0), NO_DETOUR, 0.381, CONFIG) == leave_canyon(
         percept, (5.0, 0.0), NO_DETOUR, 0.381, CONFIG
     )
+
+
+def test_a_detour_ends_only_nearer_to_the_goal_than_ever_before() -> None:
+    """Otherwise a canyon is left and entered in turn, each time a little nearer than where the last detour began."""
+    wall = np.column_stack([np.full(9, 1.0), np.linspace(-2.0, 1.0, 9)])
+    _, detour = leave_canyon(seen(0.0, 0.0, wall), (5.0, 0.0), replace(NO_DETOUR, nearest_m=4.0), 0.381, BLIND)
+    assert detour.began_m == 4.0
+    _, going = leave_canyon(seen(0.5, 0.0), (5.0, 0.0), detour, 0.381, BLIND)
+    assert going.side == detour.side
+    _, over = leave_canyon(seen(1.5, 0.0), (5.0, 0.0), detour, 0.381, BLIND)
+    assert over.side == 0
+
+
+def test_at_the_back_of_a_narrow_dead_end_the_obstacle_is_the_other_side() -> None:
+    """There is no room to drive across: the robot turns back at once, and goes on along the opposite wall."""
+    x = np.arange(-2.0, 1.2, 0.1)
+    y = np.arange(-1.0, 1.01, 0.1)
+    pocket = np.concatenate([
+        np.column_stack([x, np.ones_like(x)]), np.column_stack([x, -np.ones_like(x)]),
+        np.column_stack([np.full_like(y, 1.15), y]),
+    ])  # fmt: skip
+    detour = replace(NO_DETOUR, side=1, began_m=5.0, wall_rad=0.5 * math.pi)
+    for place in (0.15, 0.0):  # at the second one, ahead would be free again
+        response, detour = leave_canyon(seen(place, 0.0, pocket), (6.0, 0.0), detour, 0.381, BLIND)
+        assert response is not None
+        assert abs(math.atan2(response.y, response.x)) > math.radians(140.0)
+        assert detour.wall_rad == pytest.approx(-0.5 * math.pi, abs=0.7)
+
+
+def test_inside_a_known_canyon_a_detour_begins_and_does_not_end() -> None:
+    begin, detour = leave_canyon(seen(2.0, 0.0, canyons=(CANYON,)), (6.0, 0.0), NO_DETOUR, 0.381, BLIND)
+    assert begin is not None
+    going, _ = leave_canyon(seen(3.0, 0.0, canyons=(CANYON,)), (6.0, 0.0), detour, 0.381, BLIND)
+    assert going is not None
+    assert leave_canyon(seen(2.0, 0.0, canyons=(CANYON,)), (3.5, 0.0), NO_DETOUR, 0.381, BLIND)[0] is None

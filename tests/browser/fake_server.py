@@ -74,6 +74,7 @@ class FakeServer:
     session: dict[str, Any] = field(default_factory=dict)
     changed: list[tuple[str, Any]] = field(default_factory=list)
     areas: list[list[float]] = field(default_factory=list)
+    canyons: list[dict[str, Any]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
     """What commands of other kinds are answered with, by kind."""
@@ -151,7 +152,7 @@ class FakeServer:
         client.gone |= set(removed)
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
         frame = self.hall.frame(self.cycle) | stopped | self.robot() | {
-            "type": "state", "flags": self.flags, "areas": self.areas, "segments": segments,
+            "type": "state", "flags": self.flags, "areas": self.areas, "canyons": self.canyons, "segments": segments,
             "drive_request": self.drive_request, "dropped": 0,
             "controller": self.controller == client.number, "playback": self.playback,
         }  # fmt: skip

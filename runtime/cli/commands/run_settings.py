@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from config.errors import WRONG_CALL, UserError
 from config.files import is_utf8, one_line, utf8
-from config.load import ConfigError, load_settings, with_goal, with_known_room
+from config.load import ConfigError, list_shipped, load_settings, with_goal, with_known_room
 from config.mission_step import Frame
 from config.settings import GoalConfig, Settings
 from runtime.support.pattern_check import refuse_undrivable
@@ -25,6 +25,8 @@ def settings_of_files(
 ) -> Settings:
     """Return the settings as the files are now, on the port that they name.
 
+    Without a run file and a mission, a shipped world is driven as the shipped run of its name says: with its goal.
+
     Parameters
     ----------
     config, sets, world, robot, map_file, mission, goal, no_console
@@ -37,6 +39,8 @@ def settings_of_files(
     UserError
         No robot can carry them out.
     """
+    if config is None and mission is None and world in list_shipped("runs"):
+        config = world
     settings = load_settings(config, sets, robot=robot, world=world, mission=mission)
     if map_file is not None:
         settings = with_known_room(settings, map_file)

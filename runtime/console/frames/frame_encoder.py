@@ -21,6 +21,7 @@ from config.settings import Settings
 from drivers.messages import Firing, LinkCounts, Pose
 from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
+from perception.percept import Canyon
 from perception.pipeline import Perception
 from runtime.console.frames.mission_rows import MissionRows
 from runtime.console.frames.segment_delta import SegmentDelta
@@ -177,6 +178,7 @@ class FrameEncoder:
             "clusters": self._cluster_boxes,
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
             "areas": [[a.number, round(a.x, 3), round(a.y, 3), a.radius] for a in state.perception.vacant_areas()],
+            "canyons": [_canyon(canyon) for canyon in state.perception.canyons()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": self._drive_request(state.drive_request, state.goal_place),
             "valley": None if state.goal_drive is None else _valley(state.goal_drive),
@@ -306,6 +308,17 @@ def _localized(perception: Perception) -> dict[str, Any] | None:
 
 def _rounded(pose: Pose) -> list[float]:
     return [round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)]
+
+
+def _canyon(canyon: Canyon) -> dict[str, Any]:
+    """Return a box canyon in odometry's frame, m and rad."""
+    return {
+        "number": canyon.number,
+        "mouth": [round(end, 3) for end in canyon.mouth],
+        "axis": round(canyon.axis_rad, 4),
+        "depth": round(canyon.depth_m, 3),
+        "probability": round(canyon.probability, 3),
+    }
 
 
 def _valley(drive: GoalDrive) -> dict[str, Any]:

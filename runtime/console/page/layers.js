@@ -1,6 +1,7 @@
 // The layers of the map, bottom to top; each is a draw function that can be switched on and off.
 
 import { el, svg } from "./dom.js";
+import { drawCanyons } from "./draw_canyons.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
 import { drawEvidenceGrid } from "./draw_evidence.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
@@ -28,6 +29,7 @@ const TABLE = [
   ["map_frame", "front", "map frame, known room, and where the robot is: 95 % ellipse", drawMapFrame, true, "M8 17V4m0 13h13M24 10a6 4 0 1 1-.1 0Z", "drive"],
   ["drive_request", "front", "goal", drawGoal, true, "M14 18V3l14 4-14 4", "drive"],
   ["valley", "front", "way to the goal; directions that are blocked", drawValley, true, "M8 6a14 14 0 0 1 24 0M6 18l8-6 12 2 8-8", "drive"],
+  ["canyons", "front", "dead ends: mouth, axis, depth, probability (dashed mouth: uncertain)", drawCanyons, true, "M32 4H10m22 12H10M32 4v12M10 2v16M4 10h16m-5-4 5 4-5 4", "stop"],
   ["mission", "front", "waypoints and paths of the mission", drawMission, true, "M6 15 20 5l14 8M4 15a2 2 0 1 1 4 0 2 2 0 0 1-4 0", "drive", "4 2"],
   ["vectors", "front", "schema vectors and their sum", drawVectors, true, "M4 16 30 5m0 0-8 0m8 0-5 6", "vector"],
   ["labels", "front", "labels and probability", drawLabels, true, "M14 17 20 3l6 14m-9.5-5h7", "model"],

@@ -11,7 +11,7 @@ const CHART_MAX = 600;
 
 const EMPTY = {
   cycle: 0, robot_s: 0, mode: "no data", reason: null, hold_reason: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
-  ranges: [], age: [], clusters: [], objects: [], areas: [], vectors: [], drive_request: null, valley: null, phases: {}, cycle_us: 0, late_us: 0,
+  ranges: [], age: [], clusters: [], objects: [], areas: [], canyons: [], vectors: [], drive_request: null, valley: null, phases: {}, cycle_us: 0, late_us: 0,
   waiting: 0, localized: null, missed: null, late: null, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
   recording: null, paused: false, speed: 1, playback: null,
 };

@@ -55,3 +55,10 @@ def test_a_goal_of_the_command_line_takes_the_place_of_the_files_goal_or_mission
     with pytest.raises(UserError, match="exclude each other"):
         settings_of_files(None, [], None, None, None, "patrol", goal="1,2", no_console=False)
     assert reload_settings(None, [], None, None, None, goal="1,2").goal == GoalConfig(x_m=1.0, y_m=2.0)
+
+
+def test_a_shipped_world_is_driven_as_the_run_of_its_name_says_unless_a_run_is_named() -> None:
+    office = settings_of_files(None, [], "office", None, None, None, no_console=True)
+    assert office.goal is not None
+    assert office.perception.grid.method == "directed"
+    assert settings_of_files("hallway", [], "office", None, None, None, no_console=True).goal is None

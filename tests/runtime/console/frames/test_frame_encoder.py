@@ -13,7 +13,8 @@ from behaviors.valley.look_ahead import Search
 from drivers.messages import Pose
 from perception.detected_object import DetectedObject
 from perception.localization.drift_correction import SeenObject
-from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, _object
+from perception.percept import Canyon
+from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, _canyon, _object
 from runtime.cycle.goal_drive import GoalDrive
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
@@ -146,6 +147,13 @@ async def test_the_way_to_a_goal_and_the_blocked_directions_are_shown() -> None:
         case.cycles()
         shown = (await page.next("state"))["valley"]
         assert shown == {"blocked": blocked, "direction": 1.235, "way": [[0.0, 0.0], [0.5, 0.12]]}
+
+
+def test_a_canyon_is_sent_with_its_mouth_axis_depth_and_probability() -> None:
+    canyon = Canyon(3, (0.0, 1.0, 0.12346, -1.0), 0.123456, 2.98765, 0.98765)
+    assert _canyon(canyon) == {
+        "number": 3, "mouth": [0.0, 1.0, 0.123, -1.0], "axis": 0.1235, "depth": 2.988, "probability": 0.988,
+    }  # fmt: skip
 
 
 def test_a_wall_is_sent_with_its_ends_and_other_objects_without() -> None:
