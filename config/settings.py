@@ -210,6 +210,10 @@ class LogConfig(Strict):
     """Least severity that is logged."""
     cap_mb: float = Field(default=20.0, ge=0.1, le=1e6)
     """Size at which the file becomes NAME.1, in place of the one before, MB."""
+    webhook: str | None = Field(default=None, pattern=r"^https?://", max_length=2000)
+    """Web address to which warnings and errors are sent, as JSON with a text, as chat programs take it."""
+    webhook_period_s: float = Field(default=10.0, ge=1.0, le=86_400.0)
+    """Least time between two such messages, s; what comes between goes together."""
 
 
 class RecordingConfig(Strict):

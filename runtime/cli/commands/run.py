@@ -284,6 +284,13 @@ async def run_process(
             stack.push_async_callback(preparation.close)
         kernel_loader = KernelLoader(log)
         reloader = Reloader(process.live_settings, reload, log, kernel_loader)
+        if settings.log.webhook is not None:
+            from runtime.support.webhook import Webhook
+
+            hook = Webhook(settings.log.webhook, settings.log.webhook_period_s, settings.robot.name or "the robot")
+            stack.enter_context(hook.sending())
+            log_status.listeners.append(hook.on_log)
+            stack.callback(log_status.listeners.remove, hook.on_log)
         if settings.console.enabled:
             from runtime.cli.commands.serve_console import serve_console
             from runtime.support.console_address import announced
