@@ -39,8 +39,32 @@ def test_check_says_so(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_sizes_of_a_pioneers_packets_are_those_on_the_line() -> None:
     still = Sip(
-        0x32, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, gripper=0, analog_port=0, analog=0, digital_in=0, digital_out=0, battery_10=0, charge=0,
-        turn_10=0, fault_flags=0, lateral=0, temperature=0, charge_percent=0, controller_us=0, flags_3=0,
-    )  # fmt: skip
+        0x32,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        gripper=0,
+        analog_port=0,
+        analog=0,
+        digital_in=0,
+        digital_out=0,
+        battery_10=0,
+        charge=0,
+        turn_10=0,
+        fault_flags=0,
+        lateral=0,
+        temperature=0,
+        charge_percent=0,
+        controller_us=0,
+        flags_3=0,
+    )
     assert len(encode(still)) == SIP_BYTES
     assert len(encode(replace(still, sonar=(SonarReading(0, 0),)))) == SIP_BYTES + RANGE_BYTES
