@@ -64,16 +64,16 @@ class StandardError(io.TextIOWrapper):
     A pipe that is full and has a reader which does not read would hold the program, and its end, for ever.
     """
 
-    _patience_s = FULL_PIPE_WAIT_S
+    _wait_s = FULL_PIPE_WAIT_S
 
     def write(self, text: str, /) -> int:
         """Write a text, or lose it."""
         with contextlib.suppress(OSError):
-            if select.select([], [self.fileno()], [], self._patience_s)[1]:
+            if select.select([], [self.fileno()], [], self._wait_s)[1]:
                 super().write(text)
-                self._patience_s = FULL_PIPE_WAIT_S
+                self._wait_s = FULL_PIPE_WAIT_S
             else:
-                self._patience_s = 0.0
+                self._wait_s = 0.0
         return len(text)
 
     def flush(self) -> None:
