@@ -81,6 +81,7 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "drivers/firmware/board/robot_config_esp32.py",
             "drivers/firmware/board/robot_config_pico.py",
         ),
+        "tests/runtime/cli/commands/test_init_files.py calls its commands": ("runtime/cli/init_commands.py",),
         "`make ros2` runs it beside real nodes, see test_real_nodes.py": (
             "drivers/ros2/gateway.py",
             "runtime/bridges/ros2/bridge.py",

@@ -157,11 +157,11 @@ def test_a_run_names_its_mission_and_must_recognise_what_it_looks_for(tmp_path: 
     with pytest.raises(ConfigError, match=r'mission "dok": no such mission; did you mean dock\?'):
         load_settings("room", ["mission=dok"])
     with pytest.raises(ConfigError, match="mission dock looks for drum, which no model is named"):
-        load_settings("hallway", mission="dock")
+        load_settings("hallway", mission="dock", models=["box"])
     with pytest.raises(ConfigError, match="goal and mission exclude each other"):
         load_settings("room", ["goal.x_m=1.0", "goal.y_m=0.0"], mission="dock")
     with pytest.raises(ConfigError, match="mission dock looks for drum"):
-        with_mission(load_settings("hallway"), load_mission("dock"))
+        with_mission(load_settings("hallway", models=["box"]), load_mission("dock"))
     assert with_mission(load_settings("room"), load_mission("dock")).mission == load_mission("dock")
     recorded = load_settings("room", mission="inspect-drums")
     assert override_settings(recorded, "a recording", []) == recorded

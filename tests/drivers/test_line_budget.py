@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from config.load import load_robot
 from config.robot import RobotConfig
-from drivers.arcos.codec import encode
-from drivers.arcos.frames import Sip, SonarReading
-from drivers.arcos.line_load import RANGE_BYTES, SIP_BYTES
 from drivers.firing_pattern import FiringError
 from drivers.registry import make_driver
 from runtime.cli.app import run_command
@@ -35,36 +30,3 @@ def test_a_line_too_slow_for_its_traffic_is_refused(name: str, too_slow: int, en
 def test_check_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["check", "hallway", "--set", "robot=magellan", "--set", "link.baud=9600"]) != 0
     assert "set link.baud to 38400 or more" in capsys.readouterr().err
-
-
-def test_the_sizes_of_a_pioneers_packets_are_those_on_the_line() -> None:
-    still = Sip(
-        0x32,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        gripper=0,
-        analog_port=0,
-        analog=0,
-        digital_in=0,
-        digital_out=0,
-        battery_10=0,
-        charge=0,
-        turn_10=0,
-        fault_flags=0,
-        lateral=0,
-        temperature=0,
-        charge_percent=0,
-        controller_us=0,
-        flags_3=0,
-    )
-    assert len(encode(still)) == SIP_BYTES
-    assert len(encode(replace(still, sonar=(SonarReading(0, 0),)))) == SIP_BYTES + RANGE_BYTES

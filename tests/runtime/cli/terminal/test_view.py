@@ -5,12 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
-import json
 import os
 import pty
-import re
-import shutil
-import subprocess
 import sys
 import termios
 import threading
@@ -28,14 +24,11 @@ from drivers.messages import Floats, LinkCounts, Pose, Twist
 from drivers.registry import make_driver
 from perception.detected_object import DetectedObject, MapCounts
 from perception.localization.drift_correction import LocalizedPose
-from runtime import console as page_folder
-from runtime.cli.terminal import page_text
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
-from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats
 
 SETTINGS = load_settings("hallway")
@@ -136,43 +129,6 @@ def test_no_size_is_too_small(size: tuple[int, int]) -> None:
     assert len(text.split("\n")) <= max(1, height - 1)
     if size == (20, 5):
         assert text.startswith(" SAFE STOP")
-
-
-def test_the_forms_are_those_of_the_page() -> None:
-    """Node runs the page's own code over the same values."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("needs node")
-    values = [0.0, -0.004, 1.005, 2.675, -12.3456, 0.0005, 3.14159, -85.0, 7.7724]
-    shares = [0.0, 0.004, 0.5, 0.994, 0.9951, 1.0]
-    page = Path(page_folder.__file__).parent / "page"
-    script = (
-        f"import {{Units, degrees}} from {json.dumps((page / 'units.js').as_uri())};"
-        f"const percent = {_percent(page)}; const units = new Units(); const out = [];"
-        f"for (const name of ['m', 'ft']) {{ units.choose(name); for (const v of {values})"
-        " out.push(units.number(v), units.length(v, 3), units.place(v, -v), degrees(v)); }"
-        f"for (const s of {shares}) out.push(percent(s)); console.log(JSON.stringify(out));"
-    )
-    done = subprocess.run([node, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
-    units: tuple[Units, ...] = ("m", "ft")
-    ours = [
-        form
-        for unit in units
-        for v in values
-        for form in (
-            page_text.number(v, unit), page_text.length(v, unit, 3), page_text.place(v, -v, unit),
-            page_text.degrees(v),
-        )
-    ]  # fmt: skip
-    assert json.loads(done.stdout) == [*ours, *map(page_text.percent, shares)]
-
-
-def _percent(page: Path) -> str:
-    """Return the page's function as its source has it."""
-    text = (page / "draw_objects.js").read_text(encoding="utf-8")
-    found = re.search(r"export const percent = (.*);", text)
-    assert found is not None
-    return found[1]
 
 
 class Terminal(io.StringIO):
