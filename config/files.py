@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 from config.errors import WRONG_CALL, UserError
 from config.layers import Source
 
-Kind: TypeAlias = Literal["robots", "worlds", "models", "runs", "missions"]
+Kind: TypeAlias = Literal["robots", "worlds", "models", "runs", "missions", "studies"]
 """Kind of a file, and the folder of the shipped files of that kind."""
 
 SIZE_MAX = 1 << 18
@@ -236,7 +236,7 @@ def _read_shipped(kind: Kind, name: str, named_by: Source | None) -> Document:
         data = (files("config") / kind / f"{name}.toml").read_bytes()
         shown = f"{kind}/{name}.toml"
         return Document(parse_document(data, shown), Source(shown))
-    what = kind.removesuffix("s")
+    what = "study" if kind == "studies" else kind.removesuffix("s")
     shown = f'{what} "{one_line(name)[:80]}"'
     where = shown if named_by is None else f"{named_by.name}: {shown}"
     hint = did_you_mean(name, known) + _file_hint(name, Path() if named_by is None else named_by.base)

@@ -21,6 +21,7 @@ from config.overrides import apply_overrides, parse_override
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
 from config.settings import GoalConfig, Settings
+from config.study import StudyConfig
 from config.world import WorldConfig
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "load_model",
     "load_robot",
     "load_settings",
+    "load_study",
     "load_world",
     "override_settings",
     "parse_text",
@@ -100,10 +102,21 @@ def load_mission(name_or_path: str | os.PathLike[str]) -> MissionConfig:
     return _load("missions", name_or_path, MissionConfig)
 
 
+def load_study(name_or_path: str | os.PathLike[str]) -> StudyConfig:
+    """Return the study of a shipped name or a file.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is invalid.
+    """
+    return _load("studies", name_or_path, StudyConfig)
+
+
 def load_any(
     name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()
-) -> Settings | WorldConfig | ModelConfig | MissionConfig:
-    """Return the settings, world, model or mission of a file, whose kind follows from its top-level keys.
+) -> Settings | WorldConfig | ModelConfig | MissionConfig | StudyConfig:
+    """Return the settings, world, model, mission or study of a file, whose kind follows from its top-level keys.
 
     A robot file is loaded as a run with that robot.
 
@@ -114,10 +127,18 @@ def load_any(
     """
     table = read_document("runs", name_or_path).table
     if not overrides:
-        of_run, of_world, of_model, of_mission = (
+        of_run, of_world, of_model, of_mission, of_study = (
             sum(key in schema.model_fields or key in also for key in table)
-            for schema, also in ((Settings, NAMES), (WorldConfig, ()), (ModelConfig, ()), (MissionConfig, ()))
+            for schema, also in (
+                (Settings, NAMES),
+                (WorldConfig, ()),
+                (ModelConfig, ()),
+                (MissionConfig, ()),
+                (StudyConfig, ()),
+            )
         )
+        if of_study > max(of_run, of_world, of_model, of_mission):
+            return load_study(Path(name_or_path))
         if of_mission > max(of_run, of_world, of_model):
             return load_mission(Path(name_or_path))
         if of_world > max(of_run, of_model):

@@ -16,6 +16,7 @@ from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.settings import Settings
+from config.study import StudyConfig
 from config.world import WorldConfig
 
 FILES: Final = (
@@ -24,6 +25,7 @@ FILES: Final = (
     ("world", WorldConfig, "world file, `--world FILE`, `--map FILE`"),
     ("model", ModelConfig, "object model, `--model FILE`"),
     ("mission", MissionConfig, "mission file, `--mission FILE`"),
+    ("study", StudyConfig, "study file, `echolocate sweep FILE`"),
 )
 """The kinds of files: name, model, and what each is for."""
 PLAIN: Final = ((bool, "true or false"), (int, "integer"), (float, "number"), (str, "text"))

@@ -6,7 +6,8 @@ The robot's path is the recorded one. Only the results of perception and the com
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from config.settings import Settings
@@ -15,9 +16,11 @@ from drivers.messages import Pose
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import Command, CycleRecord, State, step
 from runtime.cycle.summary import ObjectRow, object_row
+from runtime.recording.channels import CYCLE
 from runtime.recording.reader import Recording, RecordingError
 from runtime.recording.replayer import Replayer, fresh_state
-from runtime.simulation.evaluation import match_drums
+from runtime.simulation.evaluation import DrumRow, match_drums
+from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
@@ -95,6 +98,31 @@ def compare_runs(
     return comparison
 
 
+def run_under(recording: Recording, settings: Settings) -> tuple[RunOutcome, CycleStats]:
+    """Replay a recording with other settings only; return the outcome and what its cycles took.
+
+    Parameters
+    ----------
+    recording : Recording
+        The run.
+    settings : Settings
+        Of the same robot.
+    """
+    outcome, state, cycle_stats = RunOutcome(), fresh_state(settings), CycleStats(late_after_s=math.inf)
+    first_run_s = None
+    for message in recording.messages():
+        if message.topic != CYCLE:
+            continue
+        inputs = recording.decode_cycle(message).inputs
+        first_run_s = inputs.run_s if first_run_s is None else first_run_s
+        started_s = time.perf_counter()
+        record = step(state, inputs, settings, _ignore, within_quanta_per_cycle)
+        cycle_stats.add_cycle(time.perf_counter() - started_s)
+        _note_stop(outcome, record, inputs.run_s - first_run_s)
+    _sum_up(outcome, state, recording.world)
+    return outcome, cycle_stats
+
+
 def _ignore(command: Command) -> None:
     """Send nothing."""
 
@@ -105,11 +133,15 @@ def _note_stop(outcome: RunOutcome, record: CycleRecord, at_s: float) -> None:
 
 
 def _sum_up(outcome: RunOutcome, state: State, world: WorldConfig | None) -> None:
-    objects = state.perception.objects()
-    outcome.objects = [object_row(seen) for seen in objects]
+    outcome.objects = [object_row(seen) for seen in state.perception.objects()]
     if world is None or not world.drum:
         return
-    start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-    places = [start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in objects]
-    rows, outcome.false = match_drums(world, [(p.x, p.y) for p in places])
+    rows, outcome.false = match_to_world(outcome.objects, world)
     outcome.errors_m = [row["error"] for row in rows]
+
+
+def match_to_world(objects: Sequence[ObjectRow], world: WorldConfig) -> tuple[list[DrumRow], int]:
+    """Match objects in the odometry's frame, which begins at the world's start, with drums; as `match_drums`."""
+    start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+    places = [start.compose(Pose(seen["x"], seen["y"], seen["theta"])) for seen in objects]
+    return match_drums(world, [(p.x, p.y) for p in places])

@@ -1,8 +1,10 @@
-"""The command that repeats the paper's experiments in simulation: `experiment`."""
+"""The commands that drive in simulation: `experiment` repeats the paper's experiments, `sweep` makes many runs."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
+
+from cyclopts import Parameter
 
 from config.errors import WRONG_CALL, UserError
 from runtime.cli.options import Count, Force, JsonFile, ModelFiles, Sets, Several, UnitsOption, WorldFile
@@ -103,3 +105,45 @@ def experiment(
     return run_experiment(
         name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, force=force, units=units
     )
+
+
+def sweep(
+    study: str,
+    /,
+    *,
+    out: str | None = None,
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
+    workers: Count | None = None,
+    retries: Count = 3,
+) -> int:
+    """Make the runs of a study on many processes or machines, and compare their settings; needs the extra `sweep`.
+
+    A sweep that was stopped, in whatever way, goes on when it is called again.
+
+    Parameters
+    ----------
+    study
+        Study file, or the name of a shipped one: scenes, worlds or recordings, seeds, and settings to vary.
+    out
+        Folder for the results: runs.parquet, report.html and a file for each run; by default NAME-sweep.
+    scheduler
+        Address of a Dask scheduler, as in tcp://host:8786; by default, processes of this machine do the work.
+    workers
+        Processes on this machine; by default one for each processor.
+    retries
+        How often a run that ended without a result is tried again.
+
+    Raises
+    ------
+    UserError
+        There are no workers, or the options exclude one another.
+    """
+    import os
+
+    from runtime.cli.commands.sweep import run_sweep
+
+    if workers == 0:
+        raise UserError("--workers 0: must be at least 1", WRONG_CALL)
+    if workers is not None and scheduler is not None:
+        raise UserError("--scheduler has workers of its own: leave out --workers", WRONG_CALL)
+    return run_sweep(study, out=out, scheduler=scheduler, workers=workers or os.cpu_count() or 1, retries=retries)

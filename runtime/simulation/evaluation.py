@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from statistics import mean, pstdev
 from typing import Any, Final, NotRequired, TypedDict
 
-from config.errors import FAILED, UserError
+from config.errors import FAILED, WRONG_CALL, UserError
 from config.settings import Settings
 from config.units import FOOT_M
 from config.world import WorldConfig
@@ -112,6 +112,21 @@ def run_seed(
     return SeedOutcome(
         seed, rows, false, run.virtual_s, run.elapsed_s, run.cycle_stats.cycle_us(), simulation_summary(run)
     )
+
+
+def stop_at_leg_end(settings: Settings) -> Settings:
+    """Return the settings with the drive ending at the end of its leg, as in the paper's experiment.
+
+    Raises
+    ------
+    UserError
+        The leg has no end.
+    """
+    ahead = settings.behaviors.move_ahead
+    if ahead.distance_m is None:
+        raise UserError("behaviors.move_ahead.distance_m is not set: the experiment needs an end", WRONG_CALL)
+    behaviors = settings.behaviors.model_copy(update={"move_ahead": ahead.model_copy(update={"at_end": "stop"})})
+    return settings.model_copy(update={"behaviors": behaviors})
 
 
 def require_finished(run: SimulationResult, seed: int, seconds_max: float) -> None:

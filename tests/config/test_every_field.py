@@ -17,14 +17,15 @@ import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from config.load import ConfigError, load_mission, load_model, load_robot, load_settings, load_world
+from config.load import ConfigError, load_mission, load_model, load_robot, load_settings, load_study, load_world
 from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.settings import Settings
 from config.strict import Strict
+from config.study import StudyConfig, Value
 from config.world import WorldConfig
-from tests.config.toml_text import MISSION, MODEL, ROBOT, RUN, WORLD, document, irregular, toml
+from tests.config.toml_text import MISSION, MODEL, ROBOT, RUN, STUDY, WORLD, document, irregular, toml
 
 ROOTS: dict[str, tuple[type[BaseModel], dict[str, Any], Callable[[Path], BaseModel]]] = {
     "run": (Settings, RUN, load_settings),
@@ -33,6 +34,7 @@ ROOTS: dict[str, tuple[type[BaseModel], dict[str, Any], Callable[[Path], BaseMod
     "world": (WorldConfig, WORLD, load_world),
     "model": (ModelConfig, MODEL, load_model),
     "mission": (MissionConfig, MISSION, load_mission),
+    "study": (StudyConfig, STUDY, load_study),
 }
 WRONG_TYPES = {"text": "oddly", "flag": True, "list": [1.5], "table": {"a": 1}, "number": 1.5, "integer": 7}
 WRONG: dict[Any, tuple[str, ...]] = {
@@ -121,6 +123,8 @@ def entries_of(root: str, annotation: Any, table: Any, at: tuple[str | int, ...]
     """Yield the settings of every table in a list, or of the first entry."""
     entry, location = get_args(annotation)[0], (*at, 0)
     kind = inner(entry)
+    if entry == Value:
+        return  # anything but a list or a table
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         for i, one in enumerate(table):
             yield from settings_of(root, member(entry, one), one, (*at, i))

@@ -37,6 +37,7 @@ def test_the_names_of_shipped_files() -> None:
     assert list_shipped("models") == ("box", "drum", "semicircle")
     assert list_shipped("runs") == ("hallway", "irregular", "office", "room")
     assert len(list_shipped("missions")) == 10
+    assert list_shipped("studies") == ("halls",)
 
 
 def test_every_shipped_file_loads() -> None:

@@ -79,6 +79,14 @@ WORLD: dict[str, Any] = {
     "acoustics": {"model": "cone", "noise_relative": 0.01},
     "odometry": {"scale": 1.0},
 }
+STUDY: dict[str, Any] = {
+    "scenes": ["clean"],
+    "seeds": 2,
+    "models": ["drum"],
+    "sets": ["cycle.rate_hz=20.0"],
+    "vary": [{"setting": "ring.beam_half_angle_deg", "values": [8.0, 12.0]}],
+    "objectives": ["recall"],
+}
 MISSION: dict[str, Any] = {
     "name": "errand",
     "about": "Goes there and back.",

@@ -56,6 +56,8 @@ def run_experiment(
     UserError
         The settings do not describe an experiment, or a file cannot be written.
     """
+    from runtime.simulation.evaluation import run_seed, stop_at_leg_end, summarise
+
     settings = stop_at_leg_end(load_settings(name, sets, world=world, models=models))
     if settings.world is None or not settings.world.drum:
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
@@ -65,7 +67,6 @@ def run_experiment(
     check_outputs({"--out": [] if folder is None else run_files(folder, name), "--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
-    from runtime.simulation.evaluation import run_seed, summarise
 
     outcomes = []
     with progress(console, "driving", seeds) as step:
@@ -204,18 +205,3 @@ def run_scenes(
             output.print(boxes_table(outcome, units))
     output.print(scene_line(outcome, units), soft_wrap=True)
     return DONE
-
-
-def stop_at_leg_end(settings: Settings) -> Settings:
-    """Return the settings with the drive ending at the end of its leg, as in the paper's experiment.
-
-    Raises
-    ------
-    UserError
-        The leg has no end.
-    """
-    ahead = settings.behaviors.move_ahead
-    if ahead.distance_m is None:
-        raise UserError("behaviors.move_ahead.distance_m is not set: the experiment needs an end", WRONG_CALL)
-    behaviors = settings.behaviors.model_copy(update={"move_ahead": ahead.model_copy(update={"at_end": "stop"})})
-    return settings.model_copy(update={"behaviors": behaviors})

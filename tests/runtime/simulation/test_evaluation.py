@@ -15,8 +15,7 @@ from config.errors import FAILED, UserError
 from config.load import load_settings
 from config.settings import Settings
 from config.world import DrumConfig, WorldConfig
-from runtime.cli.commands.experiment import stop_at_leg_end
-from runtime.simulation.evaluation import GATE_M, SeedOutcome, match_drums, run_seed, summarise
+from runtime.simulation.evaluation import GATE_M, SeedOutcome, match_drums, run_seed, stop_at_leg_end, summarise
 from runtime.timing.cycle_stats import Quantiles
 
 QUICK: Quantiles = {"p50": 1.0, "p99": 2.0, "max": 9.0}

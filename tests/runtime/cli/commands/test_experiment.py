@@ -13,8 +13,8 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from runtime.analysis.plots import animation
 from runtime.cli.app import run_command
-from runtime.cli.commands.experiment import stop_at_leg_end
 from runtime.recording.reader import open_recording
+from runtime.simulation.evaluation import stop_at_leg_end
 from runtime.simulation.scenes import halls
 
 FT = 0.3048

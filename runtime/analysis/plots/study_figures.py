@@ -1,0 +1,62 @@
+"""The figures of a study: how one result is paid for with another, and what each setting changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from runtime.analysis.plots.plot_style import ECHO, MUTED, SEGMENT, WIDTH_IN
+
+Points = Sequence[tuple[float, float]]
+
+
+def trade_off_figure(points: Points, front: Points, best: tuple[float, float], labels: tuple[str, str]) -> Figure:
+    """Return the figure of two results of every combination of settings.
+
+    Parameters
+    ----------
+    points : sequence of (x, y)
+        All combinations.
+    front : sequence of (x, y)
+        Those that no other is better than in everything.
+    best : (x, y)
+        The best by the order of the objectives.
+    labels : (str, str)
+        Of both axes.
+    """
+    figure = Figure(figsize=(WIDTH_IN, 3.6), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(*zip(*points, strict=True), linestyle="", marker="o", markersize=4, color=MUTED, alpha=0.6,
+              label="combinations", gid="combinations")  # fmt: skip
+    axes.plot(*zip(*sorted(front), strict=True), marker="o", markersize=5, linewidth=1.2, color=ECHO,
+              label="no other better in all", gid="front")  # fmt: skip
+    axes.plot(*best, linestyle="", marker="*", markersize=11, color=SEGMENT, label="best", gid="best")
+    axes.set(xlabel=labels[0], ylabel=labels[1])
+    axes.legend()
+    return figure
+
+
+def effects_figure(effects: Sequence[tuple[str, Sequence[tuple[str, float]]]], objective: str) -> Figure:
+    """Return the figure of an objective's mean for each value of each setting.
+
+    Parameters
+    ----------
+    effects : sequence of (setting, values)
+        For each setting its values, as text, with the mean of the objective.
+    objective : str
+        Its name.
+    """
+    figure = Figure(figsize=(WIDTH_IN, 0.9 + 0.28 * sum(len(values) + 1 for _, values in effects)),
+                    layout="constrained")  # fmt: skip
+    axes = figure.subplots()
+    at, ticks = 0, []
+    for setting, values in effects:
+        rows = range(at, at + len(values))
+        axes.plot([mean for _, mean in values], rows, marker="o", markersize=5, color=ECHO, linewidth=1.2)
+        ticks += [(row, f"{setting} = {text}") for row, (text, _) in zip(rows, values, strict=True)]
+        at += len(values) + 1
+    axes.set_yticks([row for row, _ in ticks], [text for _, text in ticks])
+    axes.invert_yaxis()
+    axes.set_xlabel(f"mean {objective}")
+    return figure

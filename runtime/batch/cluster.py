@@ -1,0 +1,144 @@
+"""Workers of Dask: processes of this machine, or those of a scheduler that the user has started anywhere."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from config.errors import FAILED, WRONG_CALL, UserError
+from runtime import VERSION
+from runtime.batch.dispatch import Done
+from runtime.batch.local_workers import local_workers
+from runtime.batch.runs import Run
+from runtime.batch.worker import run_one
+
+if TYPE_CHECKING:
+    from distributed import Client, as_completed
+
+CONNECT_TIMEOUT_S: Final = 10.0
+WORKERS_TIMEOUT_S: Final = 120.0
+"""There must be a worker by then."""
+AHEAD: Final = 2
+"""Runs under way for each thread of a worker: the next is there when one ends."""
+COUNT_PERIOD_S: Final = 5.0
+"""After this time the workers are counted again, as they come and go."""
+DEATHS_MAX: Final = 10
+"""Workers that may die during one attempt at a run before it is blamed."""
+LOCAL_HOST: Final = "127.0.0.1"
+WORKER_COMMAND: Final = (
+    sys.executable, "-m", "dask", "worker", "--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--no-dashboard",
+    "--host", LOCAL_HOST,
+)  # fmt: skip
+SETTINGS: Final = (
+    ("distributed.scheduler.allowed-failures", DEATHS_MAX),
+    ("distributed.admin.system-monitor.gil.enabled", False),
+)
+
+
+class DaskPool:
+    """A client of a scheduler, as a pool of workers.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Connected to the scheduler.
+    completed : distributed.as_completed
+        Empty: gets the futures, and yields them as they end.
+    """
+
+    def __init__(self, client: Client, completed: as_completed) -> None:
+        self._client = client
+        self._completed = completed
+        self._under_way: dict[str, tuple[Run, int]] = {}
+        self._capacity = 1
+        self._counted_s = -COUNT_PERIOD_S
+
+    def capacity(self) -> int:
+        """Return how many runs should be under way."""
+        if time.monotonic() - self._counted_s >= COUNT_PERIOD_S:
+            with contextlib.suppress(OSError):
+                self._capacity = max(1, AHEAD * sum(self._client.nthreads().values()))
+            self._counted_s = time.monotonic()
+        return self._capacity
+
+    def submit(self, run: Run, attempt: int) -> None:
+        """Begin a run."""
+        key = f"echolocate-{run.key}-{attempt}"
+        self._under_way[key] = run, attempt
+        self._completed.add(self._client.submit(run_one, run, key=key))
+
+    def next_done(self) -> Done:
+        """Wait for the next run that ends.
+
+        Raises
+        ------
+        UserError
+            The scheduler is gone, or a worker has another version of this program.
+        """
+        future = next(self._completed)
+        run, attempt = self._under_way.pop(future.key)
+        try:
+            row = future.result()
+        except Exception as error:  # noqa: BLE001 - whatever a run on a worker raised
+            if future.cancelled() or self._client.status != "running":
+                raise UserError(
+                    "the Dask scheduler is gone; start it again and repeat the call: what is done is kept", FAILED
+                ) from None
+            return Done(run, attempt, error)
+        if row["version"] != VERSION:
+            raise UserError(
+                f"a worker has echolocate {row['version']}, and this is {VERSION}: install the same everywhere",
+                FAILED,
+            )
+        return Done(run, attempt, row)
+
+
+@contextlib.contextmanager
+def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPool]:
+    """Yield the workers of a scheduler, or so many processes on this machine, which end with the block.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address, as in ``tcp://host:8786``; None for this machine.
+    workers : int
+        Processes on this machine.
+    log : Path
+        File for what these processes print.
+
+    Raises
+    ------
+    UserError
+        There is no such scheduler, or it has no worker.
+    """
+    import dask
+    from distributed import Client, LocalCluster, as_completed
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(dask.config.set(dict(SETTINGS)))
+        if scheduler is None:
+            cluster = LocalCluster(
+                n_workers=0, host=LOCAL_HOST, dashboard_address=None, silence_logs="CRITICAL", processes=True
+            )
+            client = stack.enter_context(Client(stack.enter_context(cluster)))
+            command = (*WORKER_COMMAND, cluster.scheduler_address)
+            stack.enter_context(local_workers(command, workers, log))
+            where, hint = "this machine", f"{log} says why"
+        else:
+            try:
+                client = stack.enter_context(Client(scheduler, timeout=CONNECT_TIMEOUT_S))
+            except (OSError, ValueError) as error:
+                raise UserError(
+                    f"--scheduler {scheduler}: no scheduler answers there ({error}); start one with `dask scheduler`",
+                    WRONG_CALL,
+                ) from None
+            where, hint = f"--scheduler {scheduler}", f"start some with `dask worker {scheduler}`"
+        try:
+            client.wait_for_workers(1, timeout=WORKERS_TIMEOUT_S)
+        except TimeoutError:
+            raise UserError(f"{where}: there is no worker after {WORKERS_TIMEOUT_S:g} s; {hint}", FAILED) from None
+        yield DaskPool(client, as_completed())

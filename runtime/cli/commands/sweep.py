@@ -1,0 +1,215 @@
+"""`echolocate sweep`: the runs of a study on many workers, and what they found."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from rich.console import Console
+from rich.table import Table
+
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.load import load_study
+from config.settings import Settings
+from runtime.cli.commands.offline_io import plain_console, require_package
+from runtime.cli.commands.output_files import make_output_folder, writing
+from runtime.cli.terminal.escaping_console import EscapingConsole
+from runtime.support.file_lock import file_lock
+from runtime.support.kernel_cache import needed_parts, prepare_kernels
+from runtime.support.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from config.study import StudyConfig
+    from runtime.batch.dispatch import Unfinished
+    from runtime.batch.outcome import Combination
+    from runtime.batch.runs import Run
+
+PACKAGES: Final = (("distributed", "distributed"), ("pyarrow", "pyarrow"))
+EXTRA: Final = "sweep"
+PAGE: Final = "report.html"
+LOCK: Final = ".sweep"
+"""File in the folder of a sweep: marks it as one, and is locked while one runs."""
+LOG: Final = "workers.log"
+LINE_PERIOD_S: Final = 60.0
+"""Time between two lines of progress where there is no terminal."""
+SHOWN: Final = 5
+"""Combinations that are printed; the page has more."""
+
+
+def run_sweep(name: str, *, out: str | None, scheduler: str | None, workers: int, retries: int) -> int:
+    """Make the runs of a study that are not finished yet, write table and page, and return the exit code.
+
+    Parameters
+    ----------
+    name, out, scheduler, workers, retries
+        As of `runtime.cli.experiment_commands.sweep`.
+
+    Raises
+    ------
+    UserError
+        The study is invalid, a package is missing, the folder is not a sweep's, or a run was given up.
+    """
+    from runtime.batch.runs import expand
+
+    study = load_study(name)
+    runs = expand(study, Path(name).parent)
+    for module, package in PACKAGES:
+        require_package(module, package, EXTRA)
+    folder = sweep_folder(f"{Path(name).stem}-sweep" if out is None else out)
+    console = EscapingConsole(stderr=True)
+    with file_lock(folder / LOCK, f"--out {folder}"):
+        unfinished = make_runs(runs, folder, console, scheduler=scheduler, workers=workers, retries=retries)
+        combinations = write_results(Path(name).stem, study, runs, folder, unfinished)
+    output = plain_console()
+    output.print(best_table(study, combinations))
+    for file in (folder / "runs.parquet", folder / PAGE):
+        output.print(str(file))
+    if unfinished:
+        raise UserError(f"{len(unfinished)} of {len(runs)} runs ended without a result, the first: "
+                        f"{unfinished[0].reason}; {folder / PAGE} lists them; the same call tries them again",
+                        FAILED)  # fmt: skip
+    return DONE
+
+
+def sweep_folder(path: str) -> Path:
+    """Return the folder of a sweep, a new one or that of an earlier call.
+
+    Raises
+    ------
+    UserError
+        It holds something else.
+    """
+    folder = make_output_folder(path)
+    if not (folder / LOCK).exists() and any(folder.iterdir()):
+        raise UserError(f"--out {path}: holds other files than a sweep's; name another folder", WRONG_CALL)
+    return folder
+
+
+def make_runs(
+    runs: Sequence[Run], folder: Path, console: Console, *, scheduler: str | None, workers: int, retries: int
+) -> list[Unfinished]:
+    """Make those runs that have no row yet, and return those that were given up.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        All runs of the study.
+    folder : Path
+        Of the sweep.
+    console : Console
+        For progress.
+    scheduler, workers, retries
+        As of `run_sweep`.
+    """
+    from runtime.batch.cluster import connected
+    from runtime.batch.dispatch import dispatch
+    from runtime.batch.rows import RowFolder
+    from runtime.batch.worker import Row
+
+    rows = RowFolder(folder)
+    finished = rows.read(runs)
+    left = [run for run in runs if run.key not in finished]
+    if finished:
+        console.print(f"{len(finished)} of {len(runs)} runs are finished already")
+    if not left:
+        return []
+    if scheduler is None:
+        compile_kernels(left, console)
+    workers = min(workers, len(left))
+    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "running", len(left)) as step:
+        say = progress_lines(console, len(left))
+
+        def on_row(row: Row) -> None:
+            with writing("--out", folder):
+                rows.write(row)
+            step()
+            say()
+
+        return dispatch(left, pool, on_row, retries)
+
+
+def compile_kernels(runs: Sequence[Run], console: Console) -> None:
+    """Compile what the runs need once, before several processes would do so at the same time."""
+    prepared: set[str] = set()
+    for text in {run.settings: None for run in runs}:
+        settings = Settings.model_validate_json(text)
+        parts = [part for part in needed_parts(settings) if part not in prepared]
+        if parts:
+            prepare_kernels(settings, console, parts)
+            prepared.update(parts)
+
+
+def progress_lines(console: Console, total: int, clock: Callable[[], float] = time.monotonic) -> Callable[[], None]:
+    """Return the function to call after each run; where there is no terminal it prints a line every minute.
+
+    Parameters
+    ----------
+    console : Console
+        Where the lines go.
+    total : int
+        Runs to make.
+    clock : callable
+        Returns the time, s.
+    """
+    started_s = clock()
+    done, said_s = 0, started_s
+
+    def step() -> None:
+        nonlocal done, said_s
+        done += 1
+        now_s = clock()
+        if console.is_terminal or now_s - said_s < LINE_PERIOD_S:
+            return
+        said_s = now_s
+        left_min = (now_s - started_s) / done * (total - done) / 60.0
+        console.print(f"{done} of {total} runs, {left_min:.0f} min left")
+
+    return step
+
+
+def write_results(
+    name: str, study: StudyConfig, runs: Sequence[Run], folder: Path, unfinished: Sequence[Unfinished]
+) -> list[Combination]:
+    """Write table and page of all finished runs, and return what was found for each combination of settings.
+
+    Parameters
+    ----------
+    name : str
+        Of the study.
+    study : StudyConfig
+        The study.
+    runs : sequence of Run
+        All its runs.
+    folder : Path
+        Of the sweep.
+    unfinished : sequence of Unfinished
+        Runs that were given up.
+    """
+    from runtime.batch.outcome import combine
+    from runtime.batch.report import page
+    from runtime.batch.rows import RowFolder, table, whole_file, write_table
+
+    finished = RowFolder(folder).read(runs)
+    combinations = combine(runs, finished)
+    with writing("--out", folder):
+        write_table(study, table(study, runs, finished), folder)
+        with whole_file(folder / PAGE) as part:
+            part.write_text(page(name, study, len(runs), combinations, unfinished), encoding="utf-8")
+    return combinations
+
+
+def best_table(study: StudyConfig, combinations: Sequence[Combination]) -> Table:
+    """Return the best combinations as a table for the terminal."""
+    from runtime.batch.report import best_rows
+
+    headings, rows = best_rows(study, combinations, SHOWN)
+    shown = Table(title=f"the best of {len(combinations)} combinations", title_justify="left")
+    for heading in headings:
+        shown.add_column(heading, justify="right", overflow="fold")
+    for row in rows:
+        shown.add_row(*row)
+    return shown
