@@ -133,7 +133,9 @@ def entries_of(root: str, annotation: Any, table: Any, at: tuple[str | int, ...]
         yield Setting(root, location, FieldInfo.from_annotation(entry), "list")
         yield from entries_of(root, kind, table[0], location)
     else:
-        yield Setting(root, location, FieldInfo.from_annotation(entry), kind)
+        yield Setting(
+            root, location, FieldInfo.from_annotation(entry), "name" if get_origin(kind) is Literal else kind
+        )
 
 
 EVERY = [s for root, (model, table, _) in ROOTS.items() for s in settings_of(root, model, table)]
