@@ -21,6 +21,7 @@ from config.overrides import apply_overrides, parse_override
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
 from config.settings import GoalConfig, Settings
+from config.strict import Strict
 from config.study import StudyConfig
 from config.world import WorldConfig
 
@@ -113,12 +114,8 @@ def load_study(name_or_path: str | os.PathLike[str]) -> StudyConfig:
     return _load("studies", name_or_path, StudyConfig)
 
 
-def load_any(
-    name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()
-) -> Settings | WorldConfig | ModelConfig | MissionConfig | StudyConfig:
-    """Return the settings, world, model, mission or study of a file, whose kind follows from its top-level keys.
-
-    A robot file is loaded as a run with that robot.
+def load_any(name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Strict:
+    """Return the run, world, model, mission or study of a file, by its top-level keys; a robot's as a run with it.
 
     Raises
     ------
@@ -126,26 +123,12 @@ def load_any(
         The file cannot be read or is invalid.
     """
     table = read_document("runs", name_or_path).table
-    if not overrides:
-        of_run, of_world, of_model, of_mission, of_study = (
-            sum(key in schema.model_fields or key in also for key in table)
-            for schema, also in (
-                (Settings, NAMES),
-                (WorldConfig, ()),
-                (ModelConfig, ()),
-                (MissionConfig, ()),
-                (StudyConfig, ()),
-            )
-        )
-        if of_study > max(of_run, of_world, of_model, of_mission):
-            return load_study(Path(name_or_path))
-        if of_mission > max(of_run, of_world, of_model):
-            return load_mission(Path(name_or_path))
-        if of_world > max(of_run, of_model):
-            return load_world(Path(name_or_path))
-        if of_model > of_run:
-            return load_model(Path(name_or_path))
-    return load_settings(name_or_path, overrides)
+    kinds: dict[type[Strict], Kind] = {Settings: "runs", ModelConfig: "models", WorldConfig: "worlds",
+                                       MissionConfig: "missions", StudyConfig: "studies"}  # fmt: skip
+    kind = max(kinds, key=lambda one: len(table.keys() & {*one.model_fields, *(NAMES if one is Settings else ())}))
+    if kind is Settings or overrides:
+        return load_settings(name_or_path, overrides)
+    return _load(kinds[kind], Path(name_or_path), kind)
 
 
 def load_settings(
