@@ -22,6 +22,7 @@ class VaryConfig(Strict):
     setting: str = Field(min_length=1)
     """Its path, as after `--set`; `robot` and `models.0` name files."""
     values: TomlList[Value] = Field(min_length=1, max_length=1000)
+    """Its values, each once."""
 
     @model_validator(mode="after")
     def _each_once(self) -> VaryConfig:
