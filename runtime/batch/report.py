@@ -42,8 +42,7 @@ def page(name: str, study: StudyConfig, runs: int, combinations: Sequence[Combin
         Runs that were given up.
     """
     title = escape(utf8(name))
-    done, failed = (sum(numbers) for numbers in zip(*((one.runs, one.failed) for one in combinations), strict=True)) \
-        if combinations else (0, 0)  # fmt: skip
+    done, failed = sum(one.runs for one in combinations), sum(one.failed for one in combinations)
     effects = sensitivities(study, combinations)
     body = "".join(
         (
