@@ -182,10 +182,11 @@ def replay_again(
         console.print(str(region))
     for first, last in result.missing:
         console.print(f"cycles {first} to {last} are missing in the recording; replay continues at the next keyframe")
-    causes = ", ".join(f"{cause} {count}" for cause, count in sorted(result.refinement_stops.items()))
+    stops = sorted(result.refinement_stops.items())
+    causes = ", ".join(f"{'nothing to refine' if cause == 'nothing' else cause} {count}" for cause, count in stops)
     output.print(
         f"{result.cycles} cycles from cycle {result.first_cycle} on, {result.differences} differences, "
-        f"{result.keyframes} keyframes compared; refinement ended by: {causes}; "
+        f"{result.keyframes} keyframes compared; why refinement stopped, and how often: {causes}; "
         f"{result.times_real_time:.0f} times real time"
     )
     if result.first_difference is not None:

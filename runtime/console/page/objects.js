@@ -164,15 +164,22 @@ export class Objects {
     const bar = (kind, name, nats) => {
       const fill = el("span", { class: "fill" });
       fill.style.width = `${(100 * nats) / most}%`;
-      return el("div", { class: `scale ${kind}` }, el("span", {}, name), el("span", { class: "track" }, fill), el("b", {}, `${nats.toFixed(1)} ${evidence.lines.length > 0 ? "segments" : "nats"}`));
+      return el("div", { class: `scale ${kind}` }, el("span", {}, name), el("span", { class: "track" }, fill), el("b", {}, evidence.lines.length > 0 ? `${nats.toFixed(1)} segments` : `odds × ${times(nats)}`));
     };
     const { readings, lines, rivals } = evidence;
     const against = readings.filter(({ nats }) => nats < 0).length + lines.filter(({ supports }) => !supports).length;
-    const others = rivals.map(([name, lead]) => `${name} ${lead > 0 ? "+" : "−"}${Math.abs(lead).toFixed(1)}`).join(", ");
+    const others = rivals.map(([name, lead]) => `${name} ${times(Math.abs(lead))} times ${lead > 0 ? "likelier" : "less likely"}`).join(", ");
     byId("evidence").replaceChildren(...[bar("for", "for it", evidence.pro), bar("against", "against", evidence.contra),
       el("p", { class: "hint" }, `${readings.length + lines.length} ${lines.length > 0 ? "segments" : "readings"} on the map, ${against} of them against (dashed, ✕)`),
-      others === "" ? null : el("p", { class: "hint" }, `Other explanations, nats ahead of it: ${others}`)].filter((part) => part !== null));
+      others === "" ? null : el("p", { class: "hint" }, `Other explanations: ${others}`)].filter((part) => part !== null));
   }
+}
+
+// A natural logarithm of odds as the number of times: 1.2, 11, 10⁹.
+function times(logarithm) {
+  const tens = logarithm / Math.LN10;
+  if (tens < 4) return String(Number(Math.exp(logarithm).toPrecision(2)));
+  return `10${String(Math.round(tens)).replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit])}`;
 }
 
 // Describes the map in a sentence, for screen readers.
