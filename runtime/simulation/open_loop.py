@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, TypedDict
 
@@ -119,8 +119,8 @@ def match_objects(
 ) -> tuple[list[DrumRow], list[BoxRow], int]:
     """Match round objects with drums, others with boxes and polygons; return the rows and the number of false ones.
 
-    Objects that are of none of the models, such as walls, are ignored. The rows of the polygons follow those of the
-    boxes, with the middle of the vertices as their place.
+    Objects of none of the models, such as walls, are ignored, and so are drums and polygons that look like none. The
+    rows of the polygons follow those of the boxes, with the middle of the vertices as their place.
 
     Parameters
     ----------
@@ -136,8 +136,9 @@ def match_objects(
     known = [s for s in seen if s.model in is_round]
     radii = [model.arc_radius_m for model in models if model.arc_radius_m is not None]
     wanted = [d for d in world.drum if not radii or any(abs(d.radius_m - r) < RADIUS_TOLERANCE_M for r in radii)]
-    polygons = () if all(is_round.values()) else world.polygon
-    world = world.model_copy(update={"drum": tuple(wanted), "polygon": polygons})
+    spokes = [_spokes(model.vertices_m) for model in models if model.arc_radius_m is None]
+    polygons = [p for p in world.polygon if any(_are_alike(_spokes(p.vertices_m), of) for of in spokes)]
+    world = world.model_copy(update={"drum": tuple(wanted), "polygon": tuple(polygons)})
     drums, false_drums = match_drums(world, [(s.x, s.y) for s in known if is_round[s.model]])
     middles = {model.name: np.mean(model.vertices_m, axis=0).tolist() for model in models}
     angular = [_about_its_middle(s, *middles[s.model]) for s in known if not is_round[s.model]]
@@ -157,6 +158,16 @@ def match_objects(
             }
         )
     return drums, boxes, false_drums + len(angular) - len(match)
+
+
+def _spokes(vertices: Sequence[tuple[float, float]]) -> list[float]:
+    """Return the distances of vertices from their mean, m, sorted: the same for an outline wherever it stands."""
+    away = np.array(vertices) - np.mean(vertices, axis=0)
+    return sorted(np.hypot(away[:, 0], away[:, 1]).tolist())
+
+
+def _are_alike(a: Sequence[float], b: Sequence[float]) -> bool:
+    return len(a) == len(b) and max(abs(i - j) for i, j in zip(a, b, strict=True)) < RADIUS_TOLERANCE_M
 
 
 def _about_its_middle(seen: DetectedObject, x: float, y: float) -> DetectedObject:
