@@ -16,6 +16,14 @@ from typing import Final
 
 ROOT: Final = Path(__file__).parents[1]
 PRODUCT: Final = ("config", "drivers", "perception", "behaviors", "runtime")
+ELSEWHERE: Final = (
+    "drivers/firmware/board/",
+    "drivers/ros2/gateway.py",
+    "runtime/bridges/ros2/bridge.py",
+    "runtime/bridges/ros2/node.py",
+    "runtime/bridges/ros2/robot_listener.py",
+)
+"""What tests run in another Python, of which no probe reports: MicroPython, and that with ROS (`make ros2`)."""
 KERNEL: Final = re.compile(r"^@(owning_)?kernel$", re.MULTILINE)
 
 
@@ -46,8 +54,12 @@ class LineCoverage:
 
     def write(self) -> None:
         """Write the lines that were executed, and those that were not."""
+        coverage = self._slipcover.get_coverage()
+        coverage["files"] = {
+            path: lines for path, lines in coverage["files"].items() if not path.startswith(ELSEWHERE)
+        }  # fmt: skip
         self._report.parent.mkdir(parents=True, exist_ok=True)
-        self._report.write_text(json.dumps(self._slipcover.get_coverage()), encoding="utf-8")
+        self._report.write_text(json.dumps(coverage), encoding="utf-8")
 
 
 def start() -> LineCoverage | None:

@@ -22,6 +22,7 @@ from config.settings import Settings
 from drivers.denning.wire_units import wire_pattern
 from drivers.firing_pattern import FiringError
 from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.timing.footprint import peak_mb
 from tests.fuzz.mutators import mutate
 
 LINE_MAX = 1000
@@ -124,7 +125,7 @@ def campaign(kind: str, seed: int, count: int) -> dict[str, Any]:
                     break
             result["slowest_s"] = max(result["slowest_s"], time.process_time() - file_s)
     result["files_per_s"] = round(count / (time.perf_counter() - start_s))
-    result["memory_mb"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    result["memory_mb"] = round(peak_mb() or 0.0)
     return result
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from config.files import SIZE_MAX
+from runtime.timing.footprint import peak_mb
 from tests.fuzz.campaign import (
     ADDRESS_SPACE,
     LINE_MAX,
@@ -132,7 +133,7 @@ def main(share: float) -> None:
                     file.truncate(GIGABYTE)
             costs[name] = cost(path, read_whole_ring_log if name in LOGS else read_run)
             path.unlink()
-    memory_mb = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    memory_mb = round(peak_mb() or 0.0)
     sys.stdout.write(json.dumps({"cases": costs, "memory_mb": memory_mb}))
 
 

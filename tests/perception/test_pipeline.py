@@ -54,7 +54,7 @@ def test_in_a_known_room_the_place_is_found_and_a_snapshot_continues_to_the_bit(
 def test_the_robot_is_placed_in_a_known_room_only() -> None:
     chosen = settings()
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
-    assert perception.edit(PlaceRobot(1.0, 2.0, 0.5)) == "there is no known room: start with --map"
+    assert perception.edit(PlaceRobot(1.0, 2.0, 0.5)) == "there is no known room: start with --map, or load a map"
     chosen = with_known_room(chosen, "irregular")
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
     assert "invalid pose" in (perception.edit(PlaceRobot(1.0, math.nan, 0.5)) or "")

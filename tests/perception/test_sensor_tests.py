@@ -18,6 +18,7 @@ from perception.sensor_tests import (
     LESS_TRUSTED,
     MISSED_FIRINGS_MAX,
     NEIGHBOUR_CHANGES_MIN,
+    PASSED_CHANGES_MIN,
     PASSED_READINGS_MIN,
     RECOVERY_READINGS,
     begin_run,
@@ -79,9 +80,9 @@ def test_neighbours_are_counted_from_the_beginning_of_the_run() -> None:
     memory[3].counts.leaps += 5
     assert neighbour_counts(0, NEIGHBOURS, memory, False) == (3.0, 2.0, 1.0)  # noqa: FBT003 - kernels take no keywords
     assert neighbour_counts(0, ALONE, memory, False) == (0.0, 0.0, 0.0)  # noqa: FBT003
-    memory[1].last_m = math.inf
+    memory[1].steady_m = math.inf
     assert neighbour_counts(0, NEIGHBOURS, memory, True) == (3.0, 7.0, 1.0), "the deaf one is left out"  # noqa: FBT003
-    memory[3].last_m = math.inf
+    memory[3].steady_m = math.inf
     assert neighbour_counts(0, NEIGHBOURS, memory, True) == (0.0, 0.0, 0.0)  # noqa: FBT003
 
 
@@ -104,9 +105,9 @@ def test_most_others_must_have_changed() -> None:
         (1.1, 0.0, EQUAL_READINGS_MIN - 1, NEIGHBOUR_CHANGES_MIN, 0, False),
         (1.1, 0.0, EQUAL_READINGS_MIN, NEIGHBOUR_CHANGES_MIN - 1, 0, False),
         (0.0, 2.1, PASSED_READINGS_MIN, 4, 4, True),  # passed by, and the neighbours' readings leapt
-        (0.0, 2.1, PASSED_READINGS_MIN, 19, 3, False),  # along a wall
-        (0.0, 2.1, PASSED_READINGS_MIN, 20, 0, True),
-        (0.0, 1.9, PASSED_READINGS_MIN, 20, 20, False),
+        (0.0, 2.1, PASSED_READINGS_MIN, PASSED_CHANGES_MIN - 1, 3, False),  # along a wall
+        (0.0, 2.1, PASSED_READINGS_MIN, PASSED_CHANGES_MIN, 0, True),
+        (0.0, 1.9, PASSED_READINGS_MIN, PASSED_CHANGES_MIN, PASSED_CHANGES_MIN, False),
     ],
 )
 def test_stuck_needs_a_way_equal_readings_and_neighbours_that_change(

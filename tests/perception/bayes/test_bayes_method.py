@@ -207,6 +207,7 @@ def test_a_pinned_segment_survives_the_segments_after_it() -> None:
     assert perception.edit(PinSegments((number,), pinned=True)) is None
     geometry = perception.segments().geometry[0].tolist()
     perception.memory.state["buckets"]["count"] = 0
+    perception.memory.state["segments_held"] = 0
     perception.observe(Firing(1e3, Pose(0.0, 0.0, 0.0), 0.0, np.full(SENSORS, np.nan)))
     kept = perception.segments()
     assert kept.numbers.tolist() == [number]

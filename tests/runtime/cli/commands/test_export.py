@@ -28,7 +28,7 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
 def test_a_recording_as_tables(hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert export_to("csv", hall_run, tmp_path / "new") == DONE
     files = sorted((tmp_path / "new").iterdir())
-    assert [path.name for path in files] == ["echoes.csv", "objects.csv", "odometry.csv", "segments.csv"]
+    assert [path.name for path in files] == ["echoes.csv", "objects.csv", "odometry.csv", "segments.csv", "walls.csv"]
     assert sorted(capsys.readouterr().out.splitlines()) == [str(path) for path in files]
 
 
