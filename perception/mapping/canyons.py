@@ -8,6 +8,7 @@ before the walls it knows. What was found is remembered by its number when the r
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
@@ -33,7 +34,10 @@ BRIDGE_WEIGHT: Final = 0.85
 """Weight of a gap that is too narrow, in place of the surface's probability."""
 SURFACE_PROBABILITY_MIN: Final = 0.5
 SURFACES_MIN: Final = 3
-SURFACES_MAX: Final = 48
+SURFACES_MAX: Final = 16
+"""Walls, and other objects, that count, the nearest to the robot: time must not grow with the room."""
+BRIDGES_MAX: Final = 24
+"""Gaps that are closed at most, the narrowest."""
 POST_RADIUS_M: Final = 0.1
 """Radius of what has a place but no known shape."""
 STEP_RAD: Final = math.radians(5.0)
@@ -75,7 +79,7 @@ def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], se
     Parameters
     ----------
     seen
-        What perception reports.
+        What perception reports, the nearest first: the others are left out where there are too many.
     radii_m
         Radius by label; what has another label and is no wall is a post.
     sealed_m
@@ -98,24 +102,32 @@ def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], se
     return Surfaces(np.concatenate([pieces[:, :4], bridges]), weights, circles[:, :3], circles[:, 3])
 
 
+def _distance(one: DetectedObject, x: float, y: float) -> float:
+    """Return the distance of a place from an object's middle, or from a wall's middle or nearer end, m."""
+    away = math.hypot(one.x - x, one.y - y)
+    ends = one.ends
+    return away if ends is None else min(away, math.dist(ends[:2], (x, y)), math.dist(ends[2:], (x, y)))
+
+
 def _bridges(pieces: Floats, circles: Floats, sealed_m: float) -> Floats:
-    """Return straight pieces across the gaps that are too narrow, shape (k, 4)."""
+    """Return straight pieces across the gaps that are too narrow, shape (k, 4); what touches has none."""
     ends = np.concatenate([pieces[:, :2], pieces[:, 2:], circles[:, :2]])
     radii = np.concatenate([np.zeros(2 * len(pieces)), circles[:, 2]])
     owner = np.concatenate([np.arange(len(pieces)), np.arange(len(pieces)), np.full(len(circles), -1)])
-    found = []
+    found: list[tuple[float, ...]] = []
     if len(pieces):
         a, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
         share = ((ends[:, None] - a) * along).sum(axis=2) / np.maximum((along * along).sum(axis=1), 1e-12)
         feet = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
         gaps = np.hypot(*np.moveaxis(feet - ends[:, None], 2, 0)) - radii[:, None]
         gaps[owner[:, None] == np.arange(len(pieces))] = math.inf
-        for i, k in np.argwhere(gaps < sealed_m):
-            found.append((*ends[i], *feet[i, k]))
+        near = np.argwhere((gaps > 0.0) & (gaps < sealed_m))
+        found += [(gaps[i, k], *ends[i], *feet[i, k]) for i, k in near]
     apart = np.hypot(*np.moveaxis(circles[:, None, :2] - circles[:, :2], 2, 0)) - circles[:, None, 2] - circles[:, 2]
-    for i, k in np.argwhere(np.triu(apart < sealed_m, 1)):
-        found.append((*circles[i, :2], *circles[k, :2]))
-    return np.array(found, dtype=np.float64).reshape(-1, 4)
+    near = np.argwhere(np.triu((apart > 0.0) & (apart < sealed_m), 1))
+    found += [(apart[i, k], *circles[i, :2], *circles[k, :2]) for i, k in near]
+    found.sort(key=operator.itemgetter(0))
+    return np.array(found[:BRIDGES_MAX], dtype=np.float64).reshape(-1, 5)[:, 1:]
 
 
 def canyon_round(x: float, y: float, surfaces: Surfaces, sealed_m: float) -> Canyon | None:
@@ -151,12 +163,14 @@ def canyon_round(x: float, y: float, surfaces: Surfaces, sealed_m: float) -> Can
     if spans[longest] <= math.pi:
         return None
     run = (begins[longest] + np.arange(counts[longest])) % len(angles)
-    return _measured(x, y, points[run], weights[run], sealed_m)
+    # By angle, not by count: what lies hidden behind one side adds directions there.
+    half = int(np.searchsorted(np.remainder(angles[run] - angles[run[0]], 2.0 * math.pi), 0.5 * spans[longest]))
+    return _measured(x, y, points[run], weights[run], half, sealed_m)
 
 
-def _measured(x: float, y: float, chain: Floats, weights: Floats, sealed_m: float) -> Canyon | None:
-    """Return the canyon of a chain of points in turn, counter-clockwise round (x, y)."""
-    first, last, half = 0, len(chain) - 1, len(chain) // 2
+def _measured(x: float, y: float, chain: Floats, weights: Floats, half: int, sealed_m: float) -> Canyon | None:
+    """Return the canyon of a chain of points, counter-clockwise round (x, y); `half` is the one in the middle."""
+    first, last = 0, len(chain) - 1
     to_first = np.hypot(*(chain[half:] - chain[0]).T)
     to_last = np.hypot(*(chain[:half] - chain[-1]).T)
     if math.dist(chain[0], chain[-1]) > CLIPPED * min(to_first.min(), to_last.min()):
@@ -261,12 +275,14 @@ class CanyonMap:
             Radius by label of round models.
         """
         self.is_due = False
-        surfaces = surfaces_of(seen, radii_m, self.sealed_m)
+        at_x, at_y = self._at.tolist()
+        near = sorted(seen, key=lambda one: _distance(one, at_x, at_y))
+        surfaces = surfaces_of(near, radii_m, self.sealed_m)
         if len(surfaces.piece_weights) + len(surfaces.circle_weights) < SURFACES_MIN and not self.numbered:
             return
         turn, known = self.firings // EVERY_FIRINGS, np.flatnonzero(self.rows["number"] > 0)
         before = places_before(surfaces, 0.5 * self.sealed_m + CLEAR_M)
-        x, y = robot_x, robot_y = self._at.tolist()
+        x, y = at_x, at_y
         row = None
         if turn % 3 == 1 and len(known):
             row = int(known[turn // 3 % len(known)])
@@ -276,7 +292,7 @@ class CanyonMap:
         found = canyon_round(x, y, surfaces, self.sealed_m)
         if found is not None:
             self._enter(found, x, y)
-        elif row is not None and math.hypot(x - robot_x, y - robot_y) < 0.5 * REACH_M:
+        elif row is not None and math.hypot(x - at_x, y - at_y) < 0.5 * REACH_M:
             self.rows["probability"][row] *= DOUBT
             if self.rows["probability"][row] < FORGOTTEN:
                 self.rows[row] = 0

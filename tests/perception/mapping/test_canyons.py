@@ -9,7 +9,16 @@ import pytest
 
 from drivers.messages import Pose
 from perception.detected_object import DetectedObject
-from perception.mapping.canyons import DOUBT, EVERY_FIRINGS, CanyonMap, canyon_round, places_before, surfaces_of
+from perception.mapping.canyons import (
+    BRIDGES_MAX,
+    DOUBT,
+    EVERY_FIRINGS,
+    SURFACES_MAX,
+    CanyonMap,
+    canyon_round,
+    places_before,
+    surfaces_of,
+)
 from perception.percept import Canyon
 
 SEALED_M = 0.93
@@ -114,3 +123,21 @@ def test_a_canyon_keeps_its_number_is_remembered_and_forgotten_when_it_is_gone()
 def test_places_lie_before_both_faces() -> None:
     surfaces = surfaces_of([wall(0, 0, 4, 0)], RADII, SEALED_M)
     assert places_before(surfaces, 0.7).tolist() == [pytest.approx([2.0, 0.7]), pytest.approx([2.0, -0.7])]
+
+
+def test_a_crowded_room_costs_no_more_and_hides_no_canyon_beside_the_robot() -> None:
+    """What is far away is left out, and of the gaps the wide ones: the cost of a place has a bound."""
+    rng = np.random.default_rng(1)
+    places = rng.uniform(-8.0, -3.0, (60, 2)).tolist()
+    crowd = [drum(x, y) for x, y in places] + [wall(x, y, x + 1.0, y + 0.5) for x, y in places]
+    surfaces = surfaces_of(crowd, RADII, SEALED_M)
+    assert len(surfaces.circle_weights) == SURFACES_MAX
+    assert len(surfaces.piece_weights) == SURFACES_MAX + BRIDGES_MAX
+    room = CanyonMap(SEALED_M)
+    room.is_wanted = True
+    for _ in range(EVERY_FIRINGS):
+        room.observe(Pose(4.0, 0.0, 0.0))
+    for _ in range(3):
+        room.firings += EVERY_FIRINGS
+        room.refine([*crowd, *(wall(*ends) for ends in U)], RADII)
+    assert [canyon.depth_m for canyon in room.canyons()] == [pytest.approx(3.0, abs=0.01)]
