@@ -12,12 +12,21 @@ from foxglove import channels as ch
 from foxglove import messages as fx
 
 from drivers.messages import Pose
-from runtime.analysis.export.foxglove import ARC_POINTS, colour, line, placed, quaternion, scene, stamp
-from runtime.analysis.export.shapes import EVEN_M, HEIGHT_M, MODEL, SEGMENT, TRUTH
+from runtime.analysis.export.foxglove import (
+    ARC_POINTS,
+    colour,
+    line,
+    placed,
+    quaternion,
+    scene,
+    stamp,
+    write_log,
+    write_segments,
+)
+from runtime.analysis.export.shapes import HEIGHT_M, MODEL, TRUTH, even_radius
 from runtime.bridges.console_client import ConsoleClient, Message
 
 CIRCLE_POINTS: Final = 36
-LINE_PX: Final = 2.0
 MAP_EVERY: Final = 4
 """Every so many states show segments and objects."""
 STATE_FIELDS: Final = (
@@ -25,8 +34,6 @@ STATE_FIELDS: Final = (
     "missed", "late", "quanta", "waiting", "phases", "link", "clients", "speed", "paused", "localized", "sensors",
 )  # fmt: skip
 """What `/state` has of a state, as JSON, to be plotted."""
-LEVELS: Final = (("debug", fx.LogLevel.Debug), ("warning", fx.LogLevel.Warning), ("error", fx.LogLevel.Error))
-NANO: Final = 1_000_000_000
 
 
 class SceneChannels:
@@ -70,9 +77,7 @@ class SceneChannels:
     def take_log(self, entry: Message, at: int) -> None:
         """Write a line of the log."""
         fields = " ".join(f"{name}={value}" for name, value in entry["fields"].items())
-        level = dict(LEVELS).get(entry["level"], fx.LogLevel.Info)
-        text = f"{entry['event']} {fields}".strip()
-        self._log.log(fx.Log(timestamp=stamp(at), level=level, message=text, name="echolocate"), log_time=at)
+        write_log(self._log, entry["level"], f"{entry['event']} {fields}".strip(), at)
 
     def _write_frames(self, state: Message, at: int) -> None:
         x, y, theta = state["pose"]
@@ -116,12 +121,8 @@ class SceneChannels:
         self._ring.log(message, log_time=at)
 
     def _write_map(self, objects: list[Message], segments: Iterable[list[float]], at: int) -> None:
-        ends = [fx.Point3(x=x, y=y) for row in segments for x, y in ((row[0], row[1]), (row[2], row[3]))]
-        many = fx.LinePrimitive(
-            type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True, points=ends,
-            color=colour(SEGMENT),
-        )  # fmt: skip
-        scene(self._segments, "segments", [many] if ends else [], [], at)
+        ends = [point for row in segments for point in (row[:2], row[2:4])]
+        write_segments(self._segments, ends, at)
         models = {model["name"]: model for model in self._session["models"]}
         outlines = [outline(seen, models.get(seen["model"])) for seen in objects]
         lines = [line(points, MODEL, closed=closed) for points, closed in outlines]
@@ -164,13 +165,3 @@ def circle(x: float, y: float, radius: float) -> list[tuple[float, float]]:
     """Return the corners of a circle about x, y, m."""
     turns = (2.0 * math.pi * k / CIRCLE_POINTS for k in range(CIRCLE_POINTS))
     return [(x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns]
-
-
-def even_radius(mounts: list[list[float]]) -> float | None:
-    """Return the radius of an even ring that looks outwards (m), None for any other."""
-    radius, step = math.hypot(mounts[0][0], mounts[0][1]), 2.0 * math.pi / len(mounts)
-    for k, (x, y, angle) in enumerate(mounts):
-        off_m = math.dist((x, y), (radius * math.cos(k * step), radius * math.sin(k * step)))
-        if off_m > EVEN_M or abs(math.remainder(angle - k * step, 2.0 * math.pi)) > EVEN_M:
-            return None
-    return radius

@@ -7,7 +7,7 @@ from the pose that the ring had at their firing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Final, TypeVar
@@ -144,7 +144,7 @@ class _RunExporter:
     def _write_scan(self, scan: FiringScan, at: int) -> None:
         """Write a firing: one scan for an even ring, otherwise an arc for each sensor."""
         ring = self._timeline.settings.ring
-        radius, sensors = even_radius(ring), len(ring.mounts)
+        radius, sensors = even_radius(ring.mounts), len(ring.mounts)
         if radius is not None:
             message = fx.LaserScan(
                 timestamp=stamp(at), frame_id="odom", pose=placed(scan.x, scan.y, scan.yaw), start_angle=0.0,
@@ -161,12 +161,7 @@ class _RunExporter:
             self._ring.log(message, log_time=at)
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
-        ends = snapshot.segments.reshape(-1, 2).tolist()
-        many = fx.LinePrimitive(
-            type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True,
-            points=[fx.Point3(x=x, y=y) for x, y in ends], color=colour(SEGMENT),
-        )  # fmt: skip
-        scene(self._segments, "segments", [many] if ends else [], [], at)
+        write_segments(self._segments, snapshot.segments.reshape(-1, 2).tolist(), at)
         boxes = []
         for c in snapshot.clusters:
             corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
@@ -189,9 +184,7 @@ class _RunExporter:
             self._grid.log(_grid(snapshot.grid, at), log_time=at)
 
     def _write_log_entry(self, entry: LogEntry, at: int) -> None:
-        levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
-        level = levels.get(entry.level, fx.LogLevel.Info)
-        self._log.log(fx.Log(timestamp=stamp(at), level=level, message=entry.text, name="echolocate"), log_time=at)
+        write_log(self._log, entry.level, entry.text, at)
 
 
 def _grid(known: KnownCells, at: int) -> fx.Grid:
@@ -225,6 +218,22 @@ def scene(
     """
     entity = fx.SceneEntity(timestamp=stamp(at), frame_id="odom", id=name, lines=lines, texts=texts)
     channel.log(fx.SceneUpdate(entities=[entity]), log_time=at)
+
+
+def write_segments(channel: ch.SceneUpdateChannel, ends: Sequence[Sequence[float]], at: int) -> None:
+    """Replace the outline segments at a time (ns): points x, y (m), two a segment."""
+    many = fx.LinePrimitive(
+        type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True,
+        points=[fx.Point3(x=x, y=y) for x, y in ends], color=colour(SEGMENT),
+    )  # fmt: skip
+    scene(channel, "segments", [many] if ends else [], [], at)
+
+
+def write_log(channel: ch.LogChannel, level: str, text: str, at: int) -> None:
+    """Write a line of the log at a time (ns)."""
+    levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
+    level_of = levels.get(level, fx.LogLevel.Info)
+    channel.log(fx.Log(timestamp=stamp(at), level=level_of, message=text, name="echolocate"), log_time=at)
 
 
 def line(points: Places, rgb: Colour, *, closed: bool) -> fx.LinePrimitive:

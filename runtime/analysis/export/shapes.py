@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -66,9 +66,8 @@ def scans_of(rows: Echoes, ring: RingConfig) -> Iterator[FiringScan]:
         )  # fmt: skip
 
 
-def even_radius(ring: RingConfig) -> float | None:
+def even_radius(mounts: Sequence[Sequence[float]]) -> float | None:
     """Return the radius of a ring whose sensors are evenly spaced on a circle and point outwards; None otherwise."""
-    mounts = ring.mounts
     radius = math.hypot(mounts[0][0], mounts[0][1])
     step = 2.0 * math.pi / len(mounts)
     for i, (x, y, angle) in enumerate(mounts):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -21,10 +19,9 @@ def test_a_turn_as_a_quaternion() -> None:
 
 
 def test_a_ring_is_even_if_all_sensors_point_outwards_at_equal_angles() -> None:
-    assert even_radius(RING) == pytest.approx(0.381)
+    assert even_radius(RING.mounts) == pytest.approx(0.381)
     for place in ((0.381, 0.0, 0.1), (0.4, 0.0, 0.0)):
-        uneven: Any = SimpleNamespace(mounts=(place, *RING.mounts[1:]))
-        assert even_radius(uneven) is None
+        assert even_radius((place, *RING.mounts[1:])) is None
 
 
 def test_a_scan_puts_echoes_where_they_were(timeline: Timeline) -> None:
