@@ -141,7 +141,7 @@ $(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/browser.stamp
 	$(call install,.[dev])
 
 $(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python
-	$(call install,.[dev$(COMMA)fuzz$(COMMA)sweep])
+	$(call install,.[dev$(COMMA)fuzz$(COMMA)tune])
 
 $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
 	$(call install,.[dev$(COMMA)bench])

@@ -9,6 +9,7 @@ from typing import Annotated, Final, TypeAlias
 from cyclopts import App, Parameter
 from rich.console import Console
 
+from bench.batch_commands import tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
@@ -242,6 +243,7 @@ for command in (
     app.command(command)
 app.command(map_size, name="map")
 app.command(cross_paths)
+app.command(tune)
 app.command(one_stand)
 
 

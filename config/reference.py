@@ -25,7 +25,7 @@ FILES: Final = (
     ("world", WorldConfig, "world file, `--world FILE`, `--map FILE`"),
     ("model", ModelConfig, "object model, `--model FILE`"),
     ("mission", MissionConfig, "mission file, `--mission FILE`"),
-    ("study", StudyConfig, "study file, `echolocate sweep FILE`"),
+    ("study", StudyConfig, "study file, `echolocate sweep FILE` or `echolocate tune FILE`"),
 )
 """The kinds of files: name, model, and what each is for."""
 PLAIN: Final = ((bool, "true or false"), (int, "integer"), (float, "number"), (str, "text"))

@@ -1,4 +1,4 @@
-"""A study file: the runs that `echolocate sweep` makes and compares."""
+"""A study file: the runs that `echolocate sweep` makes and compares, or among which `echolocate tune` searches."""
 
 from __future__ import annotations
 
@@ -10,22 +10,34 @@ from config.strict import Strict, TomlList
 
 Value: TypeAlias = bool | int | float | str
 Objective: TypeAlias = Literal[
-    "recall", "false", "mean_error_m", "max_error_m", "objects", "mean_sigma_m", "stops", "virtual_s", "cycle_us_p50",
-    "cycle_us_p99",
+    "recall", "f1", "false", "mean_error_m", "max_error_m", "objects", "mean_sigma_m", "stops", "predicted_nat",
+    "virtual_s", "cycle_us_p50", "cycle_us_p99",
 ]  # fmt: skip
-"""Figures of a run by which settings can be compared: of recall and objects more is better, of the others less."""
+"""Figures of a run by which settings can be compared: of recall, f1, objects and predicted_nat more is better, of the
+others less. f1 is recall and precision in one: 2 · found / (true + found + false). predicted_nat needs no truth: how
+well readings that were withheld from perception are predicted by what it found in the others."""
 
 
 class VaryConfig(Strict):
-    """A setting that is varied. The runs are made with every combination of the values of all of them."""
+    """A setting that is varied: by its values, of which `sweep` makes every combination, or `tune` within a range."""
 
     setting: str = Field(min_length=1)
     """Its path, as after `--set`; `robot` and `models.0` name files."""
-    values: TomlList[Value] = Field(min_length=1, max_length=1000)
+    values: TomlList[Value] = Field(default=(), max_length=1000)
     """Its values, each once."""
+    range: TomlList[float] = Field(default=(), max_length=2)
+    """Instead of values, for `tune`: the least and the greatest value of a number."""
+    log: bool = False
+    """Search a range by ratios instead of differences."""
 
     @model_validator(mode="after")
-    def _each_once(self) -> VaryConfig:
+    def _one_form(self) -> VaryConfig:
+        if bool(self.values) == bool(self.range):
+            raise ValueError(f"{self.setting}: give either values or a range, one of the two")
+        if self.range and (len(self.range) != 2 or self.range[0] >= self.range[1]):
+            raise ValueError(f"range of {self.setting}: give two numbers, the lesser first")
+        if self.log and (not self.range or self.range[0] <= 0.0):
+            raise ValueError(f"log of {self.setting}: goes with a range above 0")
         if len(set(self.values)) < len(self.values):
             raise ValueError(f"values of {self.setting}: one stands twice: name each once")
         return self
@@ -44,7 +56,8 @@ class StudyConfig(Strict):
     recordings: str | None = None
     """Folder of recordings (MCAP) and ring logs (CSV) that are replayed."""
     truth: str | None = None
-    """The true world of the recordings; a recording from the emulator contains its own."""
+    """The true world of the recordings, or a folder with a world file for each of them, of the same name; a recording
+    from the emulator contains its own."""
     seeds: int = Field(default=1, ge=1, le=1_000_000)
     """Runs with each scene or world."""
     first_seed: int = Field(default=0, ge=0, le=1_000_000_000)
@@ -69,6 +82,8 @@ class StudyConfig(Strict):
             raise ValueError("a study has one of scenes, worlds and recordings")
         if self.recordings is None and self.truth is not None:
             raise ValueError("truth is that of recordings; scenes and worlds know theirs")
+        if self.recordings is None and "predicted_nat" in self.objectives:
+            raise ValueError("predicted_nat is for recordings; scenes and worlds know the truth: take f1")
         if self.recordings is not None and (self.seeds > 1 or self.first_seed):
             raise ValueError("a replay has no seed: leave out seeds and first_seed")
         for name, values in (

@@ -13,7 +13,7 @@ from runtime.batch.rows import FIGURES
 from runtime.batch.runs import Run
 from runtime.batch.worker import Row
 
-MORE_IS_BETTER: Final = frozenset({"recall", "objects"})
+MORE_IS_BETTER: Final = frozenset({"recall", "f1", "objects", "predicted_nat"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ def page(name: str, study: StudyConfig, runs: int, combinations: Sequence[Combin
     effects = sensitivities(study, combinations)
     body = "".join(
         (
-            f'<h1>{title}</h1><p class="sub">{escape(_about(study))}, version {escape(VERSION)}</p>',
+            f'<h1>{title}</h1><p class="sub">{escape(about(study))}, version {escape(VERSION)}</p>',
             f'<div class="tiles">{tile(f"{done:,} of {runs:,}", "runs finished")}'
             f'{tile(f"{len(combinations):,}", "combinations of settings")}'
             f'{tile(f"{failed:,}", "drives that did not arrive")}</div>',
@@ -55,10 +55,21 @@ def page(name: str, study: StudyConfig, runs: int, combinations: Sequence[Combin
                 f"objectives: {', '.join(study.objectives)}.")),
             section("Trade-offs", *_trade_offs(study, combinations)),
             section("What each setting changes", *_effects(effects)),
-            section("Without a result", _unfinished(unfinished)),
+            section("Without a result", unfinished_table(unfinished)),
             section("Study", settings_list(study)),
         )
     )  # fmt: skip
+    return html_document(title, body)
+
+
+def html_document(title: str, body: str) -> str:
+    """Return a whole page.
+
+    Parameters
+    ----------
+    title, body : str
+        HTML, escaped already.
+    """
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title} · echolocate</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -109,7 +120,8 @@ def number(value: float | None) -> str:
     return "" if value is None else f"{value:.{DIGITS}g}"
 
 
-def _about(study: StudyConfig) -> str:
+def about(study: StudyConfig) -> str:
+    """Return what a study runs, in a few words."""
     if study.recordings is not None:
         return f"recordings {utf8(study.recordings)}"
     what = "scenes" if study.scenes else "worlds"
@@ -131,7 +143,7 @@ def _trade_offs(study: StudyConfig, combinations: Sequence[Combination]) -> list
             )
             with styled(text_as_text=True):
                 svg = svg_of(trade_off_figure(points, of_front, of_best[0], (other, first)))
-            parts.append(_figure(svg, f"trade-{other}", f"{first} over {other}"))
+            parts.append(figure_block(svg, f"trade-{other}", f"{first} over {other}"))
     front = pareto_front(combinations, study.objectives)
     if len(study.objectives) > 1 and len(combinations) > 1:
         parts.append(note(f"In all objectives together, no other is better than {len(front)} of "
@@ -147,7 +159,7 @@ def _effects(effects: Sequence[Sensitivity]) -> list[str]:
         with styled(text_as_text=True):
             drawn = [(one.setting, [(shown_value(value), mean) for value, mean in one.means]) for one in own]
             svg = svg_of(effects_figure(drawn, objective))
-        parts.append(_figure(svg, f"effects-{objective}", f"{objective} by value of each setting"))
+        parts.append(figure_block(svg, f"effects-{objective}", f"{objective} by value of each setting"))
         rows = [
             [one.setting, f"{100.0 * one.share:.0f} %", *_extremes(one)]
             for one in own
@@ -165,7 +177,8 @@ def _extremes(effect: Sensitivity) -> list[str]:
     return [shown_value(least[0]), number(least[1]), shown_value(most[0]), number(most[1])]
 
 
-def _unfinished(unfinished: Sequence[Unfinished]) -> str:
+def unfinished_table(unfinished: Sequence[Unfinished]) -> str:
+    """Return the table of the runs that were given up; empty if there are none."""
     if not unfinished:
         return ""
     rows = [
@@ -176,6 +189,7 @@ def _unfinished(unfinished: Sequence[Unfinished]) -> str:
     return table(["run", "seed", "settings", "reason"], rows, text=True)
 
 
-def _figure(svg: str, name: str, caption: str) -> str:
+def figure_block(svg: str, name: str, caption: str) -> str:
+    """Return a figure with its caption; `name` is unique on the page."""
     label = escape(caption)
     return f"<figure>{inlined(svg, name, label)}<figcaption>{label}</figcaption></figure>"

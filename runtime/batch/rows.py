@@ -23,8 +23,8 @@ from runtime.batch.worker import Row
 ROWS: Final = "rows"
 TABLE: Final = "runs.parquet"
 FIGURES: Final = (
-    "truth", "found", "recall", "false", "mean_error_m", "max_error_m", "inside_95", "objects", "mean_sigma_m",
-    "stops", "virtual_s", "cycle_us_p50", "cycle_us_p99", "elapsed_s",
+    "truth", "found", "recall", "f1", "false", "mean_error_m", "max_error_m", "inside_95", "objects", "mean_sigma_m",
+    "stops", "predicted_nat", "virtual_s", "cycle_us_p50", "cycle_us_p99", "elapsed_s",
 )  # fmt: skip
 """Columns of results. Empty where a run has no such figure."""
 COUNTS: Final = frozenset({"truth", "found", "false", "objects", "stops"})

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, get_args
@@ -44,11 +44,13 @@ class Run:
     """What differs from the settings in a recording (MCAP), as after ``--set``."""
     truth: str | None = None
     """The true world of a recording (JSON)."""
+    predicts: bool = False
+    """Whether readings of a recording are withheld, and then predicted."""
     varied: Mapping[str, Value] = field(default_factory=dict)
     """The varied settings."""
 
 
-def expand(study: StudyConfig, base: Path) -> list[Run]:
+def expand(study: StudyConfig, base: Path, varied: Sequence[Mapping[str, Value]] | None = None) -> list[Run]:
     """Return the runs of a study, each once, settings after settings.
 
     Parameters
@@ -57,6 +59,8 @@ def expand(study: StudyConfig, base: Path) -> list[Run]:
         The study.
     base : Path
         Its folder, to which paths in it are relative.
+    varied : sequence of mapping, optional
+        Values of settings by name; by default every combination of the study.
 
     Raises
     ------
@@ -64,11 +68,12 @@ def expand(study: StudyConfig, base: Path) -> list[Run]:
         A scene, a file or a value is invalid, or there are too many runs or none.
     """
     subjects = list(_subjects(study, base))
-    varied = combinations(study)
+    varied = combinations(study) if varied is None else varied
     seeds = [None] if study.recordings is not None else range(study.first_seed, study.first_seed + study.seeds)
     if (count := len(varied) * len(subjects) * len(seeds)) > RUNS_MAX:
         raise ConfigError(f"the study has {count:,} runs, at most {RUNS_MAX:,} are allowed: leave out some values")
-    truth = None if study.truth is None else load_world(_path(study.truth, base)).model_dump_json()
+    truths = _truths(study, base, [subject for _, subject, _ in subjects])
+    predicts = "predicted_nat" in study.objectives
     runs: dict[str, Run] = {}
     for values in varied:
         overrides = tuple(f"{setting}={json.dumps(value)}" for setting, value in values.items())
@@ -78,10 +83,11 @@ def expand(study: StudyConfig, base: Path) -> list[Run]:
             if world not in settings:
                 settings[world] = _settings(study, base, overrides, world).model_dump_json()
             for seed in seeds:
-                inputs = [VERSION, kind, identity, seed, settings[world], truth]
-                key = hashlib.sha256(json.dumps(inputs).encode()).hexdigest()[:KEY_DIGITS]
                 changes = (*study.sets, *overrides) if kind == "recording" else ()
-                runs.setdefault(key, Run(key, kind, subject, seed, settings[world], changes, truth, values))
+                inputs = [VERSION, kind, identity, seed, settings[world], changes, truths[subject], predicts]
+                key = hashlib.sha256(json.dumps(inputs).encode()).hexdigest()[:KEY_DIGITS]
+                run = Run(key, kind, subject, seed, settings[world], changes, truths[subject], predicts, values)
+                runs.setdefault(key, run)
     return list(runs.values())
 
 
@@ -141,6 +147,23 @@ def _subjects(study: StudyConfig, base: Path) -> Iterator[tuple[RunKind, str, st
         raise ConfigError(f"recordings {folder}: no recording (.mcap) or ring log (.csv) there; name their folder")
     for path in files:
         yield "recording", str(path.resolve()), _identity(path, folder)
+
+
+def _truths(study: StudyConfig, base: Path, subjects: Iterable[str]) -> dict[str, str | None]:
+    """Return the true world (JSON) of each recording; None where the study names none.
+
+    Raises
+    ------
+    ConfigError
+        One cannot be read or is invalid.
+    """
+    if study.truth is None or study.recordings is None:
+        return dict.fromkeys(subjects)
+    if not (base / study.truth).is_dir():
+        return dict.fromkeys(subjects, load_world(_path(study.truth, base)).model_dump_json())
+    folder = (base / study.recordings).resolve()
+    files = {subject: base / study.truth / Path(subject).relative_to(folder) for subject in subjects}
+    return {subject: load_world(path.with_suffix(".toml")).model_dump_json() for subject, path in files.items()}
 
 
 def _identity(path: Path, folder: Path) -> str:

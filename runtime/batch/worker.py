@@ -22,8 +22,9 @@ from runtime import VERSION
 from runtime.batch.runs import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
+    from drivers.messages import Firing
     from runtime.cycle.summary import ObjectRow
     from runtime.simulation.evaluation import DrumRow
     from runtime.simulation.open_loop import BoxRow
@@ -125,7 +126,9 @@ def recording_figures(settings: Settings, run: Run) -> Row:
     UserError
         The file cannot be read.
     """
-    from runtime.analysis.comparison import match_to_world, run_under
+    from runtime.analysis.comparison import run_under
+    from runtime.analysis.export.ring_log_export import recorded_firings
+    from runtime.analysis.prediction import predicted_nat, withhold
     from runtime.recording.reader import is_recording, open_recording
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings
@@ -133,20 +136,52 @@ def recording_figures(settings: Settings, run: Run) -> Row:
 
     path = Path(run.subject)
     world = None if run.truth is None else WorldConfig.model_validate_json(run.truth)
+    firings: Iterable[Firing] | None = None
+    figures: Row = {"stops": 0}
     if is_recording(path):
         with open_recording(path) as recording:
-            own = override_settings(recording.settings, str(path), run.overrides)
-            outcome, cycle_stats = run_under(recording, own)
+            settings = override_settings(recording.settings, str(path), run.overrides)
             world = recording.world if world is None else world
-        objects, cycle_us, stops = outcome.objects, cycle_stats.cycle_us(), len(outcome.stops)
+            if run.predicts:
+                firings = recorded_firings(recording)
+            else:
+                outcome, cycle_stats = run_under(recording, settings)
+                objects, cycle_us = outcome.objects, cycle_stats.cycle_us()
+                figures["stops"] = len(outcome.stops)
     else:
         logged = read_ring_log(path, sensors=len(settings.ring.mounts))
-        summary = replay_firings(settings, plausible_firings(logged, path, settings))
-        objects, cycle_us, stops = summary["objects"], summary["cycle_us"], 0
-    figures: Row = {"objects": len(objects), "mean_sigma_m": mean_sigma(objects), "stops": stops}
-    if world is not None and world.drum:
-        figures |= truth_figures(*match_to_world(objects, world))
+        firings = plausible_firings(logged, path, settings)
+    if firings is not None:
+        if run.predicts:
+            firings, withheld = withhold(firings)
+        summary = replay_firings(settings, firings)
+        objects, cycle_us = summary["objects"], summary["cycle_us"]
+        if run.predicts:
+            figures["predicted_nat"] = predicted_nat(settings, summary, withheld)
+    figures |= {"objects": len(objects), "mean_sigma_m": mean_sigma(objects)}
+    if world is not None:
+        figures |= map_figures(objects, world, settings)
     return {**figures, **cycle_figures(cycle_us)}
+
+
+def map_figures(objects: Sequence[ObjectRow], world: WorldConfig, settings: Settings) -> Row:
+    """Return how the objects of a recording, whose odometry begins at the world's start, compare with the truth.
+
+    Objects of the world that are none of the models are not looked for; figures are empty if there is no other.
+    """
+    from drivers.messages import Pose
+    from perception.detected_object import DetectedObject
+    from runtime.simulation.open_loop import match_objects
+
+    start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+    seen = []
+    for one in objects:
+        at = start.compose(Pose(one["x"], one["y"], one["theta"]))
+        seen.append(DetectedObject(one["model"], at.x, at.y, at.theta, one["sigma"], one["support"], one["score"]))
+    drums, boxes, false = match_objects(world, seen, settings.models)
+    with_boxes = any(model.arc_radius_m is None for model in settings.models)
+    rows = [*drums, *(boxes if with_boxes else ())]
+    return truth_figures(rows, false) if rows else {}
 
 
 def truth_figures(rows: Sequence[DrumRow | BoxRow], false: int) -> Row:
@@ -164,6 +199,7 @@ def truth_figures(rows: Sequence[DrumRow | BoxRow], false: int) -> Row:
         "truth": len(rows),
         "found": len(errors),
         "recall": len(errors) / len(rows) if rows else None,
+        "f1": 2.0 * len(errors) / (len(rows) + len(errors) + false) if rows else None,
         "false": false,
         "mean_error_m": mean(errors) if errors else None,
         "max_error_m": max(errors, default=None),

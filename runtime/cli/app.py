@@ -15,7 +15,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import noting_files_read, one_line
 from runtime.cli.board_commands import firmware, probe_command, ring_test_command
 from runtime.cli.bridge_commands import foxglove, ros2, ros2_robot_command
-from runtime.cli.experiment_commands import experiment, sweep
+from runtime.cli.experiment_commands import experiment, sweep, tune
 from runtime.cli.first_signals import EXIT_CODE_BASE
 from runtime.cli.init_commands import init_app
 from runtime.cli.recording_commands import calibrate, export, figures, map_command, recover, replay, report
@@ -42,7 +42,7 @@ app = App(
 for title, commands in (
     ("Robot", (run, emulate, check, settings_command, service)),
     ("Recordings", (replay, report, figures, export, map_command, calibrate, recover)),
-    ("Simulation", (experiment, sweep)),
+    ("Simulation", (experiment, sweep, tune)),
     ("Other programs", (ros2, ros2_robot_command, foxglove)),
     ("A robot of your own", (probe_command, firmware, ring_test_command)),
 ):

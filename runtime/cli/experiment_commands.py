@@ -1,4 +1,4 @@
-"""The commands that drive in simulation: `experiment` repeats the paper's experiments, `sweep` makes many runs."""
+"""The commands of many runs: `experiment` repeats the paper's, `sweep` compares settings, `tune` finds them."""
 
 from __future__ import annotations
 
@@ -138,12 +138,67 @@ def sweep(
     UserError
         There are no workers, or the options exclude one another.
     """
-    import os
-
     from runtime.cli.commands.sweep import run_sweep
+
+    return run_sweep(study, out=out, scheduler=scheduler, workers=_processes(workers, scheduler), retries=retries)
+
+
+def tune(
+    study: str,
+    /,
+    *,
+    out: str | None = None,
+    trials: Count = 60,
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
+    workers: Count | None = None,
+    retries: Count = 3,
+) -> int:
+    """Find better settings for your recordings or scenes, and write the changes as TOML; needs the extra `tune`.
+
+    What is gained is measured on recordings or seeds that the search has not used. A search that was stopped, in
+    whatever way, goes on when it is called again.
+
+    Parameters
+    ----------
+    study
+        Study file, or a folder of recordings.
+    out
+        Folder for the results: tuned.toml, report.html, trials.csv and a file for each run; by default NAME-tune.
+    trials
+        Combinations of settings to try.
+    scheduler
+        Address of a Dask scheduler, as in tcp://host:8786; by default, processes of this machine do the work.
+    workers
+        Processes on this machine; by default one for each processor.
+    retries
+        How often a run that ended without a result is tried again.
+
+    Raises
+    ------
+    UserError
+        There are no workers or trials, or the options exclude one another.
+    """
+    from runtime.cli.commands.tune import run_tune
+
+    if trials == 0:
+        raise UserError("--trials 0: must be at least 1", WRONG_CALL)
+    return run_tune(
+        study, out=out, trials=trials, scheduler=scheduler, workers=_processes(workers, scheduler), retries=retries
+    )
+
+
+def _processes(workers: int | None, scheduler: str | None) -> int:
+    """Return how many processes of this machine work.
+
+    Raises
+    ------
+    UserError
+        There are none, or a scheduler has its own.
+    """
+    import os
 
     if workers == 0:
         raise UserError("--workers 0: must be at least 1", WRONG_CALL)
     if workers is not None and scheduler is not None:
         raise UserError("--scheduler has workers of its own: leave out --workers", WRONG_CALL)
-    return run_sweep(study, out=out, scheduler=scheduler, workers=workers or os.cpu_count() or 1, retries=retries)
+    return workers or os.cpu_count() or 1

@@ -48,6 +48,11 @@ def test_the_documented_studies_load() -> None:
         ('scenes = ["clean"]\n' + VARY + VARY, "vary: one stands twice"),
         ('scenes = ["clean"]\n[[vary]]\nsetting = "a"\nvalues = [1, 1.0]', "values of a: one stands twice"),
         ('scenes = ["clean"]\nobjectives = ["speed"]', "objectives"),
+        ('scenes = ["clean"]\nobjectives = ["predicted_nat"]', "predicted_nat is for recordings"),
+        ('scenes = ["clean"]\n[[vary]]\nsetting = "a"', "either values or a range"),
+        ('scenes = ["clean"]\n' + VARY + "range = [1.0, 2.0]", "either values or a range"),
+        ('scenes = ["clean"]\n[[vary]]\nsetting = "a"\nrange = [2.0, 1.0]', "two numbers, the lesser first"),
+        ('scenes = ["clean"]\n[[vary]]\nsetting = "a"\nrange = [0.0, 1.0]\nlog = true', "a range above 0"),
     ],
 )
 def test_a_study_that_makes_no_sense_is_refused(text: str, problem: str) -> None:

@@ -1,4 +1,4 @@
-"""The figures of a study: how one result is paid for with another, and what each setting changes."""
+"""The figures of a study: how one result is paid for with another, what each setting changes, a search's course."""
 
 from __future__ import annotations
 
@@ -59,4 +59,26 @@ def effects_figure(effects: Sequence[tuple[str, Sequence[tuple[str, float]]]], o
     axes.set_yticks([row for row, _ in ticks], [text for _, text in ticks])
     axes.invert_yaxis()
     axes.set_xlabel(f"mean {objective}")
+    return figure
+
+
+def search_figure(trials: Points, best: Sequence[float]) -> Figure:
+    """Return the figure of a search: the cost of each trial.
+
+    Parameters
+    ----------
+    trials : sequence of (number, cost)
+        The trials, of which the first is that of the present settings.
+    best : sequence of float
+        The least cost up to each of them.
+    """
+    figure = Figure(figsize=(WIDTH_IN, 2.8), layout="constrained")
+    axes = figure.subplots()
+    numbers = [trial for trial, _ in trials]
+    axes.plot(*zip(*trials, strict=True), linestyle="", marker="o", markersize=4, color=MUTED, alpha=0.6,
+              label="trials", gid="trials")  # fmt: skip
+    axes.step(numbers, best, where="post", linewidth=1.4, color=ECHO, label="best so far", gid="best")
+    axes.plot(*trials[0], linestyle="", marker="s", markersize=7, color=SEGMENT, label="present", gid="present")
+    axes.set(xlabel="trial", ylabel="cost")
+    axes.legend()
     return figure

@@ -56,6 +56,9 @@ def run_sweep(name: str, *, out: str | None, scheduler: str | None, workers: int
     from runtime.batch.runs import expand
 
     study = load_study(name)
+    if (one := next((one for one in study.vary if one.range), None)) is not None:
+        raise UserError(f"{name}: {one.setting} has a range, in which `echolocate tune` searches: give values for a "
+                        "sweep", WRONG_CALL)  # fmt: skip
     runs = expand(study, Path(name).parent)
     for module, package in PACKAGES:
         require_package(module, package, EXTRA)
@@ -121,20 +124,30 @@ def make_runs(
         compile_kernels(left, console)
     workers = min(workers, len(left))
     with connected(scheduler, workers, folder / LOG) as pool, progress(console, "running", len(left)) as step:
-        say = progress_lines(console, len(left))
+        lines = ProgressLines(console, len(left), time.monotonic)
 
         def on_row(row: Row) -> None:
             with writing("--out", folder):
                 rows.write(row)
             step()
-            say()
+            lines.step()
 
         return dispatch(left, pool, on_row, retries)
 
 
-def compile_kernels(runs: Sequence[Run], console: Console) -> None:
-    """Compile what the runs need once, before several processes would do so at the same time."""
-    prepared: set[str] = set()
+def compile_kernels(runs: Sequence[Run], console: Console, prepared: set[str] | None = None) -> None:
+    """Compile what the runs need once, before several processes would do so at the same time.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        What will be run.
+    console : Console
+        For progress.
+    prepared : set of str, optional
+        The parts that are compiled already; more are added.
+    """
+    prepared = set() if prepared is None else prepared
     for text in {run.settings: None for run in runs}:
         settings = Settings.model_validate_json(text)
         parts = [part for part in needed_parts(settings) if part not in prepared]
@@ -143,8 +156,8 @@ def compile_kernels(runs: Sequence[Run], console: Console) -> None:
             prepared.update(parts)
 
 
-def progress_lines(console: Console, total: int, clock: Callable[[], float] = time.monotonic) -> Callable[[], None]:
-    """Return the function to call after each run; where there is no terminal it prints a line every minute.
+class ProgressLines:
+    """Progress where there is no terminal: a line every minute, with the time left.
 
     Parameters
     ----------
@@ -155,20 +168,26 @@ def progress_lines(console: Console, total: int, clock: Callable[[], float] = ti
     clock : callable
         Returns the time, s.
     """
-    started_s = clock()
-    done, said_s = 0, started_s
 
-    def step() -> None:
-        nonlocal done, said_s
-        done += 1
-        now_s = clock()
-        if console.is_terminal or now_s - said_s < LINE_PERIOD_S:
+    def __init__(self, console: Console, total: int, clock: Callable[[], float]) -> None:
+        self._console, self._total, self._clock = console, total, clock
+        self._started_s = self._said_s = clock()
+        self._done = self._skipped = 0
+
+    def skip(self, runs: int) -> None:
+        """Note runs that are finished already, which took no time."""
+        self._skipped += runs
+
+    def step(self) -> None:
+        """Note a run that was made."""
+        self._done += 1
+        now_s = self._clock()
+        if self._console.is_terminal or now_s - self._said_s < LINE_PERIOD_S:
             return
-        said_s = now_s
-        left_min = (now_s - started_s) / done * (total - done) / 60.0
-        console.print(f"{done} of {total} runs, {left_min:.0f} min left")
-
-    return step
+        self._said_s = now_s
+        done = self._done + self._skipped
+        left_min = (now_s - self._started_s) / self._done * max(0, self._total - done) / 60.0
+        self._console.print(f"{done} of {self._total} runs, {left_min:.0f} min left")
 
 
 def write_results(

@@ -13,6 +13,7 @@ from config.files import ConfigError
 from config.load import load_settings
 from config.settings import Settings
 from config.study import StudyConfig, VaryConfig
+from config.world import WorldConfig
 from runtime.batch.runs import expand
 
 ANGLE = "ring.beam_half_angle_deg"
@@ -64,11 +65,27 @@ def test_a_key_changes_with_everything_that_a_result_depends_on(tmp_path: Path) 
         study(scenes=[], worlds=["room"]),
         study(**recordings),
         study(**recordings, truth="hallway"),
+        study(**recordings, objectives=["predicted_nat"]),
     ]
     keys = [run.key for one in studies for run in expand(one, HERE)]
     (tmp_path / "log.csv").write_text("t,x,y,theta,r00\n0,0,0,0,2\n")
     keys += [run.key for run in expand(study(**recordings), HERE)]
-    assert len(set(keys)) == len(keys) == 10
+    assert len(set(keys)) == len(keys) == 11
+
+
+def test_each_recording_may_have_a_truth_of_its_own(tmp_path: Path) -> None:
+    for name in ("a", "sub/b"):
+        (tmp_path / "logs" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "truth" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "logs" / f"{name}.csv").write_text(f"t,x,y,theta,r00\n0,0,0,0,{len(name)}\n")
+        (tmp_path / "truth" / f"{name}.toml").write_text(f"[start]\nx_m = {len(name)}.0\n")
+    one = study(scenes=[], recordings="logs", truth="truth")
+    truths = {Path(run.subject).stem: run.truth or "" for run in expand(one, tmp_path)}
+    starts = {name: WorldConfig.model_validate_json(truth).start.x_m for name, truth in truths.items()}
+    assert starts == {"a": 1.0, "b": 5.0}
+    (tmp_path / "truth" / "a.toml").unlink()
+    with pytest.raises(ConfigError, match=r"a\.toml"):
+        expand(one, tmp_path)
 
 
 def test_paths_are_relative_to_the_study(tmp_path: Path) -> None:

@@ -174,8 +174,8 @@ def test_every_command_that_writes_a_file_is_tried() -> None:
         "--version",
         "--install-completion",
     }
-    own_guard = {"firmware", "sweep"}
-    """One keeps each file that was changed, the other takes a folder of its own: see test_firmware, test_sweep."""
+    own_guard = {"firmware", "sweep", "tune"}
+    """One keeps each file that was changed, the others take a folder of their own: see test_firmware, test_sweep."""
     assert {words[0] for words in CALLS.values()} == set(app) - writing_none - own_guard
 
 

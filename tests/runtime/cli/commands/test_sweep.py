@@ -15,7 +15,7 @@ from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.batch.dispatch import Done
 from runtime.batch.runs import Run
 from runtime.cli.app import run_command
-from runtime.cli.commands.sweep import progress_lines
+from runtime.cli.commands.sweep import ProgressLines
 from runtime.support.file_lock import file_lock
 
 STUDY = """
@@ -140,7 +140,8 @@ def test_a_missing_extra_is_one_line(
 
 def test_without_a_terminal_there_is_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:
     times = iter([0.0, 30.0, 70.0, 90.0, 131.0])
-    step = progress_lines(Console(force_terminal=False), 10, lambda: next(times))
+    lines = ProgressLines(Console(force_terminal=False), 12, lambda: next(times))
+    lines.skip(2)
     for _ in range(4):
-        step()
-    assert capsys.readouterr().out.splitlines() == ["2 of 10 runs, 5 min left", "4 of 10 runs, 3 min left"]
+        lines.step()
+    assert capsys.readouterr().out.splitlines() == ["4 of 12 runs, 5 min left", "6 of 12 runs, 3 min left"]
