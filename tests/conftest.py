@@ -13,9 +13,10 @@ generates new ones), and the settings of the user's terminal are removed.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from tests import promises  # noqa: E402
 from tests.compile_kernels import compile_all  # noqa: E402
 
 KERNEL_CACHE = use_kernel_cache()
+FREEZE, UNFREEZE = gc.freeze, gc.unfreeze
 
 TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
@@ -68,6 +70,17 @@ def slow_kernel_setting() -> str | None:
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--promises", metavar="PAGE", help="write the measurements, see tests/promises.py")
     parser.addoption("--screenshots", metavar="FOLDER", help="save the screenshots of browser tests there")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Let no collection of garbage visit what importing the tests makes: with a million objects each takes long."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -136,6 +149,25 @@ def _children_at_usual_priority(request: pytest.FixtureRequest, monkeypatch: pyt
     """Start children at the priority of the tests: at the low one, a few tests at a time leave them no processor."""
     if request.path.name != "test_child_process.py":
         monkeypatch.setattr(child_process, "LOW_PRIORITY", "runpy")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _tests_stay_frozen() -> Generator[None]:
+    """Keep the end of a drive from letting the tests themselves in again; see `pytest_collection`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gc, "freeze", lambda: None)
+        patch.setattr(gc, "unfreeze", lambda: None)
+        yield
+
+
+@pytest.fixture
+def may_freeze() -> Generator[None]:
+    """Let a test exclude objects from the collection of garbage, and let them in again."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gc, "freeze", FREEZE)
+        patch.setattr(gc, "unfreeze", UNFREEZE)
+        yield
+    FREEZE()
 
 
 @pytest.fixture

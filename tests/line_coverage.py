@@ -1,9 +1,9 @@
 """Which lines of the product the tests execute, measured by slipcover in the workers of pytest-xdist.
 
 With `LINE_COVERAGE=FOLDER` in the environment, each worker writes what it has seen to a file there, and
-`python -m slipcover --merge` adds the files up. Slipcover removes its probes from lines that it has seen, so tests
-run nearly as fast as without; a tracer doubles their time. The probes are byte code inside the functions. Numba would
-compile them, too, so files with kernels are measured only in a run that compiles none (`NUMBA_DISABLE_JIT=1`).
+`python -m slipcover --merge` adds the files up. Slipcover removes its probes from lines that it has seen often, so
+tests run nearly as fast as without; a tracer doubles their time. The probes are byte code inside the functions. Numba
+would compile them, too, so files with kernels are measured only in a run that compiles none (`NUMBA_DISABLE_JIT=1`).
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ ELSEWHERE: Final = (
     "runtime/bridges/ros2/robot_listener.py",
 )
 """What tests run in another Python, of which no probe reports: MicroPython, and that with ROS (`make ros2`)."""
+PASSES: Final = 5000
+"""How often a line is executed until the probes of all lines seen so far are removed. A probe costs 0.1 µs each time,
+removing them costs 0.1 s, because every function of the product is looked at."""
 KERNEL: Final = re.compile(r"^@(owning_)?kernel$", re.MULTILINE)
 
 
@@ -49,7 +52,9 @@ class LineCoverage:
         from slipcover import ImportManager, Slipcover  # only where lines are measured
 
         self._report = report
-        self._slipcover = Slipcover(source=[str(ROOT / package) for package in PRODUCT] if list_all else None)
+        self._slipcover = Slipcover(
+            source=[str(ROOT / package) for package in PRODUCT] if list_all else None, d_miss_threshold=PASSES
+        )
         ImportManager(self._slipcover, MeasuredFiles(with_kernels=with_kernels)).__enter__()
 
     def write(self) -> None:

@@ -202,6 +202,7 @@ async def test_cut_for_real_within_what_the_robot_says(tmp_path: Path, measured:
     measured(f"{len(CUTS)} cuts on a pty, within the robot's frames: an echo after each replug")
 
 
+@pytest.mark.usefixtures("may_freeze")
 @pytest.mark.promise("P5")
 async def test_unplugged_and_plugged_again_many_times(
     tmp_path: Path, measured: Callable[[str], None]
@@ -213,6 +214,7 @@ async def test_unplugged_and_plugged_again_many_times(
 
 
 @pytest.mark.soak
+@pytest.mark.usefixtures("may_freeze")
 @pytest.mark.promise("P5")
 async def test_twenty_thousand_times_unplugged_and_plugged_again(
     tmp_path: Path, measured: Callable[[str], None]

@@ -23,6 +23,9 @@ from typing import Any, Final, TypeVar, cast
 TIMEOUT_S: Final = 120.0
 """For what must come at once on any machine: only what hangs takes so long."""
 
+LOOK_S: Final = 0.03
+"""Between two looks at what is waited for: who looks more often takes the processor from it."""
+
 TRIALS: Final = 4
 
 STALL_S: Final = 0.1

@@ -11,12 +11,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 from drivers.messages import Flags
-from tests.hil.machine import TIMEOUT_S
+from tests.hil.machine import LOOK_S, TIMEOUT_S
 from tests.hil.truth import Truth
 
 ROOT = Path(__file__).parents[2]
@@ -35,7 +35,7 @@ def wait_for(done: Callable[[], bool], what: str, seen: Callable[[], object] = s
     end_s = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < end_s, f"it never came: {what}; {seen()}"
-        time.sleep(0.01)
+        time.sleep(LOOK_S)
 
 
 class Signalled(NamedTuple):
@@ -52,6 +52,8 @@ class Running:
     process: subprocess.Popen[bytes]
     folder: Path
     name: str
+    _log: list[dict[str, object]] = field(default_factory=list)
+    _offset: int = 0
 
     @property
     def out(self) -> str:
@@ -78,9 +80,16 @@ class Running:
         return code
 
     def events(self) -> list[dict[str, object]]:
-        """Return the lines of its log so far."""
+        """Return the lines of its log so far; each is read once, however often one looks."""
         log = self.folder / f"{self.name}.jsonl"
-        return [json.loads(line) for line in log.read_text("utf-8").split("\n")[:-1]] if log.exists() else []
+        if log.exists():
+            with log.open("rb") as file:
+                file.seek(self._offset)
+                data = file.read()
+            whole = data[: data.rfind(b"\n") + 1]
+            self._offset += len(whole)
+            self._log += [json.loads(line) for line in whole.splitlines()]
+        return self._log
 
     def modes(self) -> list[str]:
         """Return the modes it has noted in its log so far."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drivers.emulator.truth_trace import HEADER
 from drivers.messages import Flags
-from tests.hil.machine import TIMEOUT_S
+from tests.hil.machine import LOOK_S, TIMEOUT_S
 
 DRIVING_M_S = 0.2
 _OF = [HEADER.split(",").index(name) for name in ("t_s", "host_s", "v_m_s", "w_rad_s", "flags")]
@@ -75,7 +75,7 @@ class Truth:
         end_s = time.monotonic() + timeout_s
         while not ((rows := self.read()) and done(rows[-1])):
             assert time.monotonic() < end_s, f"it never came: {what}"
-            time.sleep(0.01)
+            time.sleep(LOOK_S)
         return rows[-1]
 
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import gc
 
+import pytest
+
 from runtime.timing.memory_policy import EVERY_CYCLES, OLD_EVERY_CYCLES, SLACK_MIN_S, MemoryPolicy
+
+pytestmark = pytest.mark.usefixtures("may_freeze")
 
 
 class Ring:
