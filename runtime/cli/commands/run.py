@@ -143,8 +143,6 @@ def run_robot(
         appended={"log.file": log_path(settings.log)},
     )  # fmt: skip
     preparation = begin_preparation(settings)
-    if preparation is None:
-        prepare_kernels(settings, console)
     log_status = LogStatus()
     with contextlib.ExitStack() as stack:
         for option, path in own_files.items():
@@ -172,6 +170,9 @@ def run_robot(
             async with contextlib.AsyncExitStack() as running:
                 running.enter_context(ending_the_start())  # until `signals` takes over
                 run_settings = settings
+                loading = None
+                if preparation is None:  # beside the start of the emulator, which takes as long
+                    loading = asyncio.create_task(asyncio.to_thread(prepare_kernels, settings, console))
                 control: TimeControl = NoTimeControl()
                 if isinstance(clock, ScaledClock):
                     arguments = emulator.arguments(config, sets, robot)
@@ -179,6 +180,8 @@ def run_robot(
                         start_emulator(arguments, clock, compiled=preparation is None)
                     )
                     run_settings = with_port(settings, emulator_port)
+                if loading is not None:
+                    await loading
                 return await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
