@@ -77,6 +77,6 @@ def noise(bad: int, what: str) -> str | None:
     if bad < _NOISE_MIN:
         return None
     return (
-        f"{bad} corrupt frames came in place of {what}: noise on the line, check its cable and shield, and that "
+        f"{bad} corrupt frames came in place of {what}; noise on the line: check its cable and shield, and that "
         f"nothing else sends on it"
     )

@@ -198,6 +198,12 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "it: the goal moves in odometry's frame by at most .2 m/s, the velocities follow without a step; "
             "while the place is unknown the robot stands and says so",
         ),
+        "P31": Promise(
+            "One true state, nothing lost, nothing to guess",
+            "the state bar names the robot's mode in every tab, in playback, in a pause, without data; every edit of "
+            "the map can be undone, a rejected object does not return; a run with an emulator names its program, not "
+            "cables; the first hour of docs/tutorial.md runs as it is written",
+        ),
         "P32": Promise(
             "A mission moves nothing by itself and never stands without a reason",
             "120 random missions with random edits, stops and faults, 60 cycles each (soak: 10⁴ of 200): no motion "

@@ -73,13 +73,9 @@ def robot(
     port
         Serial port of the robot, as /dev/ttyUSB0; by default a run names it.
     """
+    given = locals()  # the options by their names, as the questions have them
     from runtime.cli.commands.init_files import write_robot
 
-    given = {
-        "driver": driver, "name": name, "sensors": sensors, "ring_radius": ring_radius, "body_radius": body_radius,
-        "beam_half_angle": beam_half_angle, "range_min": range_min, "range_max": range_max, "resolution": resolution,
-        "speed_max": speed_max, "turn_max": turn_max, "synchro": synchro or None, "baud": baud, "port": port,
-    }  # fmt: skip
     return write_robot(file, given, yes=yes, force=force)
 
 
@@ -113,9 +109,9 @@ def world(
     surfaces
         How they reflect: cone (each point answers) or specular (as mirrors).
     """
+    given = locals()  # the options by their names, as the questions have them
     from runtime.cli.commands.init_files import write_world
 
-    given = {"width": width, "depth": depth, "drums": drums, "drum_radius": drum_radius, "surfaces": surfaces}
     return write_world(file, given, yes=yes, force=force)
 
 
@@ -149,9 +145,9 @@ def model(
     width
         Of a box, along its own y axis, m.
     """
+    given = locals()  # the options by their names, as the questions have them
     from runtime.cli.commands.init_files import write_model
 
-    given = {"name": name, "shape": shape, "radius": radius, "length": length, "width": width}
     return write_model(file, given, yes=yes, force=force)
 
 
@@ -182,8 +178,7 @@ def run_file(
     mission
         What to do once armed: a mission file or the name of a shipped one; - for none.
     """
+    given = locals()  # the options by their names, as the questions have them
     from runtime.cli.commands.init_files import write_run
 
-    return write_run(
-        file, {"robot": robot, "world": world, "models": models, "mission": mission}, yes=yes, force=force
-    )
+    return write_run(file, given, yes=yes, force=force)

@@ -28,10 +28,9 @@ from runtime.console.frames.session_info import session_info
 from runtime.console.http.auth import SCHEME, Auth, is_loopback, new_token, url_host
 from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import listen
-from runtime.console.http.report_tab import ReportTab
 from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
-from runtime.console.protocols import NOT_AVAILABLE, FileControl, RecordingControl, ReplayControl, Run
+from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run
 from runtime.console.timed_coroutine import timed_coroutine
 from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
 from runtime.cycle.inputs import Request
@@ -230,7 +229,6 @@ class Console:
             on_message=self.dispatcher.receive,
             on_leave=self._on_leave,
             on_fault=self._run.health.report,
-            report=ReportTab(self._report, self._clock),
             file_of=self._file_of,
             watch_without_token=self._config.watch_without_token,
             timed=self._run.timing_monitor.timed,
@@ -289,11 +287,6 @@ class Console:
             client.task.cancel()
         if self._commands.replay is not None:
             self._commands.replay.leave(client)
-
-    async def _report(self) -> bytes:
-        if self._commands.replay is None:
-            raise CommandError(f"report: {NOT_AVAILABLE}")
-        return await self._commands.replay.report()
 
     async def _file_of(self, path: str, job: str, name: str) -> Path | None:
         """Return the path of a recording, or of a file that a job made; None if there is none of this name."""

@@ -115,9 +115,6 @@ class ReplayControl(Protocol):
     def leave(self, viewer: Viewer) -> None:
         """End the recording shown to a disconnected client."""
 
-    async def report(self) -> bytes:
-        """Return the report of the run so far, as an HTML page."""
-
     async def close(self) -> None:
         """End all recordings that are shown."""
 

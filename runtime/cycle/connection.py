@@ -10,6 +10,7 @@ from config.errors import FAILED, UserError
 from drivers.driver import LineState, RobotDriver
 from drivers.link import Link
 from drivers.messages import Flags
+from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.step import STANDSTILL
 
 CONNECT_MAX_S: Final = 5.0
@@ -30,6 +31,7 @@ class Connection(NamedTuple):
     send: Callable[[], None]
     clock: Callable[[], float]
     """The run's clock, s."""
+    line_messages: LineMessages = ROBOT_LINE
 
     async def connect(self, is_stopping: Callable[[], bool]) -> None:
         """Open the port and wait until the robot is ready, or until the run is ending.
@@ -51,8 +53,11 @@ class Connection(NamedTuple):
             lost = None if link.is_open else link.last_error
             if run_s > deadline_run_s or lost is not None or driver.state is LineState.DOWN:
                 await link.stop()
-                no_answer = f"no robot answers on {link.config.port}: check its power and link.baud"
-                raise UserError(lost or driver.problem or no_answer, FAILED)
+                no_answer = f"no robot answers on {link.config.port}; check its power and link.baud"
+                text = lost or driver.problem or no_answer
+                raise UserError(
+                    self.line_messages.problem(LineState.CLOSED if lost else driver.state, text) or text, FAILED
+                )
             await asyncio.sleep(POLL_S)
 
     async def shut_down(self) -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
 from drivers.driver import LineState, Received, RobotDriver
 from perception.edits import Edit
 from runtime.cycle.drive_requests import DriveInput
+from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 
 GAP_SHARE: Final = 0.9
 """Largest time between two commands as a share of the base's deadman, which stops a base that waits longer."""
@@ -73,6 +74,7 @@ def gather_inputs(
     edits: tuple[Edit, ...] = (),
     drive_request: DriveInput | None = None,
     host_s: float | None = None,
+    line_messages: LineMessages = ROBOT_LINE,
 ) -> Inputs:
     """Return the inputs of a cycle, among them everything that the driver has received.
 
@@ -88,10 +90,15 @@ def gather_inputs(
         How long the oldest of the firings has waited.
     overrun, fault : str, optional
         Why the robot must not drive.
+    line_messages : LineMessages
+        Words the driver's messages for what is at the other end of the line.
     """
     driver.tick(run_s)
     gap_max_s = command_gap_max_s(driver)
-    line, line_problem, received = driver.state, driver.problem, driver.take_received()
+    line, received = driver.state, driver.take_received()
+    line_problem = line_messages.problem(line, driver.problem)
+    if received.notes:
+        received = replace(received, notes=tuple(map(line_messages.message, received.notes)))
     return Inputs(
         run_s,
         line,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.settings import Settings
-from drivers.driver import RobotDriver
+from drivers.driver import LineState, RobotDriver
 from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
@@ -24,6 +24,7 @@ from runtime.cycle.connection import Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
+from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.mode_log import ModeLog
 from runtime.cycle.modes import Mode, ModeState
@@ -94,6 +95,8 @@ class RobotProcess:
         Reports to the service manager that started this process, if one did.
     preparation : Preparation, optional
         Prepares recognition beside the first cycles; None if it is ready.
+    line_messages : LineMessages
+        Words messages about the line for what is at its other end.
 
     Attributes
     ----------
@@ -111,7 +114,9 @@ class RobotProcess:
         clock: Callable[[], float] = time.monotonic,
         notifier: SdNotifier | None = None,
         preparation: Preparation | None = None,
+        line_messages: LineMessages = ROBOT_LINE,
     ) -> None:
+        self._line_messages = line_messages
         self.live_settings = LiveSettings(settings)
         self._settings = settings
         """Those of the cycle in progress."""
@@ -130,7 +135,7 @@ class RobotProcess:
             settings.link, on_opened, on_data, timed(LINE_LOST, self._on_closed), **line_options(settings)
         )
         self._clock.on_change(self._link.release)
-        self._connection = Connection(self._link, self._driver, self._send, self._clock)
+        self._connection = Connection(self._link, self._driver, self._send, self._clock, line_messages)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
         self._mode_log = ModeLog(log, self._notifier)
         self._alerts = Alerts()
@@ -223,13 +228,9 @@ class RobotProcess:
                 self._scheduler.close()
                 await self._shut_down(link_task)
         return run_summary(
-            self._state,
-            self._scheduler.stats,
-            self.timing_monitor,
-            self._driver,
-            process_row,
+            self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row,
             self._mode_log.stop_reasons,
-        )
+        )  # fmt: skip
 
     async def _prepare(self, preparation: Preparation) -> None:
         """Run cycles without perception until recognition is ready; it begins with an empty map."""
@@ -296,16 +297,10 @@ class RobotProcess:
         self._request = None
         edits, self._edits = tuple(self._edits[:EDITS_PER_CYCLE]), self._edits[EDITS_PER_CYCLE:]
         return gather_inputs(
-            self._driver,
-            run_s,
-            request,
-            echo_age_s=echo_age_s,
-            overrun=self._scheduler.overrun,
-            fault=self.health.fault(),
-            edits=edits,
-            drive_request=self._drive_inputs.take(),
-            host_s=host_s,
-        )
+            self._driver, run_s, request, echo_age_s=echo_age_s, overrun=self._scheduler.overrun,
+            fault=self.health.fault(), edits=edits, drive_request=self._drive_inputs.take(), host_s=host_s,
+            line_messages=self._line_messages,
+        )  # fmt: skip
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:
         """Run the pure step with this process's line and clock."""
@@ -384,7 +379,7 @@ class RobotProcess:
     def _on_closed(self, reason: str) -> None:
         self._driver.line_closed()
         if not self._stop.is_set():
-            self._log.warning("line lost", reason=reason)
+            self._log.warning("line lost", reason=self._line_messages.problem(LineState.CLOSED, reason))
 
     async def _shut_down(self, link_task: asyncio.Task[None]) -> None:
         """Halt the base and wait until it has stopped; then close the line."""
@@ -393,6 +388,7 @@ class RobotProcess:
         self.health.begin_shutdown()
         self._notifier.stopping()
         if not await self._connection.shut_down():
-            self._log.warning("the base did not confirm the halt: if it moves, stop it by its emergency switch")
+            unconfirmed = "the base did not confirm the halt; if it moves, stop it by its emergency switch"
+            self._log.warning(self._line_messages.message(unconfirmed))
         link_task.cancel()
         await asyncio.gather(link_task, return_exceptions=True)

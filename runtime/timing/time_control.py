@@ -113,6 +113,10 @@ class EmulatorTimeControl:
         """Speed of time while it is not paused: 1 is real time."""
         return self.clock.factor
 
+    def has_ended(self) -> bool:
+        """Return whether the emulator has ended."""
+        return self._problem == ENDED
+
     async def pause(self) -> str | None:
         """Pause the time of robot and run."""
         async with self._lock:

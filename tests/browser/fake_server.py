@@ -193,11 +193,6 @@ class FakeServer:
     async def file(self, request: web.Request) -> web.StreamResponse:
         return _file(PAGE / request.match_info["file"])
 
-    async def report(self, request: web.Request) -> web.StreamResponse:
-        self.received.append({"type": "GET /report", "id": 0, "token": request.query.get("token")})
-        self._changed.set()
-        return web.Response(text="<!doctype html><title>report</title><h1>Report</h1>", content_type="text/html")
-
     async def talk(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
             self.connections += 1
@@ -355,7 +350,7 @@ async def serving(hall: Hall) -> AsyncIterator[FakeServer]:
     app = web.Application()
     app.add_routes([
         web.get("/", server.index), web.get("/page/{file}", server.file),
-        web.get("/ws", server.talk), web.get("/report", server.report),
+        web.get("/ws", server.talk),
     ])  # fmt: skip
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
     await runner.setup()

@@ -49,6 +49,7 @@ async def test_a_command_carries_the_newest_challenge(server: FakeServer, opener
     assert server.of("arm")[0]["challenge"] == newest, "to the last bit"
 
 
+@pytest.mark.promise("P31")
 async def test_old_data_are_reported_as_old(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.run_for(1000)

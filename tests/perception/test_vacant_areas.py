@@ -64,6 +64,7 @@ def test_areas_are_bounded() -> None:
     assert radius_of(0.8) == 0.8
 
 
+@pytest.mark.promise("P31")
 @pytest.mark.compiled
 def test_a_rejected_object_does_not_return_until_its_area_is_lifted(seen: Perception, firings: list[Firing]) -> None:
     """The issue's case: it was back after 4 s under another number."""

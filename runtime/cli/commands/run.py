@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
+    from runtime.cycle.line_messages import LineMessages
     from runtime.cycle.process import OnCycle, RobotProcess
     from runtime.cycle.reloader import Reloader
     from runtime.cycle.step import CycleRecord, State
@@ -164,6 +165,7 @@ def run_robot(
             log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
 
         async def run() -> RunSummary:
+            from runtime.cycle.line_messages import ProgramLine, messages_on
             from runtime.simulation.emulator_process import start_emulator
             from runtime.timing.time_control import NoTimeControl
 
@@ -174,18 +176,20 @@ def run_robot(
                 if preparation is None:  # beside the start of the emulator, which takes as long
                     loading = asyncio.create_task(asyncio.to_thread(prepare_kernels, settings, console))
                 control: TimeControl = NoTimeControl()
+                line_messages = messages_on(port)
                 if isinstance(clock, ScaledClock):
                     arguments = emulator.arguments(config, sets, robot)
-                    emulator_port, control = await running.enter_async_context(
+                    emulated = await running.enter_async_context(
                         start_emulator(arguments, clock, compiled=preparation is None)
                     )
-                    run_settings = with_port(settings, emulator_port)
+                    run_settings, control = with_port(settings, emulated.port), emulated.control
+                    line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
                 if loading is not None:
                     await loading
                 return await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
-                    foxglove=foxglove, emulated=port is None, preparation=preparation,
+                    foxglove=foxglove, emulated=port is None, preparation=preparation, line_messages=line_messages,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
                         robot=robot, map_file=map_file, mission=mission, goal=goal, no_console=no_console,
@@ -234,6 +238,7 @@ async def run_process(
     foxglove: bool,
     emulated: bool,
     preparation: KernelPreparation | None,
+    line_messages: LineMessages,
     reload: Callable[[], Settings],
 ) -> RunSummary:
     """Run the robot's process with live view, console, signals and keys; return the summary of the run.
@@ -262,6 +267,8 @@ async def run_process(
         Whether the robot is emulated.
     preparation : KernelPreparation, optional
         Prepares recognition beside the run; None if it is ready.
+    line_messages : LineMessages
+        About the line.
     reload : callable
         Reads the settings again.
     """
@@ -281,7 +288,13 @@ async def run_process(
 
         observers = recording.observers(on_cycle, log)
         process = RobotProcess(
-            settings, log, observers, clock, stack.enter_context(SdNotifier.from_environment()), preparation
+            settings,
+            log,
+            observers,
+            clock,
+            stack.enter_context(SdNotifier.from_environment()),
+            preparation,
+            line_messages,
         )
         if preparation is not None:
             stack.push_async_callback(preparation.close)

@@ -61,7 +61,7 @@ async def serve_console(
         return None if recording.now is None else recording.now.file
 
     folder, jobs = recordings_folder(settings.recording), Jobs(units)
-    replays = ReplayClient(folder, REPLAY_PROGRAM, current_file, units)
+    replays = ReplayClient(folder, REPLAY_PROGRAM, current_file)
     console = Console(
         process, log, prepare, emulated=emulated, units=units, time=control, recording=recording, replay=replays,
         files=RecordingFiles(folder, current_file, jobs),

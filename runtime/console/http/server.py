@@ -1,4 +1,4 @@
-"""The console's web server: the page's files, the report, the log, and the websocket of each client.
+"""The console's web server: the page's files, the log, recordings, what is made of them, and each client's websocket.
 
 A request carries nothing but its path and its token: the server takes no forms and no uploads. Each response closes
 its connection; only websockets stay open.
@@ -20,13 +20,11 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from drivers.token_bucket import TokenBucket
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
-from runtime.console.commands.command_error import CommandError
 from runtime.console.http.auth import Auth
 from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import BACKLOG, ConnectionLimiter
 from runtime.console.http.downloads import send_file
 from runtime.console.http.log_forwarder import LogForwarder
-from runtime.console.http.report_tab import AGAIN_S, ReportTab
 from runtime.console.http.static_files import StaticFile, security_headers
 from runtime.console.timed_coroutine import Timed, timed_coroutine
 from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
@@ -69,8 +67,6 @@ class ServerContext:
     on_leave: Callable[[Client], None]
     on_fault: Callable[[str, BaseException], None]
     """Gets the name of a part and the unexpected error in it."""
-    report: ReportTab
-    """Of the run so far."""
     file_of: Callable[[str, str, str], Awaitable[Path | None]]
     """Returns the path of the file that a request of `DOWNLOADS` means: its path, job and name."""
     watch_without_token: bool
@@ -153,7 +149,6 @@ class Server:
                 await asyncio.gather(*closing, return_exceptions=True)
         for client in list(self._websockets):
             client.disconnect()
-        await self._context.report.close()
         if self._web is not None:
             await self._web.shutdown(CLOSE_MAX_S)
 
@@ -191,20 +186,13 @@ class Server:
         if path in context.files:
             file = context.files[path]
             return web.Response(body=file.body, headers={"Content-Type": file.content_type})
-        if path not in {"/report", "/log", *DOWNLOADS}:
+        if path not in {"/log", *DOWNLOADS}:
             return web.Response(status=404, text="there is no such page")
         if not self._has_token(request):
             return self._refuse(request, HTTPStatus.FORBIDDEN, WRONG_TOKEN)
         if path in DOWNLOADS:
             return await self._download(request, host)
-        if path == "/log":
-            return web.Response(body=context.hub.log_lines, content_type="application/x-ndjson")
-        try:
-            status, page = await context.report.answer(wait="wait" in request.query)
-        except CommandError as error:
-            return web.Response(status=HTTPStatus.CONFLICT, text=str(error))
-        again = {"Refresh": str(AGAIN_S)} if status == HTTPStatus.ACCEPTED else None
-        return web.Response(status=status, body=page, content_type="text/html", charset="utf-8", headers=again)
+        return web.Response(body=context.hub.log_lines, content_type="application/x-ndjson")
 
     async def _download(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
         """Send a recording, or a file that a job made."""

@@ -27,7 +27,7 @@ export class Files {
   #recording = undefined;
   #shown = "";
 
-  constructor({ run, connection, notifications, address, play }) {
+  constructor({ run, connection, notifications, address, play, showFiles }) {
     Object.assign(this, { run, connection, notifications, address, play });
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("files-again", () => this.list(notifications.showError));
@@ -36,7 +36,8 @@ export class Files {
     on("file-map", () => this.make("map", this.#chosen));
     on("file-pin", () => this.#change({ type: "pin_recording", file: this.#chosen, pinned: !this.#row.pinned }));
     on("file-delete", () => this.#delete());
-    on("map-make", () => this.#makeOfRun());
+    on("map-make", () => this.#makeOfRun("map"));
+    on("report", () => void this.#makeOfRun("report").then((started) => started && showFiles()));
     byId("file-rename").addEventListener("submit", (event) => this.#rename(event));
     connection.on("job", (job) => this.#follow(job));
     connection.on("opening", ({ share }) => setText(byId("file-opening"), `Opening: ${Math.round(100 * share)} %`));
@@ -152,11 +153,13 @@ export class Files {
     return this.connection.request({ type: "make_files", kind, file }).catch(this.notifications.showError);
   }
 
-  async #makeOfRun() {
+  // Returns whether there is a recording of this run.
+  async #makeOfRun(kind) {
     await this.list(this.notifications.showError);
     const live = this.#rows.find((row) => row.live);
-    if (live) await this.make("map", live.file);
-    else this.notifications.toast("This run is not being recorded, and its map is made from the recording: press Record in the tab Time");
+    if (live) await this.make(kind, live.file);
+    else this.notifications.toast(`This run is not being recorded, and its ${kind} is made from the recording: press Record in the tab Time`);
+    return live !== undefined;
   }
 
   #follow(job, { quiet = false } = {}) {

@@ -109,7 +109,7 @@ const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: 
 const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot" });
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
-const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")) });
+const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
 new RobotForm({ run, connection, notifications });
 new MapFile({ run, units, connection, notifications, tools });
 tabs = new Tabs((name) => {
@@ -225,7 +225,6 @@ connection.on("evidence", (message) => objects.showEvidence(message));
 connection.on("parameters", (message) => parameters.show(message.parameters));
 connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
-byId("report").href = `/report${query}`;
 byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings the segments back, and vacant areas stay."), [
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -23,20 +22,18 @@ from runtime.console.playback.replay_worker import ANSWER, HEADER, PROGRESS, SPE
 from runtime.console.protocols import Viewer
 from runtime.recording.folder_files import describe_recordings
 from runtime.recording.storage import find_recording
-from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
-from runtime.support.length_format import Units
+from runtime.support.child_process import kill_child, start_child
 
 WORKERS_MAX: Final = 3
 """Recordings open at a time: each worker holds the whole of perception in memory."""
 OPEN_MAX_S: Final = 30.0
 """Longest time without progress while a recording is indexed."""
-REPORT_MAX_S: Final = 300.0
 STEP_MAX: Final = 100_000
 """Cycles of one step: more than an hour of a run."""
 
 
 class ReplayError(CommandError):
-    """A recording cannot be listed, opened or played, or its report cannot be made."""
+    """A recording cannot be listed, opened or played."""
 
 
 class ReplayProcess:
@@ -143,7 +140,7 @@ class ReplayProcess:
 
 
 class ReplayClient:
-    """The recordings that clients watch, and the report of the run so far.
+    """The recordings that clients watch.
 
     Parameters
     ----------
@@ -153,20 +150,16 @@ class ReplayClient:
         The module of the worker process: it calls `replay_worker.run_worker`.
     current : callable
         Returns the file of the recording in progress, None while nothing is recorded.
-    units : {"m", "ft"}
-        Of the report.
     """
 
-    def __init__(self, folder: Path, program: str, current: Callable[[], str | None], units: Units = "m") -> None:
+    def __init__(self, folder: Path, program: str, current: Callable[[], str | None]) -> None:
         self._folder = folder
         self._program = program
         self._current = current
-        self._units: Units = units
         self._open: dict[int, ReplayProcess] = {}
         self._workers = 0
         """Processes that run, from before their start until after their end."""
         self._closing: set[asyncio.Task[None]] = set()
-        self._report_lock = asyncio.Lock()
 
     async def recordings(self) -> list[dict[str, Any]]:
         """Return the recordings that can be opened, newest first; `live` marks the one in progress."""
@@ -282,24 +275,6 @@ class ReplayClient:
         replays, self._open = list(self._open.values()), {}
         await asyncio.gather(*(self._end(replay) for replay in replays), *self._closing, return_exceptions=True)
 
-    async def report(self) -> bytes:
-        """Return the report of the run so far as an HTML page, made from the recording in progress.
-
-        Raises
-        ------
-        ReplayError
-            The run is not being recorded, another report is in progress, or it cannot be made.
-        """
-        current = self._current()
-        if current is None:
-            raise ReplayError(
-                "this run is not being recorded, and a report is made from its recording: start recording"
-            )
-        if self._report_lock.locked():
-            raise ReplayError("a report is in progress: wait for it")
-        async with self._report_lock:
-            return await make_report(Path(current), self._units)
-
     def _replay_of(self, viewer: Viewer) -> ReplayProcess:
         replay = self._open.get(id(viewer))
         if replay is None:
@@ -315,43 +290,6 @@ class ReplayClient:
             await replay.close()
         finally:
             self._workers -= 1
-
-
-async def make_report(file: Path, units: Units, timeout_s: float = REPORT_MAX_S) -> bytes:
-    """Return the report of a recording as an HTML page, made by a child process.
-
-    Parameters
-    ----------
-    file : Path
-        The recording; it may be in progress.
-    units : {"m", "ft"}
-        Of the report.
-    timeout_s : float
-        The child process is ended after this time.
-
-    Raises
-    ------
-    ReplayError
-        It cannot be made, or not in time.
-    """
-    with tempfile.TemporaryDirectory(prefix="echolocate-") as folder:
-        target = Path(folder) / f"{file.stem}.html"
-        process = await start_child(
-            ECHOLOCATE, ["report", str(file), "--out", str(target), "--units", units], pipes=False, low_priority=True
-        )
-        try:
-            async with asyncio.timeout(timeout_s):
-                _, output = await process.communicate()
-        except TimeoutError:
-            raise ReplayError(
-                f"the report was not done within {timeout_s:.0f} s: make it later with `echolocate report {file}`"
-            ) from None
-        finally:
-            await kill_child(process)
-        if process.returncode:
-            reason = _last_line(output).removeprefix("echolocate: ") or "its process ended"
-            raise ReplayError(f"cannot make the report: {reason}")
-        return await asyncio.to_thread(target.read_bytes)
 
 
 def _forward(viewer: Viewer, frame: EncodedFrame) -> None:

@@ -179,7 +179,7 @@ def test_noise_instead_of_an_answer_points_at_the_baud_rate() -> None:
 
 
 @pytest.mark.parametrize(
-    ("broken", "message"), [(1, "nothing received for 0.41 s"), (9, "9 corrupt frames came in place of it: noise")]
+    ("broken", "message"), [(1, "nothing received for 0.41 s"), (9, "9 corrupt frames came in place of it; noise")]
 )
 def test_noise_in_place_of_odometry_is_named_and_one_broken_frame_is_not(
     harness: DriverHarness, broken: int, message: str
@@ -196,7 +196,7 @@ def test_noise_in_place_of_echoes_is_named_once_they_are_overdue(harness: Driver
         harness.robot.receive(b"\x9f\x33\0" * (k % 2), harness.now)
         harness.pass_time(0.02)
         assert harness.robot.problem is None or k > 20
-    assert "corrupt frames came in place of its echoes: noise" in (harness.robot.problem or "")
+    assert "corrupt frames came in place of its echoes; noise" in (harness.robot.problem or "")
     harness.send(Echo(0, 29 * PERIOD_US, 0, 1, (10,)))
     assert harness.robot.problem is None
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 from pathlib import Path
 
+import pytest
 from playwright._impl._driver import compute_driver_executable
 
 from runtime import console as page_folder
@@ -14,6 +15,7 @@ from runtime.cli.terminal import page_text
 from runtime.support.length_format import Units
 
 
+@pytest.mark.promise("P31")
 def test_the_forms_are_those_of_the_page() -> None:
     """Node runs the page's own code over the same values."""
     node, _ = compute_driver_executable()  # the one that drives the browser in tests

@@ -100,6 +100,7 @@ BUSY = replace(
 )  # fmt: skip
 
 
+@pytest.mark.promise("P31")
 @pytest.mark.parametrize("size", [(80, 24), (120, 40), (200, 60), (40, 16), (100, 10)])
 def test_what_a_person_needs_fits_the_terminal(size: tuple[int, int]) -> None:
     width, height = size

@@ -83,11 +83,6 @@ class StubControl:
     def leave(self, viewer: Viewer) -> None:
         self.left.append(viewer)
 
-    async def report(self) -> bytes:
-        if self.refusal is not None:
-            raise CommandError(self.refusal)
-        return b"<h1>report</h1>"
-
     async def close(self) -> None:
         self.calls.append("close")
 
@@ -148,9 +143,4 @@ async def test_a_recording_is_shown_only_to_the_client_that_opened_it() -> None:
         await page.ask(type="close_recording")
         case.cycles()
         assert (await page.next("state"))["segments"]["whole"]
-        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert await answer.text() == "<h1>report</h1>"
-        stub.refusal = "nothing is being recorded"
-        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert (answer.status, await answer.text()) == (409, stub.refusal)
     assert stub.calls[-1] == "close"

@@ -54,6 +54,7 @@ def state_of(perception: Perception) -> dict[str, Any]:
     }
 
 
+@pytest.mark.promise("P31")
 @pytest.mark.parametrize(
     "edit",
     [DeleteSegments((1, 2, 5)), PinSegments((2, 7), pinned=True), PinSegments((2, 7), pinned=False),

@@ -95,7 +95,7 @@ async def test_localhost_is_accepted() -> None:
 async def test_a_wrong_or_missing_token_is_refused(token: str | None) -> None:
     async with open_console() as case:
         assert await refused(case, token=token) == (403, "a wrong token, or none")
-        for path in ("/log", "/report", "/ws"):
+        for path in ("/log", "/recording", "/made", "/ws"):
             async with case.session.get(case.url.with_path(path).with_query({"token": token or ""})) as answer:
                 assert answer.status == 403
 
@@ -138,8 +138,6 @@ async def test_only_the_log_has_the_token() -> None:
         async with case.session.get(case.url.with_path("/log", keep_query=True)) as answer:
             assert answer.status == 200
             assert orjson.loads(await answer.read())["fields"] == {"port": "/dev/x"}
-        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert answer.status == 409
         async with case.session.get(case.url.with_path("/ws", keep_query=True)) as answer:
             assert answer.status == 426
 

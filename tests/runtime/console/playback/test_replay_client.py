@@ -16,7 +16,7 @@ import pytest
 
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
-from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, make_report
+from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError
 from runtime.console.playback.replay_worker import ANSWER, HEADER
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
@@ -242,27 +242,6 @@ def test_only_files_of_the_folder_are_recordings(folder: Path, tmp_path: Path) -
     assert [one.file for one in list_recordings(folder)] == ["broken.mcap", "hall.mcap"]
     assert find_recording(folder, "hall.mcap") == folder / "hall.mcap"
     assert find_recording(folder, "../hall.mcap") is None
-
-
-async def test_the_report_of_a_run_in_progress(folder: Path, tmp_path: Path) -> None:
-    whole = (folder / "hall.mcap").read_bytes()
-    cut = tmp_path / "cut.mcap"
-    cut.write_bytes(whole[: int(0.7 * len(whole))])
-    async with replay_client(folder, str(cut)) as client:
-        first = asyncio.create_task(client.report())
-        await asyncio.sleep(0)
-        with pytest.raises(ReplayError, match="in progress"):
-            await client.report()
-        page = (await first).decode()
-        assert page.startswith("<!doctype html>")
-        assert "<h2>Figures</h2>" in page
-    async with replay_client(folder) as client:
-        with pytest.raises(ReplayError, match="not being recorded"):
-            await client.report()
-    with pytest.raises(ReplayError, match=r"broken\.mcap: holds no readable message"):
-        await make_report(folder / "broken.mcap", "m")
-    with pytest.raises(ReplayError, match="not done within"):
-        await make_report(cut, "m", timeout_s=0.01)
 
 
 async def test_a_child_process_is_ended_at_once() -> None:

@@ -1,0 +1,92 @@
+"""Messages about a line whose other end is a program: it has no cable, no power switch and no emergency switch.
+
+Drivers write their messages for a robot: what happened; likely cause: next action. What happened is true of an
+emulated robot too. Cause and action are not where they name hardware, and are replaced here by the program's.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from drivers.driver import LineState
+
+HARDWARE: Final = re.compile(r"\b(cable|power|plug|plugged|unplugged|restart the robot|emergency switch)\b")
+"""What the other end lacks if it is a program."""
+
+PSEUDO_TERMINALS: Final = "/dev/pts/"
+
+
+class LineMessages(Protocol):
+    """Words messages about the line of a run."""
+
+    def message(self, text: str) -> str:
+        """Return a driver's or a line's message with the cause and the action that fit."""
+
+    def problem(self, state: LineState, text: str | None) -> str | None:
+        """Return why the line is not ready, None where nothing is known; `text` is the driver's reason."""
+
+
+class RobotLine:
+    """Leaves messages about the line to a robot as the driver has them."""
+
+    def message(self, text: str) -> str:
+        """Return the message as it is."""
+        return text
+
+    def problem(self, _state: LineState, text: str | None) -> str | None:
+        """Return the driver's reason as it is."""
+        return text
+
+
+ROBOT_LINE: Final = RobotLine()
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramLine:
+    """Words messages about a line to a program.
+
+    Parameters
+    ----------
+    program : str
+        What it is, as a user knows it.
+    action : str
+        What to do if it has ended.
+    has_ended : callable
+        Returns whether it is known to have ended.
+    """
+
+    program: str
+    action: str
+    has_ended: Callable[[], bool] = lambda: False
+
+    def message(self, text: str) -> str:
+        """Return the message; where it names hardware, cause and action are the program's."""
+        what, _, rest = text.partition("; ")
+        return f"{what}; {self._cause(is_closed=False)}" if HARDWARE.search(rest) else text
+
+    def problem(self, state: LineState, text: str | None) -> str | None:
+        """Return why the line is not ready."""
+        if state is LineState.CLOSED and (text is None or HARDWARE.search(text)):
+            return f"the line to {self.program} is closed; {self._cause(is_closed=True)}"
+        return None if text is None else self.message(text)
+
+    def _cause(self, *, is_closed: bool) -> str:
+        if self.has_ended():
+            return f"{self.program} has ended: {self.action}"
+        if is_closed:
+            return f"{self.program} has ended, or its faults file cuts the line: {self.action} if it does not return"
+        return (
+            f"{self.program} is stopped or late, likely because the machine is overloaded, or its faults file asks "
+            f"for this: end other programs, then re-arm"
+        )
+
+
+def messages_on(port: str | None) -> LineMessages:
+    """Return what words messages about the line at a port; behind a pseudo-terminal is a program, as an emulator."""
+    if port is None or not os.path.realpath(port).startswith(PSEUDO_TERMINALS):
+        return ROBOT_LINE
+    return ProgramLine(f"the program at the other end of {port}", "start it again")
