@@ -182,6 +182,8 @@ class Arc:
     """None if it heard no echo."""
     nats: float
     """Log likelihood ratio of the object against an echo of something else; negative: evidence against it."""
+    listener: tuple[float, float] | None = None
+    """Place of the sensor that heard it, m, where another one fired; `range_m` is half the way then."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,12 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig
-from drivers.messages import Firing
+from drivers.messages import CrossPaths, Firing
 from perception.kernel import Floats, Ints
 from perception.records import records, zeros
 from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
 from perception.sensor_mounts import mounts_array
-from perception.sensor_report import SensorReport, describe_fault
+from perception.sensor_report import SILENT, SensorReport, describe_fault
 from perception.sensor_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
@@ -145,10 +145,20 @@ class SensorMonitor:
             self._ring_records, self._sets, trusted, possible,
         )  # fmt: skip
         self.changes += changed & FAULTS_CHANGED
+        if firing.cross_paths is not None:
+            firing = replace(firing, cross_paths=self._between_sound(firing.cross_paths))
         return (
             _with_ranges(firing, trusted) if changed & LESS_TRUSTED else firing,
             _with_ranges(firing, possible) if changed & LESS_POSSIBLE else firing,
         )
+
+    def _between_sound(self, heard: CrossPaths) -> CrossPaths:
+        """Return the cross paths without those of sensors that have a fault; what a silent one hears is real."""
+        faulty = (self._sensors["faults"] & ~SILENT) != 0
+        sound = ~(faulty[heard.transmitters] | faulty[heard.listeners])
+        if sound.all():
+            return heard
+        return CrossPaths(heard.transmitters[sound], heard.listeners[sound], heard.half_paths_m[sound])
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""

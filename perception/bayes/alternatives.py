@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.cross_path import circle_error
 from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.parameters import FIT_SOFTNESS
@@ -43,7 +44,7 @@ def bearing_sum(
         dx = cx - q.x
         dy = cy - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        if abs(q.range_m - (d - radius)) < gate and d > 0.0:
+        if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
             sx += dx / d
             sy += dy / d
             count += 1

@@ -1,7 +1,7 @@
 """Tracks as archived records: everything but the readings as it is, and of the readings the newest of each bearing.
 
 A track takes up to 30 kB, nearly all of it readings; an archived record takes less than 1.8 kB. Readings are kept in
-single precision about the object's centre, which is exact to a micrometre.
+single precision about the object's centre, which is exact to a micrometre. Cross paths are not kept.
 """
 
 from __future__ import annotations
@@ -74,10 +74,11 @@ def unpack(row: NDArray[Any], track: NDArray[Any]) -> None:
     readings["x"][b, in_bin], readings["y"][b, in_bin] = row["x"] + kept[:, 0], row["y"] + kept[:, 1]
     readings["axis_x"][b, in_bin], readings["axis_y"][b, in_bin] = np.cos(kept[:, 2]), np.sin(kept[:, 2])
     readings["range_m"][b, in_bin] = kept[:, 3]
+    readings["listener_x"][b, in_bin] = readings["listener_y"][b, in_bin] = 0.0
 
 
 def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:
-    """Return the newest reading of each bearing bin, then the second newest of each, and so on: (≤ 48,) `Reading`.
+    """Return the newest echo of each bearing bin, then the second newest of each, and so on: (≤ 48,) `Reading`.
 
     Parameters
     ----------
@@ -87,9 +88,9 @@ def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:
     counts, capacity = bins["count"], bins["readings"].shape[1]
     rank = np.arange(capacity)[:, None]
     ranks, which = np.nonzero(rank < counts)
-    ranks, which = ranks[:READINGS_KEPT], which[:READINGS_KEPT]
     found: NDArray[Any] = bins["readings"][which, (counts[which] - 1 - ranks) % capacity]
-    return found
+    echoes: NDArray[Any] = found[(found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)]
+    return echoes[:READINGS_KEPT]
 
 
 def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:

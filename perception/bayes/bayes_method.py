@@ -31,7 +31,7 @@ from perception.bayes.object_report import (
     polygon_object,
     rival_label,
 )
-from perception.bayes.observe import associate, observe
+from perception.bayes.observe import associate, hear_crosses, observe
 from perception.bayes.pinned_segments import Pins
 from perception.bayes.polygon_association import associate_polygons
 from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
@@ -128,6 +128,13 @@ class BayesPerception:
             firing.ranges_m,
         )  # fmt: skip
         self._readings = readings
+        heard = firing.cross_paths
+        if heard is not None:
+            # Not in the kernel: where no sensor listens, it need not be compiled.
+            hear_crosses(
+                s, tracks, settings, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), readings,
+                heard.transmitters, heard.listeners, heard.half_paths_m,
+            )  # fmt: skip
         if len(self._outlines) > 0:
             # Not in the kernel: where all models are round, it need not be compiled.
             associate_polygons(s, tracks, settings, readings)

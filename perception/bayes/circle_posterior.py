@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.cross_path import is_crossed, over_circle
 from perception.bayes.elements import GRID_CELLS, Reading
 from perception.bayes.likelihood import level_of
 from perception.bayes.parameters import (
@@ -60,10 +61,15 @@ def linearise(
         dy = y - q.y
         d = math.sqrt(dx * dx + dy * dy)
         e = q.range_m - (d - radius)
+        ux = uy = 0.0
+        if is_crossed(q):
+            half, ux, uy = over_circle(q, dx, dy, radius)
+            e = q.range_m - half
         if abs(e) > gate or d == 0.0 or dx * q.axis_x + dy * q.axis_y < cos_may * d:
             continue
-        ux = dx / d
-        uy = dy / d
+        if not is_crossed(q):
+            ux = dx / d
+            uy = dy / d
         row = linear[m]
         row.error = e
         row.slope_a = ux * root_xx + uy * root_yx

@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from perception.bayes.alternatives import bearing_sum
+from perception.bayes.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import (
@@ -39,7 +40,7 @@ IMPOSSIBLE_NAT: Final = -1e9
 
 @kernel
 def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
-    """Return the range of a reading less its perpendicular distance to a face, m.
+    """Return the range of a reading less its perpendicular distance to a face, or a cross path's half over it, m.
 
     Parameters
     ----------
@@ -50,6 +51,10 @@ def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
     face : LineFit
         Unit normal and distance of the face from the origin.
     """
+    if is_crossed(q):
+        away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
+        half, _, _ = over_line(q, face.normal_x, face.normal_y, away)
+        return q.range_m - half
     return q.range_m - face.distance + face.normal_x * (q.x - cx) + face.normal_y * (q.y - cy)
 
 
@@ -82,7 +87,9 @@ def is_of_face(
         return False
     if not has_edge:
         return True
-    at_edge = abs(q.range_m - math.hypot(corner.edge_x - q.x, corner.edge_y - q.y))
+    ex = corner.edge_x - q.x
+    ey = corner.edge_y - q.y
+    at_edge = abs(circle_error(q, ex, ey, math.hypot(ex, ey), 0.0))
     return bool(min(e0, e1) <= at_edge + CORNER_EDGE_LEAD_GATES * gate)
 
 
@@ -142,7 +149,7 @@ def fit_faces(
                 dx = cx - q.x
                 dy = cy - q.y
                 d = math.sqrt(dx * dx + dy * dy)
-                if abs(q.range_m - (d - radius)) >= gate or d == 0.0:
+                if abs(circle_error(q, dx, dy, d, radius)) >= gate or d == 0.0:
                     continue
                 if turn == 0:
                     is_own = (sx * dy - sy * dx > 0.0) == (side == 0)
@@ -212,7 +219,7 @@ def score_corner(
         q = readings[j]
         dx = cx - q.x
         dy = cy - q.y
-        if abs(q.range_m - (math.sqrt(dx * dx + dy * dy) - radius)) >= gate:
+        if abs(circle_error(q, dx, dy, math.sqrt(dx * dx + dy * dy), radius)) >= gate:
             continue
         level = level_of(p, s[0].noise_level, q.range_m)
         v = 0.0
@@ -225,6 +232,6 @@ def score_corner(
             ey = corner.edge_y - q.y
             d = math.sqrt(ex * ex + ey * ey)
             if ex * q.axis_x + ey * q.axis_y >= cos_may * d:
-                v = max(v, log_likelihood(p, level, q.range_m - d))
+                v = max(v, log_likelihood(p, level, circle_error(q, ex, ey, d, 0.0)))
         total += v - CORNER_HIT_NAT if v > 0.0 else p[0].table[level, TABLE_BINS - 1]
     return total - CORNER_MODEL_NAT

@@ -20,6 +20,8 @@ BIN_CAPACITY: Final = 20
 MAX_LINES: Final = 24
 HISTORY: Final = 28
 """Readings kept of each sensor, hits and silences of any object."""
+CROSS_HISTORY: Final = 1024
+"""Cross paths kept of all sensors."""
 READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + 64
 """Readings compared at a time: a reservoir's, and some more of the sensors' histories."""
 ATTRACTING_MAX: Final = 16
@@ -47,16 +49,19 @@ GRID_CELLS: Final = 49
 
 
 class Reading(Record):
-    """A raw range in the odometry frame."""
+    """A raw range in the odometry frame, or half a cross path; see `perception.bayes.cross_path`."""
 
     x: float
-    """The sensor's position, m."""
+    """Position of the sensor that fired, m."""
     y: float
     axis_x: float
     """Its axis, a unit vector."""
     axis_y: float
     range_m: float
     """Range, m; at least `range_fit.FAR` without an echo."""
+    listener_x: float
+    """Position of the sensor that heard it, from there, m; 0, 0 where it is the same one."""
+    listener_y: float
 
 
 class Pose(Record):

@@ -103,8 +103,8 @@ def evidence_of(
     else:
         n = polygon_evidence(memory.s, p, t, readings, score, nats)
     arcs = tuple(
-        Arc(x, y, float(np.arctan2(uy, ux)), r if r < FAR else None, nat)
-        for (x, y, ux, uy, r), nat in zip(heard[:n].tolist(), nats[:n].tolist(), strict=True)
+        Arc(x, y, float(np.arctan2(uy, ux)), r if r < FAR else None, nat, (x + lx, y + ly) if lx or ly else None)
+        for (x, y, ux, uy, r, lx, ly), nat in zip(heard[:n].tolist(), nats[:n].tolist(), strict=True)
     )
     said = nats[:n]
     return Evidence(

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from perception.bayes.alternatives import score
+from perception.bayes.cross_path import circle_error
 from perception.bayes.parameters import LATERAL_LEAD_NAT, LATERAL_PLACES, LATERAL_STEP_M
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTrack, StateRecord
@@ -39,7 +40,9 @@ def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
     heard = 0
     for j in range(n):
         q = readings[j]
-        if abs(q.range_m - (math.hypot(track.x - q.x, track.y - q.y) - track.radius)) < p[0].gate_m:
+        dx = track.x - q.x
+        dy = track.y - q.y
+        if abs(circle_error(q, dx, dy, math.hypot(dx, dy), track.radius)) < p[0].gate_m:
             x += q.x
             y += q.y
             heard += 1

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.elements import BEARING_BINS, Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import (
@@ -27,7 +28,7 @@ from perception.bayes.parameters import (
 from perception.bayes.range_fit import FAR
 from perception.bayes.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.state import ESTABLISHED, CircleTrack, CircleTracks, StateRecord
-from perception.bayes.wall_contact import BEAM_EDGE, NOWHERE, contact, edges_answer, is_on_span
+from perception.bayes.wall_contact import BEAM_EDGE, FOOT, NOWHERE, contact, edges_answer, is_on_span, wall_normal
 from perception.bayes.wall_records import CORNERS_MAX, MAX_WALLS, WallMap
 from perception.kernel import kernel
 
@@ -75,6 +76,12 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
         wall = room.walls[k]
         if wall.weight > 0.0:
             kind, expected, along, _ = contact(wall, q, p)
+            if is_crossed(q):
+                if kind != FOOT:
+                    continue
+                nx, ny = wall_normal(wall)
+                expected, _, _ = over_line(q, nx, ny, expected)
+                along += 0.5 * (nx * q.listener_y - ny * q.listener_x)
             if kind != NOWHERE and (kind != BEAM_EDGE or edges) and is_on_span(wall, along, ROOM_MARGIN_M):
                 best = max(best, log_likelihood(p, level, q.range_m - expected))
     for c in range(CORNERS_MAX):
@@ -84,7 +91,10 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
             dy = corner.y - q.y
             d = math.sqrt(dx * dx + dy * dy)
             if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d:
-                best = max(best, log_likelihood(p, level, q.range_m - d))
+                e = circle_error(q, dx, dy, d, 0.0)
+                if is_crossed(q) and corner.is_edge == 0:  # twice the way to the middle between both
+                    e = q.range_m - math.hypot(dx - 0.5 * q.listener_x, dy - 0.5 * q.listener_y)
+                best = max(best, log_likelihood(p, level, e))
     return best
 
 
@@ -116,7 +126,7 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = q.range_m - (d - track.radius)
+        e = circle_error(q, dx, dy, d, track.radius)
         if abs(e) > p[0].gate_m or dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
             continue
         level = level_of(p, s[0].noise_level, q.range_m)

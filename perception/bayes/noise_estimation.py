@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.cross_path import circle_error
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import (
@@ -115,7 +116,7 @@ def add_residuals(
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = q.range_m - (d - track.radius)
+        e = circle_error(q, dx, dy, d, track.radius)
         if abs(e) < p[0].gate_m and dx * q.axis_x + dy * q.axis_y >= p[0].cos_half_angle * d:
             for h in range(NOISES):
                 track.noise_nat[h] += log_likelihood(p, level_of(p, h, q.range_m), e)

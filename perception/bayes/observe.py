@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.elements import HISTORY, Reading
+from perception.bayes.cross_path import circle_error, is_crossed
+from perception.bayes.elements import CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.model_check import count_surroundings
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.occlusion import is_elsewhere
@@ -29,7 +30,7 @@ from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, CircleTracks, S
 from perception.bayes.track_initiation import initiate_circle
 from perception.bayes.track_selection import is_waiting
 from perception.bayes.walls import update_lines
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
@@ -49,6 +50,7 @@ def place_readings(
     s, p, mounts, px, py, yaw, ranges
         As for `associate`.
     """
+    s[0].scratch.crosses = 0
     if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
         return 0
     scratch = s[0].scratch
@@ -86,7 +88,7 @@ def place_readings(
 
 
 @kernel
-def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
+def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, first: int = 0) -> None:
     """Associate fired readings with the established circles that explain them best.
 
     Parameters
@@ -95,9 +97,11 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
         Memory and circles, updated, and settings.
     m : int
         Number of fired readings, the first of the scratch.
+    first : int
+        The first of them that is to be associated.
     """
     var0, rel2 = noise_variance(s, p)
-    for i in range(m):
+    for i in range(first, m):
         q = s[0].scratch.fired[i]
         if q.range_m >= FAR:
             continue
@@ -112,7 +116,7 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
             d = math.sqrt(dx * dx + dy * dy)
             if dot <= 0.0 or dot < p[0].cos_may_answer * d - ASSOCIATION_MARGIN_M:
                 continue
-            e = abs(q.range_m - (d - track.radius))
+            e = abs(circle_error(q, dx, dy, d, track.radius))
             if e < best and e < tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx:
                 best = e
                 s[0].scratch.explained_by[i] = t
@@ -143,7 +147,9 @@ def bears_on_circle(
     d = math.sqrt(dx * dx + dy * dy)
     if dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
         return False
-    e = q.range_m - (d - radius)
+    e = circle_error(q, dx, dy, d, radius)
+    if is_crossed(q) and abs(e) > p[0].gate_m:
+        return False
     if e < -p[0].gate_m:
         return is_free and dot >= p[0].cos_must_answer * d
     if e > p[0].gate_m:
@@ -160,7 +166,7 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
     s, tracks, p
         Memory, circles (updated) and settings.
     m : int
-        Number of fired readings, the first of the scratch.
+        Number of echoes, the first of the scratch; its cross paths follow them.
     """
     for t in range(len(tracks)):
         track = tracks[t]
@@ -169,7 +175,7 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
         track.idle_firings += 1
         cx = track.x
         cy = track.y
-        for i in range(m):
+        for i in range(m + s[0].scratch.crosses):
             q = s[0].scratch.fired[i]
             owner = s[0].scratch.explained_by[i]
             is_own = owner in (UNEXPLAINED, t) or (owner < 0 and track.status != TENTATIVE)
@@ -292,6 +298,58 @@ def associate(
         s[0].ring_y = py
     associate_circles(s, tracks, p, m)
     return m
+
+
+@kernel
+def hear_crosses(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, m: int,
+    transmitters: Ints, listeners: Ints, half_paths: Floats,
+) -> None:  # fmt: skip
+    """Write the cross paths of a firing to the scratch, behind its echoes, remember them, and associate them.
+
+    Those that were not heard are left out, and all of a transmitter that has hardly moved since others last listened
+    to it: a robot that stands still would fill the reservoirs with one look.
+
+    Parameters
+    ----------
+    s, tracks, p, mounts, px, py, yaw
+        As for `associate`, which has placed the firing's echoes.
+    m : int
+        Echoes of this firing.
+    transmitters, listeners, half_paths
+        As in `drivers.messages.CrossPaths`.
+    """
+    if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
+        return
+    scratch = s[0].scratch
+    c = math.cos(yaw)
+    sn = math.sin(yaw)
+    end = m
+    for k in range(len(half_paths)):
+        i, j = transmitters[k], listeners[k]
+        if not 0.0 <= half_paths[k] < p[0].range_max_m or i == j or end == len(scratch.fired):
+            continue
+        q = scratch.fired[end]
+        q.x = px + c * mounts[i, 0] - sn * mounts[i, 1]
+        q.y = py + sn * mounts[i, 0] + c * mounts[i, 1]
+        q.axis_x = math.cos(yaw + mounts[i, 2])
+        q.axis_y = math.sin(yaw + mounts[i, 2])
+        q.range_m = half_paths[k]
+        q.listener_x = c * (mounts[j, 0] - mounts[i, 0]) - sn * (mounts[j, 1] - mounts[i, 1])
+        q.listener_y = sn * (mounts[j, 0] - mounts[i, 0]) + c * (mounts[j, 1] - mounts[i, 1])
+        before = s[0].sensors[i].crossed
+        is_still = math.hypot(q.x - before.x, q.y - before.y) < STILL_M
+        if is_still and q.axis_x * before.axis_x + q.axis_y * before.axis_y > STILL_COS:
+            continue
+        scratch.fired_sensors[end] = i
+        scratch.explained_by[end] = UNEXPLAINED
+        end += 1
+    for k in range(m, end):
+        copy_reading(scratch.fired[k], s[0].crosses[s[0].crosses_kept % CROSS_HISTORY])
+        copy_reading(scratch.fired[k], s[0].sensors[scratch.fired_sensors[k]].crossed)
+        s[0].crosses_kept += 1
+    scratch.crosses = end - m
+    associate_circles(s, tracks, p, end, m)
 
 
 @kernel

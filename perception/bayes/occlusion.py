@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.cross_path import circle_error, is_crossed
 from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.reservoir import copy_reading
@@ -98,7 +99,7 @@ def is_explained_elsewhere(
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = abs(q.range_m - (d - track.radius))
+        e = abs(circle_error(q, dx, dy, d, track.radius))
         tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx
         if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d and e < min(off, tight):
             return True
@@ -118,7 +119,9 @@ def is_relevant(
         As for `is_explained_elsewhere`.
     """
     d = math.hypot(cx - q.x, cy - q.y)
-    e = q.range_m - (d - radius)
+    e = circle_error(q, cx - q.x, cy - q.y, d, radius)
+    if is_crossed(q) and abs(e) > p[0].gate_m:
+        return False
     if e > p[0].gate_m:
         return not (d > radius and is_hidden(tracks, q.x, q.y, cx, cy, d, radius, own))
     return not is_explained_elsewhere(tracks, p, q, cx, cy, radius, abs(e), own, var0, rel2)

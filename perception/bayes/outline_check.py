@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.cross_path import circle_error, is_crossed, over_circle
 from perception.bayes.elements import BEARING_BINS, BIN_CAPACITY
 from perception.bayes.likelihood import bounded_exp
 from perception.bayes.noise_estimation import noise_variance
@@ -60,7 +61,7 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = q.range_m - (d - track.radius)
+        e = circle_error(q, dx, dy, d, track.radius)
         if abs(e) > p[0].gate_m or q.range_m - e < p[0].range_min_m:
             continue
         if dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
@@ -164,7 +165,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) ->
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = q.range_m - (d - track.radius)
+        e = circle_error(q, dx, dy, d, track.radius)
         if abs(e) > p[0].gate_m or q.range_m - e < p[0].range_min_m:
             continue
         if dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
@@ -174,15 +175,19 @@ def round_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) ->
         e = min(most, max(-most, e))
         ux = dx / d
         uy = dy / d
+        along = 1.0  # fall of the range with the radius
+        if is_crossed(q):
+            _, ux, uy = over_circle(q, dx, dy, track.radius)
+            along = math.hypot(ux, uy)
         xx += ux * ux / variance
         xy += ux * uy / variance
         yy += uy * uy / variance
-        xr -= ux / variance
-        yr -= uy / variance
-        rr += 1.0 / variance
+        xr -= along * ux / variance
+        yr -= along * uy / variance
+        rr += along * along / variance
         xe += ux * e / variance
         ye += uy * e / variance
-        re -= e / variance
+        re -= along * e / variance
     det = xx * yy - xy * xy
     if det <= DETERMINANT_MIN * xx * yy:
         return 0.0

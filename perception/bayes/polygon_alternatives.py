@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.cross_path import over_line
 from perception.bayes.elements import MAX_LINES, Reading
 from perception.bayes.likelihood import bounded_exp
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
@@ -47,7 +48,9 @@ def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight:
         q = readings[j]
         ahead, _ = off_and_along(line, q.x, q.y)
         towards = line.normal_x * q.axis_x + line.normal_y * q.axis_y
-        if abs(towards) >= cos_may and towards * ahead > 0.0 and abs(q.range_m - abs(ahead)) < tight:
+        side = 1.0 if ahead > 0.0 else -1.0
+        half, _, _ = over_line(q, side * line.normal_x, side * line.normal_y, abs(ahead))
+        if abs(towards) >= cos_may and towards * ahead > 0.0 and abs(q.range_m - half) < tight:
             explained += 1
     return explained
 

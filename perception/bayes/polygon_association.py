@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import MAX_POLYGONS, Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.polygon_cross_path import predict_cross
 from perception.bayes.polygon_job import cost
 from perception.bayes.polygon_likelihood import predict
 from perception.bayes.polygon_parameters import OVERLAP_RADII, WHOLE_SHARE
@@ -31,10 +33,13 @@ def range_error(
     sides, is_closed, p
         As for `polygon_likelihood.predict`.
     """
-    dx = q.x - track.x
-    dy = q.y - track.y
     c = math.cos(track.heading)
     sn = math.sin(track.heading)
+    if is_crossed(q):
+        mirror, _, cone = predict_cross(q, track.x, track.y, c, sn, sides, is_closed, p)
+        return min(abs(q.range_m - mirror), abs(q.range_m - cone))
+    dx = q.x - track.x
+    dy = q.y - track.y
     mirror, _, _, cone, _ = predict(
         c * dx + sn * dy, -sn * dx + c * dy, c * q.axis_x + sn * q.axis_y, -sn * q.axis_x + c * q.axis_y, sides,
         is_closed, p,
@@ -51,7 +56,7 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
     s, tracks, p
         Memory, updated, circles and settings.
     m : int
-        Fired readings.
+        Echoes; the cross paths follow them.
     """
     var0, _ = noise_variance(s, p)
     tight = tolerance_m(p[0].half_resolution_m, var0)
@@ -65,7 +70,7 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
         x = track.x
         y = track.y
         may_explain = track.status == ESTABLISHED and track.hits > WHOLE_SHARE * track.near
-        for i in range(m):
+        for i in range(m + s[0].scratch.crosses):
             q = s[0].scratch.fired[i]
             if not bears_on_polygon(q, x, y, outline.outer_radius_m, p):
                 continue

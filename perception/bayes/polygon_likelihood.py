@@ -12,9 +12,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import DROP_OUT_NAT, DROP_OUT_SHARE
+from perception.bayes.polygon_cross_path import NO_ANSWER_M, score_crosses
 from perception.bayes.polygon_parameters import (
     DOUBTFUL_ANSWER_NAT,
     EDGE_NAT_PER_M,
@@ -31,10 +33,6 @@ from perception.bayes.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.state import PoseSearch
 from perception.kernel import kernel
 from perception.records import Records
-
-NO_ANSWER_M: Final = 1e18
-"""A range that stands for no answer."""
-
 
 ALONG, ACROSS, TURN = range(3)
 """Axes of a search: along and across the body, and turn."""
@@ -193,8 +191,12 @@ def score_polygon(
     cone_throughs = 0.0
     cone_near = 0.0
     cone_sure = 0.0
+    has_crosses = False
     for j in range(0, len(readings), every):
         q = readings[j]
+        if is_crossed(q):
+            has_crosses = True
+            continue
         dx = q.x - x
         dy = q.y - y
         r = q.range_m
@@ -234,6 +236,16 @@ def score_polygon(
                     cone_sure += 1.0
         elif must_cone and r > at_cone:
             cone_throughs += 1.0
+    if has_crosses:  # in a loop of their own: the one above is the innermost of all
+        over_mirror, near, hits, over_cone, near_cone, hits_cone = score_crosses(
+            readings, every, x, y, c, s, sides, is_closed, p, noise
+        )
+        mirror += over_mirror
+        mirror_near += near
+        mirror_hits += hits
+        cone += over_cone
+        cone_near += near_cone
+        cone_hits += hits_cone
     mirror -= surplus_nat(mirror_throughs, mirror_hits)
     cone -= surplus_nat(cone_throughs, cone_hits)
     llr = max(mirror, cone) + math.log(0.5 + 0.5 * math.exp(-abs(mirror - cone)))

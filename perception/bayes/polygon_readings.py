@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.elements import HISTORY, Reading
+from perception.bayes.cross_path import is_crossed
+from perception.bayes.elements import CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
@@ -35,6 +36,8 @@ def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: Settings
     if abs(dx * q.axis_y - dy * q.axis_x) * p[0].cos_half_angle - dot * p[0].sin_half_angle > bound:
         return False
     d = math.sqrt(dx * dx + dy * dy)
+    if is_crossed(q) and q.range_m > d + bound + p[0].gate_m:
+        return False
     return d <= reach and q.range_m >= d - bound - p[0].gate_m
 
 
@@ -62,4 +65,12 @@ def gather_polygon_history(s: StateRecord, p: SettingsRecord, model: int, cx: fl
                     return n
                 copy_reading(sensor.history[k], readings[n])
                 n += 1
+    kept = s[0].crosses_kept
+    for k in range(min(kept, CROSS_HISTORY)):
+        q = s[0].crosses[(kept - 1 - k) % CROSS_HISTORY]
+        if bears_on_polygon(q, cx, cy, bound, p):
+            if n >= len(readings):
+                return n
+            copy_reading(q, readings[n])
+            n += 1
     return n

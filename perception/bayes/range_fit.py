@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.cross_path import circle_error, is_crossed, over_circle, over_line
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import (
@@ -69,6 +70,8 @@ def score_circle(
     else                                  nothing: the circle predicts no echo
     ====================================  =====================================================================
 
+    A cross path counts only within the gate; r is half of it then, and what the circle predicts half the way over it.
+
     Parameters
     ----------
     readings : (n,) Reading
@@ -98,7 +101,9 @@ def score_circle(
         dy = cy - q.y
         d = math.sqrt(dx * dx + dy * dy)
         ahead = dx * q.axis_x + dy * q.axis_y
-        e = q.range_m - (d - radius)
+        e = circle_error(q, dx, dy, d, radius)
+        if abs(e) > gate and is_crossed(q):
+            continue
         if e > gate:
             if ahead >= cos_must * d:
                 llr += missed
@@ -176,11 +181,18 @@ def fit_circle(
             dy = y - q.y
             d = math.sqrt(dx * dx + dy * dy)
             e = q.range_m - (d - radius)
+            ux = uy = 0.0
+            if is_crossed(q):
+                half, ux, uy = over_circle(q, dx, dy, radius)
+                e = q.range_m - half
             if abs(e) > gate or d == 0.0 or dx * q.axis_x + dy * q.axis_y < cos_may * d:
                 continue
             g = robust_weight(e, var0 + rel2 * q.range_m * q.range_m, soft)
-            dx /= d
-            dy /= d
+            if is_crossed(q):
+                dx, dy = ux, uy
+            else:
+                dx /= d
+                dy /= d
             a += g * dx * dx
             b += g * dx * dy
             c += g * dy * dy
@@ -242,16 +254,21 @@ def fit_line(
             q = readings[j]
             px = q.x - ox
             py = q.y - oy
-            e = q.range_m - (c - nx * px - ny * py)
+            half, by_own, by_listener = over_line(q, nx, ny, c - nx * px - ny * py)
+            e = q.range_m - half
             if abs(e) > gate or nx * q.axis_x + ny * q.axis_y < cos_may:
                 continue
             g = robust_weight(e, var0 + rel2 * q.range_m * q.range_m, soft)
-            lever = ny * px - nx * py  # the range's derivative by the normal's direction
+            lever = ny * px - nx * py  # the range's derivative by the normal's direction, …
+            slope = 1.0  # … and by the distance
+            if is_crossed(q):
+                slope = by_own + by_listener
+                lever = slope * lever + by_listener * (ny * q.listener_x - nx * q.listener_y)
             h00 += g * lever * lever
-            h01 += g * lever
-            h11 += g
+            h01 += g * lever * slope
+            h11 += g * slope * slope
             g0 += g * lever * e
-            g1 += g * e
+            g1 += g * slope * e
         h00 *= 1.0 + FIT_DAMPING
         h11 *= 1.0 + FIT_DAMPING
         det = h00 * h11 - h01 * h01
@@ -298,7 +315,8 @@ def score_line(
             continue
         px = q.x - ox
         py = q.y - oy
-        e = q.range_m - (c - nx * px - ny * py)
+        half, _, _ = over_line(q, nx, ny, c - nx * px - ny * py)
+        e = q.range_m - half
         if abs(e) < gate:
             v = log_likelihood(p, level_of(p, noise, q.range_m), e)
             if ahead < cos_half:
@@ -311,6 +329,8 @@ def score_line(
                 high = max(high, foot)
     for j in range(len(readings)):
         q = readings[j]
+        if is_crossed(q):
+            continue
         px = q.x - ox
         py = q.y - oy
         predicted = c - nx * px - ny * py

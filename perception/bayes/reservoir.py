@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.elements import HISTORY, Reading
+from perception.bayes.elements import CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.parameters import HYPOTHESIS_MARGIN_M
 from perception.bayes.settings_record import Settings
 from perception.bayes.state import CircleTrack, PolygonTrack, State
@@ -30,6 +30,8 @@ def copy_reading(source: Reading, target: Reading) -> None:
     target.axis_x = source.axis_x
     target.axis_y = source.axis_y
     target.range_m = source.range_m
+    target.listener_x = source.listener_x
+    target.listener_y = source.listener_y
 
 
 @kernel
@@ -65,6 +67,26 @@ def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]
 
 
 @kernel
+def may_bear(p: Records[Settings], q: Reading, cx: float, cy: float, radius: float) -> bool:
+    """Return whether a circle may lie in a reading's beam and reach.
+
+    Parameters
+    ----------
+    p, q
+        Settings and the reading.
+    cx, cy, radius : float
+        The circle, m.
+    """
+    dx = cx - q.x
+    dy = cy - q.y
+    dot = dx * q.axis_x + dy * q.axis_y
+    if dot <= 0.0:
+        return False
+    d = math.sqrt(dx * dx + dy * dy)
+    return not (dot < p[0].cos_may_answer * d - HYPOTHESIS_MARGIN_M or d - radius > p[0].range_max_m)
+
+
+@kernel
 def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float, radius: float) -> int:
     """Copy the remembered readings that bear on a circle, hits and silences, to the scratch; return their number.
 
@@ -76,20 +98,20 @@ def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float
         The circle, m.
     """
     readings = s[0].scratch.readings
-    cos_may, range_max = p[0].cos_may_answer, p[0].range_max_m
     n = 0
     for i in range(s[0].sensor_count):
         sensor = s[0].sensors[i]
         for k in range(min(sensor.kept, HISTORY)):
-            q = sensor.history[k]
-            dx = cx - q.x
-            dy = cy - q.y
-            dot = dx * q.axis_x + dy * q.axis_y
-            if dot <= 0.0:
+            if not may_bear(p, sensor.history[k], cx, cy, radius):
                 continue
-            d = math.sqrt(dx * dx + dy * dy)
-            if dot < cos_may * d - HYPOTHESIS_MARGIN_M or d - radius > range_max:
-                continue
+            if n >= len(readings) - ROOM:
+                return n
+            copy_reading(sensor.history[k], readings[n])
+            n += 1
+    kept = s[0].crosses_kept
+    for k in range(min(kept, CROSS_HISTORY)):
+        q = s[0].crosses[(kept - 1 - k) % CROSS_HISTORY]
+        if may_bear(p, q, cx, cy, radius):
             if n >= len(readings) - ROOM:
                 return n
             copy_reading(q, readings[n])

@@ -147,7 +147,9 @@ class Scratch(Record):
     """Values that kernels overwrite before each use."""
 
     fired: Annotated[Records[Reading], SENSORS_MAX]
-    """The readings of this firing."""
+    """The readings of this firing: echoes, then cross paths."""
+    crosses: int
+    """Number of cross paths among them."""
     fired_sensors: Annotated[Ints, SENSORS_MAX]
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""

@@ -18,6 +18,7 @@ from perception.bayes.elements import (
     BIN_CAPACITY,
     BUCKET_CAPACITY,
     BUCKETS,
+    CROSS_HISTORY,
     HISTORY,
     MAX_LINES,
     MAX_POLYGONS,
@@ -55,6 +56,8 @@ class Sensor(Record):
     """Readings ever put there."""
     last: Reading
     """The last reading that was not redundant."""
+    crossed: Reading
+    """Where it stood when others last listened to it; without a range."""
 
 
 class Bucket(Record):
@@ -315,6 +318,8 @@ class State(Record):
     """Readings with an echo …"""
     silent: float
     """… and without; older ones count less."""
+    crosses_kept: int
+    """Cross paths ever remembered."""
     names_withdrawn: int
     """Names withdrawn since a named circle was last heard from many sides, …"""
     unconfirmed_m: float
@@ -323,6 +328,8 @@ class State(Record):
     """Evidence of the readings' roughness for each noise."""
     residuals_nat: Annotated[Floats, NOISES]
     """Evidence of all objects' residuals for each noise."""
+    crosses: Annotated[Records[Reading], CROSS_HISTORY]
+    """A ring buffer of cross paths."""
     sensors: Annotated[Records[Sensor], SENSORS_MAX]
     buckets: Annotated[Records[Bucket], BUCKETS]
     """The outline map."""
@@ -368,8 +375,8 @@ class Memory:
             array.view(np.uint8)[...] = 0
         for name, value in kept.items():
             self.state[name] = value
-        for field in Reading.DTYPE.names or ():
-            self.state["sensors"]["last"][field] = np.nan
+        for field in ("x", "y", "axis_x", "axis_y", "range_m"):
+            self.state["sensors"]["last"][field] = self.state["sensors"]["crossed"][field] = np.nan
         self.state["noise_level"] = START_NOISE
         self.state["roughness_nat"][0, START_NOISE] = START_NOISE_NAT
         self.state["scratch"]["attracting_rows"] = np.arange(ATTRACTING_MAX)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.cross_path import is_crossed, over_line
 from perception.bayes.elements import MAX_LINES
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.parameters import (
@@ -197,15 +198,20 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
         line = s[0].lines[k]
         if line.echoes <= 0.0:
             continue
-        for i in range(m):
+        for i in range(m + scratch.crosses):
             q = scratch.fired[i]
             dot = line.normal_x * q.axis_x + line.normal_y * q.axis_y
             if dot < LINE_FRONT_COS:
                 continue
-            expected, foot = off_and_along(line, q.x, q.y)
+            # A line answers two sensors, but for the length of the way, as one midway between them.
+            x, y = q.x + 0.5 * q.listener_x, q.y + 0.5 * q.listener_y
+            expected, foot = off_and_along(line, x, y)
             if expected <= 0.0:
                 continue
             r = q.range_m
+            if is_crossed(q):
+                across = line.normal_x * q.listener_x + line.normal_y * q.listener_y
+                expected, _, _ = over_line(q, line.normal_x, line.normal_y, expected + 0.5 * across)
             var = var0 + rel2 * expected * expected
             tight = half_box + LINE_SLACK_M + EXPLAINED_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
             associates = line.high - line.low > p[0].associating_line_m
@@ -218,13 +224,15 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
                     line.high = max(line.high, foot)
                     line.log_odds = min(line.log_odds + LINE_ECHO_LOG_ODDS, LINE_LOG_ODDS_MAX)
                     line.echoes += 1.0
-                    correct_line(line, q.x - line.origin_x, q.y - line.origin_y, e, var)
+                    correct_line(line, x - line.origin_x, y - line.origin_y, e, var)
+                elif is_crossed(q):
+                    continue
                 elif e > p[0].gate_m and dot >= p[0].cos_must_answer and reaches(line, foot, -LINE_SILENCE_WITHIN_M):
                     line.log_odds -= 1.0
                     if line.log_odds < 0.0:
                         line.echoes = 0.0
                         break
-            elif r < FAR:
+            elif r < FAR and not is_crossed(q):
                 # A cone's nearest point of a slanting wall lies on the beam's edge.
                 off = math.acos(min(1.0, dot)) - p[0].half_angle_rad
                 side = 1.0 if line.normal_x * q.axis_y - line.normal_y * q.axis_x < 0.0 else -1.0

@@ -125,7 +125,10 @@ class MapFrame:
         ]
         return replace(
             evidence,
-            arcs=tuple(replace(arc, x=at.x, y=at.y, direction=at.theta) for arc, at in arcs),
+            arcs=tuple(
+                replace(arc, x=at.x, y=at.y, direction=at.theta, listener=_moved(to, arc.listener))
+                for arc, at in arcs
+            ),
             lines=tuple(replace(line, x1=a.x, y1=a.y, x2=b.x, y2=b.y) for line, a, b in lines),
         )
 
@@ -144,6 +147,13 @@ class MapFrame:
 
 
 SegmentRow: TypeAlias = tuple[float, float, float, float, float, float, float, float]
+
+
+def _moved(to: Pose, place: tuple[float, float] | None) -> tuple[float, float] | None:
+    if place is None:
+        return None
+    at = to.compose(Pose(*place, 0.0))
+    return at.x, at.y
 
 
 def _turned_row(to: Pose, row: SegmentRow) -> SegmentRow:

@@ -60,11 +60,13 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS, *
     """Drive past a wall."""
     import numpy as np
 
-    from drivers.messages import Firing, Pose
+    from drivers.messages import CrossPaths, Firing, Pose
 
+    count = len(settings.ring.mounts)
+    heard = CrossPaths(np.array([0]), np.array([1 % count]), np.array([2.0]))  # the next robot may listen
     for k in range(firings):
-        ranges = np.full(len(settings.ring.mounts), 2.0)
-        perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
+        ranges = np.full(count, 2.0)
+        perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges, heard))
         while refines and perception.can_refine:
             perception.refine()
     perception.labelled_objects()

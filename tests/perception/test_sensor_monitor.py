@@ -15,7 +15,7 @@ from config.world import AcousticsConfig, WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
-from drivers.messages import Firing, Pose
+from drivers.messages import CrossPaths, Firing, Pose
 from perception.pipeline import Perception
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_report import SensorFault
@@ -311,3 +311,17 @@ def test_masks_apply_to_map_and_obstacles_and_are_part_of_the_snapshot() -> None
     assert other.sensor_reports() == perception.sensor_reports()
     other.reset()
     assert other.sensor_reports() == perception.sensor_reports(), "the robot restarted, the sensor is still broken"
+
+
+def test_cross_paths_of_a_faulty_sensor_are_left_out_whichever_end_it_is_at() -> None:
+    monitor, count = SensorMonitor(RING), len(RING.mounts)
+    heard = CrossPaths(np.array([0, 0, 5]), np.array([1, 2, 6]), np.array([1.0, 1.1, 1.2]))
+    for k in range(MISSED_FIRINGS_MAX + 2):
+        ranges = np.full(count, 2.0)
+        ranges[2] = FAULTY
+        trusted, _ = monitor.filter(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges, heard))
+        if k == 0:
+            assert trusted.cross_paths is heard
+    assert trusted.cross_paths is not None
+    assert trusted.cross_paths.listeners.tolist() == [1, 6]
+    assert trusted.cross_paths.half_paths_m.tolist() == [1.0, 1.2]

@@ -269,7 +269,7 @@ def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:
         "model": found.model,
         "for": found.supporting,
         "against": -found.opposing,
-        "readings": [[a.x, a.y, a.range_m, a.direction, a.nats] for a in found.arcs],
+        "readings": [[a.x, a.y, a.range_m, a.direction, a.nats, *(a.listener or ())] for a in found.arcs],
         "lines": [[line.number, line.x1, line.y1, line.x2, line.y2, line.supports] for line in found.lines],
         "rivals": found.rivals,
     }

@@ -95,7 +95,7 @@ def random_pose(rng: np.random.Generator) -> Floats:
 
 def enter_job(memory: Memory, w: Floats, noise: int) -> None:
     """Give the job these readings and this noise."""
-    numbers(memory.state["job_readings"][0])[: len(w)] = w
+    numbers(memory.state["job_readings"][0])[: len(w), :5] = w
     memory.s[0].job.reading_count, memory.s[0].job.noise_level = len(w), noise
 
 
@@ -103,5 +103,5 @@ def keep_polygon_readings(memory: Memory, t: int, w: Floats) -> None:
     """Store readings in a polygon's reservoir, in turn in each of its bins."""
     for j, q in enumerate(w):
         held = memory.polygons["bins"][t, j % POLYGON_BEARING_BINS]
-        held["readings"][j // POLYGON_BEARING_BINS] = tuple(q)
+        held["readings"][j // POLYGON_BEARING_BINS] = (*q, 0.0, 0.0)
         held["count"] += 1

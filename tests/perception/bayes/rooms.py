@@ -30,7 +30,7 @@ def new_room() -> tuple[Memory, WallMap]:
 def reading(x: float, y: float, axis: float, range_m: float) -> Reading:
     """Return one reading, its axis given by its angle (rad)."""
     array = zeros(Reading, 1)
-    array[0] = (x, y, math.cos(axis), math.sin(axis), range_m)
+    array[0] = (x, y, math.cos(axis), math.sin(axis), range_m, 0.0, 0.0)
     return records(Reading, array)[0]
 
 

@@ -31,7 +31,14 @@ def filled(seed: int, readings: int) -> Memory:
     one = zeros(Reading, 1)
     for _ in range(readings):
         turn = rng.uniform(-np.pi, np.pi)
-        one[0] = (*(np.array([track.x, track.y]) + rng.uniform(-6.0, 6.0, 2)), np.cos(turn), np.sin(turn), 3.0)
+        one[0] = (
+            *(np.array([track.x, track.y]) + rng.uniform(-6.0, 6.0, 2)),
+            np.cos(turn),
+            np.sin(turn),
+            3.0,
+            0.0,
+            0.0,
+        )
         reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
     return memory
 
@@ -85,7 +92,7 @@ def test_a_polygon_comes_back_too() -> None:
     track = memory.polygons[0]
     track["x"], track["y"], track["heading"], track["number"], track["covariance"]["hh"] = 3.0, -2.0, 0.7, 12, 0.01
     track["bins"]["count"][5] = 1
-    track["bins"]["readings"][5, 0] = (1.0, 0.5, 0.6, 0.8, 2.5)
+    track["bins"]["readings"][5, 0] = (1.0, 0.5, 0.6, 0.8, 2.5, 0.0, 0.0)
     unpack(pack(memory.polygons[:1], archived_dtype(PolygonTrack), is_reported=False), memory.polygons[-1:])
     back = memory.polygons[-1]
     assert (back["x"], back["heading"], back["number"], back["covariance"]["hh"]) == (3.0, 0.7, 12, 0.01)
@@ -94,3 +101,13 @@ def test_a_polygon_comes_back_too() -> None:
 
 def test_an_archived_object_takes_less_than_2_kb() -> None:
     assert max(archived_dtype(kind).itemsize for kind in (CircleTrack, PolygonTrack)) < BYTES_MAX
+
+
+def test_cross_paths_are_left_out_of_an_archived_track() -> None:
+    memory, one = filled(3, 0), zeros(Reading, 1)
+    track = memory.tracks[0]
+    for k in range(30):
+        one[0] = (track.x + 2.0, track.y, -1.0, 0.0, 1.0 + k, 0.1 * (k % 3), 0.0)
+        reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
+    kept = newest_readings(memory.circles["bins"][0])
+    assert kept["range_m"].tolist() == [1.0 + k for k in range(29, 9, -1) if k % 3 == 0]

@@ -86,7 +86,7 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides(examples: int)
             w[:, 2:4] = unit(rng.uniform(0, 7) + rng.normal(0, rng.uniform(0, 0.5), len(w)))
             for i, q in enumerate(w):
                 held = polygons["bins"][t, i % 10]
-                held["readings"][held["count"] % POLYGON_BIN_CAPACITY] = tuple(q)
+                held["readings"][held["count"] % POLYGON_BIN_CAPACITY] = (*q, 0.0, 0.0)
                 polygons["bins"]["count"][t, i % 10] += 1
             kept.append(w)
         want = [

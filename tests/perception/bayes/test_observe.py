@@ -44,7 +44,7 @@ def test_readings_are_placed_and_remembered(examples: int) -> None:
         m = observe.place_readings(memory.s, P, MOUNTS, *pose, ranges)
         want = naive_tracks.place_readings(last, MOUNTS, pose, ranges, S.range_max_m, S.half_resolution_m)
         assert m == len(want)
-        fired = np.column_stack([numbers(scratch["fired"][0])[:m], scratch["fired_sensors"][0, :m]])
+        fired = np.column_stack([numbers(scratch["fired"][0])[:m, :5], scratch["fired_sensors"][0, :m]])
         assert fired == pytest.approx(np.array(want).reshape(m, 6), rel=1e-12, abs=1e-12)
         assert (scratch["explained_by"][0, :m] == UNEXPLAINED).all()
         entered += m
@@ -67,7 +67,7 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
 ) -> None:
     rng, memory = np.random.default_rng(10), new_memory()
     circles, scratch = memory.circles, memory.state["scratch"]
-    fired, explained_by = numbers(scratch["fired"][0])[:SENSORS], scratch["explained_by"][0, :SENSORS]
+    fired, explained_by = numbers(scratch["fired"][0])[:SENSORS, :5], scratch["explained_by"][0, :SENSORS]
     taken = kept = 0
     for _ in range(examples):
         circles.view(np.uint8)[...] = 0
@@ -125,7 +125,7 @@ def test_the_surest_unexplained_segment_in_reach_is_proposed_first() -> None:
     segments, explained_by = scratch["segments"][0], scratch["explained_by"][0]
     segments["reading"][:5] = np.arange(5)
     segments["sigma_direction"][:5] = (0.02, 0.03, 0.001, 0.2, 0.002)
-    numbers(scratch["fired"][0])[:5] = (0.0, 0.0, 1.0, 0.0, 1.0)
+    numbers(scratch["fired"][0])[:5] = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
     explained_by[:5] = UNEXPLAINED
     explained_by[2] = 4
     scratch["fired"]["range_m"][0, 4] = S.pair_range_max_m + 0.1

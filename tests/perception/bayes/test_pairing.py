@@ -36,7 +36,7 @@ def test_segments_equal_their_oracle(examples: int) -> None:
     segments, segment = 0, zeros(PairSegment, 1)
     for pose, time_s, ranges in random_drive(rng, examples):
         m = observe.place_readings(memory.s, P, MOUNTS, *pose, ranges)
-        fired = np.column_stack([numbers(scratch["fired"][0])[:m], scratch["fired_sensors"][0, :m]])
+        fired = np.column_stack([numbers(scratch["fired"][0])[:m, :5], scratch["fired_sensors"][0, :m]])
         memory.s[0].noise_level = int(rng.integers(len(NOISES)))
         var0, rel2 = noise_estimation.noise_variance(memory.s, P)
         numbered = int(memory.state["segments_numbered"][0])

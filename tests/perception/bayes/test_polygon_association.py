@@ -52,7 +52,7 @@ def test_an_established_polygon_takes_the_readings_it_explains_and_keeps_all_tha
     for status in (ESTABLISHED, TENTATIVE):
         memory.clear()
         place(memory, 2, pose, status)
-        numbers(scratch["fired"][0])[:12] = w
+        numbers(scratch["fired"][0])[:12, :5] = w
         explained_by = scratch["explained_by"][0, :12]
         explained_by[...] = UNEXPLAINED
         explained_by[2] = 0  # a circle of a model took it
@@ -118,7 +118,7 @@ def test_the_jobs_readings_are_left_to_a_neighbour_that_explains_them_better_or_
         job.next_step = u
         association.leave_to_next_neighbour(s, P, 0)
         assert job.next_step == u + 1
-        rows = numbers(memory.state["job_readings"][0])[: job.reading_count].tolist()
+        rows = numbers(memory.state["job_readings"][0])[: job.reading_count, :5].tolist()
         if u == 1:
             assert rows == [*mine.tolist(), list(open_view)]
         else:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.polygon_likelihood import NO_ANSWER_M, begin_search, continue_search, predict
+from perception.bayes.polygon_cross_path import NO_ANSWER_M
+from perception.bayes.polygon_likelihood import begin_search, continue_search, predict
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import Score
 from perception.bayes.state import PoseSearch

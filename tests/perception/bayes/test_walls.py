@@ -60,7 +60,7 @@ def test_lines_take_the_echoes_they_explain_and_end_when_ranges_pass_through(exa
             r = rng.choice([d / math.cos(edge) + rng.normal(0, 0.01), 2 * FAR, rng.uniform(0, 4)])
             cur[i] = *place, *unit(math.atan2(line.normal[1], line.normal[0]) + alpha), max(r, 0.0), i
         scratch = memory.state["scratch"]
-        numbers(scratch["fired"][0])[:SENSORS] = cur[:, :5]
+        numbers(scratch["fired"][0])[:SENSORS, :5] = cur[:, :5]
         scratch["explained_by"][0, :SENSORS] = np.where(rng.random(SENSORS) < 0.8, -1, 3)
         owner = scratch["explained_by"][0, :SENSORS].tolist()
         walls.update_lines(memory.s, P, SENSORS)

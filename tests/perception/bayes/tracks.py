@@ -75,7 +75,7 @@ def sigma(memory: Memory) -> tuple[float, float]:
 def readings_of(rows: Floats) -> Records[Reading]:
     """Return readings as kernels take them, from rows of place, axis and range."""
     array = zeros(Reading, len(rows))
-    numbers(array)[...] = np.asarray(rows).reshape(len(rows), 5)
+    numbers(array)[:, :5] = np.asarray(rows).reshape(len(rows), 5)
     return records(Reading, array)
 
 
@@ -89,23 +89,24 @@ def keep(memory: Memory, t: int, w: Floats, bins: int = 36) -> None:
     """Store readings in a circle's reservoir, in turn in so many of its bins."""
     for j, q in enumerate(w):
         held = memory.circles["bins"][t, j % bins]
-        held["readings"][j // bins] = tuple(q)
+        held["readings"][j // bins] = (*q, 0.0, 0.0)
         held["count"] += 1
 
 
 def enter_readings(memory: Memory, rows: Floats) -> None:
     """Put readings to the beginning of the scratch."""
-    numbers(memory.state["scratch"]["readings"][0])[: len(rows)] = rows
+    readings = numbers(memory.state["scratch"]["readings"][0])[: len(rows)]
+    readings[:, :5], readings[:, 5:] = rows, 0.0
 
 
 def scratch_readings(memory: Memory, n: int) -> Floats:
     """Return the first readings of the scratch as rows."""
-    return numbers(memory.state["scratch"]["readings"][0])[:n]
+    return numbers(memory.state["scratch"]["readings"][0])[:n, :5]
 
 
 def history(memory: Memory, i: int) -> Floats:
     """Return a sensor's history as rows: a view."""
-    return numbers(memory.state["sensors"]["history"][0, i])
+    return numbers(memory.state["sensors"]["history"][0, i])[:, :5]
 
 
 def kept_by(memory: Memory, t: int) -> Floats:
