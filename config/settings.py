@@ -249,6 +249,9 @@ class ConsoleConfig(Strict):
     keep_token: bool = False
     """Keep the token across restarts, as a service does, so that open pages come back by themselves. It is in the
     file `console-token` of the state folder, which only its owner can read; delete that file for a new token."""
+    announce: Literal["when_open", "always", "never"] = "when_open"
+    """Announce this run on the local network by multicast DNS (name, mode, address, version; never the token), and
+    list the other robots that are announced: where the console listens beyond this machine, always, or never."""
     clients_max: int = Field(default=16, ge=1, le=256)
     """Largest number of pages open at a time."""
     command_age_max_s: float = Field(default=1.0, ge=0.3, le=60.0)

@@ -222,6 +222,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "a hall with a beam set too wide, without the truth (soak: 20 halls with wrong beam, resolution and "
             "thresholds, 40 trials): ≥ 95 % of the lost recall found again, in ten halls that were held out as well",
         ),
+        "P35": Promise(
+            "A robot on the network gives nothing away",
+            "announced only where the console listens beyond this machine, or when configured: name, mode, address "
+            "and version, no token; two runs find each other, and one that ends is gone at once",
+        ),
     }
 )  # fmt: skip
 

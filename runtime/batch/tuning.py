@@ -29,6 +29,8 @@ NEXT_OBJECTIVE: Final = 1e-3
 """Weight of each objective over that of the one before it."""
 FAILED_WEIGHT: Final = 1e3
 """Weight of the share of drives that did not arrive."""
+LOSS_MAX: Final = 0.5
+"""Standard errors that undoing a change may cost for it to be dropped; a loss in one run alone is a whole one."""
 UNKNOWN: Final = 1.0
 """Cost of a later objective that is not known, such as the error where nothing was found."""
 CONFIDENCE: Final = 0.95
@@ -173,7 +175,7 @@ class Tuner:
         return first + sum(later) + FAILED_WEIGHT * figures.failed / figures.runs
 
     def _without_idle_changes(self, best: Trial) -> Trial:
-        """Return the trial without the changes whose absence costs no more than one standard error.
+        """Return the trial without the changes whose absence costs no more than half a standard error.
 
         The error is that of the difference between the same runs, and the cost is always compared with that of the
         best trial, so that many small losses do not add up.
@@ -194,7 +196,7 @@ class Tuner:
         first = self._study.objectives[0]
         differences = _paired(runs, self._make(runs), first, best.values)
         loss = one.figures.cost(first) - best.figures.cost(first)
-        return len(differences) > 1 and loss <= stdev(differences) / math.sqrt(len(differences))
+        return len(differences) > 1 and loss <= LOSS_MAX * stdev(differences) / math.sqrt(len(differences))
 
     def _compare(self, tuned: Values, runs: Sequence[Run]) -> list[Difference]:
         """Return what each objective changes by in runs with the present settings and with the tuned ones."""

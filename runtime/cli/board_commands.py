@@ -56,12 +56,12 @@ def probe_command(
     *,
     robot: RobotFile = None,
 ) -> int:
-    """Find out which robots answer on which ports, without moving anything.
+    """Find out which robots answer on which ports, without moving anything, and which run on the local network.
 
     Parameters
     ----------
     port
-        Serial port, or socket://host:port; by default all serial ports of this computer.
+        Serial port, or socket://host:port; by default all serial ports of this computer and the local network.
     robot
         Try this robot, file or name of a shipped one, instead of all shipped ones.
     """

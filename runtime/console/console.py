@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import time as host_time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,6 +79,8 @@ class Console:
     ----------
     url
         The start URL with the token; empty before the console is open.
+    listening
+        The address and the port on which the console listens; None before it is open.
     tunnel
         The ssh command that forwards the console to another machine; None if it listens on other addresses anyway.
     """
@@ -124,6 +126,8 @@ class Console:
         self._tasks: set[asyncio.Task[None]] = set()
         self._server: Server | None = None
         self.url = ""
+        self.listening: tuple[str, int] | None = None
+        self._robots: Sequence[Mapping[str, Any]] = ()
         self.tunnel: str | None = None
 
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
@@ -174,7 +178,7 @@ class Console:
         """
         files = page_files()
         listening = await listen(self._config)
-        address, port = listening.getsockname()[:2]
+        address, port = self.listening = listening.getsockname()[:2]
         token, host = self._token(), self._config.host
         own_names = (socket.gethostname(), f"{socket.gethostname()}.local")
         names = (host,) if is_loopback(address) else (host, *own_names)
@@ -198,6 +202,11 @@ class Console:
             yield
         finally:
             await self._close(self._server)
+
+    def show_robots(self, robots: Sequence[Mapping[str, Any]]) -> None:
+        """Show other robots of the local network on every page: name, mode, url, version of each."""
+        self._robots = robots
+        self.hub.broadcast({"type": "robots", "robots": robots})
 
     def hints(self) -> list[str]:
         """Return lines for the terminal: where the page is, and how to reach it from another machine."""
@@ -258,7 +267,7 @@ class Console:
         info = session_info(
             self._run.live_settings.current, name=self._run.name, emulated=self._emulated, units=self._units
         )  # fmt: skip
-        return {**info, "recording": self._commands.recording is not None}
+        return {**info, "recording": self._commands.recording is not None, "robots": self._robots}
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:
         self._console_log.note("configuration changed from the console", changed=[str(one) for one in changed])

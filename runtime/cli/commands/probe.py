@@ -1,4 +1,4 @@
-"""`echolocate probe`: which robots answer on which ports, without moving anything."""
+"""`echolocate probe`: which robots answer on which ports and on the local network, without moving anything."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import time
 from typing import Final, NamedTuple
 
 import numpy as np
+from rich.console import Console
 from serial.tools.list_ports import comports
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
@@ -27,6 +28,8 @@ ANSWER_MAX_S: Final = 2.0
 """Longest wait for a robot's first frame, s; a controller that is being reset by the opened port takes longer."""
 READY_MAX_S: Final = 6.0
 """Longest wait from the first frame until the robot is ready, s."""
+NETWORK_S: Final = 2.0
+"""How long runs on the local network may take to answer, s."""
 LOOK_S: Final = 1.0
 """How long a robot that is ready is listened to, for its sensors and its state, s."""
 WARNINGS: Final = (
@@ -62,6 +65,8 @@ class _Answer(NamedTuple):
 def probe(port: str | None, *, robot: str | None) -> int:
     """Try the drivers on one port, or on all of this computer, print what answers and return the exit code.
 
+    Without a port and a robot, the runs on the local network are looked for as well.
+
     Parameters
     ----------
     port
@@ -72,9 +77,13 @@ def probe(port: str | None, *, robot: str | None) -> int:
     Raises
     ------
     UserError
-        This computer has no serial port, or the robot file is invalid.
+        This computer has no serial port and no run is found, or the robot file is invalid.
     """
     ports = [port] if port is not None else sorted(str(found.device) for found in comports())
+    output = plain_console()
+    is_found = port is None and robot is None and show_network(output)
+    if not ports and is_found:
+        return DONE
     if not ports:
         raise UserError(
             "this computer has no serial port: plug the robot in, or name a port, as in `echolocate probe "
@@ -82,7 +91,6 @@ def probe(port: str | None, *, robot: str | None) -> int:
             FAILED if robot is None else WRONG_CALL,
         )
     robots = {name: load_robot(name) for name in (list_shipped("robots") if robot is None else (robot,))}
-    output, is_found = plain_console(), False
     for each in ports:
         finding = asyncio.run(probe_port(each, robots))
         is_found |= finding.robot is not None
@@ -90,6 +98,22 @@ def probe(port: str | None, *, robot: str | None) -> int:
         for line in (f"{one_line(each)}:", *(f"  {line}" for line in (*finding.said, *run))):
             output.print(line)
     return DONE if is_found else FAILED
+
+
+def show_network(output: Console) -> bool:
+    """Print the runs on the local network; return whether there is one."""
+    from runtime.bridges.local_network import find_robots
+
+    try:
+        robots = asyncio.run(find_robots(NETWORK_S))
+    except OSError as error:
+        output.print(f"the local network cannot be searched: {error}")
+        return False
+    if robots:
+        output.print("on the local network:")
+    for one in robots:
+        output.print(f"  {one_line(one.name)}, {one_line(one.mode)}: {one.url} (version {one_line(one.version)})")
+    return bool(robots)
 
 
 async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:

@@ -308,6 +308,7 @@ async def run_process(
             log_status.listeners.append(hook.on_log)
             stack.callback(log_status.listeners.remove, hook.on_log)
         if settings.console.enabled:
+            from runtime.cli.commands.network_presence import on_the_network
             from runtime.cli.commands.serve_console import serve_console
             from runtime.support.console_address import announced
 
@@ -320,6 +321,9 @@ async def run_process(
             stack.callback(log_status.listeners.remove, page.hub.on_log)
             listeners.append(page.on_cycle)
             stack.enter_context(announced(page.url, state_folder()))
+            presence = await stack.enter_async_context(on_the_network(page, process, settings.console, log))
+            if presence is not None:
+                listeners.append(presence.on_cycle)
             if foxglove:
                 await stack.enter_async_context(foxglove_beside(page.url, log))
             if view is not None:

@@ -22,6 +22,7 @@ import { watchPointers } from "./pointer.js";
 import { prefer, preferred } from "./preferences.js";
 import { Ring } from "./ring.js";
 import { RobotForm } from "./robot_form.js";
+import { Robots } from "./robots.js";
 import { Scene } from "./scene.js";
 import { Selection } from "./selection.js";
 import { watchSplitters } from "./splitters.js";
@@ -111,6 +112,7 @@ const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
 const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
 new RobotForm({ run, connection, notifications });
+new Robots({ run, connection });
 new MapFile({ run, units, connection, notifications, tools });
 tabs = new Tabs((name) => {
   drawInstruments();

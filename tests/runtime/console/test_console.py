@@ -24,6 +24,18 @@ async def test_a_console_open_to_other_machines_warns() -> None:
         assert "anyone with the token can drive" in str(warning["event"])
 
 
+async def test_other_robots_are_shown_to_open_pages_and_new_ones() -> None:
+    robots = [{"name": "beta", "mode": "DRIVE", "url": "http://10.0.0.7:8765/", "version": "1"}]
+    async with open_console() as case:
+        assert case.console.listening == (case.url.host, case.url.port)
+        page = await case.connect()
+        assert (await page.next("session"))["robots"] == []
+        case.console.show_robots(robots)
+        assert (await page.next("robots"))["robots"] == robots
+        late = await case.connect()
+        assert (await late.next("session"))["robots"] == robots
+
+
 async def test_a_console_that_stops_listening_is_unhealthy() -> None:
     async with open_console() as case:
         assert case.console.probe() is None

@@ -12,10 +12,36 @@ from serial.tools.list_ports_common import ListPortInfo
 from config.errors import DONE, FAILED
 from config.load import load_robot
 from config.robot import RobotConfig
+from runtime.bridges import local_network
+from runtime.bridges.local_network import Announced
 from runtime.cli.app import run_command
 from runtime.cli.commands import probe
 from tests.hil.running import emulated
 from tests.hil.truth import Truth
+
+
+async def no_robots(_seconds: float) -> list[Announced]:
+    return []
+
+
+def test_runs_on_the_local_network_are_listed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def two(_seconds: float) -> list[Announced]:
+        return [Announced("alpha", "DRIVE", "10.0.0.7", 8765, "1.2"), Announced("b", "?", "10.0.0.8", 80, "")]
+
+    async def none(_seconds: float) -> list[Announced]:
+        raise OSError("Network is unreachable")
+
+    monkeypatch.setattr(probe, "comports", list)
+    monkeypatch.setattr(local_network, "find_robots", two)
+    assert run_command(["probe"]) == DONE
+    assert capsys.readouterr().out.splitlines()[:2] == [
+        "on the local network:", "  alpha, DRIVE: http://10.0.0.7:8765/ (version 1.2)",
+    ]  # fmt: skip
+    monkeypatch.setattr(local_network, "find_robots", none)
+    assert run_command(["probe"]) == FAILED
+    assert "the local network cannot be searched: Network is unreachable" in capsys.readouterr().out
 
 
 @pytest.mark.realtime
@@ -68,6 +94,7 @@ def test_a_battery_that_is_low_is_named_with_and_without_its_voltage() -> None:
 
 def test_a_port_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(probe, "ANSWER_MAX_S", 0.05)
+    monkeypatch.setattr(local_network, "find_robots", no_robots)
     robot, line = os.openpty()
     tty.setraw(line)
     monkeypatch.setattr(probe, "comports", lambda: [ListPortInfo(os.ttyname(line))])
@@ -81,6 +108,7 @@ def test_no_port_and_one_that_cannot_be_opened(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(probe, "comports", list)
+    monkeypatch.setattr(local_network, "find_robots", no_robots)
     assert run_command(["probe"]) == FAILED
     assert "this computer has no serial port: plug the robot in" in capsys.readouterr().err
     assert run_command(["probe", str(tmp_path / "none")]) == FAILED
