@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from behaviors.response import Response
+from behaviors.steady_heading import held, turned_towards
 from behaviors.valley.choice import apart, candidates, cheapest
 from behaviors.valley.look_ahead import Search, carrot
 from behaviors.valley.polar_histogram import (
@@ -22,14 +23,11 @@ from behaviors.valley.polar_histogram import (
     room_m,
 )
 from config.behaviors import FollowValleyConfig
-from perception.percept import Percept, wrap_angle
+from perception.percept import Percept
 
 SCHEMA: Final = "follow_valley"
 LEAST_WAY_M: Final = 0.1
 """A direction is blocked if the robot cannot drive so far in it, however near the target is, m."""
-HELD_RAD: Final = math.radians(1.0)
-"""The heading is not corrected by less than this, and in full by twice this: the odometry's rounding would steer the
-wheels to and fro."""
 STRAIGHT: Final = 0.5
 """A target within so many sectors of the goal's direction is the goal: the way is straight."""
 
@@ -72,7 +70,9 @@ def follow_valley(
     if not (math.isfinite(length) and math.isfinite(pose.theta)) or length == 0.0:
         return Response(SCHEMA, to_goal.x, to_goal.y), before
     target_rad, target_m = math.atan2(to_goal.y, to_goal.x), goal_m
-    if (ahead := carrot(search, pose.x, pose.y, config.carrot_m)) is not None:
+    # Of a goal beside a wall one look-ahead finds that it can be reached, and the next that it cannot.
+    is_there = goal_m < config.look_ahead_step_m
+    if not is_there and (ahead := carrot(search, pose.x, pose.y, config.carrot_m)) is not None:
         dx, dy = ahead[0] - pose.x, ahead[1] - pose.y
         bearing = math.atan2(dy, dx)
         if apart(bearing / SECTOR_RAD, target_rad / SECTOR_RAD) > STRAIGHT:
@@ -96,11 +96,10 @@ def follow_valley(
         return Response(SCHEMA, 0.0, 0.0), Valley(shown, None)
     direction = chosen * SECTOR_RAD
     if before.direction_rad is not None:
-        turned = before.direction_rad + config.turn_share * wrap_angle(direction - before.direction_rad)
+        turned = turned_towards(before.direction_rad, direction, config.turn_share)
         if not blocked[round(turned / SECTOR_RAD) % SECTORS]:
             direction = turned
-    off = wrap_angle(direction - pose.theta)
-    driven = pose.theta + off * min(1.0, max(0.0, abs(off) / HELD_RAD - 1.0))
+    driven = held(pose.theta, direction)
     return Response(SCHEMA, length * math.cos(driven), length * math.sin(driven)), Valley(shown, direction)
 
 

@@ -22,11 +22,13 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from behaviors.blocked_ahead import Ahead, Block, between, blocked_ahead, outline, presume, widen
 from behaviors.clearance import free_paths_m
 from behaviors.near_memory import NearEchoes, remember
 from behaviors.response import Response
+from behaviors.steady_heading import turned_towards
 from config.behaviors import LeaveCanyonConfig
 from perception.percept import Canyon, Floats, Percept, Pose, wrap_angle
 
@@ -57,6 +59,12 @@ LOST_M: Final = 1.0
 FAR_M: Final = 1e6
 """Farther than any goal."""
 NO_POINTS: Final = np.empty((0, 2))
+TURN_SHARE: Final = 0.15
+"""The direction turns by this share of the angle to the chosen one in each cycle."""
+PASSAGE_M: Final = 0.165
+"""Least room on either side of the robot where it passes between two objects: just above the arbiter's clearance."""
+THROUGH_M: Final = 1.5
+"""A gap is passed if the robot sees so far through it, m."""
 TURNS: Final = np.arange(0.0, 2.0 * math.pi, math.radians(5.0))
 """Turns from the obstacle's direction that are tried, in this order."""
 
@@ -101,7 +109,7 @@ NO_DETOUR: Final = Detour()
 
 def leave_canyon(
     percept: Percept, goal: tuple[float, float], detour: Detour, body_radius_m: float, config: LeaveCanyonConfig,
-    *, waits: bool = False,
+    *, waits: bool = False, last_rad: float | None = None,
 ) -> tuple[Response | None, Detour]:  # fmt: skip
     """Return the vector round what closes the way to a goal, None while nothing does; and the detour so far.
 
@@ -120,6 +128,8 @@ def leave_canyon(
     waits
         Another schema finds a way between single obstacles: echoes ahead alone begin a detour only where the robot
         drives and comes no nearer.
+    last_rad
+        The direction of the cycle before, from which the robot turns steadily; None: it turns at once.
     """
     pose, room = percept.pose, body_radius_m + config.room_m
     dx, dy = goal[0] - pose.x, goal[1] - pose.y
@@ -153,8 +163,12 @@ def leave_canyon(
     if detour.block is not None and abs(wrap_angle(heading - detour.block.axis_rad)) > TURNED_BACK_RAD:
         below = to_goal - PRESUMED_SHARE * (detour.block.back_m - detour.block.front_m)
         return None, replace(detour, side=0, ahead=None, block=None, presume_below_m=below)
-    gain = config.leave_canyon_gain
-    return Response(SCHEMA, gain * math.cos(heading), gain * math.sin(heading)), replace(detour, wall_rad=wall)
+    if last_rad is not None:
+        turned = turned_towards(last_rad, heading, TURN_SHARE)
+        if _free_m(points, pose, turned, body_radius_m + PASSAGE_M) >= config.look_m:
+            heading = turned
+    gain, detour = config.leave_canyon_gain, replace(detour, wall_rad=wall)
+    return Response(SCHEMA, gain * math.cos(heading), gain * math.sin(heading)), detour
 
 
 def _free_m(points: Floats, pose: Pose, heading_rad: float, room_m: float) -> float:
@@ -272,7 +286,16 @@ def _along(
     free = free_paths_m(points, pose, headings, room_m)
     is_free = free >= config.look_m
     chosen = int(is_free.argmax()) if is_free.any() else int(free.argmax())
+    through = free_paths_m(points, pose, headings, room_m - config.room_m + PASSAGE_M) >= THROUGH_M
+    chosen = _gap(through, chosen if is_free.any() else len(TURNS), chosen)
     heading = float(headings[chosen])
     if TURNS[chosen] > NEXT_WALL_RAD:
         wall_rad = heading + 0.5 * math.pi * side
     return wrap_angle(wall_rad), wrap_angle(heading)
+
+
+def _gap(through: NDArray[np.bool_], end: int, otherwise: int) -> int:
+    """Return the middle of the first gap before `end`: a run of directions with nothing free on either side."""
+    edges = np.diff(through[:end].astype(np.int8)).nonzero()[0] + 1
+    edges = edges[1:] if len(edges) and not through[edges[0]] else edges
+    return int(edges[0] + edges[1] - 1) // 2 if len(edges) > 1 else otherwise

@@ -62,6 +62,8 @@ class MoveToGoalConfig(Strict):
     """See `stuck_after_s`, m."""
     unreachable_after_s: float = Field(default=120.0, ge=1.0, le=1e5)
     """The goal is given up after the robot has not come nearer to it than ever before for so long, s."""
+    turn_rate_max_rad_s: float = Field(default=0.5, gt=0.0, le=20.0)
+    """On its way to a goal the robot turns no faster than this, rad/s."""
 
     @model_validator(mode="after")
     def _ordered(self) -> MoveToGoalConfig:

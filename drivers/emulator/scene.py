@@ -23,6 +23,7 @@ _PARALLEL = 1e-12
 """Sine of the angle below which two sides count as parallel: rounding makes any crossing of theirs meaningless."""
 
 _Point = tuple[float, float]
+_Side = tuple[_Point, _Point]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,11 +56,12 @@ def compile_scene(world: WorldConfig) -> Scene:
     )
 
 
-def _sectors(sides: list[tuple[_Point, _Point]]) -> list[tuple[float, ...]]:
+def _sectors(sides: list[_Side]) -> list[tuple[float, ...]]:
     """Return the open sectors round every point where a side ends or two sides cross."""
     rows: list[tuple[float, ...]] = []
-    for x, y in _meeting_points(sides):
-        directions = _directions_from((x, y), sides)
+    boxes = _Boxes(sides)
+    for x, y in _meeting_points(sides, boxes):
+        directions = _directions_from((x, y), [sides[i] for i in boxes.near((x, y), (x, y))])
         for i, start in enumerate(directions):
             end = directions[(i + 1) % len(directions)]
             opening = (end - start) % (2.0 * math.pi) or 2.0 * math.pi
@@ -68,18 +70,40 @@ def _sectors(sides: list[tuple[_Point, _Point]]) -> list[tuple[float, ...]]:
     return rows
 
 
-def _meeting_points(sides: list[tuple[_Point, _Point]]) -> list[_Point]:
-    found: list[_Point] = []
+class _Boxes:
+    """The rectangles round all sides, so that a building's hundreds are not compared each with each."""
+
+    def __init__(self, sides: list[_Side]) -> None:
+        ends = np.array(sides, dtype=np.float64).reshape(-1, 2, 2)
+        self._low, self._high = ends.min(axis=1) - JOIN_M, ends.max(axis=1) + JOIN_M
+
+    def near(self, a: _Point, b: _Point) -> list[int]:
+        """Return the sides, in turn, whose rectangle is within `JOIN_M` of the rectangle of two points."""
+        low, high = np.minimum(a, b) - JOIN_M, np.maximum(a, b) + JOIN_M
+        near: list[int] = ((self._low <= high) & (self._high >= low)).all(axis=1).nonzero()[0].tolist()
+        return near
+
+
+def _meeting_points(sides: list[_Side], boxes: _Boxes) -> list[_Point]:
+    """Return the ends of all sides and where they cross; of those nearer than `JOIN_M` to one another the first."""
     crossings = [
-        p for i, side in enumerate(sides) for other in sides[:i] if (p := _crossing(side, other)) is not None
+        p
+        for i, side in enumerate(sides)
+        for k in boxes.near(*side)
+        if k < i and (p := _crossing(side, sides[k])) is not None
     ]
+    found: list[_Point] = []
+    squares: dict[tuple[int, int], list[_Point]] = {}
     for point in [end for side in sides for end in side] + crossings:
-        if all(math.dist(point, other) > JOIN_M for other in found):
+        column, row = math.floor(point[0] / JOIN_M), math.floor(point[1] / JOIN_M)
+        around = (squares.get((i, k), ()) for i in range(column - 1, column + 2) for k in range(row - 1, row + 2))
+        if all(math.dist(point, other) > JOIN_M for others in around for other in others):
             found.append(point)
+            squares.setdefault((column, row), []).append(point)
     return found
 
 
-def _crossing(first: tuple[_Point, _Point], second: tuple[_Point, _Point]) -> _Point | None:
+def _crossing(first: _Side, second: _Side) -> _Point | None:
     (ax, ay), (bx, by) = first
     (cx, cy), (dx, dy) = second
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
@@ -91,7 +115,7 @@ def _crossing(first: tuple[_Point, _Point], second: tuple[_Point, _Point]) -> _P
     return (ax + t * ux, ay + t * uy) if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0 else None
 
 
-def _directions_from(point: _Point, sides: list[tuple[_Point, _Point]]) -> list[float]:
+def _directions_from(point: _Point, sides: list[_Side]) -> list[float]:
     """Return the directions in which surface leaves `point`, ascending, each once."""
     directions: list[float] = []
     for a, b in sides:

@@ -13,9 +13,9 @@ from behaviors.goal_progress import Progress, observe_progress
 from behaviors.leave_canyon import NO_DETOUR, Detour, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.response import Response
+from behaviors.steady_heading import held
 from behaviors.valley.look_ahead import Search, begin, expand
 from behaviors.valley.polar_histogram import cells_near
-from config.behaviors import AvoidStaticObstacleConfig, BehaviorsConfig
 from config.settings import Settings
 from perception.percept import Percept
 from runtime.cycle.drive_requests import STANDSTILL
@@ -74,11 +74,15 @@ def drive_to_goal(
         has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
         around, detour = leave_canyon(
             percept, (goal.x, goal.y), now.detour, body.radius_m, behaviors.leave_canyon,
-            waits=has_valley and run_s - now.progress.moved_run_s < STANDS_S,
+            waits=has_valley and run_s - now.progress.moved_run_s < STANDS_S, last_rad=now.valley.direction_rad,
         )  # fmt: skip
         now = replace(now, detour=detour)
     if around is not None:
-        response = around
+        length, direction_rad = math.hypot(around.x, around.y), math.atan2(around.y, around.x)
+        now = replace(now, valley=replace(now.valley, direction_rad=direction_rad))
+        driven_rad = held(percept.pose.theta, direction_rad)
+        response = Response(around.schema, length * math.cos(driven_rad), length * math.sin(driven_rad))
+        pushes = (_underneath(percept, behaviors.leave_canyon.room_m, settings), *pushes[1:])
         if now.detour.rounds < ROUNDS_MAX:
             now = replace(now, progress=replace(now.progress, nearer_run_s=run_s))
     elif behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
@@ -88,9 +92,9 @@ def drive_to_goal(
         )
         now = replace(now, valley=valley)
         hold_reason = NO_VALLEY if valley.direction_rad is None else None
-        pushes = (avoid_static_obstacle(percept, body.radius_m, _underneath(behaviors)), *pushes[1:])
+        pushes = (_underneath(percept, behaviors.follow_valley.safety_m, settings), *pushes[1:])
     responses = (response, *pushes)
-    decision = arbitrate(responses, percept, body, behaviors.arbiter, tuple(r.schema for r in responses))
+    decision = _arbitrate(responses, percept, settings)
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
             now.progress, percept.pose, distance_m, run_s, hold_reason, behaviors.move_to_goal,
@@ -122,11 +126,19 @@ def drive_through_valley(
     now = GoalDrive(Progress.starting_at(percept.pose, 0.0, run_s)) if before is None else before
     config, radius_m = settings.behaviors.follow_valley, settings.body.radius_m
     response, valley = follow_valley(percept, way, distance_m, now.valley, Search(), radius_m, config)
-    responses = (response, avoid_static_obstacle(percept, radius_m, _underneath(settings.behaviors)), *beside)
+    responses = (response, _underneath(percept, config.safety_m, settings), *beside)
     expected = tuple(r.schema for r in responses)
     decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
     is_closed = valley.direction_rad is None and math.hypot(way.x, way.y) > 0.0
     return replace(now, valley=valley), responses, decision, NO_VALLEY if is_closed else None
+
+
+def _arbitrate(responses: tuple[Response, ...], percept: Percept, settings: Settings) -> Decision:
+    """Return the arbiter's decision for a robot that turns no faster than it should on its way."""
+    body, behaviors = settings.body, settings.behaviors
+    rate_rad_s = min(body.turn_max_rad_s, behaviors.move_to_goal.turn_rate_max_rad_s)
+    gentle = body.model_copy(update={"turn_max_rad_s": rate_rad_s})
+    return arbitrate(responses, percept, gentle, behaviors.arbiter, tuple(r.schema for r in responses))
 
 
 def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
@@ -135,16 +147,16 @@ def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
     return bool((cells_near(percept, goal.x, goal.y, body.radius_m, config).certainties == 1.0).any())
 
 
-def _underneath(behaviors: BehaviorsConfig) -> AvoidStaticObstacleConfig:
-    """Return avoid-static-obstacle's settings beside follow-valley, which keeps the distance itself.
+def _underneath(percept: Percept, room_m: float, settings: Settings) -> Response:
+    """Return avoid-static-obstacle's response beside a schema that keeps `room_m` between rim and obstacle itself.
 
-    It pushes the robot out of the room that follow-valley wants, and out of the arbiter's clearance without bound.
+    It pushes the robot out of that room, and out of the arbiter's clearance without bound.
     """
-    margin_m = behaviors.arbiter.clearance_m
-    sphere_m = max(behaviors.follow_valley.safety_m, margin_m + FAINT_M)
-    return behaviors.avoid_static_obstacle.model_copy(
-        update={"avoid_obstacle_sphere_m": sphere_m, "avoid_obstacle_safety_margin_m": margin_m}
-    )
+    margin_m = settings.behaviors.arbiter.clearance_m
+    config = settings.behaviors.avoid_static_obstacle.model_copy(update={
+        "avoid_obstacle_sphere_m": max(room_m, margin_m + FAINT_M), "avoid_obstacle_safety_margin_m": margin_m,
+    })  # fmt: skip
+    return avoid_static_obstacle(percept, settings.body.radius_m, config)
 
 
 def _with_search(now: GoalDrive, goal: Goal, percept: Percept, run_s: float, settings: Settings) -> GoalDrive:

@@ -103,3 +103,11 @@ def test_what_is_not_finite_reaches_the_arbiter() -> None:
         at(0.0, 0.0), Response("move_to_goal", math.nan, 0.0), 1.0, Valley(), Search(), 0.4, CONFIG
     )
     assert math.isnan(broken[0].x)
+
+
+def test_close_to_the_goal_no_look_ahead_leads_away_from_it() -> None:
+    """Beside a wall one finds that the goal can be reached, the next that it cannot: the robot turned to and fro."""
+    back = Search(goal=(0.3, 0.0), way=((0.0, 0.0), (-1.0, 0.0)), reaches=False)
+    for goal_m, along in ((0.3, 0.5), (2.0, -0.5)):
+        found, _ = follow_valley(at(0.0, 0.0), TO_GOAL, goal_m, Valley(), back, RADIUS_M, CONFIG)
+        assert found.x == pytest.approx(along)

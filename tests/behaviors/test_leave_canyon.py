@@ -143,3 +143,27 @@ def test_inside_a_known_canyon_a_detour_begins_and_does_not_end() -> None:
     going, _ = leave_canyon(seen(3.0, 0.0, canyons=(CANYON,)), (6.0, 0.0), detour, 0.381, BLIND)
     assert going is not None
     assert leave_canyon(seen(2.0, 0.0, canyons=(CANYON,)), (3.5, 0.0), NO_DETOUR, 0.381, BLIND)[0] is None
+
+
+def along_a_wall_with_a_doorway(width_m: float, last_rad: float | None = None, away_m: float = 1.0) -> float:
+    """Return the heading of a robot that follows a wall on its left, before the middle of a doorway in it, rad."""
+    x = np.concatenate([np.arange(-4.0, -0.5 * width_m, 0.05), [-0.5 * width_m]])
+    wall = np.column_stack([np.concatenate([x, -x]), np.full(2 * len(x), away_m)])
+    detour = replace(NO_DETOUR, side=1, began_m=5.0, wall_rad=math.radians(120.0))
+    response, _ = leave_canyon(seen(0.0, 0.0, wall), (0.0, 5.5), detour, 0.381, BLIND, last_rad=last_rad)
+    assert response is not None
+    return math.atan2(response.y, response.x)
+
+
+@pytest.mark.parametrize(("width_m", "passes"), [(1.0, False), (1.1, True), (1.2, True), (1.26, True)])
+def test_a_doorway_that_the_robot_can_pass_is_passed_in_its_middle(width_m: float, passes: bool) -> None:
+    heading = along_a_wall_with_a_doorway(width_m)
+    assert (abs(heading - 0.5 * math.pi) < math.radians(16.0)) is passes
+    assert passes or abs(heading) < math.radians(45.0), "past the doorway, towards the wall behind it"
+
+
+def test_it_turns_steadily_where_there_is_room_and_at_once_where_there_is_not() -> None:
+    wanted = along_a_wall_with_a_doorway(1.0)
+    assert along_a_wall_with_a_doorway(1.0, -0.5) == pytest.approx(-0.5 + 0.15 * (wanted + 0.5))
+    wanted = along_a_wall_with_a_doorway(1.0, away_m=0.8)
+    assert along_a_wall_with_a_doorway(1.0, 0.6 * math.pi, away_m=0.8) == wanted, "the wall is near"

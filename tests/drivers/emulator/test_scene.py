@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -59,3 +60,26 @@ def test_drums_are_circles_and_polygons_are_closed() -> None:
     scene = compile_scene(WorldConfig(drum=(drum(1, 2, 0.5),), polygon=(triangle,)))
     assert scene.circles.tolist() == [(1.0, 2.0, 0.5)]
     assert scene.segments[-1].tolist() == (0.0, 1.0, 0.0, 0.0)
+
+
+def test_of_many_sides_every_end_and_every_crossing_is_found_once() -> None:
+    """As found by comparing each side with each, which a building's hundreds are not."""
+    ends = np.random.default_rng(5).integers(-6, 7, (40, 4)).astype(float)
+    ends = ends[(ends[:, :2] != ends[:, 2:]).any(axis=1)]
+    scene = compile_scene(world_of("specular", wall=tuple(wall(*side) for side in ends.tolist())))
+    places = {(x, y) for side in ends.tolist() for x, y in (side[:2], side[2:])}
+    for (ax, ay, bx, by), (cx, cy, dx, dy) in itertools.combinations(ends.tolist(), 2):
+        matrix = np.array([[bx - ax, cx - dx], [by - ay, cy - dy]])
+        if abs(np.linalg.det(matrix)) > 0.5:
+            t, s = np.linalg.solve(matrix, [cx - ax, cy - ay]).tolist()
+            if min(t, s) >= -1e-9 and max(t, s) <= 1.0 + 1e-9:
+                places.add((ax + t * (bx - ax), ay + t * (by - ay)))
+    expected = {(round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in places}
+    opening: dict[tuple[float, float], float] = {}
+    for x, y, _, angle in scene.corners.tolist():
+        at = (round(x, 6) + 0.0, round(y, 6) + 0.0)
+        opening[at] = opening.get(at, 0.0) + angle
+    straight = expected - opening.keys()
+    assert opening.keys() <= expected
+    assert all(abs(remainder) < 1e-6 for remainder in (math.remainder(a, math.pi) for a in opening.values()))
+    assert len(straight) <= 2, "only points in the middle of straight surfaces are no corners"

@@ -24,7 +24,8 @@ from tests.runtime.scripted_step import PERIOD_S
 
 def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
     script = driving("behaviors.move_to_goal.success_radius_m=0.2")
-    assert script.request_drive(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
+    rate = script.settings.behaviors.move_to_goal.turn_rate_max_rad_s
+    assert script.request_drive(Goal(0.0, 5.0)).command == near(0.0, rate)
     to_goal = script.state.vectors[0]
     assert to_goal.schema == "follow_valley"
     assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))

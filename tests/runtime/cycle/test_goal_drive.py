@@ -12,7 +12,7 @@ import pytest
 from pydantic import ValidationError
 
 from behaviors.move_to_goal import Goal
-from drivers.messages import Pose
+from drivers.messages import Pose, Twist
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.step import STANDSTILL
@@ -125,3 +125,11 @@ def test_a_goal_that_is_corrected_gets_another_way() -> None:
     script.state.drive_request = replace(FAR, y=1.0)
     script.request_drive(None)
     assert goal_drive(script).search.goal == (5.5, 1.0)
+
+
+def test_on_its_way_the_robot_turns_no_faster_than_it_should() -> None:
+    for rate, expected in (("0.5", 0.5), ("0.2", 0.2), ("20.0", 1.0)):
+        script = driving(f"behaviors.move_to_goal.turn_rate_max_rad_s={rate}")
+        command = script.request_drive(Goal(-5.0, 0.5)).command
+        assert isinstance(command, Twist)
+        assert abs(command.w) == expected
