@@ -12,6 +12,11 @@ ARRAY: Final = 8
 """Sensors of an array of a Pioneer, and of a bank that is written for an rFLEX controller; of each, one fires."""
 BAUD: Final = 115200
 ARCOS_BAUD: Final = 38400
+ARCOS_LINK: Final = """reply_timeout_s = 0.25
+tries = 2
+silence_max_s = 0.5  # the controller reports every 0.1 s
+deadman_max_s = 2.0  # its watchdog as delivered; less in the robot's flash is better
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +75,7 @@ synchro = {str(draft.synchro).lower()}  # true: the wheels turn, body and ring d
 [link]
 {f"port = {_quoted(port)}" if port else '# port = "/dev/ttyUSB0"  # or name it at the start: echolocate run --port'}
 baud = {baud}
-"""  # noqa: E501 - the file's own lines
+{ARCOS_LINK if draft.driver == "arcos" else ""}"""  # noqa: E501 - the file's own lines
 
 
 def _mounting(draft: RobotDraft) -> str:

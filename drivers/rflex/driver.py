@@ -13,7 +13,7 @@ from typing import Final
 
 from config.robot import RingConfig, RobotConfig
 from drivers import line_diagnostics
-from drivers.driver import LineState
+from drivers.driver import DriverError, LineState
 from drivers.line_budget import refuse_slow_line
 from drivers.messages import Flags, Identity, LinkCounts, Odometry, Twist
 from drivers.rflex import diagnostics
@@ -70,11 +70,14 @@ class RflexDriver(Session[Measurements]):
     drivers.firing_pattern.FiringError
         The ring or the controller cannot carry out the firing pattern.
     DriverError
-        The sonar banks do not fit the ring.
+        The sonar banks do not fit the ring, or its ranges are finer than the controller's.
     """
 
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
+        finer = line_diagnostics.finer_than_line(config.ring.resolution_m, 1.0 / config.rflex.range_factor)
+        if finer is not None:
+            raise DriverError(finer)
         self._pattern = pattern_of(config, config.ring)
         axes = 2 * len(encode(frame_of(AxisReport(0, 0, 0, 0)))) / REPORT_PERIOD_S
         ranges = SonarReport(0, tuple((0, 0) for _ in config.rflex.banks))

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from config.robot import RobotConfig
+from config.units import FOOT_M
 from drivers.messages import Firing
 from runtime.recording.ring_log import RingLogError
 
@@ -26,12 +27,15 @@ STEPS_MIN: Final = 30
 """Steps that moved or turned before they are judged."""
 STEPS_KEPT: Final = 4096
 """Newest steps that are judged."""
-FAST_FACTOR: Final = 20.0
-"""A log whose median speed exceeds the robot's by this factor is in another unit; millimetres give a thousand. A
-median, because a leap of the odometry is no unit."""
+FAST_FACTOR, TURN_FACTOR = 20.0, 5.0
+"""A log whose median speed or rate of turning exceeds the robot's by such a factor is in another unit: millimetres
+give a thousand, degrees 57. A median, because a leap of the odometry is no unit."""
 ALONG_MIN: Final = 0.95
 AGAINST_MAX: Final = 0.8
 """Median |cos| between path and heading: a robot drives along its heading; in a wrong unit, that is anywhere."""
+TELLING: Final = 0.1
+"""Least difference of that cosine between radians and degrees for a step that can show the unit: on a straight drive
+along x, both fit."""
 FAR_SHARE: Final = 0.3
 """Share of the ranges that may lie beyond the ring's."""
 CEILING_SHARE: Final = 0.3
@@ -85,10 +89,10 @@ class RingLogUnits:
             return (
                 f"{100 * self._far / self._ranges:.0f} % of the ranges are beyond ring.range_max_m "
                 f"{ring.range_max_m:g}, the greatest is {self._highest:g}: "
-                f"ranges are in metres{_thousand(self._highest)}"
+                f"ranges are in metres{_remedy(self._highest, ring.range_max_m)}"
             )
-        moves = np.median(np.array(self._moves), axis=0) if len(self._moves) >= STEPS_MIN else np.zeros(3)
-        speed, along, along_degrees = moves.tolist()
+        moves = np.array(self._moves).reshape(-1, 3)
+        speed = float(np.median(moves[:, 0])) if len(moves) >= STEPS_MIN else 0.0
         if speed > FAST_FACTOR * body.speed_max_m_s:
             return (
                 f"x and y move at {speed:.3g} m/s, and this robot's body.speed_max_m_s is {body.speed_max_m_s:g}: "
@@ -96,13 +100,15 @@ class RingLogUnits:
             )
         if self.count > 1 and (period := self._period()) > PERIOD_MAX_S:
             return f"the firings are {period:.3g} s apart: t is in seconds{_thousand(period)}"
+        telling = moves[np.abs(moves[:, 1] - moves[:, 2]) > TELLING, 1:]
+        along, along_degrees = np.median(telling, axis=0).tolist() if len(telling) >= STEPS_MIN else (1.0, 0.0)
         if along < AGAINST_MAX and along_degrees > ALONG_MIN:
             return (
                 "the robot moves along theta only if theta is in degrees: it is in radians, counter-clockwise; "
                 "multiply theta (and ring_yaw) by pi/180"
             )
         rate = float(np.median(self._turns)) if len(self._turns) >= STEPS_MIN else 0.0
-        if rate > FAST_FACTOR * body.turn_max_rad_s:
+        if rate > TURN_FACTOR * body.turn_max_rad_s:
             return (
                 f"theta turns at {rate:.3g} rad/s, and this robot's body.turn_max_rad_s is {body.turn_max_rad_s:g}: "
                 "theta is in radians; multiply it (and ring_yaw) by pi/180 where it is in degrees"
@@ -179,6 +185,13 @@ def _refuse(units: RingLogUnits, path: Path) -> None:
     problem = units.problem()
     if problem is not None:
         raise RingLogError(f"{path}: {problem}; or name the robot file of the robot that recorded the log")
+
+
+def _remedy(highest: float, most_m: float) -> str:
+    """Return the remedy for a greatest range that would be within the ring's in another unit."""
+    factors = {"feet": FOOT_M, "centimetres": 0.01, "millimetres": 0.001}
+    unit = next((unit for unit, factor in factors.items() if factor * highest <= 1.2 * most_m), None)
+    return "" if unit is None else f"; multiply them by {factors[unit]:g} if they are in {unit}"
 
 
 def _thousand(value: float) -> str:

@@ -1,15 +1,21 @@
-"""Numbers as the console's page writes them (its `units.js`, `objects.js`, `status.js`): same digits, same order."""
+"""What the console's page writes, as it writes it (its `units.js`, `objects.js`, `status.js`, `walls.js`)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from decimal import ROUND_HALF_UP, Decimal
+from typing import Final
 
 from config.units import FOOT_M
+from drivers.messages import Pose
 from perception.bayes.object_report import worst_sigma
 from perception.detected_object import DetectedObject
 from perception.localization.drift_correction import LocalizedPose
 from runtime.support.length_format import Units
+
+BEHIND_M: Final = 0.1
+"""An object in front of a wall may touch it."""
 
 
 def number(metres: float, units: Units, digits: int = 2) -> str:
@@ -40,14 +46,50 @@ def percent(share: float) -> str:
     return f"{'> 99' if 0.995 < share < 1.0 else math.floor(100.0 * share + 0.5)} %"
 
 
-def certainty(seen: DetectedObject) -> str:
-    """Return what is known of an object: what an operator said of it counts more than a number."""
+def is_hidden(seen: DetectedObject, radius_m: float, robot: Pose, objects: Iterable[DetectedObject]) -> bool:
+    """Return whether a wall hides an object: the sight line to its middle crosses it, and all of it lies beyond.
+
+    Parameters
+    ----------
+    seen
+        The object; no wall counts as hidden.
+    radius_m
+        Of the object.
+    robot
+        In the frame of the objects.
+    objects
+        All that are reported, walls among them.
+    """
+    if seen.ends is not None:
+        return False
+    for wall in objects:
+        if wall.ends is None:
+            continue
+        x1, y1, x2, y2 = wall.ends
+        dx, dy, sx, sy = x2 - x1, y2 - y1, seen.x - robot.x, seen.y - robot.y
+        of_robot, of_object = dx * (robot.y - y1) - dy * (robot.x - x1), dx * (seen.y - y1) - dy * (seen.x - x1)
+        of_ends = (sx * (y1 - robot.y) - sy * (x1 - robot.x)) * (sx * (y2 - robot.y) - sy * (x2 - robot.x))
+        square = dx * dx + dy * dy
+        along = 0.0 if square == 0.0 else min(1.0, max(0.0, ((seen.x - x1) * dx + (seen.y - y1) * dy) / square))
+        away_m = math.hypot(seen.x - x1 - along * dx, seen.y - y1 - along * dy)
+        if of_robot * of_object < 0.0 and of_ends < 0.0 and away_m > radius_m + BEHIND_M:
+            return True
+    return False
+
+
+def certainty(seen: DetectedObject, *, hidden: bool = False) -> str:
+    """Return what is known of an object: what an operator said counts more than a number.
+
+    Behind a wall no reading checks the number.
+    """
+    if hidden and not seen.confirmed:
+        return "hidden"
     if seen.placed and not seen.confirmed:
         return "placed"
     return f"{'✓ ' if seen.confirmed else ''}{percent(seen.score if seen.probability is None else seen.probability)}"
 
 
-def object_row(seen: DetectedObject, units: Units) -> tuple[str, str, str, str, str]:
+def object_row(seen: DetectedObject, units: Units, *, hidden: bool = False) -> tuple[str, str, str, str, str]:
     """Return number, name, certainty, place and uncertainty of an object, or the length of a wall."""
     if seen.ends is None:
         where = f"{place(seen.x, seen.y, units)}, {degrees(seen.theta)}"
@@ -56,7 +98,7 @@ def object_row(seen: DetectedObject, units: Units) -> tuple[str, str, str, str, 
         x1, y1, x2, y2 = seen.ends
         where = f"{number(x1, units)}, {number(y1, units)} to {place(x2, y2, units)}"
         size = f"{length(math.hypot(x2 - x1, y2 - y1), units)} long"
-    return "–" if seen.number is None else str(seen.number), seen.model, certainty(seen), where, size
+    return "–" if seen.number is None else str(seen.number), seen.model, certainty(seen, hidden=hidden), where, size
 
 
 def twist(v: float, w: float, units: Units) -> str:

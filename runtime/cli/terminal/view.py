@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import os
 import sys
 import termios
@@ -16,6 +17,7 @@ import tty
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from types import MappingProxyType
 from typing import Final
 
@@ -29,7 +31,7 @@ from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose, Twist
 from perception.detected_object import DetectedObject, MapCounts
 from perception.localization.drift_correction import LocalizedPose
-from runtime.cli.terminal.page_text import localized_place, object_row, twist
+from runtime.cli.terminal.page_text import is_hidden, localized_place, object_row, twist
 from runtime.cli.terminal.plan import draw_plan
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import ModeState
@@ -51,6 +53,9 @@ FAULTS_SHOWN: Final = 3
 WARNINGS_MAX: Final = 3
 ROOMY_ROWS: Final = 14
 """From so many lines left on, the counts are all shown beside the objects."""
+TALL_ROWS: Final = 20
+REASON_LINES_MAX: Final = 3
+"""Of a reason that does not fit beside the mode, on a terminal of so many lines."""
 PLAN_ROWS_MIN: Final = 4
 """A plan of fewer lines shows nothing."""
 LEGEND: Final = "→ robot   • outline segments   o objects   = walls"
@@ -59,6 +64,8 @@ KEY_LINES: Final = (
     "a arm ␣ halt q quit", "a ␣halt q",
 )  # fmt: skip
 """The longest that fits is shown."""
+CORNERED_M: Final = 0.1
+"""What counts as the radius of a model without one, as on the page."""
 KEYS_MAX: Final = 64
 KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
 
@@ -110,6 +117,7 @@ class View:
         self._size_m = {
             m.name: m.arc_radius_m or max(float(np.hypot(x, y)) for x, y in m.vertices_m) for m in settings.models
         }
+        self._radii_m = {m.name: m.arc_radius_m or CORNERED_M for m in settings.models}
         self._ranges = np.full(len(settings.ring.mounts), np.nan)
         self._trail: deque[tuple[float, float]] = deque(maxlen=TRAIL)
         self.console_url: str | None = None
@@ -206,22 +214,31 @@ class View:
         return Text("\n", no_wrap=True).join(lines)
 
     def _head(self, snapshot: Snapshot, width: int) -> list[Text]:
-        """Return mode, the address of the console (whole, on as many lines as it needs), and the keys."""
+        """Return mode and reason, the address of the console (whole, on as many lines as it needs), and the keys."""
         mode = snapshot.mode
         name = mode.mode.value.replace("_", " ")  # as on the page
         head = Text.assemble((f" {name} ", STYLES.get(mode.mode.value, "bold black on yellow")))
         head.append("" if snapshot.twist is None else f" {twist(snapshot.twist.v, snapshot.twist.w, self._units)}")
-        head.append(f"  {mode.reason or ''}")
+        reason, room = mode.reason or "", width - len(head.plain) - 2
+        more = list[str]()
+        if len(reason) > room and self._console.height >= TALL_ROWS:
+            more, reason = wrap(reason, width, max_lines=REASON_LINES_MAX, placeholder=" …"), ""
+        head.append(f"  {reason}" if reason else "")
         url = self.console_url or ""
         address = [Text(url[k : k + width], style="bold") for k in range(0, len(url), width)]
-        return [head, *address, Text(next((keys for keys in KEY_LINES if len(keys) <= width), KEY_LINES[-1]))]
+        return [
+            head,
+            *map(Text, more),
+            *address,
+            Text(next((keys for keys in KEY_LINES if len(keys) <= width), KEY_LINES[-1])),
+        ]
 
     def _warnings(self, snapshot: Snapshot) -> list[Text]:
         return [Text(f"masked  {reason}", style="yellow") for reason in snapshot.sensors[:WARNINGS_MAX]]
 
     def _objects(self, snapshot: Snapshot, rows: int) -> list[Text]:
         """Return a line for each object as on the page, and how many have no room."""
-        objects = snapshot.objects
+        objects = sorted(snapshot.objects, key=lambda seen: math.inf if seen.number is None else seen.number)
         if rows < 1 or not objects:
             return []
         walls = sum(seen.ends is not None for seen in objects)
@@ -229,13 +246,17 @@ class View:
         count = f"objects  {len(objects) - walls}, and {walls} wall{'s' * (walls > 1)}" if walls else (
             f"objects  {len(objects)}")  # fmt: skip
         more = f"; {len(objects) - shown} have no room here" if shown < len(objects) else ""
-        cells = [object_row(seen, self._units) for seen in objects[:shown]]
+        cells = [object_row(seen, self._units, hidden=self._is_hidden(seen, snapshot)) for seen in objects[:shown]]
         wide = [max((len(row[k]) for row in cells), default=0) for k in range(4)]
         lines = [
             Text(f"{no:>{wide[0]}} {name:<{wide[1]}}  {sure:>{wide[2]}}  {where:<{wide[3]}}  {size}")
             for no, name, sure, where, size in cells
         ]
         return [Text(count + more, style="bold"), *lines]
+
+    def _is_hidden(self, seen: DetectedObject, snapshot: Snapshot) -> bool:
+        radius_m = self._radii_m.get(seen.model, CORNERED_M)
+        return snapshot.pose is not None and is_hidden(seen, radius_m, snapshot.pose, snapshot.objects)
 
     def _counts(self, snapshot: Snapshot) -> list[Text]:
         counts, took, lag = snapshot.counts, snapshot.cycle_us, snapshot.lag_us

@@ -85,6 +85,7 @@ def test_the_whole_first_hour(here: Path, monkeypatch: pytest.MonkeyPatch, measu
     assert max(misses) < 0.15
     assert math.dist(places[-1], ROUTE[-1]) < 0.15
     drums = len(found["objects"])
+    assert drums >= 3, "the route leads round all four"
     measured(
         f"{len(COMMANDS)} commands; waypoints passed within {max(misses):.2f} m; {drums} drums of 4 in its own CSV"
     )

@@ -17,6 +17,7 @@ from runtime.recording.ring_log_units import FIRST, plausible_firings
 
 ROBOT = load_settings("hallway")
 LOG = Path("log.csv")
+HALF_S = 3.0
 
 
 def drive(count: int = 300, turn: float = 0.2, heading: float = 0.4) -> Iterator[Firing]:
@@ -42,11 +43,25 @@ def turns_on_the_spot(firing: Firing) -> Firing:
     return replace(firing, pose=Pose(0.0, 0.0, 3.0 * firing.pose.theta))
 
 
+def straight_first(firing: Firing) -> Firing:
+    """Return a firing of a drive whose first half leads along x, where degrees and radians are the same."""
+    along = 0.2 * min(firing.robot_s, HALF_S)
+    if firing.robot_s <= HALF_S:
+        return replace(firing, pose=Pose(along, 0.0, 0.0), ring_yaw=0.0)
+    angle = 0.2 * (firing.robot_s - HALF_S)  # an arc of a radius of 1 m
+    return replace(firing, pose=Pose(along + math.sin(angle), 1.0 - math.cos(angle), angle), ring_yaw=angle)
+
+
 @pytest.mark.parametrize("count", [1, 50, 300, FIRST + 7])
 def test_a_log_in_metres_and_radians_passes_unchanged(count: int) -> None:
     given, said = list(drive(count)), list[str]()
     assert list(plausible_firings(iter(given), LOG, ROBOT, said.append)) == given
-    for change in (turns_on_the_spot, lambda f: in_units(f, place=0.0), lambda f: in_units(f, place=-1.0)):
+    for change in (
+        turns_on_the_spot,
+        straight_first,
+        lambda f: in_units(f, place=0.0),
+        lambda f: in_units(f, place=-1.0),
+    ):
         changed = [change(firing) for firing in given]
         assert list(plausible_firings(changed, LOG, ROBOT, said.append)) == changed, "on the spot, or backwards"
     assert not said
@@ -61,14 +76,17 @@ def test_leaps_of_the_odometry_are_no_unit() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda f: in_units(f, reach=1e3), "ranges are in metres; divide by 1000"),
+        (lambda f: in_units(f, reach=1e3), "ranges are in metres; multiply them by 0.001 if they are in millimetres"),
+        (lambda f: in_units(f, reach=100.0), "multiply them by 0.01 if they are in centimetres"),
+        (lambda f: in_units(f, reach=1.0 / 0.3048), "multiply them by 0.3048 if they are in feet"),
         (lambda f: in_units(f, place=1e3), "positions are in metres"),
         (lambda f: in_units(f, place=1e3, reach=1e3, angle=180.0 / math.pi), "ranges are in metres"),
         (lambda f: in_units(f, angle=180.0 / math.pi), "theta is in degrees"),
+        (lambda f: in_units(straight_first(f), angle=180.0 / math.pi), "theta is in degrees"),
         (lambda f: in_units(turns_on_the_spot(f), angle=180.0 / math.pi), "theta turns at"),
         (lambda f: in_units(f, t=1e3), "t is in seconds"),
     ],
-    ids=["mm", "mm-places", "all", "degrees", "degrees-on-the-spot", "ms"],
+    ids=["mm", "cm", "ft", "mm-places", "all", "degrees", "degrees-after-a-straight", "degrees-on-the-spot", "ms"],
 )
 def test_a_log_in_other_units_is_refused(change: Callable[[Firing], Firing], said: str, count: int) -> None:
     with pytest.raises(RingLogError, match=said) as refused:

@@ -49,6 +49,8 @@ def test_a_line_too_slow_or_ranges_finer_than_it_are_wrong(capsys: pytest.Captur
     for sets, said in (
         (["link.baud=9600"], "a line of 9600 baud carries 960"),
         (["robot.protocol=1", "ring.resolution_m=0.001"], "ring.resolution_m = 0.001 is finer than the 0.03048 m"),
+        (['robot="p3dx"', "ring.resolution_m=0.0001"], "ring.resolution_m = 0.0001 is finer than the 0.001 m"),
+        (['robot="b21r"', "ring.resolution_m=0.0001"], "ring.resolution_m = 0.0001 is finer than the 0.0006775 m"),
     ):
         words = [word for one in sets for word in ("--set", one)]
         assert run_command(["check", "hallway", *words]) == WRONG_CALL

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE, WRONG_CALL
+from config.load import load_settings
 from runtime.cli.app import run_command
+from runtime.cycle.modes import Mode
+from tests.runtime.emulated_run import Run
 
 
 class Person(io.StringIO):
@@ -53,6 +56,17 @@ def test_what_is_written_is_good_and_is_never_overwritten(
     assert Path("mine.toml").read_text() == before
     assert run_command(["init", kind, "mine.toml", "--force"]) == DONE
     assert [path.name for path in Path().iterdir()] == ["mine.toml"], "no draft is left"
+
+
+@pytest.mark.parametrize("driver", ["denning", "arcos", "rflex"])
+def test_a_robot_that_is_described_with_the_defaults_can_be_driven(driver: str) -> None:
+    """A Pioneer's own file was good for `check`, and its robot was refused for its watchdog."""
+    assert run_command(["init", "robot", "mine.toml", "--driver", driver, "--name", "Rosa", "--yes"]) == DONE
+    settings = load_settings("hallway", ["perception.method=paper"], robot="mine.toml")
+    assert settings.robot.name == "Rosa"
+    assert settings.world is not None
+    run = Run(settings, settings.world, 0)
+    run.until_true(lambda: run.mode is Mode.DRIVE, 4.0)
 
 
 @pytest.mark.parametrize(

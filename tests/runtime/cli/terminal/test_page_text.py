@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
+import random
 import re
 import subprocess
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from playwright._impl._driver import compute_driver_executable
 
+from drivers.messages import Pose
+from perception.detected_object import DetectedObject
 from runtime import console as page_folder
 from runtime.cli.terminal import page_text
 from runtime.support.length_format import Units
+
+NODE, _ = compute_driver_executable()  # the one that drives the browser in tests
 
 
 @pytest.mark.promise("P31")
 def test_the_forms_are_those_of_the_page() -> None:
     """Node runs the page's own code over the same values."""
-    node, _ = compute_driver_executable()  # the one that drives the browser in tests
     values = [0.0, -0.004, 1.005, 2.675, -12.3456, 0.0005, 3.14159, -85.0, 7.7724]
     shares = [0.0, 0.004, 0.5, 0.994, 0.9951, 1.0]
     page = Path(page_folder.__file__).parent / "page"
@@ -29,7 +36,7 @@ def test_the_forms_are_those_of_the_page() -> None:
         " out.push(units.number(v), units.length(v, 3), units.place(v, -v), degrees(v)); }"
         f"for (const s of {shares}) out.push(percent(s)); console.log(JSON.stringify(out));"
     )
-    done = subprocess.run([node, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
+    done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
     units: tuple[Units, ...] = ("m", "ft")
     ours = [
         form
@@ -41,6 +48,43 @@ def test_the_forms_are_those_of_the_page() -> None:
         )
     ]  # fmt: skip
     assert json.loads(done.stdout) == [*ours, *map(page_text.percent, shares)]
+
+
+@pytest.mark.promise("P31")
+def test_what_a_wall_hides_is_what_it_hides_on_the_page(measured: Callable[[str], None]) -> None:
+    """Node runs the page's own code over the same random scenes."""
+    rng, cases = random.Random(16), list[list[list[float]]]()
+    for _ in range(300):
+        cases.append([[rng.uniform(-3.0, 3.0) for _ in range(4)], [rng.uniform(-1.0, 1.0), rng.uniform(0.2, 4.0)],
+                      [rng.uniform(-3.0, 3.0), rng.uniform(-3.0, 3.0), rng.choice([0.1, 0.3])]])  # fmt: skip
+    page = Path(page_folder.__file__).parent / "page"
+    script = (
+        f"import {{hidingWall}} from {json.dumps((page / 'walls.js').as_uri())};"
+        f"const out = {json.dumps(cases)}.map(([[x, y, theta, half], [rx, ry], [ox, oy, radius]]) => {{"
+        " const c = Math.cos(theta) * half, s = Math.sin(theta) * half;"
+        " const wall = { ends: [x - c, y - s, x + c, y + s] }, seen = { x: ox, y: oy };"
+        " return hidingWall({ pose: [rx, ry], objects: [wall, seen] }, seen, radius) !== null; });"
+        " console.log(JSON.stringify(out));"
+    )
+    done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
+    ours = list[bool]()
+    for (x, y, theta, half), (rx, ry), (ox, oy, radius) in cases:
+        along = half * half / 3.0  # of an even distribution over its length
+        c, s = math.cos(theta), math.sin(theta)
+        covariance = (along * c * c, along * c * s, along * s * s)
+        wall = DetectedObject("wall", x, y, theta, 0.1, 9, 0.9, 0.9, covariance)
+        seen = DetectedObject("drum", ox, oy, 0.0, 0.1, 9, 0.9, 0.9)
+        ours.append(page_text.is_hidden(seen, radius, Pose(rx, ry, 0.0), (wall, seen)))
+        assert not page_text.is_hidden(wall, 0.1, Pose(rx, ry, 0.0), (wall, wall))
+    assert json.loads(done.stdout) == ours
+    assert 20 < sum(ours) < 280
+    measured(f"{len(ours)} scenes of a wall and an object: hidden in {sum(ours)}, as by the page's code")
+
+
+def test_a_hidden_object_is_called_so_unless_it_was_confirmed() -> None:
+    seen = DetectedObject("drum", 1.0, 2.0, 0.0, 0.1, 9, 0.9, 0.9)
+    assert page_text.certainty(seen, hidden=True) == "hidden"
+    assert page_text.certainty(replace(seen, confirmed=True), hidden=True) == "✓ 90 %"
 
 
 def _percent(page: Path) -> str:
