@@ -33,7 +33,7 @@ give a thousand, degrees 57. A median, because a leap of the odometry is no unit
 ALONG_MIN: Final = 0.95
 AGAINST_MAX: Final = 0.8
 """Median |cos| between path and heading: a robot drives along its heading; in a wrong unit, that is anywhere."""
-TELLING: Final = 0.1
+DISTINCT: Final = 0.1
 """Least difference of that cosine between radians and degrees for a step that can show the unit: on a straight drive
 along x, both fit."""
 FAR_SHARE: Final = 0.3
@@ -100,8 +100,8 @@ class RingLogUnits:
             )
         if self.count > 1 and (period := self._period()) > PERIOD_MAX_S:
             return f"the firings are {period:.3g} s apart: t is in seconds{_thousand(period)}"
-        telling = moves[np.abs(moves[:, 1] - moves[:, 2]) > TELLING, 1:]
-        along, along_degrees = np.median(telling, axis=0).tolist() if len(telling) >= STEPS_MIN else (1.0, 0.0)
+        distinct = moves[np.abs(moves[:, 1] - moves[:, 2]) > DISTINCT, 1:]
+        along, along_degrees = np.median(distinct, axis=0).tolist() if len(distinct) >= STEPS_MIN else (1.0, 0.0)
         if along < AGAINST_MAX and along_degrees > ALONG_MIN:
             return (
                 "the robot moves along theta only if theta is in degrees: it is in radians, counter-clockwise; "
