@@ -9,7 +9,7 @@ stands before the first of these directions is too old, and before its path turn
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -98,13 +98,16 @@ def seen_for_s(
     horizon_s
         Time beyond which directions that a turn brings into the path do not matter.
     """
-    beam, rate = view.half_angle_rad, abs(turn_rad_s)
+    beam, rate, age_max_s = view.half_angle_rad, abs(turn_rad_s), view.age_max_s
     swept = min(rate * (horizon_s + REACTION_S), max(0.0, math.pi - half_angle_rad - beam))
     soonest_s = math.inf
     for begin, end, age_s in _sectors(view.bearings_rad, view.ages_s, beam, heading_rad, half_angle_rad + swept):
-        outside = max(begin - half_angle_rad, -half_angle_rad - end)
+        left_s = age_max_s - age_s
+        if left_s >= soonest_s:
+            continue
+        outside = begin - half_angle_rad if begin > -end else -half_angle_rad - end
         reached_s = -math.inf if outside < -ROUNDING_RAD else outside / max(rate, ROUNDING_RAD) - REACTION_S
-        soonest_s = min(soonest_s, max(reached_s, view.age_max_s - age_s))
+        soonest_s = min(soonest_s, max(reached_s, left_s))
     return soonest_s
 
 
@@ -151,8 +154,8 @@ def turn(begin_rad: float, ends_rad: Floats) -> Floats:
 
 def _sectors(
     bearings_rad: Floats, ages_s: Floats, beam_rad: float, direction_rad: float, half_angle_rad: float
-) -> Iterator[tuple[float, float, float]]:
-    """Yield sectors that together are all directions within `half_angle_rad` of one: begin, end, age of the look.
+) -> list[tuple[float, float, float]]:
+    """Return sectors that together are all directions within `half_angle_rad` of one: begin, end, age of the look.
 
     Begin and end count from `direction_rad`. The youngest beam is laid out first, and each older one where no younger
     one lies; where none lies, the age is infinite. Plain Python: a standing ring has a handful of beams ahead, for
@@ -168,8 +171,13 @@ def _sectors(
         As for `oldest_look_s`.
     """
     reach = half_angle_rad + beam_rad
-    axes = ((bearing - direction_rad + math.pi) % math.tau - math.pi for bearing in bearings_rad.tolist())
-    beams = sorted((age_s, axis) for age_s, axis in zip(ages_s.tolist(), axes, strict=True) if -reach < axis < reach)
+    beams = [
+        (age_s, axis)
+        for age_s, bearing in zip(ages_s.tolist(), bearings_rad.tolist(), strict=True)
+        if -reach < (axis := (bearing - direction_rad + math.pi) % math.tau - math.pi) < reach
+    ]
+    beams.sort()
+    sectors: list[tuple[float, float, float]] = []
     open_sectors = [(-half_angle_rad, half_angle_rad)]
     for age_s, axis in beams:
         left, right = axis - beam_rad, axis + beam_rad
@@ -180,13 +188,13 @@ def _sectors(
             if high - low <= ROUNDING_RAD:
                 remaining.append((begin, end))
                 continue
-            yield low, high, age_s
+            sectors.append((low, high, age_s))
             if low - begin > ROUNDING_RAD:
                 remaining.append((begin, low))
             if end - high > ROUNDING_RAD:
                 remaining.append((high, end))
         open_sectors = remaining
         if not open_sectors:
-            return
-    for begin, end in open_sectors:
-        yield begin, end, math.inf
+            return sectors
+    sectors += [(begin, end, math.inf) for begin, end in open_sectors]
+    return sectors

@@ -6,13 +6,17 @@ slept, waited for a lock or a disk) has one more voluntary context switch; one t
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from resource import RUSAGE_THREAD, getrusage
 from time import process_time
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from runtime.timing.run_clock import run_clock
+
+OTHERS_AGE_S: Final = 1e-3
+"""How old the other threads' time may be: reading it takes as long as reading all else."""
 
 
 class ClockSample(NamedTuple):
@@ -24,8 +28,8 @@ class ClockSample(NamedTuple):
     """The host's monotonic clock, by which work is measured; the run's differs from it once time was paused."""
     thread_s: float
     """CPU time of this thread."""
-    process_s: float
-    """CPU time of all threads of this process."""
+    others_s: float
+    """CPU time of this process's other threads, at most `OTHERS_AGE_S` ago."""
     waits: int
     """Voluntary context switches of this thread so far."""
 
@@ -41,9 +45,13 @@ class ClockSampler:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = run_clock(clock)
+        self._others_s, self._others_host_s = 0.0, -math.inf
 
     def read(self) -> ClockSample:
-        """Return all clocks as of now; takes about 5 µs."""
+        """Return all clocks as of now; takes about 4 µs."""
         thread = getrusage(RUSAGE_THREAD)
         run_s, host_s = self._clock.both()
-        return ClockSample(run_s, host_s, thread.ru_utime + thread.ru_stime, process_time(), thread.ru_nvcsw)
+        thread_s = thread.ru_utime + thread.ru_stime
+        if host_s - self._others_host_s >= OTHERS_AGE_S:
+            self._others_s, self._others_host_s = process_time() - thread_s, host_s
+        return ClockSample(run_s, host_s, thread_s, self._others_s, thread.ru_nvcsw)

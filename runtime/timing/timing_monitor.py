@@ -268,5 +268,4 @@ def _suspended_by(begin: ClockSample, end: ClockSample) -> str | None:
 
 def _other_threads(begin: ClockSample, end: ClockSample, span_s: float) -> str | None:
     """Return `THREAD` where other threads of this process worked for most of `span_s`, None otherwise."""
-    others_s = (end.process_s - begin.process_s) - (end.thread_s - begin.thread_s)
-    return THREAD if others_s > MOST * span_s else None
+    return THREAD if end.others_s - begin.others_s > MOST * span_s else None

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 from drivers.emulator.time_scale import TimeScale
-from runtime.timing.clock_sampler import ClockSampler
+from runtime.timing.clock_sampler import OTHERS_AGE_S, ClockSampler
 from runtime.timing.run_clock import ScaledClock
 
 
@@ -24,8 +25,19 @@ def test_the_clock_sampler_distinguishes_work_from_sleep() -> None:
     assert slept.waits > before.waits
     assert slept.host_s - before.host_s >= 0.02
     assert slept.thread_s - before.thread_s < 0.5 * (slept.host_s - before.host_s)
-    while sampler.read().thread_s - slept.thread_s < 0.02:
+    while (worked := sampler.read()).thread_s - slept.thread_s < 0.02:
         pass
-    worked = sampler.read()
-    # The clocks are read one after another.
-    assert worked.thread_s - slept.thread_s <= worked.process_s - slept.process_s + 0.01
+    assert worked.host_s - slept.host_s >= 0.02
+
+
+def test_the_work_of_other_threads_is_read_once_in_a_millisecond() -> None:
+    host_s = [5.0]
+    sampler = ClockSampler(lambda: host_s[0])
+    before = sampler.read()
+    worker = threading.Thread(target=lambda: sum(range(1_000_000)))
+    worker.start()
+    worker.join()
+    host_s[0] += 0.9 * OTHERS_AGE_S
+    assert sampler.read().others_s == before.others_s
+    host_s[0] += 0.2 * OTHERS_AGE_S
+    assert sampler.read().others_s > before.others_s

@@ -33,14 +33,14 @@ class Machine:
     """Clocks that only simulated work moves; in whole microseconds, so that statistics can be exact."""
 
     def __init__(self) -> None:
-        self.host_us, self.thread_us, self.process_us, self.waits = BEGIN_US, 0, 0, 0
+        self.host_us, self.thread_us, self.others_us, self.waits = BEGIN_US, 0, 0, 0
 
     def read(self) -> ClockSample:
         host_s = self.host_us * US
-        return ClockSample(host_s, host_s, self.thread_us * US, self.process_us * US, self.waits)
+        return ClockSample(host_s, host_s, self.thread_us * US, self.others_us * US, self.waits)
 
     def work(self, us: int) -> None:
-        self.host_us, self.thread_us, self.process_us = self.host_us + us, self.thread_us + us, self.process_us + us
+        self.host_us, self.thread_us = self.host_us + us, self.thread_us + us
 
     def be_suspended(self, us: int) -> None:
         self.host_us += us
@@ -49,7 +49,7 @@ class Machine:
         self.host_us, self.waits = self.host_us + us, self.waits + 1
 
     def wait_for_thread(self, us: int) -> None:
-        self.host_us, self.process_us, self.waits = self.host_us + us, self.process_us + us, self.waits + 1
+        self.host_us, self.others_us, self.waits = self.host_us + us, self.others_us + us, self.waits + 1
 
 
 @dataclass(frozen=True)
