@@ -13,7 +13,7 @@ from bench.batch_commands import tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
-from bench.ear_commands import cross_paths, one_stand
+from bench.ear_commands import cross_paths, ear_halls, one_stand, stand_bound
 from bench.estimator import Peer
 from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
@@ -244,7 +244,9 @@ for command in (
 app.command(map_size, name="map")
 app.command(cross_paths)
 app.command(tune)
+app.command(ear_halls)
 app.command(one_stand)
+app.command(stand_bound)
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:

@@ -6,6 +6,7 @@ from rich.console import Console
 
 from bench.table import report, rows_table, wide
 from config.load import load_robot
+from runtime.simulation.scene_names import SceneName
 
 
 def cross_paths(*, json: str = "cross_paths.json", rooms: int = 30, first: int = 0) -> int:
@@ -25,6 +26,38 @@ def cross_paths(*, json: str = "cross_paths.json", rooms: int = 30, first: int =
     with Console(stderr=True).status("bench") as status:
         rows = measure(range(first, first + max(1, rooms)), status.update)
     return report(json, rows, rows_table("cross paths: the emulator and bursts of sound", rows))
+
+
+def ear_halls(
+    *, json: str = "ear_halls.json", scene: list[SceneName] | None = None, ring: list[str] | None = None,
+    seeds: int = 2, first: int = 700,
+) -> int:  # fmt: skip
+    """Measure first sure fixes, wrong names, drums found and cost in the halls, with and without listening sensors.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    scene
+        Scenes; those of the requirement if not given.
+    ring
+        Rings: "ears", "ears, no listeners", "denning"; all if not given.
+    seeds
+        Seeds of each scene; `moved` and `jit10` have ten halls a seed, the others one.
+    first
+        The first of them.
+    """
+    from bench.ear_halls import SCENES, measure, rings, settings_of
+
+    chosen = {name: one for name, one in rings().items() if ring is None or name in ring}
+    rows = {}
+    with Console(stderr=True).status("bench") as status:
+        for what in scene or SCENES:
+            for name, one in chosen.items():
+                rows[f"{what}, {name}"] = measure(
+                    what, settings_of(one), range(first, first + max(1, seeds)), status.update
+                )
+    return report(json, rows, rows_table("the halls with listening sensors", rows))
 
 
 def one_stand(*, json: str = "one_stand.json", scenes: int = 20, first: int = 1000, rounds: int = 1) -> int:
@@ -53,3 +86,22 @@ def one_stand(*, json: str = "one_stand.json", scenes: int = 20, first: int = 10
     for table in tables:
         wide().print(table)
     return report(json, rows, rows_table("one stand", rows))
+
+
+def stand_bound(*, json: str = "stand_bound.json") -> int:
+    """Print how well one stand can tell edge, post and drum apart at all, with listeners as shipped and with all.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    """
+    from bench.stand_bound import bounds
+
+    ring = load_robot("ears").ring
+    rows = {
+        f"{what}{name}": row
+        for what, everyone in (("", False), ("all listen: ", True))
+        for name, row in bounds(ring, everyone=everyone).items()
+    }
+    return report(json, rows, rows_table("one stand: the least error of any rule", rows))

@@ -20,10 +20,12 @@ BIN_CAPACITY: Final = 20
 MAX_LINES: Final = 24
 HISTORY: Final = 28
 """Readings kept of each sensor, hits and silences of any object."""
-CROSS_HISTORY: Final = 1024
-"""Cross paths kept of all sensors."""
-READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + 64
-"""Readings compared at a time: a reservoir's, and some more of the sensors' histories."""
+CROSS_HISTORY: Final = 3072
+"""Cross paths kept of all sensors: those of the last metre or two."""
+CROSSES_MAX: Final = 192
+"""Cross paths compared at a time."""
+READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + CROSSES_MAX + 64
+"""Readings compared at a time: a reservoir's, cross paths, and some more of the sensors' histories."""
 ATTRACTING_MAX: Final = 16
 """Outline segments that may attract a hypothesis."""
 BUCKETS: Final = 4096

@@ -13,7 +13,7 @@ from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.occlusion import is_relevant
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.range_fit import FAR, score_circle
-from perception.bayes.reservoir import copy_reservoir
+from perception.bayes.reservoir import add_crosses, copy_reservoir
 from perception.bayes.scratch import Score
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTracks, Memory, StateRecord
@@ -45,6 +45,7 @@ def circle_evidence(
     track = tracks[t]
     var0, rel2 = noise_variance(s, p)
     n = copy_reservoir(track, readings)
+    n = add_crosses(s, p, track.x, track.y, track.radius, readings, n)
     for j in range(n):
         nats[j] = 0.0
         if is_relevant(tracks, p, readings[j], track.x, track.y, track.radius, t, var0, rel2):

@@ -182,7 +182,8 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
             if 0 <= owner < len(tracks) and not is_own:  # a part of the same body answered
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
             if bears_on_circle(q, cx, cy, track.radius, owner == UNEXPLAINED, is_own, p):
-                keep_reading(track, cx, cy, q)
+                if not is_crossed(q):
+                    keep_reading(track, cx, cy, q)
                 track.unseen += 1
                 track.idle_firings = 0
                 track.final_refinements = p[0].final_refinements

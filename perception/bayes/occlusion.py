@@ -107,6 +107,33 @@ def is_explained_elsewhere(
 
 
 @kernel
+def answers_before(tracks: Records[CircleTrack], p: Records[Settings], q: Reading, own: int) -> bool:
+    """Return whether a named circle other than `own` must have answered a cross path sooner: so it comes from none.
+
+    A listener reports the first pulse to arrive. Beams that are wide enough for listening look past bodies at places
+    from which nothing can be heard, and what a strayed pulse seems to show there nothing would contradict.
+
+    Parameters
+    ----------
+    tracks, p, q, own
+        As for `is_explained_elsewhere`.
+    """
+    apart = math.sqrt(q.listener_x * q.listener_x + q.listener_y * q.listener_y)
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if t == own or track.status != ESTABLISHED or track.is_named == 0:
+            continue
+        dx = track.x - q.x
+        dy = track.y - q.y
+        d = math.sqrt(dx * dx + dy * dy)
+        # Half the way over it is longer than the way back by half the listener's distance at most.
+        is_before = d - track.radius + 0.5 * apart < q.range_m - p[0].gate_m
+        if is_before and dx * q.axis_x + dy * q.axis_y >= p[0].cos_must_answer * d:
+            return True
+    return False
+
+
+@kernel
 def is_relevant(
     tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, radius: float, own: int,
     var0: float, rel2: float,
@@ -120,7 +147,7 @@ def is_relevant(
     """
     d = math.hypot(cx - q.x, cy - q.y)
     e = circle_error(q, cx - q.x, cy - q.y, d, radius)
-    if is_crossed(q) and abs(e) > p[0].gate_m:
+    if is_crossed(q) and (abs(e) > p[0].gate_m or answers_before(tracks, p, q, own)):
         return False
     if e > p[0].gate_m:
         return not (d > radius and is_hidden(tracks, q.x, q.y, cx, cy, d, radius, own))

@@ -52,7 +52,7 @@ from perception.bayes.parameters import (
     UNSURE_ROOT_M,
 )
 from perception.bayes.range_fit import fit_circle
-from perception.bayes.reservoir import copy_reservoir
+from perception.bayes.reservoir import add_crosses, copy_reservoir
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.track_labels import drop_track, is_rejected, outlives
@@ -304,9 +304,9 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         The track.
     """
     track = tracks[t]
-    n = keep_relevant(
-        s, tracks, p, copy_reservoir(track, s[0].scratch.readings), track.x, track.y, track.radius, t
-    )  # fmt: skip
+    n = copy_reservoir(track, s[0].scratch.readings)
+    n = add_crosses(s, p, track.x, track.y, track.radius, s[0].scratch.readings, n)
+    n = keep_relevant(s, tracks, p, n, track.x, track.y, track.radius, t)
     track.reservoir = n
     track.unseen = 0
     track.refinements += 1

@@ -3,6 +3,9 @@
 Hits and silences share the bins, so that new silences replace the hits of an object that has gone, for each bearing
 from which the robot observes it again. No reading is dropped for its age. Readings of one bearing never replace those
 of another, because a position needs readings from many bearings.
+
+Cross paths come eight at a time and would fill a circle's bins with the last decimetre. All circles share one memory
+of them, of the last metre or two, and each takes those that it may explain.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.elements import CROSS_HISTORY, HISTORY, Reading
+from perception.bayes.elements import BEARING_BINS, BIN_CAPACITY, CROSS_HISTORY, CROSSES_MAX, HISTORY, Reading
 from perception.bayes.parameters import HYPOTHESIS_MARGIN_M
 from perception.bayes.settings_record import Settings
 from perception.bayes.state import CircleTrack, PolygonTrack, State
@@ -18,8 +21,6 @@ from perception.kernel import kernel
 from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
-ROOM: Final = 64
-"""Places left free at the end of the scratch's readings."""
 
 
 @kernel
@@ -67,23 +68,45 @@ def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]
 
 
 @kernel
-def may_bear(p: Records[Settings], q: Reading, cx: float, cy: float, radius: float) -> bool:
-    """Return whether a circle may lie in a reading's beam and reach.
+def add_crosses(
+    s: Records[State], p: Records[Settings], cx: float, cy: float, radius: float, readings: Records[Reading], n: int
+) -> int:
+    """Add the remembered cross paths that a circle may explain to the first `n` readings; return the new number.
+
+    Of more than `CROSSES_MAX` every second counts, or third: evenly over the way they were heard from, which shows
+    the shape better than the newest would.
 
     Parameters
     ----------
-    p, q
-        Settings and the reading.
+    s, p
+        Memory and settings.
     cx, cy, radius : float
         The circle, m.
+    readings : (≥ n + CROSSES_MAX,) Reading
+        Updated.
+    n : int
+        Readings there.
     """
-    dx = cx - q.x
-    dy = cy - q.y
-    dot = dx * q.axis_x + dy * q.axis_y
-    if dot <= 0.0:
-        return False
-    d = math.sqrt(dx * dx + dy * dy)
-    return not (dot < p[0].cos_may_answer * d - HYPOTHESIS_MARGIN_M or d - radius > p[0].range_max_m)
+    found, cos2 = s[0].scratch.crosses_found, p[0].cos_may_answer ** 2
+    count = 0
+    for k in range(min(s[0].crosses_kept, CROSS_HISTORY)):
+        q = s[0].crosses[k]
+        dx = cx - q.x
+        dy = cy - q.y
+        dot = dx * q.axis_x + dy * q.axis_y
+        d2 = dx * dx + dy * dy
+        if dot <= 0.0 or dot * dot < cos2 * d2:
+            continue
+        # Half the way to the listener differs by less than half the distance to it.
+        most = p[0].gate_m + 0.5 * (abs(q.listener_x) + abs(q.listener_y))
+        if abs(q.range_m + radius - math.sqrt(d2)) < most:
+            found[count] = k
+            count += 1
+    step = (count + CROSSES_MAX - 1) // CROSSES_MAX
+    for k in range(0, count, max(step, 1)):
+        copy_reading(s[0].crosses[found[k]], readings[n])
+        n += 1
+    return n
 
 
 @kernel
@@ -98,22 +121,22 @@ def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float
         The circle, m.
     """
     readings = s[0].scratch.readings
+    cos_may, range_max = p[0].cos_may_answer, p[0].range_max_m
     n = 0
     for i in range(s[0].sensor_count):
         sensor = s[0].sensors[i]
         for k in range(min(sensor.kept, HISTORY)):
-            if not may_bear(p, sensor.history[k], cx, cy, radius):
+            q = sensor.history[k]
+            dx = cx - q.x
+            dy = cy - q.y
+            dot = dx * q.axis_x + dy * q.axis_y
+            if dot <= 0.0:
                 continue
-            if n >= len(readings) - ROOM:
-                return n
-            copy_reading(sensor.history[k], readings[n])
-            n += 1
-    kept = s[0].crosses_kept
-    for k in range(min(kept, CROSS_HISTORY)):
-        q = s[0].crosses[(kept - 1 - k) % CROSS_HISTORY]
-        if may_bear(p, q, cx, cy, radius):
-            if n >= len(readings) - ROOM:
-                return n
+            d = math.sqrt(dx * dx + dy * dy)
+            if dot < cos_may * d - HYPOTHESIS_MARGIN_M or d - radius > range_max:
+                continue
+            if n >= BEARING_BINS * BIN_CAPACITY:
+                break
             copy_reading(q, readings[n])
             n += 1
-    return n
+    return add_crosses(s, p, cx, cy, radius, readings, n)

@@ -9,6 +9,7 @@ from perception.bayes.elements import (
     ATTRACTING_MAX,
     BEARING_BINS,
     BIN_CAPACITY,
+    CROSS_HISTORY,
     GRID_CELLS,
     PAIRS_PER_SENSOR,
     READINGS_MAX,
@@ -150,6 +151,8 @@ class Scratch(Record):
     """The readings of this firing: echoes, then cross paths."""
     crosses: int
     """Number of cross paths among them."""
+    crosses_found: Annotated[Ints, CROSS_HISTORY]
+    """Places of the remembered cross paths that a circle may explain."""
     fired_sensors: Annotated[Ints, SENSORS_MAX]
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""

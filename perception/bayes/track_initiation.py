@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
+from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import ATTRACTING_MAX, MappedSegment
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.occlusion import keep_relevant
@@ -208,7 +209,8 @@ def restart_circle(
     track.y = y
     track.radius = radius
     for j in range(n):
-        keep_reading(track, x, y, s[0].scratch.readings[j])
+        if not is_crossed(s[0].scratch.readings[j]):
+            keep_reading(track, x, y, s[0].scratch.readings[j])
 
 
 @kernel

@@ -11,8 +11,8 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes import circle_posterior, cross_path, observe, range_fit
-from perception.bayes.elements import GRID_CELLS
+from perception.bayes import circle_posterior, cross_path, observe, occlusion, range_fit, reservoir
+from perception.bayes.elements import CROSS_HISTORY, CROSSES_MAX, GRID_CELLS
 from perception.bayes.scratch import UNEXPLAINED, CircleFit, CirclePosterior, LinearReading, LineFit, Score
 from perception.bayes.state import ESTABLISHED
 from perception.kernel import Floats
@@ -194,8 +194,49 @@ def test_cross_paths_of_a_firing_are_placed_remembered_and_associated() -> None:
     assert memory.s[0].crosses_kept == 2
     assert numbers(memory.state["crosses"][0])[:2] == pytest.approx(rows)
     observe.keep_readings(memory.s, memory.tracks, P, 0)
-    assert memory.circles["bins"]["count"][0].sum() == 1  # one that came from elsewhere is no evidence
+    assert track.unseen == 1  # one that came from elsewhere is no evidence
+    assert memory.circles["bins"]["count"][0].sum() == 0  # all circles share the memory of them
     assert hear(halves) == 0  # the robot has not moved
     assert hear(np.full(3, np.inf), (1.3, 1.0, 0.2)) == 0  # nothing was heard
     assert hear(halves, (1.3, 1.0, 0.2)) == 2
     assert hear(halves, (math.nan, 1.0, 0.2)) == 0
+
+
+def test_a_circle_takes_of_the_remembered_cross_paths_those_that_it_may_explain_evenly() -> None:
+    rng, memory = np.random.default_rng(7), new_memory()
+    centre, radius = 0.3 - 0.2j, 0.25
+    rows = rng.uniform(-3.0, 3.0, (CROSS_HISTORY, 7))
+    axes = np.exp(1j * (np.angle(centre - rows[:, 0] - 1j * rows[:, 1]) + rng.uniform(-0.8, 0.8, len(rows))))
+    rows[:, 2], rows[:, 3], rows[:, 5:] = axes.real, axes.imag, rng.uniform(-0.2, 0.2, (len(rows), 2))
+    rows[:, 4] = abs(centre - rows[:, 0] - 1j * rows[:, 1]) - radius + rng.uniform(-0.6, 0.6, len(rows))
+    numbers(memory.state["crosses"][0])[...] = rows
+    memory.s[0].crosses_kept = 5 * CROSS_HISTORY
+    out = memory.s[0].scratch.readings
+    n = reservoir.add_crosses(memory.s, P, centre.real, centre.imag, radius, out, 3) - 3
+    taken = numbers(memory.state["scratch"]["readings"][0])[3 : 3 + n]
+    to = centre - rows[:, 0] - 1j * rows[:, 1]
+    bears = (to * axes.conj()).real >= P[0].cos_may_answer * abs(to)
+    bears &= abs(rows[:, 4] + radius - abs(to)) < P[0].gate_m + 0.5 * abs(rows[:, 5:]).sum(1)
+    step = math.ceil(bears.sum() / CROSSES_MAX)
+    assert step > 1
+    assert taken == pytest.approx(rows[bears][::step])
+    assert n <= CROSSES_MAX
+
+
+def test_a_cross_path_that_a_named_drum_must_have_answered_sooner_is_no_other_bodys() -> None:
+    memory = new_memory()
+    memory.circles.view(np.uint8)[...] = 0
+    near = memory.tracks[0]
+    near.status, near.radius, near.x, near.y, near.is_named = ESTABLISHED, 0.3, 1.3, 0.0, 1
+    to, across = 2.5 + 0.2j, 0.05 + 0.1j
+    half = half_over_circle(0j, across, to, 0.3)
+    q = crosses(np.array([[0.0, 0.0, 1.0, 0.0, half, across.real, across.imag]]))[0]
+
+    def counts(own: int) -> bool:
+        return bool(occlusion.is_relevant(memory.tracks, P, q, to.real, to.imag, 0.3, own, 1e-6, 0.0))
+
+    assert not counts(1)
+    near.is_named = 0
+    assert counts(1)
+    near.is_named, near.y = 1, 1.3  # out of the beam
+    assert counts(1)
