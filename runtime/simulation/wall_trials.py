@@ -1,20 +1,19 @@
 """The walls and corners that perception reports in random rooms, compared with the truth.
 
-Truth is what answered: of each wall the 5 cm places from which an echo came, and what lies between two of them that
+Truth is what answered: of each wall the points from which echoes were heard, and what lies between two of them that
 are near each other. Reported length is right where it lies on a wall in its direction, and false elsewhere.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from config.robot import RingConfig
 from config.settings import Settings
 from config.units import FOOT_M
 from drivers.emulator.scene import compile_scene
@@ -25,14 +24,14 @@ from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
 from runtime.simulation.furnished_rooms import FurnishedRoom, drive
 
-Places: TypeAlias = NDArray[np.bool_]
-PLACE_M: Final = 0.05
-"""Length of the places that answer or do not."""
+Stretches: TypeAlias = list[tuple[float, float]]
+"""Parts of a line from low to high in ascending order, m."""
 BETWEEN_M: Final = 0.35
-"""What lies between two places that answered counts if it is shorter than this."""
+"""What lies between two points that answered counts if it is shorter than this."""
 WALL_MIN_M: Final = 2.2 * FOOT_M
+PLACE_M: Final = 0.05
 PLACES_MIN: Final = 4
-"""A wall counts if this length, and so many places, answered."""
+"""A wall counts if this length, and so many places of it, answered."""
 RIGHT_M: Final = 0.05
 RIGHT_RAD: Final = math.radians(3.0)
 """Reported length is right within this of a wall and of its direction."""
@@ -40,6 +39,8 @@ ON_WALL_M: Final = 1e-3
 """An echo comes from a wall if its point lies this near."""
 CORNER_ECHOES_MIN: Final = 10
 """A corner or an edge counts if so many echoes came from the point itself."""
+HEARD_SIGMAS: Final = 4.0
+"""A range is an echo's if its error is less than this."""
 CORNER_WITHIN_M: Final = 0.15
 """A reported one is right within this of a true one of its kind."""
 DRIVE_M: Final = 25.0
@@ -112,7 +113,10 @@ class CornerTrial:
 
 @dataclass(frozen=True, slots=True)
 class WallTrial:
-    """Lengths (m), counts and errors of one drive; errors are of the reported walls that lie on a true one."""
+    """Lengths (m), counts and errors of one drive.
+
+    Lines are those of the walls that count; errors are of all reported walls that lie on a true one.
+    """
 
     walls: int
     answered_m: float
@@ -169,13 +173,40 @@ def reported_walls(objects: Iterable[DetectedObject]) -> list[Segment]:
     return [Segment(np.array(end[:2]), np.array(end[2:])) for end in ends if end is not None]
 
 
-def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) -> WallTrial:
-    """Drive through a room and return how the reported walls compare with those that answered.
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What a drive through a room heard, and where from.
+
+    Attributes
+    ----------
+    firings : tuple of Firing
+        What perception is given.
+    walls : tuple of Segment
+        The true walls.
+    answered : tuple of (n,) float
+        Where each wall answered, from its beginning in ascending order, m.
+    corners : tuple of Corner
+        The true corners and edges.
+    echoes : tuple of int
+        The echoes that came from each of them.
+    """
+
+    firings: tuple[Firing, ...]
+    walls: tuple[Segment, ...]
+    answered: tuple[Floats, ...]
+    corners: tuple[Corner, ...]
+    echoes: tuple[int, ...]
+
+
+def listen(ring: RingConfig, room: FurnishedRoom, seed: int, step_m: float) -> Heard:
+    """Drive through a room and return what is heard.
+
+    An echo that drops out, or in whose place a wrong range is reported, is not heard.
 
     Parameters
     ----------
-    settings : Settings
-        Ring, models and perception.
+    ring : RingConfig
+        The sensors.
     room : FurnishedRoom
         The room, with its acoustics.
     seed : int
@@ -183,48 +214,61 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
     step_m : float
         Distance between two firings of one sensor.
     """
-    perception, ring = Perception(settings.ring, settings.models, settings.perception), settings.ring
-    sonar = Sonar(ring, compile_scene(room.world), room.world.acoustics, np.random.default_rng([seed, 9]))
-    pattern = firing_pattern(ring)
+    acoustics, scene, pattern = room.world.acoustics, compile_scene(room.world), firing_pattern(ring)
+    sonar = Sonar(ring, scene, acoustics, np.random.default_rng([seed, 9]))
+    sets = [sensors(mask) for mask in pattern.masks]
+    masks = [np.isin(np.arange(len(ring.mounts)), fired) for fired in sets]
     length_m = DENSE_DRIVE_M if step_m < DENSE_STEP_M else DRIVE_M
-    walls = [Segment(np.array([w.x1_m, w.y1_m]), np.array([w.x2_m, w.y2_m])) for w in room.world.wall]
-    answered = [np.zeros(math.ceil(wall.length_m / PLACE_M), dtype=np.bool_) for wall in walls]
-    corners = true_corners(walls)
-    echoes = np.zeros(len(corners), dtype=np.int64)
-    for k, (x, y, yaw) in enumerate(drive(room, seed, step_m / len(pattern.masks), length_m).tolist()):
-        fired = sensors(pattern.masks[k % len(pattern.masks)])
+    relative, least_m = acoustics.noise_relative, HEARD_SIGMAS * acoustics.noise_m + ring.resolution_m
+    firings, points = [], []
+    for k, (x, y, yaw) in enumerate(drive(room, seed, step_m / len(sets), length_m).tolist()):
         pose = Pose(x, y, yaw)
-        mask = np.isin(np.arange(len(ring.mounts)), fired)
-        points = _echo_points(sonar, pose, mask, ring.window_m)
-        _mark(walls, answered, points)
-        echoes += [int((np.hypot(*(points - (it.x, it.y)).T) < ON_WALL_M).sum()) for it in corners]
-        ranges = sonar.fire(pose, yaw, fired)
-        perception.observe(Firing(k * ring.firing.step_period_s, pose, yaw, ranges))
+        true = sonar.true_echoes(pose, yaw, masks[k % len(sets)]).copy()
+        ranges = sonar.fire(pose, yaw, sets[k % len(sets)])
+        is_heard = np.isfinite(ranges) & np.isclose(ranges, true["distance"], HEARD_SIGMAS * relative, least_m)
+        points.append(np.column_stack([true["x"], true["y"]])[is_heard])
+        firings.append(Firing(k * ring.firing.step_period_s, pose, yaw, ranges))
+    walls = tuple(Segment(np.array([w.x1_m, w.y1_m]), np.array([w.x2_m, w.y2_m])) for w in room.world.wall)
+    corners, heard = tuple(true_corners(walls)), np.concatenate(points)
+    echoes = tuple(int((np.hypot(*(heard - (it.x, it.y)).T) < ON_WALL_M).sum()) for it in corners)
+    return Heard(tuple(firings), walls, tuple(_answered(wall, heard) for wall in walls), corners, echoes)
+
+
+def _answered(wall: Segment, points: Floats) -> Floats:
+    """Return where a wall answers with echoes from these points, shape (n, 2)."""
+    off, along = wall.off_and_along(points)
+    is_on = (np.abs(off) < ON_WALL_M) & (along > -ON_WALL_M) & (along < wall.length_m + ON_WALL_M)
+    return np.sort(along[is_on].clip(0.0, wall.length_m))
+
+
+def recognise(settings: Settings, heard: Heard) -> Perception:
+    """Return perception after a drive."""
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    for firing in heard.firings:
+        perception.observe(firing)
         while perception.can_refine and perception.refine():
             pass
-    seen = perception.labelled_objects()
-    return compare(
-        walls, answered, reported_walls(seen), compare_corners(corners, echoes.tolist(), reported_corners(seen))
-    )
+    return perception
 
 
-def _echo_points(sonar: Sonar, pose: Pose, fired: Places, window_m: float) -> Floats:
-    """Return the points from which a firing's echoes come, shape (n, 2)."""
-    echoes = sonar.true_echoes(pose, pose.theta, fired)
-    heard = echoes[fired & (echoes["distance"] < window_m)]
-    return np.column_stack([heard["x"], heard["y"]])
+def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) -> WallTrial:
+    """Drive through a room and return how the reported walls compare with those that answered.
 
-
-def _mark(walls: Sequence[Segment], answered: Sequence[Places], points: Floats) -> None:
-    """Mark the places of the walls at these points."""
-    for wall, places in zip(walls, answered, strict=True):
-        off, along = wall.off_and_along(points)
-        is_on = (np.abs(off) < ON_WALL_M) & (along > -ON_WALL_M) & (along < wall.length_m + ON_WALL_M)
-        places[np.clip((along[is_on] / PLACE_M).astype(np.int64), 0, len(places) - 1)] = True
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and perception.
+    room, seed, step_m
+        As for `listen`.
+    """
+    heard = listen(settings.ring, room, seed, step_m)
+    seen = recognise(settings, heard).labelled_objects()
+    corners = compare_corners(heard.corners, heard.echoes, reported_corners(seen))
+    return compare(heard.walls, heard.answered, reported_walls(seen), corners)
 
 
 def compare(
-    walls: Sequence[Segment], answered: Sequence[Places], found: Sequence[Segment], corners: CornerTrial
+    walls: Sequence[Segment], answered: Sequence[Floats], found: Sequence[Segment], corners: CornerTrial
 ) -> WallTrial:  # fmt: skip
     """Return how reported walls compare with the true ones.
 
@@ -232,8 +276,8 @@ def compare(
     ----------
     walls : sequence of Segment
         The true walls.
-    answered : sequence of (n,) bool
-        Which places of each wall answered, from its beginning.
+    answered : sequence of (n,) float
+        Where each wall answered, from its beginning in ascending order, m.
     found : sequence of Segment
         The reported walls.
     corners : CornerTrial
@@ -254,22 +298,22 @@ def compare(
         if owner >= 0:
             offsets.append(float(abs(walls[owner].off_and_along(0.5 * (line.begin + line.end)[None])[0][0])))
             angles.append(math.asin(min(1.0, float(turns[owner]))))
-    count, answered_m, found_m = 0, 0.0, 0.0
-    for k, (wall, places) in enumerate(zip(walls, answered, strict=True)):
-        truth = _with_gaps_filled(places)
-        if places.sum() < PLACES_MIN or truth.sum() * PLACE_M < WALL_MIN_M:
+    count, lines, answered_m, found_m = 0, 0, 0.0, 0.0
+    for k, (wall, at) in enumerate(zip(walls, answered, strict=True)):
+        truth = stretches_of(at)
+        truth_m = sum(high - low for low, high in truth)
+        if len(np.unique((at / PLACE_M).astype(np.int64))) < PLACES_MIN or truth_m < WALL_MIN_M:
             continue
-        covered = np.zeros(len(truth), dtype=np.bool_)
-        for line, owner in zip(found, owners, strict=True):
-            if owner == k:
-                low, high = np.sort(wall.off_and_along(np.array([line.begin, line.end]))[1]) / PLACE_M
-                covered[max(0, round(low)) : max(0, round(high))] = True
+        own = [line for line, owner in zip(found, owners, strict=True) if owner == k]
+        ends = [np.sort(wall.off_and_along(np.array([line.begin, line.end]))[1]) for line in own]
+        covered = joined([(float(low), float(high)) for low, high in ends])
         count += 1
-        answered_m += float(truth.sum()) * PLACE_M
-        found_m += float((truth & covered).sum()) * PLACE_M
+        lines += len(own)
+        answered_m += truth_m
+        found_m += sum(max(0.0, min(b, d) - max(a, c)) for a, b in truth for c, d in covered)
     return WallTrial(
-        count, answered_m, found_m, sum(line.length_m for line in found), false_m,
-        sum(owner >= 0 for owner in owners), tuple(offsets), tuple(angles), corners,
+        count, answered_m, found_m, sum(line.length_m for line in found), false_m, lines, tuple(offsets),
+        tuple(angles), corners,
     )  # fmt: skip
 
 
@@ -281,13 +325,19 @@ def _pieces(line: Segment) -> int:
     return max(2, int(line.length_m / PLACE_M))
 
 
-def _with_gaps_filled(places: Places) -> Places:
-    """Return the places that answered, and those between two of them that are near each other."""
-    filled, at = places.copy(), np.flatnonzero(places)
-    for low, high in itertools.pairwise(at.tolist()):
-        if (high - low) * PLACE_M < BETWEEN_M:
-            filled[low:high] = True
-    return filled
+def stretches_of(at: Floats) -> Stretches:
+    """Return what lies between points that are near each other; the points are in ascending order, m."""
+    parts = np.split(at, np.flatnonzero(np.diff(at) >= BETWEEN_M) + 1) if len(at) else []
+    return [(float(part[0]), float(part[-1])) for part in parts]
+
+
+def joined(parts: Stretches) -> Stretches:
+    """Return stretches without those parts of them that others cover."""
+    whole: Stretches = []
+    for low, high in sorted(parts):
+        last = whole[-1][1] if whole else -math.inf
+        whole.append((max(low, last), max(high, last)))
+    return whole
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,15 +9,16 @@ import pytest
 
 from perception.detected_object import DetectedObject
 from runtime.simulation.wall_trials import (
-    PLACE_M,
     Corner,
     CornerTrial,
     Segment,
     compare,
     compare_corners,
     figures,
+    joined,
     reported_corners,
     reported_walls,
+    stretches_of,
     true_corners,
 )
 
@@ -28,9 +29,7 @@ def segment(x1: float, y1: float, x2: float, y2: float) -> Segment:
 
 
 WALL = segment(0.0, 0.0, 4.0, 0.0)
-PLACES = np.zeros(80, dtype=np.bool_)
-PLACES[20:60] = True
-PLACES[40:44] = False
+ANSWERED = np.concatenate([np.linspace(1.0, 2.0, 21), np.linspace(2.3, 3.0, 15)])
 """What answered: from 1 to 3 m, but for a short gap."""
 NONE = CornerTrial(0, 0, (), 0)
 
@@ -39,7 +38,7 @@ def test_a_wall_found_whole_with_its_offset_and_angle() -> None:
     turn = math.radians(1.0)
     along = np.array([math.cos(turn), math.sin(turn)])
     middle = np.array([2.0, 0.01])
-    trial = compare([WALL], [PLACES], [Segment(middle - 1.02 * along, middle + 1.02 * along)], NONE)
+    trial = compare([WALL], [ANSWERED], [Segment(middle - 1.02 * along, middle + 1.02 * along)], NONE)
     assert (trial.walls, trial.lines) == (1, 1)
     assert trial.answered_m == pytest.approx(2.0)
     assert trial.found_m == pytest.approx(2.0)
@@ -50,18 +49,33 @@ def test_a_wall_found_whole_with_its_offset_and_angle() -> None:
 
 def test_length_off_the_wall_or_across_it_is_false() -> None:
     beyond, across = segment(3.0, 0.0, 5.0, 0.0), segment(2.0, -0.5, 2.0, 0.5)
-    trial = compare([WALL], [PLACES], [beyond, across], NONE)
-    assert trial.false_m == pytest.approx(2.0, abs=2 * PLACE_M)
+    trial = compare([WALL], [ANSWERED], [beyond, across], NONE)
+    assert trial.false_m == pytest.approx(2.0, abs=0.1)
     assert trial.reported_m == pytest.approx(3.0)
     assert trial.found_m == 0.0
     assert trial.lines == 1
 
 
 def test_a_wall_that_hardly_answered_does_not_count() -> None:
-    few = np.zeros(80, dtype=np.bool_)
-    few[:8] = True
-    trial = compare([WALL], [few], [], NONE)
-    assert (trial.walls, trial.answered_m) == (0, 0.0)
+    few = np.linspace(0.0, 0.4, 8)
+    trial = compare([WALL], [few], [segment(0.0, 0.0, 0.4, 0.0)], NONE)
+    assert (trial.walls, trial.lines, trial.answered_m) == (0, 0, 0.0)
+
+
+def test_points_that_are_far_apart_are_two_stretches() -> None:
+    assert stretches_of(np.array([0.1, 0.4, 1.0, 1.3, 1.6])) == [(0.1, 0.4), (1.0, 1.6)]
+    assert stretches_of(np.zeros(0)) == []
+
+
+def test_two_lines_on_one_place_count_once() -> None:
+    assert joined([(1.0, 3.0), (0.0, 2.0), (2.5, 2.8), (4.0, 5.0)]) == [
+        (0.0, 2.0),
+        (2.0, 3.0),
+        (3.0, 3.0),
+        (4.0, 5.0),
+    ]
+    trial = compare([WALL], [ANSWERED], [segment(0.9, 0.0, 2.5, 0.0), segment(2.0, 0.0, 3.5, 0.0)], NONE)
+    assert (trial.lines, trial.found_m) == (2, pytest.approx(2.0))
 
 
 def test_a_reported_wall_ends_where_its_covariance_says() -> None:
@@ -76,7 +90,7 @@ def test_a_reported_wall_ends_where_its_covariance_says() -> None:
 def test_figures_of_several_drives() -> None:
     seen = CornerTrial(3, 2, (0.01, 0.02, 0.03), 1)
     found = figures(
-        [compare([WALL], [PLACES], [segment(1.0, 0.02, 3.0, 0.02)], seen), compare([WALL], [PLACES], [], NONE)]
+        [compare([WALL], [ANSWERED], [segment(1.0, 0.02, 3.0, 0.02)], seen), compare([WALL], [ANSWERED], [], NONE)]
     )
     assert (found.rooms, found.walls) == (2, 2)
     assert found.found == pytest.approx(0.5)
@@ -85,7 +99,7 @@ def test_figures_of_several_drives() -> None:
     assert (found.corners, found.false_corners) == (3, 0.5)
     assert found.corners_found == pytest.approx(2 / 3)
     assert found.corner_mean_m == pytest.approx(0.02)
-    nothing = figures([compare([WALL], [PLACES], [], NONE)])
+    nothing = figures([compare([WALL], [ANSWERED], [], NONE)])
     assert (nothing.false, nothing.corners_found, nothing.false_corners) == (0.0, 0.0, 0.0)
 
 
