@@ -42,6 +42,8 @@ MIRRORS_SILENCES: Final = 20.0
 """So many silences of beam edges, with so few echoes, show mirrors."""
 EDGE_REACH_M: Final = 1.0
 """An edge between mirrors is heard from within this."""
+HEARD_REACH_M: Final = 3.0
+"""Farthest beyond the ends of its wall that a corner is looked for among the echoes."""
 EDGES_LEAD: Final = 4.0
 EDGES_SHARE: Final = 0.25
 """Edges count if their echoes exceed this share of their silences by this lead. Mirrors leave 1 %; of surfaces that

@@ -18,6 +18,7 @@ from perception.bayes.state import CircleTracks, StateRecord
 from perception.bayes.wall_contact import (
     EDGE_REACH_M,
     EXPLAINED_SIGMAS,
+    HEARD_REACH_M,
     distance_and_foot,
     edges_answer,
     is_hidden,
@@ -282,8 +283,27 @@ def find_edges(room: WallMap) -> None:
             edge.passes *= max(0.0, 1.0 - math.hypot(edge.x - old_x, edge.y - old_y) / EDGE_MOVED_M)
     for c in range(EDGES_MAX):
         edge = room.edges[c]
+        keep_heard(room, edge)
         if edge.is_used == PENDING or (edge.is_used == KEPT and is_near_corner(room, edge.first, edge.x, edge.y)):
             edge.is_used = 0
+
+
+@kernel
+def keep_heard(room: WallMap, edge: RoomCorner) -> None:
+    """Keep a corner between mirrors at which no wall ends any more, if it is heard on the line of one."""
+    is_heard = edge.is_edge == 0 and edge.far_echoes >= max(EDGE_ECHOES_MIN, edge.far_passes)
+    if edge.is_used != PENDING or not is_heard or edges_answer(room):
+        return
+    for k in range(MAX_WALLS):
+        wall = room.walls[k]
+        distance, along = distance_and_foot(wall, edge.x, edge.y)
+        is_beyond = is_on_span(wall, along, HEARD_REACH_M) and not is_on_span(wall, along, 0.0)
+        if wall.weight >= EDGE_WALL_WEIGHT_MIN and abs(distance) < EDGE_OFF_M and is_beyond:
+            edge.is_used = KEPT
+            edge.first, edge.second = k, int(along > wall.spans[wall.span_count - 1].high)
+            add_line(wall, edge.x, edge.y, room.lines)
+            locate(edge, room.lines)
+            break
 
 
 @kernel

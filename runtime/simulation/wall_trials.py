@@ -24,7 +24,7 @@ from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
 from runtime.simulation.furnished_rooms import FurnishedRoom, drive
 
-Stretches: TypeAlias = list[tuple[float, float]]
+Spans: TypeAlias = list[tuple[float, float]]
 """Parts of a line from low to high in ascending order, m."""
 BETWEEN_M: Final = 0.35
 """What lies between two points that answered counts if it is shorter than this."""
@@ -300,7 +300,7 @@ def compare(
             angles.append(math.asin(min(1.0, float(turns[owner]))))
     count, lines, answered_m, found_m = 0, 0, 0.0, 0.0
     for k, (wall, at) in enumerate(zip(walls, answered, strict=True)):
-        truth = stretches_of(at)
+        truth = spans_of(at)
         truth_m = sum(high - low for low, high in truth)
         if len(np.unique((at / PLACE_M).astype(np.int64))) < PLACES_MIN or truth_m < WALL_MIN_M:
             continue
@@ -325,15 +325,15 @@ def _pieces(line: Segment) -> int:
     return max(2, int(line.length_m / PLACE_M))
 
 
-def stretches_of(at: Floats) -> Stretches:
+def spans_of(at: Floats) -> Spans:
     """Return what lies between points that are near each other; the points are in ascending order, m."""
     parts = np.split(at, np.flatnonzero(np.diff(at) >= BETWEEN_M) + 1) if len(at) else []
     return [(float(part[0]), float(part[-1])) for part in parts]
 
 
-def joined(parts: Stretches) -> Stretches:
-    """Return stretches without those parts of them that others cover."""
-    whole: Stretches = []
+def joined(parts: Spans) -> Spans:
+    """Return spans without those parts of them that others cover."""
+    whole: Spans = []
     for low, high in sorted(parts):
         last = whole[-1][1] if whole else -math.inf
         whole.append((max(low, last), max(high, last)))

@@ -18,7 +18,7 @@ from runtime.simulation.wall_trials import (
     joined,
     reported_corners,
     reported_walls,
-    stretches_of,
+    spans_of,
     true_corners,
 )
 
@@ -62,9 +62,9 @@ def test_a_wall_that_hardly_answered_does_not_count() -> None:
     assert (trial.walls, trial.lines, trial.answered_m) == (0, 0, 0.0)
 
 
-def test_points_that_are_far_apart_are_two_stretches() -> None:
-    assert stretches_of(np.array([0.1, 0.4, 1.0, 1.3, 1.6])) == [(0.1, 0.4), (1.0, 1.6)]
-    assert stretches_of(np.zeros(0)) == []
+def test_points_that_are_far_apart_are_two_spans() -> None:
+    assert spans_of(np.array([0.1, 0.4, 1.0, 1.3, 1.6])) == [(0.1, 0.4), (1.0, 1.6)]
+    assert spans_of(np.zeros(0)) == []
 
 
 def test_two_lines_on_one_place_count_once() -> None:
@@ -75,7 +75,8 @@ def test_two_lines_on_one_place_count_once() -> None:
         (4.0, 5.0),
     ]
     trial = compare([WALL], [ANSWERED], [segment(0.9, 0.0, 2.5, 0.0), segment(2.0, 0.0, 3.5, 0.0)], NONE)
-    assert (trial.lines, trial.found_m) == (2, pytest.approx(2.0))
+    assert trial.lines == 2
+    assert trial.found_m == pytest.approx(2.0)
 
 
 def test_a_reported_wall_ends_where_its_covariance_says() -> None:
