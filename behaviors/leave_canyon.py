@@ -42,7 +42,9 @@ LEAVE_FREE_M: Final = 1.2
 PROGRESS_M: Final = 0.4
 """… and the goal is nearer by this than it has been before: so no detour ends where an earlier one began."""
 TURNED_BACK_RAD: Final = math.radians(150.0)
-"""What was only presumed is given up if going round it leads back more than this."""
+"""What was only presumed is given up if going round it leads back more than this, …"""
+FARTHER_M: Final = 1.5
+"""… or so much farther from the goal than where the detour began: then other walls are followed, in turn."""
 PRESUMED_SHARE: Final = 0.7
 """Nothing more is presumed until the robot has come nearer by this share of the distance at which it was."""
 NEARER_M: Final = 0.1
@@ -160,8 +162,10 @@ def leave_canyon(
             detour, side=side, began_driven_m=detour.driven_m, wall_rad=bearing, rounds=detour.rounds + 1
         )
     wall, heading = _along(points, pose, detour.side, detour.wall_rad, room, config)
-    if detour.block is not None and abs(wrap_angle(heading - detour.block.axis_rad)) > TURNED_BACK_RAD:
-        below = to_goal - PRESUMED_SHARE * (detour.block.back_m - detour.block.front_m)
+    if detour.block is not None and (
+        abs(wrap_angle(heading - detour.block.axis_rad)) > TURNED_BACK_RAD or to_goal > detour.began_m + FARTHER_M
+    ):
+        below = min(to_goal, detour.began_m) - PRESUMED_SHARE * (detour.block.back_m - detour.block.front_m)
         return None, replace(detour, side=0, ahead=None, block=None, presume_below_m=below)
     if last_rad is not None:
         turned = turned_towards(last_rad, heading, TURN_SHARE)

@@ -12,6 +12,7 @@ import pytest
 from behaviors.arbiter import Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.blocked_ahead import Block
 from behaviors.leave_canyon import NO_DETOUR, SCHEMA, is_closed, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
 from config.behaviors import BehaviorsConfig, LeaveCanyonConfig
@@ -167,3 +168,13 @@ def test_it_turns_steadily_where_there_is_room_and_at_once_where_there_is_not() 
     assert along_a_wall_with_a_doorway(1.0, -0.5) == pytest.approx(-0.5 + 0.15 * (wanted + 0.5))
     wanted = along_a_wall_with_a_doorway(1.0, away_m=0.8)
     assert along_a_wall_with_a_doorway(1.0, 0.6 * math.pi, away_m=0.8) == wanted, "the wall is near"
+
+
+@pytest.mark.parametrize(("began_m", "goes_on"), [(5.0, True), (3.0, False)])
+def test_what_was_only_presumed_is_given_up_where_it_leads_away_from_the_goal(began_m: float, goes_on: bool) -> None:
+    """Otherwise the walls of a whole building were followed, one after another, for an echo ahead at the start."""
+    block = Block(0.0, 0.0, 0.0, 1.0, 3.0, -0.5, 0.5)
+    detour = replace(NO_DETOUR, side=-1, began_m=began_m, block=block, wall_rad=0.0)
+    response, going = leave_canyon(seen(0.0, 0.0), (5.0, 0.0), detour, 0.381, CONFIG)
+    assert (response is not None, going.block is not None, going.side != 0) == (goes_on,) * 3
+    assert goes_on or going.presume_below_m < began_m, "nothing more is presumed before it is nearer"
