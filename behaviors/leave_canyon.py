@@ -137,7 +137,9 @@ def leave_canyon(
     dx, dy = goal[0] - pose.x, goal[1] - pose.y
     to_goal, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
     echoes = percept.obstacles if percept.steady is None else percept.steady
-    detour = _presume(echoes, pose, detour, to_goal, bearing, room, config)
+    # With an evidence grid the look-ahead goes round what was heard; in a building a wall answers ahead on most ways.
+    reach_m = config.look_ahead_m if percept.occupancy is None else 0.0
+    detour = _presume(echoes, pose, detour, to_goal, bearing, room, reach_m, room + 0.5 * config.look_m)
     virtual = [between(*canyon.mouth) for canyon in percept.canyons if is_closed(canyon, pose, goal, config)]
     if detour.block is not None:
         virtual.append(outline(detour.block))
@@ -201,8 +203,8 @@ def _is_inside(canyon: Canyon, x: float, y: float) -> bool:
 
 
 def _presume(
-    echoes: Floats, pose: Pose, detour: Detour, to_goal_m: float, bearing_rad: float, room_m: float,
-    config: LeaveCanyonConfig,
+    echoes: Floats, pose: Pose, detour: Detour, to_goal_m: float, bearing_rad: float, room_m: float, reach_m: float,
+    front_m: float,
 ) -> Detour:  # fmt: skip
     """Return the detour with the way driven and what is presumed far ahead brought up to date."""
     step = 0.0 if detour.x is None or detour.y is None else math.hypot(pose.x - detour.x, pose.y - detour.y)
@@ -211,13 +213,13 @@ def _presume(
         return replace(detour, block=widen(detour.block, echoes, pose))
     if detour.side != 0:
         return detour
-    reach = min(config.look_ahead_m, to_goal_m)
+    reach = min(reach_m, to_goal_m)
     detour = replace(detour, ahead=blocked_ahead(echoes, pose, bearing_rad, reach, detour.ahead, step, room_m))
     if detour.ahead is None or not detour.ahead.is_sure or to_goal_m > detour.presume_below_m:
         return detour
     if not _open_sides(echoes, pose, bearing_rad, room_m):
         return detour
-    return replace(detour, block=presume(detour.ahead, pose, room_m + 0.5 * config.look_m))
+    return replace(detour, block=presume(detour.ahead, pose, front_m))
 
 
 def _open_sides(points: Floats, pose: Pose, way_rad: float, room_m: float) -> list[Side]:

@@ -137,12 +137,15 @@ class LeaveCanyonConfig(Strict):
     leave_canyon_gain: float = Field(default=1.0, ge=0.0, le=100.0)
     """Length of the schema's vector; 0 turns the schema off."""
     room_m: float = Field(default=0.25, ge=0.0, le=10.0)
-    """Distance that is kept between the rim and what is gone round, m; gaps narrower than the robot and twice this
-    count as closed."""
+    """Distance that is kept between the rim and what is gone round, m. A gap with less room on either side is passed
+    in its middle, down to just above the arbiter's default clearance."""
     look_m: float = Field(default=0.6, gt=0.0, le=10.0)
     """The detour begins where something is nearer than this to the robot and its room, m."""
     look_ahead_m: float = Field(default=8.0, ge=0.0, le=100.0)
-    """What stays in the way as far ahead as this may be the back of a canyon, and is given room, m; 0: nothing is."""
+    """What stays in the way as far ahead as this may be the back of a canyon, and is given room, m; 0: nothing is.
+
+    With an evidence grid nothing is, as its look-ahead leads round what was heard.
+    """
     probability_min: float = Field(default=0.9, ge=0.0, le=1.0)
     """Canyons that are less probable are not avoided."""
 

@@ -16,7 +16,7 @@ from behaviors.blocked_ahead import Block
 from behaviors.leave_canyon import NO_DETOUR, SCHEMA, is_closed, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
 from config.behaviors import BehaviorsConfig, LeaveCanyonConfig
-from perception.percept import Canyon, Floats, Percept, Pose
+from perception.percept import Canyon, Floats, OccupancyWindow, Percept, Pose
 from tests.behaviors.hall import BODY, STEP_S, World, clamp, echoes
 from tests.behaviors.views import EVERYWHERE
 
@@ -178,3 +178,14 @@ def test_what_was_only_presumed_is_given_up_where_it_leads_away_from_the_goal(be
     response, going = leave_canyon(seen(0.0, 0.0), (5.0, 0.0), detour, 0.381, CONFIG)
     assert (response is not None, going.block is not None, going.side != 0) == (goes_on,) * 3
     assert goes_on or going.presume_below_m < began_m, "nothing more is presumed before it is nearer"
+
+
+def test_an_echo_that_stays_ahead_is_a_dead_end_only_without_an_evidence_grid() -> None:
+    """In a building a wall answers ahead on most ways: going round each made ways up to three times as long."""
+    window = OccupancyWindow(np.full((8, 8), 0.5, np.float32), 0.0, 0.0, 0.1)
+    for occupancy in (None, window):
+        detour = NO_DETOUR
+        for k in range(40):
+            percept = replace(seen(0.02 * k, 0.0, np.array([[5.0, 0.0]])), occupancy=occupancy)
+            _, detour = leave_canyon(percept, (7.0, 0.0), detour, 0.381, CONFIG)
+        assert (detour.block is None) is (occupancy is not None)
