@@ -1,6 +1,6 @@
 """How well one stand can tell an edge, a post and a drum apart: the bound that the times of flight set.
 
-Two bodies of other radii are told apart by how far the half paths over one differ from those over the other at its
+Two bodies of other radii differ by how far the half paths over one differ from those over the other at its
 best place. With d the root of the sum of squares of these differences in their standard deviation, the likelihood
 ratio errs with probability Φ(−d/2) (Neyman and Pearson), and no rule errs less. n rounds of the pattern make it d√n.
 """

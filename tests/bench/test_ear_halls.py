@@ -40,6 +40,6 @@ def test_each_firing_has_what_its_sensors_and_listeners_heard() -> None:
 
 def test_a_post_is_no_drum() -> None:
     drum = HALL.world.drum[0]
-    seen = DetectedObject("drum", drum.x_m + 0.1, drum.y_m, 0.0, 0.01, 9.0, 1.0)
+    seen = DetectedObject("drum", drum.x_m + 0.1, drum.y_m, 0.0, 0.01, 9, 1.0)
     assert is_drum(seen, HALL.world.drum, (drum.radius_m,))
     assert not is_drum(seen, HALL.world.drum, (drum.radius_m + 0.1,))
