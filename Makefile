@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 UV     := $(shell command -v uv)
 COMMA  := ,
 PYTEST := $(BIN)/python -m pytest -q
-WORKERS = $(shell expr 2 \* $$(nproc))
+PROCESSORS = $(shell nproc)
 LINES  := $(VENV)/lines
 
 # Python's compiled modules are kept whatever the environment says: a start without them takes twice the processor time.
@@ -46,12 +46,12 @@ tests: compiled interpreted
 # All tests but those that `boundscheck` runs. Many wait for the clock, so there are twice as many at a time as processors.
 compiled: $(VENV)/test.stamp
 	@rm -f $(LINES)/compiled-*
-	LINE_COVERAGE=$(LINES) $(PYTEST) -n $(WORKERS) --dist worksteal -m "not soak and not boundscheck"
+	LINE_COVERAGE=$(LINES) $(PYTEST) --forks $$((2 * $(PROCESSORS))) -m "not soak and not boundscheck"
 
 # Kernels again as plain Python: coverage cannot see into compiled code.
 interpreted: $(VENV)/test.stamp
 	@rm -f $(LINES)/interpreted-*
-	LINE_COVERAGE=$(LINES) NUMBA_DISABLE_JIT=1 $(PYTEST) -n auto --dist worksteal tests/perception tests/drivers/emulator \
+	LINE_COVERAGE=$(LINES) NUMBA_DISABLE_JIT=1 $(PYTEST) --forks $(PROCESSORS) tests/perception tests/drivers/emulator \
 		-m "kernels and not compiled and not realtime and not soak"
 
 # The lines that neither of the two has executed.

@@ -28,11 +28,12 @@ from tests import line_coverage
 COVERAGE = line_coverage.start()  # before any module of the product is imported
 
 from runtime.support import child_process  # noqa: E402
-from runtime.support.kernel_cache import PARTS, uncompiled_parts, use_kernel_cache  # noqa: E402
+from runtime.support.kernel_cache import use_kernel_cache  # noqa: E402
 from tests import promises  # noqa: E402
 from tests.compile_kernels import compile_all  # noqa: E402
+from tests.forked import ForkedTests  # noqa: E402
 
-KERNEL_CACHE = use_kernel_cache()
+use_kernel_cache()
 FREEZE, UNFREEZE = gc.freeze, gc.unfreeze
 
 TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
@@ -68,6 +69,7 @@ def slow_kernel_setting() -> str | None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--forks", metavar="PROCESSES", type=int, default=0, help="see tests/forked.py")
     parser.addoption("--promises", metavar="PAGE", help="write the measurements, see tests/promises.py")
     parser.addoption("--screenshots", metavar="FOLDER", help="save the screenshots of browser tests there")
 
@@ -113,7 +115,7 @@ class _PromisesPlugin:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         results = self._config.stash.get(promises.RESULTS, None)
-        if results is not None:  # None in the controller of pytest-xdist
+        if results is not None:  # None where nothing was collected
             results.add_report(report)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -133,15 +135,18 @@ class _PromisesPlugin:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(_PromisesPlugin(config), "promises")
-    if getattr(config.option, "numprocesses", None) and uncompiled_parts(KERNEL_CACHE, PARTS):
-        # Compile once here; otherwise every worker process would compile everything.
-        compile_all()
+    if config.option.forks:
+        config.pluginmanager.register(ForkedTests(config.option.forks, _load_kernels, _write_coverage), "forked")
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_sessionfinish() -> None:
+def _load_kernels() -> None:
+    compile_all()
+    FREEZE()
+
+
+def _write_coverage(process: int) -> None:
     if COVERAGE is not None:
-        COVERAGE.write()
+        COVERAGE.write(process)
 
 
 @pytest.fixture(autouse=True)

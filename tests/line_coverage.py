@@ -1,6 +1,6 @@
-"""Which lines of the product the tests execute, measured by slipcover in the workers of pytest-xdist.
+"""Which lines of the product the tests execute, measured by slipcover in each process of `pytest --forks`.
 
-With `LINE_COVERAGE=FOLDER` in the environment, each worker writes what it has seen to a file there, and
+With `LINE_COVERAGE=FOLDER` in the environment, each process writes what it has seen to a file there, and
 `python -m slipcover --merge` adds the files up. Slipcover removes its probes from lines that it has seen often, so
 tests run nearly as fast as without; a tracer doubles their time. The probes are byte code inside the functions. Numba
 would compile them, too, so files with kernels are measured only in a run that compiles none (`NUMBA_DISABLE_JIT=1`).
@@ -48,31 +48,27 @@ class MeasuredFiles:
 class LineCoverage:
     """Measures the modules of the product that are imported from now on."""
 
-    def __init__(self, report: Path, *, list_all: bool, with_kernels: bool) -> None:
+    def __init__(self, folder: Path, *, with_kernels: bool) -> None:
         from slipcover import ImportManager, Slipcover  # only where lines are measured
 
-        self._report = report
-        self._slipcover = Slipcover(
-            source=[str(ROOT / package) for package in PRODUCT] if list_all else None, d_miss_threshold=PASSES
-        )
+        self._folder = folder
+        self._name = "interpreted" if with_kernels else "compiled"
+        self._slipcover = Slipcover(d_miss_threshold=PASSES)
         ImportManager(self._slipcover, MeasuredFiles(with_kernels=with_kernels)).__enter__()
 
-    def write(self) -> None:
-        """Write the lines that were executed, and those that were not."""
+    def write(self, process: int) -> None:
+        """Write the lines that were executed and those that were not; process 0 lists the files never imported."""
+        self._slipcover.source = [str(ROOT / package) for package in PRODUCT] if process == 0 else None
         coverage = self._slipcover.get_coverage()
         coverage["files"] = {
             path: lines for path, lines in coverage["files"].items() if not path.startswith(ELSEWHERE)
         }  # fmt: skip
-        self._report.parent.mkdir(parents=True, exist_ok=True)
-        self._report.write_text(json.dumps(coverage), encoding="utf-8")
+        self._folder.mkdir(parents=True, exist_ok=True)
+        (self._folder / f"{self._name}-{process}.json").write_text(json.dumps(coverage), encoding="utf-8")
 
 
 def start() -> LineCoverage | None:
-    """Start to measure, if the environment asks for it and this is a worker of pytest-xdist."""
-    worker = os.environ.get("PYTEST_XDIST_WORKER")
-    if worker is None or not (folder := os.environ.pop("LINE_COVERAGE", "")):  # popped: not for children of tests
+    """Start to measure, if the environment asks for it."""
+    if not (folder := os.environ.pop("LINE_COVERAGE", "")):  # popped: not for children of tests
         return None
-    with_kernels = os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}
-    name = f"{'interpreted' if with_kernels else 'compiled'}-{worker}.json"
-    # One of the workers also lists the files that no test imports.
-    return LineCoverage(ROOT / folder / name, list_all=worker == "gw0", with_kernels=with_kernels)
+    return LineCoverage(ROOT / folder, with_kernels=os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"})

@@ -21,8 +21,7 @@ from drivers.driver import LineState
 from drivers.firmware.bundle import Board
 from drivers.messages import Twist
 from tests.drivers.firmware.board import install, start
-
-TIMEOUT_S = 20.0
+from tests.hil.machine import TIMEOUT_S
 
 
 class Pty:

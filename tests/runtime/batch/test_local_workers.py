@@ -14,7 +14,7 @@ SLEEPER = ("sleep", "60")
 def replaced(processes: list[subprocess.Popen[bytes]], dead: subprocess.Popen[bytes]) -> bool:
     """Wait until another process stands in the place of a dead one."""
     pause = threading.Event()
-    return any(dead not in processes or pause.wait(0.01) for _ in range(1000))
+    return any(dead not in processes or pause.wait(0.01) for _ in range(12_000))
 
 
 def test_a_killed_worker_is_replaced_and_none_is_left(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from config.errors import UserError
 from runtime.bridges.foxglove_live import READ_ONLY, serve_foxglove
+from tests.hil.machine import TIMEOUT_S
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
 
@@ -26,7 +27,7 @@ class Viewer:
 
     async def until(self, op: str) -> dict[str, Any]:
         """Return the next message of a kind."""
-        async with asyncio.timeout(30.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while True:
                 message = await self.connection.receive()
                 if message.type is aiohttp.WSMsgType.BINARY:

@@ -142,7 +142,7 @@ def test_a_folder_in_place_of_the_cache_is_removed_at_the_end(home: Path) -> Non
     program = "from runtime.support.kernel_cache import cache_folder; print(cache_folder())"
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(home.parent / "tmp")}
     done = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=600, check=True
     )
     assert private_name(done.stdout)
     assert list((home.parent / "tmp").iterdir()) == []

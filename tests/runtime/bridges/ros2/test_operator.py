@@ -12,6 +12,7 @@ import pytest
 
 from runtime.bridges.console_client import ConsoleError
 from runtime.bridges.ros2.operator import Operator
+from tests.hil.machine import TIMEOUT_S
 
 
 class FakeClient:
@@ -42,7 +43,7 @@ async def driving(client: FakeClient, lines: list[str]) -> AsyncIterator[Operato
 
 
 async def until(client: FakeClient, command: str, arguments: tuple[Any, ...]) -> None:
-    async with asyncio.timeout(20.0):
+    async with asyncio.timeout(TIMEOUT_S):
         while (command, arguments) not in client.sent:
             await asyncio.sleep(0.001)
 

@@ -16,6 +16,7 @@ from runtime.cli.app import run_command
 from runtime.cli.commands import foxglove
 from runtime.cli.commands.foxglove import foxglove_beside
 from runtime.support import child_process
+from tests.hil.machine import TIMEOUT_S
 
 
 def test_the_layout_is_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,7 +59,7 @@ async def test_the_process_beside_a_run_gets_the_address_and_its_end_is_logged(
     monkeypatch.setattr(foxglove, "start_child", starting)
     log = structlog.wrap_logger(None, processors=[keep])
 
-    async with foxglove_beside("http://x:1/?token=t", log), asyncio.timeout(30.0):
+    async with foxglove_beside("http://x:1/?token=t", log), asyncio.timeout(TIMEOUT_S):
         while not any(line["event"] == "the process that serves Foxglove has ended" for line in lines):
             await asyncio.sleep(0.01)
     assert started == [{"ECHOLOCATE_CONSOLE": "http://x:1/?token=t"}]

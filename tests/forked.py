@@ -1,0 +1,198 @@
+"""Runs tests in a few processes, `pytest --forks 4`, all forked from one that has imported and collected them.
+
+A process that starts anew and imports everything by itself, as those of pytest-xdist do, takes 15 s of processor time
+before its first test, and loads every kernel again. Here one process does all that, then forks. Each child takes one
+file of tests after another from a pipe, and sends its reports to the parent, which shows and counts them.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import struct
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
+from multiprocessing.connection import Connection, Pipe, wait
+from typing import Any, Final
+
+import pytest
+
+NUMBER: Final = struct.Struct("=I")
+DONE: Final = "done"
+
+
+def files_of(items: Sequence[pytest.Item]) -> list[list[int]]:
+    """Return the indices of the tests of each file, first of those that take long as they wait for real processes."""
+    files = [list(group) for _, group in groupby(range(len(items)), lambda index: items[index].path)]
+    return sorted(files, key=lambda file: not any(items[index].get_closest_marker("realtime") for index in file))
+
+
+def shared_numbers(count: int) -> int:
+    """Return the reading end of a pipe from which several processes take the numbers up to `count`."""
+    reading, writing = os.pipe()
+    with os.fdopen(writing, "wb") as numbers:  # below 64 kB, so it need not be read meanwhile
+        numbers.write(b"".join(map(NUMBER.pack, range(count))))
+    return reading
+
+
+def taken(numbers: int) -> Iterator[int]:
+    """Take numbers from such a pipe, until none is left."""
+    while data := os.read(numbers, NUMBER.size):
+        yield NUMBER.unpack(data)[0]
+
+
+class ForkedTests:
+    """Plugin that runs what was collected.
+
+    Parameters
+    ----------
+    processes : int
+        Number of children.
+    prepare : callable
+        Loads in the parent what every child needs.
+    finish : callable
+        Is called with its number in each child, after its last test.
+    """
+
+    def __init__(self, processes: int, prepare: Callable[[], None], finish: Callable[[int], None]) -> None:
+        self._processes = processes
+        self._prepare = prepare
+        self._finish = finish
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
+        """Run all tests; every one is reported, or the session fails."""
+        if session.testsfailed or session.config.option.collectonly:
+            return None  # pytest's own loop runs nothing, and says why
+        self._prepare()
+        _temp_paths(session).getbasetemp()  # made once, before there are several who would
+        files = files_of(session.items)
+        numbers = shared_numbers(len(files))
+        children = dict(self._fork(session, files, numbers, number) for number in range(self._processes))
+        os.close(numbers)
+        missing = set(range(len(session.items)))
+        try:
+            self._listen(session, children, missing)
+        finally:
+            for child in children.values():
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)
+        if missing and not session.shouldfail:
+            names = "\n".join(session.items[index].nodeid for index in sorted(missing))
+            session.shouldfail = f"not run, because a process had ended:\n{names}"
+        if session.shouldfail:
+            raise session.Failed(session.shouldfail)
+        return True
+
+    def _fork(
+        self, session: pytest.Session, files: list[list[int]], numbers: int, number: int
+    ) -> tuple[Connection[Any, Any], int]:
+        """Start a child; return where its reports come from, and its ID."""
+        receiver, sender = Pipe(duplex=False)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # numpy's threads, which are made for it
+            child = os.fork()
+        if child:
+            sender.close()
+            return receiver, child
+        status = 1
+        try:
+            receiver.close()
+            _Child(session, sender, number).run([[session.items[i] for i in file] for file in files], files, numbers)
+            self._finish(number)
+            status = 0
+        except BaseException:  # noqa: BLE001 - nothing of it may return into the parent's part
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(status)
+
+    def _listen(self, session: pytest.Session, children: dict[Connection[Any, Any], int], missing: set[int]) -> None:
+        """Pass on what children send, until all have ended; then `missing` has the tests that were not run."""
+        hook = session.config.hook
+        under_way: dict[Connection[Any, Any], int] = {}
+        while children:
+            for receiver in wait(list(children)):
+                assert isinstance(receiver, Connection)
+                try:
+                    index, data = receiver.recv()
+                except EOFError:
+                    status = os.waitstatus_to_exitcode(os.waitpid(children.pop(receiver), 0)[1])
+                    if receiver in under_way:
+                        missing.discard(under_way[receiver])
+                        _report_lost(session, under_way.pop(receiver), status)
+                    elif status:
+                        session.shouldfail = session.shouldfail or f"a process ended with status {status}"
+                    continue
+                item = session.items[index]
+                if data is None:
+                    under_way[receiver] = index
+                elif data != DONE:
+                    hook.pytest_runtest_logreport(
+                        report=hook.pytest_report_from_serializable(config=session.config, data=data)
+                    )
+                else:
+                    missing.discard(under_way.pop(receiver))
+                    hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+                    if session.shouldfail:
+                        raise session.Failed(session.shouldfail)
+                    if session.shouldstop:
+                        raise session.Interrupted(session.shouldstop)
+
+
+def _report_lost(session: pytest.Session, index: int, status: int) -> None:
+    """Report a test as failed during which its process ended."""
+    item = session.items[index]
+    why = f"the process that ran it ended with status {status}"
+    report = pytest.TestReport(item.nodeid, item.location, {}, "failed", why, "call")
+    session.config.hook.pytest_runtest_logreport(report=report)
+
+
+def _temp_paths(session: pytest.Session) -> Any:
+    return session.config._tmp_path_factory  # type: ignore[attr-defined]
+
+
+class _Child:
+    """Runs tests in a child, and sends what happens as (index of the test, report); None is its begin."""
+
+    def __init__(self, session: pytest.Session, sender: Connection[Any, Any], number: int) -> None:
+        self._session = session
+        self._sender = sender
+        self._index = 0
+        config = session.config
+        for name in ("terminalreporter", "junitxml", "lfplugin"):  # reports are shown and kept by the parent
+            if config.pluginmanager.hasplugin(name):
+                config.pluginmanager.unregister(name=name)
+        config.pluginmanager.register(self, "child")
+        # What children capture must not go into one file, nor their temporary folders into one.
+        capture: Any = config.pluginmanager.getplugin("capturemanager")
+        capture.stop_global_capturing()
+        capture.start_global_capturing()
+        capture.suspend_global_capture(in_=False)
+        factory = _temp_paths(session)
+        own = factory.getbasetemp() / f"process{number}"
+        own.mkdir()
+        factory._basetemp = own
+
+    def run(self, files: list[list[pytest.Item]], indices: list[list[int]], numbers: int) -> None:
+        """Run the tests of the files whose numbers it takes."""
+        queue = ((i, item) for n in taken(numbers) for i, item in zip(indices[n], files[n], strict=True))
+        now = next(queue, None)
+        while now is not None:
+            self._index, item = now
+            self._sender.send((self._index, None))
+            # The next is known before this one ends, which ends what the next does not need.
+            now = next(queue, None)
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=None if now is None else now[1])
+            self._sender.send((self._index, DONE))
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Send a report to the parent."""
+        config = self._session.config
+        self._sender.send((self._index, config.hook.pytest_report_to_serializable(config=config, report=report)))

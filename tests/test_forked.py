@@ -1,0 +1,104 @@
+"""Tests of the forked processes: each test is run once and reported, whatever becomes of its process."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+from tests.forked import shared_numbers, taken
+
+ROOT = Path(__file__).resolve().parents[1]
+CONFTEST = """
+import pytest
+from tests.forked import ForkedTests
+
+def pytest_configure(config):
+    config.pluginmanager.register(ForkedTests(2, lambda: print("prepared"), lambda n: print(f"process {n} is over")))
+"""
+PASSING = """
+import pytest
+
+@pytest.fixture(scope="module", autouse=True)
+def module(tmp_path_factory):
+    print("begins")
+    yield
+    (tmp_path_factory.getbasetemp() / "ended").touch()
+
+@pytest.mark.parametrize("n", range(20))
+def test_passes(n, tmp_path, capfd):
+    print(n)
+    assert capfd.readouterr().out == f"{n}\\n"
+    assert not list(tmp_path.parent.glob("*/seen"))
+    (tmp_path / f"seen by {n}").touch()
+
+def test_fails():
+    print("what it printed")
+    assert 1 == 2
+
+def test_is_skipped():
+    pytest.skip("for a reason")
+"""
+KILLED = """
+import os, signal
+
+def test_before():
+    pass
+
+def test_dies():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def test_after():
+    pass
+"""
+
+
+def run_suite(folder: Path, *arguments: str, **files: str) -> tuple[int, str]:
+    """Run a suite of these files in two processes; return the exit code and what it printed."""
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    (folder / "conftest.py").write_text(CONFTEST)
+    for name, text in files.items():
+        (folder / f"test_{name}.py").write_text(text)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--basetemp", "temp", *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_every_test_is_run_and_reported_but_those_of_a_process_that_is_killed(tmp_path: Path) -> None:
+    code, out = run_suite(tmp_path, a=PASSING, b=PASSING.replace("1 == 2", "1 == 1"), c=PASSING, d=KILLED)
+    assert code == 1, out
+    assert "3 failed, 62 passed, 3 skipped" in out, out
+    assert "what it printed" in out
+    assert "FAILED test_d.py::test_dies - the process that ran it ended with status -9" in out
+    assert "not run, because a process had ended:\ntest_d.py::test_after" in out
+    assert out.count("prepared") == 1
+    assert len(re.findall("process . is over", out)) == 1, "the other process went on"
+    assert {path.name for path in (tmp_path / "temp").iterdir()} == {"process0", "process1"}
+
+
+def test_the_first_failure_ends_all_if_asked_for(tmp_path: Path) -> None:
+    code, out = run_suite(tmp_path, "-x", a=PASSING.replace("def test_passes", "def unused"), b=PASSING)
+    assert code == 1
+    assert "stopping after 1 failures" in out, out
+
+
+def test_a_file_that_cannot_be_imported_runs_nothing(tmp_path: Path) -> None:
+    code, out = run_suite(tmp_path, a=PASSING, b="import nowhere_at_all")
+    assert code == 2, out
+    assert "prepared" not in out
+    assert "passed" not in out
+
+
+def test_each_number_is_taken_once() -> None:
+    numbers, lists = shared_numbers(5000), [list[int]() for _ in range(3)]
+    threads = [threading.Thread(target=lambda mine=mine: mine.extend(taken(numbers))) for mine in lists]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    os.close(numbers)
+    assert sorted(number for mine in lists for number in mine) == list(range(5000))
