@@ -224,8 +224,8 @@ def timing_table(summary: RunSummary) -> Table:
     rows = {
         **timing["phases"],
         **{f"between cycles: {name}": spread for name, spread in timing["callbacks"].items()},
-        "a cycle begins after it is due by": timing["late"],
-        "an echo waits for its cycle": timing["echo_wait"],
+        "lateness of a cycle's start": timing["late"],
+        "wait of an echo for its cycle": timing["echo_wait"],
     }
     for name, spread in rows.items():
         figures = (spread["p50"], spread["p99"], spread["p999"], spread["max"])

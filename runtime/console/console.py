@@ -281,7 +281,7 @@ class Console:
             self.hub.broadcast({"type": "parameters", "parameters": parameters(settings)})
 
     def _on_stalled(self, client: str) -> None:
-        self._console_log.refuse(f"it took nothing for {self._limits.stall_s:g} s: disconnected", client)
+        self._console_log.refuse(f"it accepted no data for {self._limits.stall_s:g} s: disconnected", client)
 
     def _on_control_lost(self, client: Holder) -> None:
         """End what begins or keeps a motion only for the client that had control."""

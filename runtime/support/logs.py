@@ -211,7 +211,7 @@ def open_log(
             )
         yield log
         if output.left_out and status.file is not None:
-            status.file.put(_json({"event": "log lines were left out at last", "left_out": output.left_out}))
+            status.file.put(_json({"event": "log lines were left out at the end", "left_out": output.left_out}))
 
 
 def file_writer(name: str, file: LogFile) -> BackgroundWriter[bytes]:

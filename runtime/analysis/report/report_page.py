@@ -229,7 +229,7 @@ def _timing(timeline: Timeline) -> list[str]:
         rows.append((str(name), _spread(spread)))
     for name, spread in timing.get("callbacks", {}).items():
         rows.append((f"between cycles: {name}", _spread(spread)))
-    for name, label in (("late", "a cycle begins after it is due by"), ("echo_wait", "an echo waits for its cycle")):
+    for name, label in (("late", "lateness of a cycle's start"), ("echo_wait", "wait of an echo for its cycle")):
         if name in timing:
             rows.append((label, _spread(timing[name])))
     if not timing and "cycle_us" in summary:
@@ -277,9 +277,7 @@ def _modes(timeline: Timeline) -> list[str]:
     if not timeline.modes:
         return []
     rows = [[f"{m.t_s:.2f} s", m.mode, m.reason or ""] for m in timeline.modes]
-    notes_below = (
-        note("The robot never stopped for a reason.") if not reasons else "".join(note(r, bad=True) for r in reasons)
-    )
+    notes_below = note("The run has no safety stop.") if not reasons else "".join(note(r, bad=True) for r in reasons)
     return [notes_below, table(["after", "mode", "reason"], rows, text=True)]
 
 

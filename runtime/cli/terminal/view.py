@@ -287,7 +287,7 @@ def map_text(counts: MapCounts) -> str:
     text = f"{counts.segments} segments, {counts.hypotheses} hypotheses"
     if counts.archived:
         text += f", {counts.archived} objects left behind"
-    return f"{text}; {counts.waiting} near ones have no room" if counts.waiting else text
+    return f"{text}; {counts.waiting} near objects wait for room" if counts.waiting else text
 
 
 def millis(quantiles: Quantiles) -> str:

@@ -41,7 +41,7 @@ async def load_map(call: Call, given: LoadMap) -> None:
 
     def refusal() -> str | None:
         is_driving = robot.state.mode.mode is Mode.DRIVE
-        return "the robot drives, and places in the map would mean others: disarm it first" if is_driving else None
+        return "the robot drives, and its goals in the map would move: disarm it first" if is_driving else None
 
     await call.context.tuning.set_map(given.toml, refusal)
 

@@ -37,7 +37,7 @@ export class Drive {
 
   halt() {
     this.connection.halt().catch((error) => this.notifications.toast(error.answered ? `HALT: ${error.message}`
-      : "HALT could not be sent: no connection. Use the emergency stop on the base; it is sent as soon as there is one."));
+      : "HALT could not be sent: no connection. It is sent as soon as there is one; until then use the emergency stop of the base."));
     this.teleoperation.stop("HALT");
   }
 

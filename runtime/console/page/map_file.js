@@ -8,7 +8,7 @@ export class MapFile {
   constructor({ run, units, connection, notifications, tools }) {
     Object.assign(this, { run, units, connection, notifications, tools });
     byId("map-load").addEventListener("change", (event) => this.#load(event.target));
-    byId("map-forget").addEventListener("click", () => this.#set(null).then((done) => done && notifications.toast("The map is forgotten; places are odometry's again")));
+    byId("map-forget").addEventListener("click", () => this.#set(null).then((done) => done && notifications.toast("The map is forgotten; positions are relative to the start of the run again")));
     byId("map-here").addEventListener("click", () => tools.choose("here", { focus: true }));
     byId("here-form").addEventListener("submit", (event) => this.#here(event));
     run.on("state", () => this.#refresh());
@@ -19,7 +19,7 @@ export class MapFile {
     const { localized, controller } = this.run.state, { known_room: room } = this.run.session ?? {};
     const enabled = controller && !this.run.watchesRecording;
     const isDriving = this.run.robot.mode === "DRIVE";
-    const text = room ? `There is a map: ${STATUS[localized?.status] ?? "it is being taken up"}.` : "No map is loaded: places are where the run began.";
+    const text = room ? `There is a map: ${STATUS[localized?.status] ?? "it is being taken up"}.` : "No map is loaded: positions are relative to the start of the run.";
     setText(byId("map-known"), isDriving && enabled ? `${text} Disarm the robot to load or forget a map.` : text);
     byId("map-load").disabled = !enabled || isDriving;
     byId("map-forget").disabled = !enabled || isDriving || !room;
@@ -58,7 +58,7 @@ export class MapFile {
     }
     this.connection.request({ type: "place_robot", x, y, theta: (heading * Math.PI) / 180 }).then(() => {
       setText(byId("map-error"), "");
-      this.notifications.toast("The robot's place is checked by what it hears");
+      this.notifications.toast("The next readings check this place");
     }, (error) => setText(byId("map-error"), error.message));
   }
 }

@@ -34,7 +34,7 @@ export class Objects {
   refresh() {
     const { objects, waiting } = this.run.state;
     const counted = countObjects(objects);
-    setText(byId("objects-count"), waiting > 0 ? `${counted}, ${waiting} near ones have no room` : counted);
+    setText(byId("objects-count"), waiting > 0 ? `${counted}, ${waiting} near objects wait for room` : counted);
     byId("objects-empty").hidden = objects.length > 0;
     const seen = new Set();
     objects.forEach((object, index) => {

@@ -116,7 +116,7 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
     up() {
       if (pose?.dragged) {
         connection.request({ type: "place_robot", ...inMap(pose) })
-          .then(() => notifications.toast("The robot's place is checked by what it hears"), notifications.showError);
+          .then(() => notifications.toast("The next readings check this place"), notifications.showError);
         choose("pan");
       }
       discard();

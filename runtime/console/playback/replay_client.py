@@ -78,7 +78,7 @@ class ReplayProcess:
         except TimeoutError:
             await self.close()
             raise ReplayError(
-                f"the recording did not come on for {OPEN_MAX_S:.0f} s, likely because the machine is busy: try again"
+                f"opening made no progress for {OPEN_MAX_S:.0f} s, likely because the machine is busy: try again"
             ) from None
         except (asyncio.IncompleteReadError, OSError):
             output = b"" if self._process.stderr is None else await self._process.stderr.read()

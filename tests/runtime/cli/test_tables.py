@@ -96,7 +96,7 @@ def test_the_timing_table_and_the_causes_of_delays() -> None:
     console = Console(record=True, width=110, file=io.StringIO(), color_system=None)
     console.print(timing_table(summary))
     text = console.export_text()
-    for piece in ("refine", "between cycles: link receive", "an echo waits for its cycle", "p99.9"):
+    for piece in ("refine", "between cycles: link receive", "wait of an echo for its cycle", "p99.9"):
         assert piece in text, piece
     assert text.count("0.17") == text.count("1.25") == text.count("8.00") == text.count("49.65") == 4
     assert timing_line(summary) == (

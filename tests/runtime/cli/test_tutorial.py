@@ -32,8 +32,8 @@ CHEAP = ("init", "check", "service")
 PROGRAM = f"{shlex.quote(sys.executable)} -m runtime.cli "
 ROUTE = [tuple(map(float, place)) for place in re.findall(r"x_m = (-?[\d.]+), y_m = (-?[\d.]+)", TUTORIAL)]
 LONG_S = 600.0
-DRIVEN_BYTES = 60_000
-"""Of a recording of some seconds."""
+DRIVEN_BYTES = 400_000
+"""Of a recording of half a minute; while kernels are compiled, a minute gives a tenth of it."""
 
 
 @pytest.fixture

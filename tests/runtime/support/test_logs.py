@@ -134,7 +134,7 @@ def test_a_flood_of_lines_is_limited_and_suppresses_no_other_level(
     assert sum(1 + int(str(event.get("left_out_before", 0))) for event in warnings) - 1 == 10_000
     assert warnings[-1]["event"] == "the last one"
     assert sum(event.get("level") == "error" for event in events) == 5
-    assert events[-1] == {"event": "log lines were left out at last", "left_out": 700}
+    assert events[-1] == {"event": "log lines were left out at the end", "left_out": 700}
     measured(f"10,000 warnings in 10 s: {len(warnings) - 1} lines, none of 5 errors suppressed")
 
 

@@ -54,7 +54,7 @@ def test_page_shows_the_run(shown: str) -> None:
     assert "3 of 6" in text
     assert "as the paper's Figure 6" in text
     assert "0.249 ft" in text, "the paper's own mean error"
-    assert "The robot never stopped for a reason." in text
+    assert "The run has no safety stop." in text
     assert (
         "Cycles by what ended their refinement: the time for it was over 20, nothing was left to improve 40." in text
     )
@@ -91,7 +91,7 @@ def test_page_shows_the_summary_and_why_the_robot_stopped() -> None:
     shown = page(run, "m")
     assert shown.encode().decode() == shown, "it is UTF-8, whatever the name of the file is"
     text = " ".join(PageReader(shown).text)
-    for piece in ("refine", "between cycles: link receive", "a cycle begins after it is due by", "1.25", "49.65"):
+    for piece in ("refine", "between cycles: link receive", "lateness of a cycle's start", "1.25", "49.65"):
         assert piece in text, piece
     assert "7 cycles late, 4 missed; caused by outside the process (6)." in text
     assert "1,832" in text

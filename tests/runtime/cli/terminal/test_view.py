@@ -76,7 +76,7 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
     text = printed(snapshot)
     for piece in (
         "SAFE STOP", "bumper contact: free the robot", "→", "•",
-        "1 segments, 7 hypotheses, 12 objects left behind; 3 near ones have no room",
+        "1 segments, 7 hypotheses, 12 objects left behind; 3 near objects wait for room",
         "1832 frames, 3 bad, 2 lost",
         "520, 9 late, 4 missed", "outside the process: 7, refine: 2",
         "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
