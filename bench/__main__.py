@@ -9,7 +9,7 @@ from typing import Annotated, Final, TypeAlias
 from cyclopts import App, Parameter
 from rich.console import Console
 
-from bench.batch_commands import tune
+from bench.batch_commands import replay, scheduler, sweep, tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
@@ -245,6 +245,9 @@ app.command(map_size, name="map")
 app.command(cross_paths)
 app.command(tune)
 app.command(ear_halls)
+app.command(sweep)
+app.command(scheduler)
+app.command(replay)
 app.command(one_stand)
 app.command(stand_bound)
 

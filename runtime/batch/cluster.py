@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -14,7 +14,7 @@ from runtime import VERSION
 from runtime.batch.dispatch import Done
 from runtime.batch.local_workers import local_workers
 from runtime.batch.runs import Run
-from runtime.batch.worker import run_one
+from runtime.batch.worker import Row, run_one
 
 if TYPE_CHECKING:
     from distributed import Client, as_completed
@@ -48,11 +48,14 @@ class DaskPool:
         Connected to the scheduler.
     completed : distributed.as_completed
         Empty: gets the futures, and yields them as they end.
+    make : callable
+        Makes a run on a worker.
     """
 
-    def __init__(self, client: Client, completed: as_completed) -> None:
+    def __init__(self, client: Client, completed: as_completed, make: Callable[[Run], Row] = run_one) -> None:
         self._client = client
         self._completed = completed
+        self._make = make
         self._under_way: dict[str, tuple[Run, int]] = {}
         self._capacity = 1
         self._counted_s = -COUNT_PERIOD_S
@@ -69,7 +72,7 @@ class DaskPool:
         """Begin a run."""
         key = f"echolocate-{run.key}-{attempt}"
         self._under_way[key] = run, attempt
-        self._completed.add(self._client.submit(run_one, run, key=key))
+        self._completed.add(self._client.submit(self._make, run, key=key))
 
     def next_done(self) -> Done:
         """Wait for the next run that ends.
