@@ -31,7 +31,10 @@ WALL_CHI2_MIN: Final = 20.0
 SPAN_WEIGHT_MIN: Final = 3.0
 """Least weight of a span that is reported, …"""
 MISFIT_MAX: Final = 3.0
-"""Greatest χ² of a wall's line for each degree of freedom."""
+LIGHT_MISFIT_MAX: Final = 2.0
+LIGHT_WEIGHT: Final = 20.0
+"""Greatest χ² of a wall's line for each degree of freedom, and that of a wall of less weight, which may be the side
+of a barrel that was heard from a few places."""
 CORNER_NEAR_M: Final = 1.0
 """Distance from the ends of both walls within which a corner need not be heard …"""
 CORNER_PASSED_SHARE: Final = 0.2
@@ -187,7 +190,8 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
         All corners.
     """
     found: dict[int, Straight] = {}
-    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < MISFIT_MAX)).tolist()
+    misfit_max = np.where(walls["weight"] < LIGHT_WEIGHT, LIGHT_MISFIT_MAX, MISFIT_MAX)
+    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < misfit_max)).tolist()
     heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
     heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
     first, second = walls[heard["first"]], walls[heard["second"]]

@@ -60,6 +60,10 @@ def test_short_light_and_bent_lines_are_no_walls() -> None:
     fill(memory, wall, -0.6, 0.6)
     wall.misfit = 4.0
     assert len(wall_ends(memory)) == 0
+    wall.misfit = 2.5
+    assert len(wall_ends(memory)) == 1
+    wall.weight = 19.0
+    assert len(wall_ends(memory)) == 0, "a barrel's side"
 
 
 def test_a_segment_is_an_object_with_its_length_in_its_covariance() -> None:
