@@ -67,9 +67,11 @@ def unpack(row: NDArray[Any], track: NDArray[Any]) -> None:
     bins = track[BINS][0]
     kept = row["readings"][0, : int(row["kept"][0])][::-1].astype(np.float64)  # the oldest first
     b = bearing_bins(kept, len(bins))
-    bins["count"] = np.bincount(b, minlength=len(bins))
     order = np.argsort(b, kind="stable")
+    # They were binned about earlier centres: about this one a bin may get more than it holds, and keeps the newest.
+    order = order[np.searchsorted(b[order], b[order], "right") - np.arange(len(b)) <= bins["readings"].shape[1]]
     b, kept = b[order], kept[order]
+    bins["count"] = np.bincount(b, minlength=len(bins))
     in_bin, readings = np.arange(len(b)) - np.searchsorted(b, b), bins["readings"]
     readings["x"][b, in_bin], readings["y"][b, in_bin] = row["x"] + kept[:, 0], row["y"] + kept[:, 1]
     readings["axis_x"][b, in_bin], readings["axis_y"][b, in_bin] = np.cos(kept[:, 2]), np.sin(kept[:, 2])

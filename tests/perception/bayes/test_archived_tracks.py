@@ -65,6 +65,19 @@ def test_a_track_comes_back_as_it_was_but_for_its_older_readings(readings: int) 
             assert held == pytest.approx(before["bins"]["readings"][b, newest][field], abs=2e-6)
 
 
+def test_a_bearing_that_gets_more_than_it_holds_keeps_the_newest() -> None:
+    memory = filled(2, 400)
+    memory.circles["x"][0] -= 500.0  # the fit moved since the readings were kept: all lie at one bearing now
+    memory.circles["y"][0] -= 100.0
+    newest = newest_readings(memory.circles["bins"][0])[:BIN_CAPACITY][::-1]
+    unpack(pack(memory.circles[:1], archived_dtype(CircleTrack), is_reported=True), memory.circles[1:2])
+    bins = memory.circles["bins"][1]
+    (b,) = np.flatnonzero(bins["count"]).tolist()
+    assert bins["count"][b] == BIN_CAPACITY < READINGS_KEPT
+    assert bins["readings"]["x"][b] == pytest.approx(newest["x"], abs=1e-4)
+    assert bins["readings"]["y"][b] == pytest.approx(newest["y"], abs=1e-4)
+
+
 def test_of_many_readings_each_bearing_keeps_its_newest() -> None:
     bins = filled(1, 400).circles["bins"][0]
     kept = newest_readings(bins)
