@@ -110,7 +110,7 @@ def find_same(s: StateRecord) -> int:
 def move_bins(main: Wall, part: Wall) -> None:
     """Move the readings of a wall to another one, and end it."""
     source: NDArray[Any] = np.asarray(part.bins)
-    bins = np.flatnonzero(source["weight"] > 0.0)
+    bins = np.flatnonzero((source["weight"] > 0.0) & (source["precision"] > 0.0))
     source = source[bins]
     off, u = source["offset_sum"] / source["precision"], (bins - HALF + 0.5) * WALL_BIN_M
     dx = part.origin_x + part.normal_x * off - part.normal_y * u - main.origin_x

@@ -77,7 +77,7 @@ WALL_EXTENT: Final = Bound(-0.5 * WALL_BINS * WALL_BIN_M, 0.5 * WALL_BINS * WALL
 """Of the ends of a wall's spans, which become indices of its bins."""
 JOB_READINGS: Final = POLYGON_BEARING_BINS * POLYGON_BIN_CAPACITY
 SCRATCH: Final = "method.memory.state.scratch."
-UNHEARD: Final = "method.memory.state.sensors.last."
+UNHEARD: Final = ("method.memory.state.sensors.last.", "method.memory.state.sensors.crossed.")
 """Readings that are NaN until their sensor has made one."""
 
 _CONSTANTS: Final = (
@@ -102,7 +102,7 @@ _COUNTS: Final = (
     "_sensors.readings "
     "room.firings room.recent_count rejection_count run_firing run_length segments_held segments_made "
     "segments_numbered "
-    "sensors.kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
+    "sensors.kept crosses_kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
     "drift._arrived drift._checked _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
     "_keyframes.count _keyframes._firings entered peak_at known_room._window_begin "
     "known_room._search_begin _grid._due _grid._searches"
