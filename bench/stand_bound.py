@@ -42,12 +42,14 @@ def audible_pairs(ring: RingConfig, pairs: list[tuple[int, int]], point: complex
     return places[rows[:, 0]], places[rows[:, 1]]
 
 
-def apart(t: np.ndarray, l: np.ndarray, bearing: float, range_m: float, radius: float, other: float) -> float:  # noqa: E741
+def apart(
+    firing: np.ndarray, listening: np.ndarray, bearing: float, range_m: float, radius: float, other: float
+) -> float:
     """Return d, how far two radii are apart for one look at each pair, the other one at its best place.
 
     Parameters
     ----------
-    t, l
+    firing, listening
         Places of transmitter and listener, complex, m.
     bearing, range_m, radius
         The body: direction and distance of its nearest point from the ring's centre, rad and m, and radius, m.
@@ -57,7 +59,7 @@ def apart(t: np.ndarray, l: np.ndarray, bearing: float, range_m: float, radius: 
 
     def paths(place: Floats, rho: float) -> Floats:
         out = complex(math.cos(place[0]), math.sin(place[0]))
-        return half_paths_over_circle(t, l, (place[1] + rho) * out, rho)
+        return half_paths_over_circle(firing, listening, (place[1] + rho) * out, rho)
 
     truth, place = paths(np.array([bearing, range_m]), radius), np.array([bearing, range_m])
     for _ in range(_STEPS):

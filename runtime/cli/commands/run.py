@@ -288,14 +288,9 @@ async def run_process(
 
         observers = recording.observers(on_cycle, log)
         process = RobotProcess(
-            settings,
-            log,
-            observers,
-            clock,
-            stack.enter_context(SdNotifier.from_environment()),
-            preparation,
+            settings, log, observers, clock, stack.enter_context(SdNotifier.from_environment()), preparation,
             line_messages,
-        )
+        )  # fmt: skip
         if preparation is not None:
             stack.push_async_callback(preparation.close)
         kernel_loader = KernelLoader(log)
