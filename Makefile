@@ -9,6 +9,7 @@ COMMA  := ,
 PYTEST := $(BIN)/python -m pytest -q
 PROCESSORS = $(shell nproc)
 LINES  := $(VENV)/lines
+BOUNDSCHECKED = tests/perception tests/drivers/emulator tests/runtime/recording
 
 # Python's compiled modules are kept whatever the environment says: a start without them takes twice the processor time.
 unexport PYTHONDONTWRITEBYTECODE
@@ -60,7 +61,7 @@ coverage: $(VENV)/test.stamp
 
 # Whole drives with array bounds checked, which compiled code does not do by default.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) -m "boundscheck and not soak"
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
 
 # Measures every promise and writes docs/promises.md. (The option needs its "=": pytest would take the page for a test.)
 promises: $(VENV)/test.stamp
@@ -70,6 +71,7 @@ promises: $(VENV)/test.stamp
 # time that checks memory growth, late compilation and full garbage collections.
 soak: $(VENV)/soak.stamp ros2
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and soak"
 	$(BIN)/python -m pytest -m "soak and not ros2" --promises=docs/promises-soak.md
 	@$(BIN)/python -m bench.growth $(SOAK)
 	@$(BIN)/python -m bench.budget $(SOAK)

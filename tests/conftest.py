@@ -43,6 +43,8 @@ TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR
 KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "drivers/emulator")]
 """Folders with the tests of compiled kernels."""
 
+BROWSER_TESTS = Path(__file__).parent / "browser"
+
 for _name in TERMINAL:
     os.environ.pop(_name, None)
 
@@ -136,7 +138,14 @@ class _PromisesPlugin:
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(_PromisesPlugin(config), "promises")
     if config.option.forks:
-        config.pluginmanager.register(ForkedTests(config.option.forks, _load_kernels, _write_coverage), "forked")
+        config.pluginmanager.register(
+            ForkedTests(config.option.forks, _waits, _load_kernels, _write_coverage), "forked"
+        )
+
+
+def _waits(item: pytest.Item) -> bool:
+    """Return whether a test waits for the clock or the browser, which one or two processes share."""
+    return item.get_closest_marker("realtime") is not None or item.path.is_relative_to(BROWSER_TESTS)
 
 
 def _load_kernels() -> None:

@@ -3,6 +3,9 @@
 A process that starts anew and imports everything by itself, as those of pytest-xdist do, takes 15 s of processor time
 before its first test, and loads every kernel again. Here one process does all that, then forks. Each child takes one
 file of tests after another from a pipe, and sends its reports to the parent, which shows and counts them.
+
+Some files wait most of the time, for the clock or a browser. They have a pipe of their own, with which every other
+child begins: while those wait, the rest computes.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ import struct
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any, Final
@@ -25,23 +28,23 @@ DONE: Final = "done"
 
 
 def files_of(items: Sequence[pytest.Item]) -> list[list[int]]:
-    """Return the indices of the tests of each file, first of those that take long as they wait for real processes."""
-    files = [list(group) for _, group in groupby(range(len(items)), lambda index: items[index].path)]
-    return sorted(files, key=lambda file: not any(items[index].get_closest_marker("realtime") for index in file))
+    """Return the indices of the tests of each file."""
+    return [list(group) for _, group in groupby(range(len(items)), lambda index: items[index].path)]
 
 
-def shared_numbers(count: int) -> int:
-    """Return the reading end of a pipe from which several processes take the numbers up to `count`."""
+def shared_numbers(numbers: Iterable[int]) -> int:
+    """Return the reading end of a pipe from which several processes take these numbers."""
     reading, writing = os.pipe()
-    with os.fdopen(writing, "wb") as numbers:  # below 64 kB, so it need not be read meanwhile
-        numbers.write(b"".join(map(NUMBER.pack, range(count))))
+    with os.fdopen(writing, "wb") as pipe:  # below 64 kB, so it need not be read meanwhile
+        pipe.write(b"".join(map(NUMBER.pack, numbers)))
     return reading
 
 
-def taken(numbers: int) -> Iterator[int]:
-    """Take numbers from such a pipe, until none is left."""
-    while data := os.read(numbers, NUMBER.size):
-        yield NUMBER.unpack(data)[0]
+def taken(*pipes: int) -> Iterator[int]:
+    """Take numbers from such pipes, one after the other, until none is left."""
+    for pipe in pipes:
+        while data := os.read(pipe, NUMBER.size):
+            yield NUMBER.unpack(data)[0]
 
 
 class ForkedTests:
@@ -51,14 +54,20 @@ class ForkedTests:
     ----------
     processes : int
         Number of children.
+    waits : callable
+        Returns whether a test mostly waits.
     prepare : callable
         Loads in the parent what every child needs.
     finish : callable
         Is called with its number in each child, after its last test.
     """
 
-    def __init__(self, processes: int, prepare: Callable[[], None], finish: Callable[[int], None]) -> None:
+    def __init__(
+        self, processes: int, waits: Callable[[pytest.Item], bool],
+        prepare: Callable[[], None], finish: Callable[[int], None],
+    ) -> None:  # fmt: skip
         self._processes = processes
+        self._waits = waits
         self._prepare = prepare
         self._finish = finish
 
@@ -70,9 +79,12 @@ class ForkedTests:
         self._prepare()
         _temp_paths(session).getbasetemp()  # made once, before there are several who would
         files = files_of(session.items)
-        numbers = shared_numbers(len(files))
-        children = dict(self._fork(session, files, numbers, number) for number in range(self._processes))
-        os.close(numbers)
+        waiting = {n for n, file in enumerate(files) if any(self._waits(session.items[index]) for index in file)}
+        pipes = shared_numbers(sorted(waiting)), shared_numbers(n for n in range(len(files)) if n not in waiting)
+        orders = pipes, pipes[::-1]
+        children = dict(self._fork(session, files, orders[number % 2], number) for number in range(self._processes))
+        for pipe in pipes:
+            os.close(pipe)
         missing = set(range(len(session.items)))
         try:
             self._listen(session, children, missing)
@@ -88,7 +100,7 @@ class ForkedTests:
         return True
 
     def _fork(
-        self, session: pytest.Session, files: list[list[int]], numbers: int, number: int
+        self, session: pytest.Session, files: list[list[int]], pipes: Sequence[int], number: int
     ) -> tuple[Connection[Any, Any], int]:
         """Start a child; return where its reports come from, and its ID."""
         receiver, sender = Pipe(duplex=False)
@@ -103,7 +115,8 @@ class ForkedTests:
         status = 1
         try:
             receiver.close()
-            _Child(session, sender, number).run([[session.items[i] for i in file] for file in files], files, numbers)
+            items = [[session.items[index] for index in file] for file in files]
+            _Child(session, sender, number).run(items, files, taken(*pipes))
             self._finish(number)
             status = 0
         except BaseException:  # noqa: BLE001 - nothing of it may return into the parent's part
@@ -180,9 +193,9 @@ class _Child:
         own.mkdir()
         factory._basetemp = own
 
-    def run(self, files: list[list[pytest.Item]], indices: list[list[int]], numbers: int) -> None:
-        """Run the tests of the files whose numbers it takes."""
-        queue = ((i, item) for n in taken(numbers) for i, item in zip(indices[n], files[n], strict=True))
+    def run(self, files: list[list[pytest.Item]], indices: list[list[int]], numbers: Iterator[int]) -> None:
+        """Run the tests of the files whose numbers come."""
+        queue = ((i, item) for n in numbers for i, item in zip(indices[n], files[n], strict=True))
         now = next(queue, None)
         while now is not None:
             self._index, item = now

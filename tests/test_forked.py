@@ -17,7 +17,9 @@ import pytest
 from tests.forked import ForkedTests
 
 def pytest_configure(config):
-    config.pluginmanager.register(ForkedTests(2, lambda: print("prepared"), lambda n: print(f"process {n} is over")))
+    config.pluginmanager.register(
+        ForkedTests(2, lambda item: "_b" in item.path.name, lambda: print("prepared"),
+                    lambda n: print(f"process {n} is over")))
 """
 PASSING = """
 import pytest
@@ -94,11 +96,13 @@ def test_a_file_that_cannot_be_imported_runs_nothing(tmp_path: Path) -> None:
 
 
 def test_each_number_is_taken_once() -> None:
-    numbers, lists = shared_numbers(5000), [list[int]() for _ in range(3)]
-    threads = [threading.Thread(target=lambda mine=mine: mine.extend(taken(numbers))) for mine in lists]
+    pipes = shared_numbers(range(4000)), shared_numbers(range(4000, 5000))
+    lists = [list[int]() for _ in range(3)]
+    threads = [threading.Thread(target=lambda mine=mine: mine.extend(taken(*pipes))) for mine in lists]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    os.close(numbers)
+    for pipe in pipes:
+        os.close(pipe)
     assert sorted(number for mine in lists for number in mine) == list(range(5000))

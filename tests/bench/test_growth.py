@@ -13,8 +13,8 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P15")]
 
 ROOT = Path(__file__).parents[2]
-CYCLES = 1200
-WRAP_S = 50.0
+CYCLES = 700
+WRAP_S = 25.0
 
 
 def test_drive_does_not_grow_compile_or_collect(measured: Callable[[str], None]) -> None:

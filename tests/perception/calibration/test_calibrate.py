@@ -22,6 +22,7 @@ def errors(seed: int, model: str, drift: float, pace: float) -> CalibrationError
     return calibration_errors(drive, found)
 
 
+@pytest.mark.compiled
 def test_a_quick_drive_finds_mounts_and_scales() -> None:
     """Limits wider than the slow drive's: a sixth of the readings, 6.6° of turn between two of a sensor."""
     found = errors(200, "specular", 0.0, 6.0)

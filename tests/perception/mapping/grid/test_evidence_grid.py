@@ -75,6 +75,7 @@ def test_way_and_not_time_makes_a_repeat_count_again() -> None:
     assert driving.occupancy().occupied.max() > 0.8 > once.occupancy().occupied.max()
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", GRIDS)
 def test_perception_with_a_grid_continues_from_a_snapshot_to_the_bit(method: str) -> None:
     settings = load_settings("hallway", [f"perception.grid.method={method}"])
