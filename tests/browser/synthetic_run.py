@@ -59,6 +59,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
         "models": [{"name": "drum", "vertices": drum, "closed": True, "arc_radius_m": RADIUS},
                    {"name": "box", "vertices": [[half, -half], [half, half], [-half, half], [-half, -half]],
                     "closed": True, "arc_radius_m": None}],
+        "radii": {"edge": 0.0, "post": 0.1, "barrel": 0.67},
         "truth": {"drums": [[x, y, RADIUS] for x, y in DRUMS], "walls": [], "polygons": []},
         "known_room": {"drums": [], "walls": [[-2.0, -2.0, 4.0, -2.0]], "polygons": []},
         "missions": [{"name": "patrol", "about": "Drives round."}, {"name": "wander", "about": ""}],

@@ -23,6 +23,7 @@ from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
 from perception.percept import Canyon
 from perception.pipeline import Perception
+from runtime.console.frames.cross_path_rows import CrossPathRows
 from runtime.console.frames.mission_rows import MissionRows
 from runtime.console.frames.segment_delta import SegmentDelta
 from runtime.cycle.drive_requests import DriveRequest, GoalPlace
@@ -116,6 +117,7 @@ class FrameEncoder:
         self._ranges_m = [math.nan] * count
         self._fired_s = [math.nan] * count
         self._fired: set[int] = set()
+        self._cross_paths = CrossPathRows()
         self._segments = SegmentDelta()
         self._mission = MissionRows()
         self._clusters = ClusterView(settings.perception)
@@ -138,6 +140,7 @@ class FrameEncoder:
         if heard.rebooted:
             self._ranges_m = [math.nan] * len(self._ranges_m)
             self._fired_s = [math.nan] * len(self._fired_s)
+            self._cross_paths.clear()
         if heard.rebooted or record.inputs.edits:
             # The segments may differ although their counts do not.
             self._is_stale = True
@@ -175,6 +178,7 @@ class FrameEncoder:
             "firing": sorted(self._fired),
             "ranges": _json_numbers([NO_ECHO if r == math.inf else r for r in self._ranges_m], 4),
             "age": _json_numbers([robot_s - fired_s for fired_s in self._fired_s], 3),
+            "cross_paths": self._cross_paths.rows(),
             "clusters": self._cluster_boxes,
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
             "areas": [[a.number, round(a.x, 3), round(a.y, 3), a.radius] for a in state.perception.vacant_areas()],
@@ -213,6 +217,7 @@ class FrameEncoder:
             if not math.isnan(range_m):
                 self._ranges_m[sensor], self._fired_s[sensor] = range_m, firing.robot_s
                 self._fired.add(sensor)
+        self._cross_paths.take(firing)
 
     def _drive_request(self, drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:
         """Return what is driven, as the page shows it."""

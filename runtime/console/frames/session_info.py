@@ -12,6 +12,8 @@ from config.mission_step import LABELS
 from config.settings import Settings
 from config.world import StartConfig, WorldConfig
 from drivers.messages import Pose
+from perception.bayes.object_report import round_label
+from perception.bayes.parameters import RIVAL_RADII_M
 from runtime import VERSION
 from runtime.console.commands.parameters import parameters
 from runtime.support.length_format import Units
@@ -50,6 +52,7 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
             {"name": m.name, "vertices": m.vertices_m, "closed": m.closed, "arc_radius_m": m.arc_radius_m}
             for m in settings.models
         ],
+        "radii": {round_label(radius_m): radius_m for radius_m in RIVAL_RADII_M},
         "missions": [{"name": m.name, "about": m.about} for m in missions(settings)],
         "truth": surfaces(settings.world, settings.world.start) if emulated and settings.world is not None else None,
         "known_room": None if known_room is None else surfaces(known_room, StartConfig()),

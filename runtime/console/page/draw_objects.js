@@ -1,6 +1,7 @@
 // What was recognised: the model's outline with its label and probability, the 95 % ellipse of its place, the clusters
 // it grew from, and for the one that is picked the readings that speak for and against it.
 
+import { addArc, ellipseArc } from "./cross_paths.js";
 import { textWithHalo, overlap } from "./scene.js";
 import { isWall } from "./walls.js";
 
@@ -221,9 +222,14 @@ export function drawEvidence(f) {
     path.lineTo(x2, y2);
     if (!supports) cross(crosses, (x1 + x2) / 2, (y1 + y2) / 2, 4 * px);
   }
-  for (const { x, y, range: heard, angle, nats } of evidence.readings) {
+  for (const { x, y, range: heard, angle, nats, listener: [lx, ly] } of evidence.readings) {
     const range = heard ?? reachMax; // without an echo: anything up to this range would have been heard
     const path = nats < 0 ? against : speaks;
+    if (lx !== undefined) {
+      const arc = ellipseArc({ transmitter: { x, y, angle }, listener: { x: lx, y: ly, angle: null }, half: range }, half);
+      if (arc !== null) addArc(path, arc);
+      continue;
+    }
     path.moveTo(x + range * Math.cos(angle - half), y + range * Math.sin(angle - half));
     path.arc(x, y, range, angle - half, angle + half);
     rays.moveTo(x, y);

@@ -2,6 +2,7 @@
 
 import { el, svg } from "./dom.js";
 import { drawCanyons } from "./draw_canyons.js";
+import { drawCrossPaths } from "./draw_cross_paths.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
 import { drawEvidenceGrid } from "./draw_evidence.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
@@ -23,6 +24,7 @@ const TABLE = [
   ["evidence", "front", "readings of the selected object", drawEvidence, true, "M5 14c6-8 14-8 18 0M29 6l7 7m0-7-7 7", "stop"],
   ["models", "front", "models and walls (dashed: uncertain, or hidden by a wall)", drawModels, true, "M20 3a7 7 0 1 1-.1 0Z", "model"],
   ["ellipses", "front", "95 % ellipses of their positions (dotted: magnified)", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
+  ["cross_paths", "front", "cross paths, and what reflected them (bar: wall, angle: corner, triangle: edge, ring: round, square: other model)", drawCrossPaths, true, "M6 15c5-10 23-10 28 0M16 17v-8m-3 4h6", "cross"],
   ["areas", "front", "vacant areas: nothing stands here", drawAreas, true, "M20 2a8 8 0 1 1-.1 0ZM14 4l12 12M26 4 14 16", "muted", "2 3"],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],

@@ -147,7 +147,7 @@ export class Objects {
 
   // Evidence arrives as an answer, or as a message of its own.
   showEvidence(message) {
-    const readings = message.readings.map(([x, y, range, angle, nats]) => ({ x, y, range, angle, nats }));
+    const readings = message.readings.map(([x, y, range, angle, nats, ...listener]) => ({ x, y, range, angle, nats, listener }));
     const lines = (message.lines ?? []).map(([number, x1, y1, x2, y2, supports]) => ({ number, x1, y1, x2, y2, supports }));
     this.run.evidence = { object: message.object, pro: message.for, contra: message.against, readings, lines, rivals: message.rivals ?? [] };
     this.run.emit("evidence");

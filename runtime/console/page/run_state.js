@@ -7,11 +7,13 @@ const TRAIL_STEP_M = 0.02;
 const TRAIL_MAX = 6000;
 const ECHOES_MAX = 480;
 const ECHO_AGE_MAX_S = 6;
+const CROSS_PATHS_MAX = 192; // a round of a ring's 12 steps with 16 listeners each
+const CROSS_PATH_AGE_MAX_S = 1;
 const CHART_MAX = 600;
 
 const EMPTY = {
   cycle: 0, robot_s: 0, mode: "no data", reason: null, hold_reason: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
-  ranges: [], age: [], clusters: [], objects: [], areas: [], canyons: [], vectors: [], drive_request: null, valley: null, phases: {}, cycle_us: 0, late_us: 0,
+  ranges: [], age: [], cross_paths: [], clusters: [], objects: [], areas: [], canyons: [], vectors: [], drive_request: null, valley: null, phases: {}, cycle_us: 0, late_us: 0,
   waiting: 0, localized: null, missed: null, late: null, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
   recording: null, paused: false, speed: 1, playback: null,
 };
@@ -31,6 +33,7 @@ export class RunState extends Emitter {
   trail = [];
   trailVersion = 0;
   echoes = []; // {x, y, angle, range, t}: arcs of recent echoes
+  crossPaths = []; // {transmitter, listener, half, t}: the newest, with the sensors' frames when they listened
   chart = []; // {phases, late_ms, missed}: a column a frame
   evidence = null;
   grid = null; // the evidence grid, if its layer asks for it
@@ -62,18 +65,22 @@ export class RunState extends Emitter {
     return this.model(object.model)?.arc_radius_m ?? 0.1;
   }
 
-  // The frame of a sensor in the plane, as the ring stands now.
-  sensor(index) {
+  // The frame of a sensor in the plane, as the ring stands now or stood then: x, y, heading, ring's yaw.
+  sensor(index, [x, y, heading, ringYaw] = [...this.state.pose, this.state.ring_yaw]) {
     const mount = this.session?.ring?.mounts?.[index];
     if (mount === undefined) return null;
-    const [x, y] = this.state.pose, yaw = this.yaw(index);
+    const yaw = this.#turns(index) ? heading : ringYaw;
     const c = Math.cos(yaw), s = Math.sin(yaw);
     return { x: x + c * mount[0] - s * mount[1], y: y + s * mount[0] + c * mount[1], angle: yaw + mount[2] };
   }
 
   // The direction of the part of the ring on which a sensor is: some turn with the wheels of a synchro drive.
   yaw(index) {
-    return this.session?.ring?.turning?.includes(index) ? this.state.pose[2] : this.state.ring_yaw;
+    return this.#turns(index) ? this.state.pose[2] : this.state.ring_yaw;
+  }
+
+  #turns(index) {
+    return this.session?.ring?.turning?.includes(index);
   }
 
   apply(frame, now_ms) {
@@ -89,6 +96,7 @@ export class RunState extends Emitter {
     this.#applySegments(frame.segments);
     this.#applyTrail(state);
     this.#applyEchoes(state);
+    this.#applyCrossPaths(state);
     if (state.playback === null) this.#applyChart(state, before, this.fresh && !jumped);
     this.fresh = true;
     const changed = state.playback === null && this.#takeRobot(frame, now_ms);
@@ -115,6 +123,7 @@ export class RunState extends Emitter {
     this.trail = [];
     this.trailVersion++;
     this.echoes = [];
+    this.crossPaths = [];
     this.chart = [];
     this.grid = null;
   }
@@ -154,6 +163,17 @@ export class RunState extends Emitter {
     let old = Math.max(0, this.echoes.length - ECHOES_MAX);
     while (old < this.echoes.length && t - this.echoes[old].t > ECHO_AGE_MAX_S) old++;
     if (old > 0) this.echoes.splice(0, old);
+  }
+
+  #applyCrossPaths({ cross_paths: firings, robot_s: now_s }) {
+    const newest = this.crossPaths.at(-1)?.t ?? -Infinity;
+    for (const { robot_s: t, pose, paths } of firings.filter((firing) => firing.robot_s > newest)) {
+      for (const [from, to, half] of paths) {
+        const transmitter = this.sensor(from, pose), listener = this.sensor(to, pose);
+        if (transmitter !== null && listener !== null) this.crossPaths.push({ transmitter, listener, half, t });
+      }
+    }
+    this.crossPaths = this.crossPaths.slice(-CROSS_PATHS_MAX).filter(({ t }) => now_s - t <= CROSS_PATH_AGE_MAX_S);
   }
 
   #applyChart({ phases, late_us, missed, late, cycle }, before, follows) {

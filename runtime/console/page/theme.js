@@ -1,7 +1,7 @@
 // The style sheet's colours for canvas drawing; read again when the colour scheme changes.
 
 const NAMES = [
-  "paper", "panel", "ink", "muted", "line", "edge", "accent", "map", "grid", "axis", "truth", "truth-fill", "echo", "segment", "occupied", "free",
+  "paper", "panel", "ink", "muted", "line", "edge", "accent", "map", "grid", "axis", "truth", "truth-fill", "echo", "cross", "segment", "occupied", "free",
   "cluster", "model", "model-fill", "ellipse", "robot", "robot-fill", "vector", "chosen", "stop", "warning", "drive",
   "phase-0", "phase-1", "phase-2", "phase-3", "phase-4", "phase-5",
 ];

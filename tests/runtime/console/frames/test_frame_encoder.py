@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+import orjson
 import pytest
 
 from behaviors.follow_valley import Valley
 from behaviors.goal_progress import Progress
 from behaviors.valley.look_ahead import Search
-from drivers.messages import Pose
+from config.load import load_settings
+from drivers.driver import LineState, Received
+from drivers.messages import CrossPaths, Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.localization.drift_correction import SeenObject
 from perception.percept import Canyon
-from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, _canyon, _object
+from perception.pipeline import Perception
+from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, FrameContext, FrameEncoder, _canyon, _object
 from runtime.cycle.goal_drive import GoalDrive
+from runtime.cycle.step import Inputs, State
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
 Segments = dict[int, list[float]]
@@ -60,6 +67,7 @@ async def test_the_fields_of_a_frame() -> None:
         assert frame["clients"] == 1
         assert frame["recording"] is None
         assert frame["paused"] is False
+        assert frame["cross_paths"] == [], "no sensor of this ring listens"
 
 
 async def test_the_place_in_the_map_and_its_frame_are_shown_where_drift_is_corrected() -> None:
@@ -147,6 +155,25 @@ async def test_the_way_to_a_goal_and_the_blocked_directions_are_shown() -> None:
         case.cycles()
         shown = (await page.next("state"))["valley"]
         assert shown == {"blocked": blocked, "direction": 1.235, "way": [[0.0, 0.0], [0.5, 0.12]]}
+
+
+def test_cross_paths_are_shown_once_and_not_after_a_restart() -> None:
+    settings = load_settings("hallway", ["perception.method=paper"], robot="ears")
+    state = State(Perception(settings.ring, settings.models, settings.perception))
+    encoder, context = FrameEncoder(settings), FrameContext(0.0)
+    crosses = CrossPaths(np.array([0, 0]), np.array([1, 2]), np.array([1.5, math.inf]))
+    firing = Firing(0.05, Pose(0.0, 0.0, 0.0), 0.0, np.full(24, np.nan), crosses)
+
+    def shown(*heard: Received) -> list[dict[str, Any]]:
+        for received in heard:
+            encoder.take(SimpleNamespace(inputs=Inputs(0.05, LineState.READY, None, received)))  # type: ignore[arg-type]
+        head = encoder.frame(state, None, context).head
+        return list(orjson.loads(head + b"}")["cross_paths"])
+
+    before = Received((firing,), None, rebooted=False)
+    assert shown(before) == [{"robot_s": 0.05, "pose": [0.0, 0.0, 0.0, 0.0], "paths": [[0, 1, 1.5]]}]
+    assert shown() == []
+    assert shown(before, Received((), None, rebooted=True)) == []
 
 
 def test_a_canyon_is_sent_with_its_mouth_axis_depth_and_probability() -> None:

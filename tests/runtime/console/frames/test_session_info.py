@@ -16,6 +16,7 @@ async def test_the_session_message_describes_robot_models_and_world() -> None:
         assert len(session["truth"]["drums"]) == 6
         assert session["models"][0]["name"] == "drum"
         assert session["period_s"] == 0.05
+        assert session["radii"]["edge"] == 0.0 < session["radii"]["post"] < session["radii"]["barrel"]
         paths = {parameter["path"] for parameter in session["parameters"]}
         assert {"behaviors.avoid_static_obstacle.avoid_obstacle_gain", "cycle.perception_budget_s"} <= paths
         assert (await case.page()).received[0]["role"] == "watch"
