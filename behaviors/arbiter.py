@@ -13,11 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
-import numpy as np
-
 from behaviors.clearance import stoppable_speed_m_s
 from behaviors.field_of_view import UnseenWay, seen_speed_m_s, unseen_way
-from behaviors.response import Response
+from behaviors.response import Response, summed
 from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
 from perception.percept import Percept, Twist, wrap_angle
@@ -90,7 +88,7 @@ def arbitrate(
     error = _input_error(responses, percept, expected)
     if error is not None:
         return Stop(error)
-    x, y = sum(r.x for r in responses), sum(r.y for r in responses)
+    x, y = summed(responses)
     magnitude = min(1.0, math.hypot(x, y))
     if magnitude < NEGLIGIBLE:
         return Drive(Twist(0.0, 0.0))
@@ -145,7 +143,7 @@ def limit_velocity(
             "numbers; check the program that sent it"
         )
     c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
-    x, y = sum(r.x for r in responses), sum(r.y for r in responses)
+    x, y = summed(responses)
     along = config.base_velocity_m_s * (c * x + s * y)
     lateral = max(-1.0, min(1.0, c * y - s * x))
     w = requested.w
@@ -199,12 +197,13 @@ def _input_error(responses: Sequence[Response], percept: Percept, expected: Sequ
                 f"the schema {r.schema} answered ({_shown(r.x)}, {_shown(r.y)}), which is not a finite vector: "
                 "look for an axis left out, or for an echo or a pose that is not a number"
             )
-    if not (math.isfinite(sum(r.x for r in responses)) and math.isfinite(sum(r.y for r in responses))):
+    x, y = summed(responses)
+    if not (math.isfinite(x) and math.isfinite(y)):
         return "the schemas' vectors are too large to add: look for an extreme gain or pose"
     pose = percept.pose
     if not all(map(math.isfinite, (pose.x, pose.y, pose.theta))):
         return f"the pose ({pose.x:g}, {pose.y:g}, {pose.theta:g}) is not finite: check the odometry, then re-arm"
-    if not np.isfinite(percept.obstacles).all():
+    if not all(map(math.isfinite, percept.obstacles.ravel().tolist())):  # numpy's calls would take longer
         return "the place of an echo is not finite: check the ring's ranges and the odometry, then re-arm"
     return None
 

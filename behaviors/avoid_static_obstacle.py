@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from behaviors.response import Response
 from config.behaviors import AvoidStaticObstacleConfig
-from perception.percept import Floats, Percept
+from perception.percept import Percept
 
 SCHEMA: Final = "avoid_static_obstacle"
 
@@ -20,26 +18,24 @@ CANCELLED: Final = 1e-9
 """A sum shorter than this share of its terms' lengths is what rounding leaves of pushes that cancel."""
 
 
-def repulsions(gaps_m: Floats, config: AvoidStaticObstacleConfig) -> Floats:
-    """Return the magnitude of the repulsion from each obstacle, shape (n,).
+def repulsion(gap_m: float, config: AvoidStaticObstacleConfig) -> float:
+    """Return the magnitude of the repulsion from an obstacle.
 
     Arkin, *Motor Schema-Based Mobile Robot Navigation*, IJRR 8(4), 1989: 0 for d > S, (S − d)/(S − R)·G for
     R < d ≤ S, and unbounded for d ≤ R.
 
     Parameters
     ----------
-    gaps_m
-        d, shape (n,): from the robot's rim to each echo, negative for an echo from inside the rim.
+    gap_m
+        d, from the robot's rim to the echo, negative for an echo from inside the rim.
     config
         S is `avoid_obstacle_sphere_m`, R `avoid_obstacle_safety_margin_m`, G `avoid_obstacle_gain`.
     """
     sphere, margin = config.avoid_obstacle_sphere_m, config.avoid_obstacle_safety_margin_m
     # Comparisons with NaN are false, so a NaN distance stays NaN and reaches the arbiter, which stops for it.
-    magnitudes = (sphere - gaps_m) / (sphere - margin)
-    magnitudes[gaps_m > sphere] = 0.0
-    magnitudes[gaps_m <= margin] = UNBOUNDED
-    pushes: Floats = config.avoid_obstacle_gain * magnitudes
-    return pushes
+    if gap_m > sphere:
+        return 0.0
+    return config.avoid_obstacle_gain * (UNBOUNDED if gap_m <= margin else (sphere - gap_m) / (sphere - margin))
 
 
 def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidStaticObstacleConfig) -> Response:
@@ -51,29 +47,28 @@ def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidS
     Parameters
     ----------
     percept
-        Pose and obstacles; without obstacles the vector is zero.
+        Pose and obstacles; without obstacles near it the vector is zero.
     body_radius_m
         Distances are measured from the rim, this far from the pose, m.
     config
         The schema's settings.
     """
-    if len(percept.obstacles) == 0:
-        return Response(SCHEMA, 0.0, 0.0)
-    dx = percept.pose.x - percept.obstacles[:, 0]
-    dy = percept.pose.y - percept.obstacles[:, 1]
-    distances = np.hypot(dx, dy)
-    gaps_m, lengths = distances - body_radius_m, distances
-    if not distances.all():
-        # An echo at the robot's centre has no direction; the robot has just come from behind, so that way is free.
-        centred = distances == 0.0
-        dx[centred], dy[centred], lengths[centred] = -math.cos(percept.pose.theta), -math.sin(percept.pose.theta), 1.0
-    pushes = repulsions(gaps_m, config) / lengths
-    px, py = pushes * dx, pushes * dy
-    x, y = float(px.sum()), float(py.sum())
+    pose, pushes = percept.pose, list[tuple[float, float]]()
+    for x, y in percept.obstacles.tolist():  # two dozen: numpy's calls would take longer
+        dx, dy = pose.x - x, pose.y - y
+        distance = math.hypot(dx, dy)
+        push = repulsion(distance - body_radius_m, config)
+        if push == 0.0 and distance < math.inf:  # one at infinity has none, and must not go unnoticed
+            continue
+        if distance == 0.0:
+            # An echo at the robot's centre has no direction; the robot has just come from behind, so that way is free.
+            dx, dy, distance = -math.cos(pose.theta), -math.sin(pose.theta), 1.0
+        pushes.append((push * dx / distance, push * dy / distance))
+    x, y = sum(px for px, _ in pushes), sum(py for _, py in pushes)
     magnitude = math.hypot(x, y)
     # Not `== 0`: that would divide by what rounding leaves of repulsions that cancel.
-    if config.summing == "largest" and magnitude > CANCELLED * float(np.hypot(px, py).sum()):
-        largest = float((px * (x / magnitude) + py * (y / magnitude)).max())
+    if config.summing == "largest" and magnitude > CANCELLED * sum(math.hypot(px, py) for px, py in pushes):
+        largest = max(px * x + py * y for px, py in pushes) / magnitude
         shrink = min(1.0, largest / magnitude)
         x, y = x * shrink, y * shrink
     return Response(SCHEMA, x, y)

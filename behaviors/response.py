@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -12,3 +13,12 @@ class Response:
     schema: str
     x: float
     y: float
+
+
+def summed(responses: Iterable[Response]) -> tuple[float, float]:
+    """Return the sum of vectors, (x, y)."""
+    x = y = 0.0
+    for response in responses:
+        x += response.x
+        y += response.y
+    return x, y

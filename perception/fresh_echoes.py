@@ -91,6 +91,39 @@ def record_echoes(
             points[i, oldest, 1] = py
 
 
+@kernel
+def select_looks(
+    bearings: Floats, times: Floats, robot_s: float, age_max_s: float, fresh: Floats, ages: Floats,
+    sensor_ages: Floats,
+) -> int:  # fmt: skip
+    """Find the looks that are young enough, and how long ago each sensor last looked; return the looks' number k.
+
+    Parameters
+    ----------
+    bearings, times : (n, looks) float
+        As in `record_echoes`.
+    robot_s : float
+        The robot's time now, s.
+    age_max_s : float
+        Looks older than this are left out, s.
+    fresh, ages : (n · looks,) float
+        The first k are the bearings and ages of the looks, rad and s, sensor by sensor. Overwritten.
+    sensor_ages : (n,) float
+        Age of each sensor's last look, s; infinite for one that has not looked yet. Overwritten.
+    """
+    k = 0
+    for i in range(times.shape[0]):
+        sensor_ages[i] = math.inf
+        for j in range(times.shape[1]):
+            age = robot_s - times[i, j]
+            sensor_ages[i] = min(sensor_ages[i], age)
+            if age <= age_max_s:
+                fresh[k] = bearings[i, j]
+                ages[k] = age
+                k += 1
+    return k
+
+
 class FreshEchoes:
     """Each sensor's last usable readings.
 
@@ -133,19 +166,15 @@ class FreshEchoes:
         fresh: Floats = self._points[self._heard & self._steady & (robot_s - self._times <= age_max_s)]
         return fresh
 
-    def looks(self, robot_s: float, age_max_s: float) -> tuple[Floats, Floats]:
-        """Return where the ring looked and how long ago at the robot's time `robot_s`: shapes (k,), rad and s.
+    def looks(self, robot_s: float, age_max_s: float) -> tuple[Floats, Floats, Floats]:
+        """Return where the ring looked, and how long ago, at the robot's time `robot_s`: shapes (k,), rad and s.
 
-        Older looks than `age_max_s` are left out.
+        Older looks than `age_max_s` are left out. The third is how long ago each sensor last looked, shape (n,), s;
+        infinite for one that has not looked yet.
         """
-        ages = robot_s - self._times
-        fresh = ages <= age_max_s
-        return self._bearings[fresh], ages[fresh]
-
-    def ages(self, robot_s: float) -> Floats:
-        """Return how long ago each sensor last looked, shape (n,), s; infinite for one that has not looked yet."""
-        ages: Floats = robot_s - self._times.max(axis=1)
-        return ages
+        fresh, ages, sensor_ages = np.empty(self._times.size), np.empty(self._times.size), np.empty(len(self._times))
+        k = select_looks(self._bearings, self._times, float(robot_s), float(age_max_s), fresh, ages, sensor_ages)
+        return fresh[:k], ages[:k], sensor_ages
 
     def clear(self) -> None:
         """Remove all readings."""

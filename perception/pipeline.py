@@ -295,19 +295,11 @@ class Perception:
         age_max_s : float
             Longest age at which a direction counts as seen, s.
         """
-        bearings, ages = self._echoes.looks(robot_s, age_max_s)
+        bearings, ages, sensor_ages = self._echoes.looks(robot_s, age_max_s)
         axes = ring_yaw + self._axes
         if self._turning:
             axes[self._turning] += travel - ring_yaw
-        return FieldOfView(
-            bearings,
-            ages,
-            axes,
-            self._echoes.ages(robot_s),
-            self._half_angle,
-            self._reach_m,
-            age_max_s,
-        )
+        return FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s)
 
     def canyons(self) -> tuple[Canyon, ...]:
         """Return the box canyons found so far, in odometry's frame, those left behind included."""

@@ -19,7 +19,7 @@ from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_ahead import Leg, move_ahead
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
-from behaviors.response import Response
+from behaviors.response import Response, summed
 from behaviors.schema_call import ODOM_FRAME, Scene
 from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
@@ -228,11 +228,10 @@ def _on_mission(
             mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")
             goal_drive, hold_reason = None, mission.progress.reason or hold_reason
     elif step.gains.get(VALLEY, 0.0) > 0.0:
-        x, y = sum(r.x for r in asked.leads), sum(r.y for r in asked.leads)
         remaining_m = math.inf if asked.remaining_m is None else asked.remaining_m
         beside = (r for r in asked.helpers if r.schema != VALLEY)
         goal_drive, responses, decision, hold_reason = drive_through_valley(
-            Response(SUM, x, y), remaining_m, goal_drive, others, run_s, tuple(beside), settings
+            Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, run_s, tuple(beside), settings
         )
     else:
         responses = (*asked.leads, *asked.helpers, away)
@@ -263,4 +262,4 @@ def with_sum(responses: tuple[Response, ...], decision: Decision) -> tuple[Respo
     """Return the responses and, last, their sum; nothing where the decision is a stop, as they may not be finite."""
     if not isinstance(decision, Drive):
         return ()
-    return (*responses, Response(SUM, sum(r.x for r in responses), sum(r.y for r in responses)))
+    return (*responses, Response(SUM, *summed(responses)))

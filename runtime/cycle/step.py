@@ -296,7 +296,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
     view = state.perception.field_of_view(odometry.robot_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)
-    blind_s = min(float(view.sensor_ages_s.min()), odometry.robot_s)
+    blind_s = min(*view.sensor_ages_s.tolist(), odometry.robot_s)  # numpy's call would take longer
     if blind_s > age_max_s:
         likely = inputs.line_problem or "check the ring's power and cable"
         if odometry.robot_s - state.last_firing_robot_s > age_max_s:
