@@ -61,7 +61,7 @@ def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidS
         if push == 0.0 and distance < math.inf:  # one at infinity has none, and must not go unnoticed
             continue
         if distance == 0.0:
-            # An echo at the robot's centre has no direction; the robot has just come from behind, so that way is free.
+            # An echo at the centre has no direction; the robot has just come from behind, so that way is free.
             dx, dy, distance = -math.cos(pose.theta), -math.sin(pose.theta), 1.0
         pushes.append((push * dx / distance, push * dy / distance))
     x, y = sum(px for px, _ in pushes), sum(py for _, py in pushes)

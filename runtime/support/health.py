@@ -45,6 +45,7 @@ class Worker(threading.Thread):
         self._work = work
         self.failure: str | None = None
         """The exception that ended it, in one line; None if there was none."""
+        self._has_ended = False
 
     def run(self) -> None:
         """Do the work; keep the exception that it raises."""
@@ -52,10 +53,13 @@ class Worker(threading.Thread):
             self._work()
         except Exception as error:  # noqa: BLE001 - any exception must be reported
             self.failure = describe_exception(error)
+        finally:
+            self._has_ended = True
 
     def probe(self) -> str | None:
         """Return how the thread ended; None while it runs."""
-        return None if self.is_alive() else self.failure or NO_ERROR
+        # Not `is_alive`, which takes a lock: each cycle asks each thread.
+        return (self.failure or NO_ERROR) if self._has_ended else None
 
 
 class Health:
