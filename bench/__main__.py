@@ -13,7 +13,7 @@ from bench.batch_commands import replay, scheduler, sweep, tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
-from bench.ear_commands import cross_paths, ear_halls, one_stand, stand_bound
+from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
 from bench.estimator import Peer
 from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
@@ -250,6 +250,8 @@ app.command(scheduler)
 app.command(replay)
 app.command(one_stand)
 app.command(stand_bound)
+app.command(naming_bound)
+app.command(ear_cost)
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:

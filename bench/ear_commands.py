@@ -105,3 +105,46 @@ def stand_bound(*, json: str = "stand_bound.json") -> int:
         for name, row in bounds(ring, everyone=everyone).items()
     }
     return report(json, rows, rows_table("one stand: the least error of any rule", rows))
+
+
+def naming_bound(*, json: str = "naming_bound.json", seed: int = 700) -> int:
+    """Print how many posts, barrels and edges any rule names that names 95 % of the drums 4 ft ahead of them.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    seed
+        Of the scenes.
+    """
+    from bench.naming_bound import bounds
+
+    scenes: tuple[SceneName, ...] = ("noisy", "jit10", "moved")
+    rows: dict[str, dict[str, float]] = {name: bounds(name, seed) for name in scenes}
+    return report(json, rows, rows_table("named 4 ft before, with listeners", rows))
+
+
+def ear_cost(
+    *, json: str = "ear_cost.json", scene: list[SceneName] | None = None, seeds: int = 2, first: int = 700
+) -> int:
+    """Measure what a firing of eight sensors costs, with sixteen listeners and without, in turns.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    scene
+        Scenes; those of the requirement if not given.
+    seeds
+        Seeds of each scene, of which only the first hall counts.
+    first
+        The first of them.
+    """
+    from bench.ear_halls import SCENES, costs
+
+    rows: dict[str, dict[str, float]] = {}
+    with Console(stderr=True).status("bench") as status:
+        for what in scene or SCENES:
+            status.update(what)
+            rows |= costs(what, range(first, first + max(1, seeds)))
+    return report(json, rows, rows_table("a firing of eight sensors", rows))

@@ -43,6 +43,16 @@ def rings() -> dict[str, RingConfig]:
     }
 
 
+def octets() -> dict[str, RingConfig]:
+    """Return the ring with listeners that fires octets, the other sixteen listening, and the same without them."""
+    ears = load_robot("ears").ring
+    fired = {"sets": (tuple(range(0, 24, 3)),), "rotations": 3, "listen": None}
+    return {
+        name: ears.model_copy(update={"firing": ears.firing.model_copy(update={**fired, "listen_preset": preset})})
+        for name, preset in (("16 listeners", "neighbours"), ("no listeners", None))
+    }
+
+
 def poses(hall: Hall, step_s: float) -> Iterator[tuple[float, Pose, float]]:
     """Yield time (s), pose and direction of the ring (rad) at every step of the firing pattern.
 
@@ -139,6 +149,41 @@ def measure(
         "median ft": float(np.median([fix for fix in fixes if fix is not None])) / FOOT_M if fixes else math.nan,
         "wrong names a hall": wrong / drives, "firing ms, p50": float(np.median(took_ms)),
         "mean": float(np.mean(took_ms)),
+    }  # fmt: skip
+
+
+def costs(name: SceneName, seeds: Sequence[int]) -> dict[str, dict[str, float]]:
+    """Return the processor time of a firing of eight sensors with sixteen listeners and without, ms.
+
+    Both drive through a hall together and take turns, firing by firing, so that a slow spell counts for both.
+
+    Parameters
+    ----------
+    name, seeds
+        The scene and the seeds; of a scene of many halls the first one counts.
+    """
+    took_ms: dict[str, list[float]] = {}
+    for seed in seeds:
+        hall = halls(name, seed)[0]
+        drives = []
+        for with_listeners, ring in octets().items():
+            settings = settings_of(ring)
+            perception = Perception(settings.ring, settings.models, settings.perception)
+            took = took_ms.setdefault(f"{name}, {with_listeners}", [])
+            drives.append((perception, took, firings(ring, hall, 1000 * seed)))
+        is_over = False
+        while not is_over:
+            for perception, took, coming in drives:
+                if (firing := next(coming, None)) is None:
+                    is_over = True
+                    continue
+                begin_s = time.thread_time()
+                perceive(perception, firing)
+                took.append(1e3 * (time.thread_time() - begin_s))
+    return {
+        name: {"firings": len(took), "ms, p50": float(np.median(took)), "mean": float(np.mean(took)),
+               "p99": float(np.percentile(took, 99.0))}
+        for name, took in took_ms.items()
     }  # fmt: skip
 
 

@@ -466,13 +466,29 @@ def is_doubtful(careful: bool, misfit: float, room_lead: float, sides: int, conf
 def is_called(
     called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
     rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
+    compared: bool,
 ) -> bool:  # fmt: skip
-    """Return whether a circle has a model's name, unless it is doubtful: given when sure, kept while likely."""
+    """Return whether a circle has a model's name, unless it is doubtful: given when sure, kept while likely.
+
+    It is not given before each rival was `compared`.
+    """
     share = 1.1 if max(rivals) < -20 else 1.25
     seen_round = dispersion >= 0.008
     possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2
     needed = near if wall != 0 and wall <= -4 else sure
-    return possible and (probability >= needed or (called and probability >= min(needed, 0.5)))
+    return possible and ((compared and probability >= needed) or (called and probability >= min(needed, 0.5)))
+
+
+def without_overlaps(
+    t: int, named: Sequence[bool], places: Array, radii: Sequence[float], llr: Sequence[float]
+) -> list[bool]:
+    """Return which circles are still named: of each two that overlap, one of them `t`, the one of more evidence."""
+    left = list(named)
+    for k in range(len(left)):
+        apart = float(np.hypot(*(places[k] - places[t])))
+        if k != t and left[k] and left[t] and apart < radii[k] + radii[t] - 0.1 * FT:
+            left[t if llr[k] > llr[t] else k] = False
+    return left
 
 
 def is_sure_polygon(

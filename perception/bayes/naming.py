@@ -7,7 +7,9 @@ object, which explains any few echoes to some degree.
 from __future__ import annotations
 
 import math
+from typing import Final
 
+from config.units import FOOT_M
 from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.parameters import (
     ALONE_LEAD_NAT,
@@ -35,6 +37,9 @@ from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, CircleTrack, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import Ints, kernel
 from perception.records import Record, Records
+
+OVERLAP_MAX_M: Final = 0.1 * FOOT_M
+"""Two named circles overlap by no more than this, which their positions may be wrong by."""
 
 
 class Reported(Record):
@@ -67,6 +72,21 @@ def is_doubtful(track: CircleTrack, careful: bool) -> bool:
         return True
     sides_min = CONFIRMED_SIDES if track.is_confirmed == 1 else CAREFUL_SIDES
     return bool(careful and (track.misfit > MISFIT_MAX or track.sides < sides_min))
+
+
+@kernel
+def is_compared(track: CircleTrack, p: SettingsRecord) -> bool:
+    """Return whether every alternative was compared with a circle since it began, or became what it is.
+
+    With many readings a refinement compares one alternative only, and what was not compared weighs nothing: until the
+    last one was, the probability is too high.
+
+    Parameters
+    ----------
+    track, p
+        The circle and the settings.
+    """
+    return bool(track.reservoir < p[0].compare_all_below or track.refinements > p[0].circle_count)
 
 
 @kernel
@@ -105,8 +125,35 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
     is_vague = max(track.covariance_xx, track.covariance_yy) >= NAMED_SIGMA_MAX_M**2
     if track.log_likelihood_ratio <= over * track.unknown_nat or track.dispersion < NAMED_DISPERSION_MIN or is_vague:
         track.is_named = 0
-    elif track.probability >= least:
+    elif track.probability >= least and is_compared(track, p):
         track.is_named = 1
+
+
+@kernel
+def withdraw_overlapping(tracks: CircleTracks, t: int) -> None:
+    """Withdraw the name of every circle that overlaps a named one of more evidence: bodies do not.
+
+    Behind a drum nothing is heard, so that little contradicts what a few strays seem to show there.
+
+    Parameters
+    ----------
+    tracks : (n,) CircleTrack
+        Updated.
+    t : int
+        A circle that was just named, or not: only pairs that it is one of are compared.
+    """
+    track = tracks[t]
+    for k in range(len(tracks)):
+        if track.status != ESTABLISHED or track.is_named == 0:
+            return
+        other = tracks[k]
+        if k == t or other.status != ESTABLISHED or other.is_named == 0:
+            continue
+        if math.hypot(other.x - track.x, other.y - track.y) < track.radius + other.radius - OVERLAP_MAX_M:
+            if other.log_likelihood_ratio > track.log_likelihood_ratio:
+                track.is_named = 0
+            else:
+                other.is_named = 0
 
 
 @kernel

@@ -15,7 +15,7 @@ from perception.bayes.corner_model import score_corner
 from perception.bayes.lateral_search import search_across
 from perception.bayes.likelihood import bounded_exp
 from perception.bayes.model_check import check_model, count_names, is_careful
-from perception.bayes.naming import update_name
+from perception.bayes.naming import update_name, withdraw_overlapping
 from perception.bayes.noise_estimation import add_residuals, noise_variance
 from perception.bayes.occlusion import keep_relevant
 from perception.bayes.outline_check import other_bodies, outline_lead, round_lead
@@ -334,6 +334,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     report = p[0].report_probability
     near = p[0].report_probability_near if prior >= p[0].model_prior_nat else report
     update_name(track, p, report, near, careful)
+    withdraw_overlapping(tracks, t)
     if track.is_named == 1:
         track.marks &= CONFIRMED
     merge_duplicates(tracks, p, t)

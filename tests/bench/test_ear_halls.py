@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from bench.ear_halls import firings, is_drum, poses, rings
+from bench.ear_halls import firings, is_drum, octets, poses, rings
 from perception.detected_object import DetectedObject
 from runtime.simulation.scenes import SPEED_M_S, halls
 
@@ -36,6 +36,15 @@ def test_each_firing_has_what_its_sensors_and_listeners_heard() -> None:
     assert all(np.array_equal(a.ranges_m, b.ranges_m, equal_nan=True) for a, b in zip(deaf, eared, strict=True)), (
         "the same seed, the same noise"
     )
+
+
+def test_octets_are_heard_by_the_other_sixteen_or_by_none() -> None:
+    with_listeners, alone = (next(firings(ring, HALL, 1)) for ring in octets().values())
+    assert np.flatnonzero(~np.isnan(with_listeners.ranges_m)).tolist() == list(range(0, 24, 3))
+    assert with_listeners.cross_paths is not None
+    assert len(set(with_listeners.cross_paths.listeners.tolist())) == 16
+    assert alone.cross_paths is None
+    assert np.array_equal(with_listeners.ranges_m, alone.ranges_m, equal_nan=True)
 
 
 def test_a_post_is_no_drum() -> None:

@@ -11,12 +11,14 @@ from perception.records import records, zeros
 from tests import naive_tracks
 from tests.perception.bayes.tracks import (
     ALTERNATIVES,
+    RADII,
     TRACKS,
     P,
     S,
     around,
     examples,
     new_memory,
+    places,
     random_track,
     unit,
 )
@@ -45,6 +47,8 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         circles["is_named"] = rng.integers(0, 2, TRACKS)
         circles["misfit"], circles["room_lead"] = rng.uniform(-1, 9, TRACKS), rng.choice([-90.0, -5.1, -4.9], TRACKS)
         circles["sides"], circles["is_confirmed"] = rng.integers(5, 15, TRACKS), rng.integers(0, 2, TRACKS)
+        circles["reservoir"] = rng.choice([20, 79, 80, 200], TRACKS)
+        circles["refinements"] = rng.integers(0, 12, TRACKS)
         careful = bool(rng.random() < 0.3)
         doubtful = [
             naive_tracks.is_doubtful(careful, it["misfit"], it["room_lead"], it["sides"], it["is_confirmed"] == 1)
@@ -56,6 +60,7 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
                 it["is_named"] == 1, it["status"] == ESTABLISHED, it["kind"] < S.model_count, it["probability"], 0.92,
                 0.7, np.delete(leads[t], it["kind"]).tolist(), leads[t, -2], it["dispersion"],
                 it["log_likelihood_ratio"], it["unknown_nat"], [it["covariance_xx"], it["covariance_yy"]],
+                it["reservoir"] < 80 or it["refinements"] >= 1 + len(RADII),
             )
         ]  # fmt: skip
         for t in range(TRACKS):
@@ -67,6 +72,28 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         marked = np.flatnonzero((circles["status"] != FREE) & (circles["marks"] > 0)).tolist()
         assert report() == sorted({*want, *marked})
     assert sure > 0.05 * examples
+
+
+@examples(300, 5000)
+def test_of_two_named_circles_that_overlap_the_one_of_more_evidence_is_named(examples: int) -> None:
+    rng, memory, withdrawn, kept = np.random.default_rng(18), new_memory(), 0, 0
+    circles = memory.circles
+    for _ in range(examples):
+        for t in range(TRACKS):
+            random_track(rng, memory, t, int(rng.choice([TENTATIVE, ESTABLISHED], p=(0.2, 0.8))))
+        circles["is_named"] = rng.integers(0, 2, TRACKS)
+        named = ((circles["status"] == ESTABLISHED) & (circles["is_named"] == 1)).tolist()
+        circles["is_named"] = named
+        t = int(rng.integers(TRACKS))
+        naming.withdraw_overlapping(memory.tracks, t)
+        want = naive_tracks.without_overlaps(
+            t, named, places(memory), circles["radius"].tolist(), circles["log_likelihood_ratio"].tolist()
+        )
+        assert circles["is_named"].tolist() == want
+        withdrawn += sum(named) - sum(want)
+        kept += sum(want)
+    assert withdrawn > 0.15 * examples
+    assert kept > examples
 
 
 @examples(10, 200)
