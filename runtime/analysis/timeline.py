@@ -33,6 +33,26 @@ the firing by the robot's clock (s)."""
 Echoes: TypeAlias = NDArray[np.void]
 """Structured array (n,) of `ECHO`."""
 
+CROSS_PATH: Final = np.dtype(
+    [
+        ("t_s", np.float64),
+        ("transmitter", np.int64),
+        ("listener", np.int64),
+        ("x", np.float64),
+        ("y", np.float64),
+        ("bearing", np.float64),
+        ("listener_x", np.float64),
+        ("listener_y", np.float64),
+        ("listener_bearing", np.float64),
+        ("half_path_m", np.float64),
+        ("robot_s", np.float64),
+    ]
+)
+"""A cross path: time (s), the sensor that fired and the one that listened, position (m) and bearing (rad) of each,
+half the path (m, inf if nothing was heard), and the time of the firing by the robot's clock (s)."""
+CrossPathRows: TypeAlias = NDArray[np.void]
+"""Structured array (n,) of `CROSS_PATH`."""
+
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
@@ -132,6 +152,8 @@ class Timeline:
     """Time (s) and Unix time (ns) of each cycle; empty for a ring log. They differ by more after a pause."""
     echoes: Echoes = field(default_factory=lambda: np.empty(0, ECHO))
     """Every reading of the run."""
+    cross_paths: CrossPathRows = field(default_factory=lambda: np.empty(0, CROSS_PATH))
+    """Every cross path of the run, in order of time; empty where no sensor listens to others."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)
     """At most ten a second."""
     snapshots: list[RunSnapshot] = field(default_factory=list)

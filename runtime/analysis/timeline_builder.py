@@ -20,7 +20,16 @@ from perception.mapping.grid.known_cells import known_cells
 from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array, mounts_at
-from runtime.analysis.timeline import ECHO, Cluster, Echoes, MapView, RunSnapshot, Timeline
+from runtime.analysis.timeline import (
+    CROSS_PATH,
+    ECHO,
+    Cluster,
+    CrossPathRows,
+    Echoes,
+    MapView,
+    RunSnapshot,
+    Timeline,
+)
 
 SNAPSHOTS_MAX: Final = 240
 """Snapshots kept. At this number every second one is dropped and the interval doubles."""
@@ -49,6 +58,7 @@ class TimelineBuilder:
         self._next_s = 0.0
         self._rows: list[Echoes] = []
         self._row_count = 0
+        self._crosses: list[CrossPathRows] = []
         self._segments: dict[bytes, tuple[float, float, Floats]] = {}
         self._pose: Pose | None = None
         self._yaw = 0.0
@@ -67,20 +77,37 @@ class TimelineBuilder:
         """Discard everything so far, as a run does when the robot and its odometry restart."""
         self._timeline.notes.append(f"the robot restarted after {t_s:.1f} s; nothing before that is shown")
         self._rows, self._row_count, self._segments, self._pose = [], 0, {}, None
+        self._crosses = []
         self._placed, self._near_map, self._unplaced = [], {}, 0
         self._timeline.snapshots, self._timeline.odometry = [], []
 
     def add_firing(self, t_s: float, firing: Firing) -> None:
-        """Add the echoes of a firing received at `t_s`."""
+        """Add the echoes and cross paths of a firing received at `t_s`."""
         c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
+        mounts = mounts_at(firing, self._mounts, self._turning)
+        x = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
+        y = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
+        bearing = firing.ring_yaw + mounts[:, 2]
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))
-        mounts = mounts_at(firing, self._mounts, self._turning)[fired]
         rows = np.empty(len(fired), ECHO)
         rows["t_s"], rows["sensor"], rows["robot_s"] = t_s, fired, firing.robot_s
-        rows["x"] = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
-        rows["y"] = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
-        rows["bearing"], rows["range_m"] = firing.ring_yaw + mounts[:, 2], firing.ranges_m[fired]
+        rows["x"], rows["y"], rows["bearing"], rows["range_m"] = (
+            x[fired],
+            y[fired],
+            bearing[fired],
+            firing.ranges_m[fired],
+        )
         self._rows.append(rows)
+        if (heard := firing.cross_paths) is not None:
+            crosses = np.empty(len(heard.listeners), CROSS_PATH)
+            crosses["t_s"], crosses["robot_s"], crosses["half_path_m"] = t_s, firing.robot_s, heard.half_paths_m
+            for prefix, name, of in (
+                ("", "transmitter", heard.transmitters),
+                ("listener_", "listener", heard.listeners),
+            ):
+                crosses[name] = of
+                crosses[prefix + "x"], crosses[prefix + "y"], crosses[prefix + "bearing"] = x[of], y[of], bearing[of]
+            self._crosses.append(crosses)
         self._row_count += len(rows)
         self._pose, self._yaw = firing.pose, firing.ring_yaw
 
@@ -109,6 +136,8 @@ class TimelineBuilder:
             timeline.map_view = self._map_view(perception, perception.room)
         if self._rows:
             timeline.echoes = np.concatenate(self._rows)
+        if self._crosses:
+            timeline.cross_paths = np.concatenate(self._crosses)
         if self._segments:
             timeline.segments = np.array([[first, last, *row] for first, last, row in self._segments.values()])
 

@@ -13,7 +13,7 @@ PLOTS: Final = (
     ("line", ("link.frames", "link.bad", "link.lost")),
 )
 """The plots, each with its fields of `/state`."""
-SHOWN: Final = ("/ring", "/segments", "/clusters", "/models", "/truth", "/pose")
+SHOWN: Final = ("/ring", "/cross_paths", "/segments", "/clusters", "/models", "/truth", "/pose")
 """Topics on the plan."""
 
 
@@ -24,10 +24,7 @@ def layout() -> dict[str, Any]:
             "followTf": "odom",
             "cameraState": {"perspective": False, "distance": 12.0, "phi": 0.0, "thetaOffset": 90.0},
             "scene": {"transforms": {"visible": True}},
-            "topics": {
-                topic: {"visible": True}
-                for topic in ("/ring", "/segments", "/clusters", "/models", "/truth", "/pose")
-            },
+            "topics": {topic: {"visible": True} for topic in SHOWN},
         },
         "RosOut!log": {"topicToRender": "/log"},
         "StateTransitions!mode": {"paths": [{"value": "/state.mode", "timestampMethod": "receiveTime"}]},

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 import foxglove
+import numpy as np
 import orjson
 from foxglove import channels as ch
 from foxglove import messages as fx
@@ -20,10 +21,12 @@ from runtime.analysis.export.foxglove import (
     quaternion,
     scene,
     stamp,
+    write_cross_paths,
     write_log,
     write_segments,
 )
 from runtime.analysis.export.shapes import HEIGHT_M, MODEL, TRUTH, even_radius
+from runtime.analysis.timeline import CROSS_PATH, CrossPathRows
 from runtime.bridges.console_client import ConsoleClient, Message
 
 CIRCLE_POINTS: Final = 36
@@ -49,6 +52,7 @@ class SceneChannels:
         self._frames = ch.FrameTransformsChannel("/tf", context=context)
         self._pose = ch.PoseInFrameChannel("/pose", context=context)
         self._ring = ch.LaserScanChannel("/ring", context=context)
+        self._crosses = ch.SceneUpdateChannel("/cross_paths", context=context)
         self._segments = ch.SceneUpdateChannel("/segments", context=context)
         self._objects = ch.SceneUpdateChannel("/models", context=context)
         self._truth = ch.SceneUpdateChannel("/truth", context=context)
@@ -68,6 +72,9 @@ class SceneChannels:
             return
         self._write_frames(state, at)
         self._write_ranges(state, at)
+        if state.get("cross_paths"):  # a run of an earlier version sends none
+            rows = cross_path_rows(state["cross_paths"], self._session["ring"])
+            write_cross_paths(self._crosses, rows, self._session["ring"]["half_angle"], at)
         self._state.log(orjson.dumps({name: state[name] for name in STATE_FIELDS}), log_time=at)
         if self._states % MAP_EVERY == 0:
             self._write_map(state["objects"], client.segments.values(), at)
@@ -147,6 +154,20 @@ class SceneChannels:
             line(points, TRUTH, closed=False) for points in walls
         ]
         scene(self._truth, "truth", lines, [], at)
+
+
+def cross_path_rows(firings: list[Message], ring: Message) -> CrossPathRows:
+    """Return the cross paths of a state as an analysis has them; `t_s` is the robot's clock."""
+    rows = []
+    for firing in firings:
+        x, y, heading, ring_yaw = firing["pose"]
+        yaws = (heading if k in ring["turning"] else ring_yaw for k in range(len(ring["mounts"])))
+        eyes = [Pose(x, y, yaw).compose(Pose(*mount)) for yaw, mount in zip(yaws, ring["mounts"], strict=True)]
+        for transmitter, listener, half_m in firing["paths"]:
+            one, other = eyes[transmitter], eyes[listener]
+            places = (one.x, one.y, one.theta, other.x, other.y, other.theta)
+            rows.append((firing["robot_s"], transmitter, listener, *places, half_m, firing["robot_s"]))
+    return np.array(rows, CROSS_PATH)
 
 
 def outline(seen: Message, model: Message | None) -> tuple[list[tuple[float, float]], bool]:

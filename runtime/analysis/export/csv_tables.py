@@ -1,4 +1,7 @@
-"""A run as tables: echoes, segments, objects, walls, odometry; metres, radians, seconds, in the odometry's frame."""
+"""A run as tables: echoes, cross paths, segments, objects, walls, odometry.
+
+Metres, radians, seconds, in the odometry's frame.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +18,17 @@ from runtime.analysis.timeline import Timeline
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 """Columns by name, all of the same length. None means unknown."""
 
-NAMES: Final = ("echoes", "segments", "objects", "walls", "odometry")
+NAMES: Final = ("echoes", "cross_paths", "segments", "objects", "walls", "odometry")
 """Tables, and files without their suffix."""
 FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
 
 
 def tables(timeline: Timeline) -> dict[str, Table]:
     """Return the tables of a run by name."""
-    found = (_echoes(timeline), _segments(timeline), _objects(timeline), _walls(timeline), _odometry(timeline))
+    found = (
+        _echoes(timeline), _cross_paths(timeline), _segments(timeline), _objects(timeline), _walls(timeline),
+        _odometry(timeline),
+    )  # fmt: skip
     return dict(zip(NAMES, found, strict=True))
 
 
@@ -42,6 +48,26 @@ def _echoes(timeline: Timeline) -> Table:
         "range_m": _known(reach.tolist()),
         "echo_x_m": _known((rows["x"] + reach * np.cos(rows["bearing"])).tolist()),
         "echo_y_m": _known((rows["y"] + reach * np.sin(rows["bearing"])).tolist()),
+    }
+
+
+def _cross_paths(timeline: Timeline) -> Table:
+    """Return one row for each sensor that listened to another one's pulse; `heard` is whether it received it."""
+    rows = timeline.cross_paths
+    heard = np.isfinite(rows["half_path_m"])
+    return {
+        "t_s": rows["t_s"].tolist(),
+        "robot_t_s": rows["robot_s"].tolist(),
+        "transmitter": rows["transmitter"].tolist(),
+        "listener": rows["listener"].tolist(),
+        "transmitter_x_m": rows["x"].tolist(),
+        "transmitter_y_m": rows["y"].tolist(),
+        "transmitter_bearing_rad": rows["bearing"].tolist(),
+        "listener_x_m": rows["listener_x"].tolist(),
+        "listener_y_m": rows["listener_y"].tolist(),
+        "listener_bearing_rad": rows["listener_bearing"].tolist(),
+        "heard": heard.tolist(),
+        "half_path_m": _known(np.where(heard, rows["half_path_m"], np.nan).tolist()),
     }
 
 
@@ -136,7 +162,7 @@ def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
 
     whole = pa.int64()
     kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole,
-             "number": whole}  # fmt: skip
+             "number": whole, "transmitter": whole, "listener": whole}  # fmt: skip
     paths = []
     for name, table in tables(timeline).items():
         schema = pa.schema(

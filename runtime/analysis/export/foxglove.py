@@ -20,6 +20,7 @@ from drivers.messages import Pose
 from perception.mapping.grid.known_cells import KnownCells
 from runtime.analysis.export.shapes import (
     CLUSTER,
+    CROSS,
     HEIGHT_M,
     MODEL,
     SEGMENT,
@@ -31,8 +32,9 @@ from runtime.analysis.export.shapes import (
     whole_ring,
     yaw_quaternion,
 )
+from runtime.analysis.plots.cross_arcs import cross_arcs, heard_cross_paths, newest_cross_paths
 from runtime.analysis.plots.geometry import outline, world_outlines
-from runtime.analysis.timeline import LogEntry, RunSnapshot, Timeline
+from runtime.analysis.timeline import CrossPathRows, LogEntry, RunSnapshot, Timeline
 
 ARC_POINTS: Final = 9
 LINE_PX: Final = 2.0
@@ -100,6 +102,7 @@ class _RunExporter:
         self._frames = ch.FrameTransformsChannel("/tf", context=context)
         self._pose = ch.PoseInFrameChannel("/pose", context=context)
         self._ring = ch.LaserScanChannel("/ring", context=context)
+        self._crosses = ch.SceneUpdateChannel("/cross_paths", context=context)
         self._segments = ch.SceneUpdateChannel("/segments", context=context)
         self._clusters = ch.SceneUpdateChannel("/clusters", context=context)
         self._objects = ch.SceneUpdateChannel("/models", context=context)
@@ -161,6 +164,10 @@ class _RunExporter:
             self._ring.log(message, log_time=at)
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
+        settings = self._timeline.settings
+        if len(self._timeline.cross_paths):
+            newest = newest_cross_paths(self._timeline.cross_paths, snapshot.t_s)
+            write_cross_paths(self._crosses, newest, math.radians(settings.ring.beam_half_angle_deg), at)
         write_segments(self._segments, snapshot.segments.reshape(-1, 2).tolist(), at)
         boxes = []
         for c in snapshot.clusters:
@@ -196,6 +203,12 @@ def _grid(known: KnownCells, at: int) -> fx.Grid:
         fields=[fx.PackedElementField(name="occupied", offset=0, type=fx.PackedElementFieldNumericType.Int8)],
         data=known.percent.tobytes(),
     )  # fmt: skip
+
+
+def write_cross_paths(channel: ch.SceneUpdateChannel, rows: CrossPathRows, half_angle: float, at: int) -> None:
+    """Replace the arcs of cross paths at a time (ns); `half_angle` is that of a beam, rad."""
+    arcs = cross_arcs(heard_cross_paths(rows), half_angle).tolist()
+    scene(channel, "cross_paths", [line(points, CROSS, closed=False) for points in arcs], [], at)
 
 
 def scene(

@@ -1,8 +1,8 @@
 """Export of a run as a ROS 2 bag, without ROS: ranges, odometry, markers and frames, written by rosbags.
 
-Topics: `/sonar/s00` … (sensor_msgs/Range), each in its own frame below `ring`; `/odom`; `/markers`; `/grid`
-(nav_msgs/OccupancyGrid), where the run kept an evidence grid; `/tf` and `/tf_static`. The frame `ring` is the pose of
-the ring at the last firing: on a synchro drive it does not turn with `base_link`.
+Topics: `/sonar/s00` … (sensor_msgs/Range), each in its own frame below `ring`; `/odom`; `/markers`, with the arcs of
+cross paths; `/grid` (nav_msgs/OccupancyGrid), where the run kept an evidence grid; `/tf` and `/tf_static`. The frame
+`ring` is the pose of the ring at the last firing: on a synchro drive it does not turn with `base_link`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from drivers.messages import Odometry, Pose
 from perception.mapping.grid.known_cells import KnownCells
 from runtime.analysis.export.shapes import (
     CLUSTER,
+    CROSS,
     MODEL,
     SEGMENT,
     TRUTH,
@@ -29,6 +30,7 @@ from runtime.analysis.export.shapes import (
     firing_scans,
     yaw_quaternion,
 )
+from runtime.analysis.plots.cross_arcs import cross_arcs, heard_cross_paths, newest_cross_paths
 from runtime.analysis.plots.geometry import outline, world_outlines
 from runtime.analysis.timeline import RunSnapshot, Timeline
 
@@ -176,6 +178,11 @@ class _RunExporter:
         markers = [self._marker("all", 0, STRIP, [], TRUTH, at, action=DELETE_ALL)]
         if segments:
             markers.append(self._marker("segments", 0, LINES, segments, SEGMENT, at))
+        newest = heard_cross_paths(newest_cross_paths(self._timeline.cross_paths, snapshot.t_s))
+        for number, arc in enumerate(
+            cross_arcs(newest, math.radians(self._timeline.settings.ring.beam_half_angle_deg))
+        ):
+            markers.append(self._marker("cross_paths", number, STRIP, arc.tolist(), CROSS, at))
         for number, c in enumerate(snapshot.clusters):
             corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
             markers.append(self._marker("clusters", number, STRIP, _looped(corners), CLUSTER, at))

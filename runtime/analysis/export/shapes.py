@@ -19,6 +19,7 @@ EVEN_M = 1e-6
 
 Colour = tuple[float, float, float]
 SEGMENT: Final = (0.84, 0.37, 0.0)
+CROSS: Final = (0.34, 0.39, 0.0)
 CLUSTER: Final = (0.0, 0.62, 0.45)
 MODEL: Final = (0.0, 0.45, 0.70)
 TRUTH: Final = (0.6, 0.6, 0.6)

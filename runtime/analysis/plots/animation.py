@@ -20,7 +20,16 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from PIL import Image
 
-from runtime.analysis.plots.layers import draw_arcs, draw_clusters, draw_objects, draw_path, draw_segments, draw_world
+from runtime.analysis.plots.cross_arcs import heard_cross_paths, newest_cross_paths
+from runtime.analysis.plots.layers import (
+    draw_arcs,
+    draw_clusters,
+    draw_cross_paths,
+    draw_objects,
+    draw_path,
+    draw_segments,
+    draw_world,
+)
 from runtime.analysis.plots.paper_figures import Canvas, legend
 from runtime.analysis.plots.plot_style import MUTED
 from runtime.analysis.timeline import RunSnapshot, Timeline
@@ -91,9 +100,12 @@ def _draw(axes: Axes, timeline: Timeline, snapshot: RunSnapshot, canvas: Canvas)
     settings, frame = timeline.settings, canvas.frame
     newest = timeline.echoes[max(0, snapshot.echoes - ECHOES_SHOWN) : snapshot.echoes]
     newest = newest[np.isfinite(newest["range_m"])]
+    crosses = heard_cross_paths(newest_cross_paths(timeline.cross_paths, snapshot.t_s))
+    half = math.radians(settings.ring.beam_half_angle_deg)
     poses = [m.pose for m in timeline.snapshots if m.t_s <= snapshot.t_s]
     return [
-        *draw_arcs(axes, newest, math.radians(settings.ring.beam_half_angle_deg), frame),
+        *draw_arcs(axes, newest, half, frame),
+        *draw_cross_paths(axes, crosses, half, frame),
         *draw_segments(axes, snapshot.segments, frame, faint=True),
         *draw_clusters(axes, snapshot.clusters, settings.perception.clusters.segments_min, frame),
         *draw_objects(axes, snapshot.objects, timeline, frame, "m", labelled=False),

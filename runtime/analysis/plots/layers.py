@@ -22,9 +22,22 @@ from matplotlib.transforms import Affine2D
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 from perception.mapping.grid.known_cells import UNKNOWN, KnownCells
+from runtime.analysis.plots.cross_arcs import cross_arcs
 from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, world_outlines
-from runtime.analysis.plots.plot_style import CLUSTER, ECHO, FREE, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
-from runtime.analysis.timeline import BookmarkEntry, Cluster, Echoes, Timeline
+from runtime.analysis.plots.plot_style import (
+    CLUSTER,
+    CROSS,
+    ECHO,
+    FREE,
+    INK,
+    MODEL,
+    MUTED,
+    PAPER,
+    ROBOT,
+    SEGMENT,
+    TRUTH,
+)
+from runtime.analysis.timeline import BookmarkEntry, Cluster, CrossPathRows, Echoes, Timeline
 from runtime.simulation.evaluation import nearest_pairs
 from runtime.simulation.open_loop import angular_places
 from runtime.support.length_format import Units, format_length
@@ -122,9 +135,13 @@ def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame)
 
 def received_echoes(echoes: Echoes) -> Echoes:
     """Return the rows of echoes with a finite range, thinned evenly to at most `ARCS_MAX`."""
-    back: Echoes = echoes[np.isfinite(echoes["range_m"])]
-    thinned: Echoes = back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
-    return thinned
+    return thinned(echoes[np.isfinite(echoes["range_m"])])
+
+
+def thinned(rows: Echoes) -> Echoes:
+    """Return rows of echoes or cross paths, thinned evenly to at most `ARCS_MAX`."""
+    shown: Echoes = rows[:: max(1, math.ceil(len(rows) / ARCS_MAX))]
+    return shown
 
 
 def draw_evidence_grid(axes: Axes, known: KnownCells, frame: Frame) -> list[Line2D]:
@@ -177,6 +194,28 @@ def draw_arcs(axes: Axes, echoes: Echoes, half_angle: float, frame: Frame) -> li
         patch.set_gid("echoes")
         axes.add_patch(patch)
     return [Line2D([], [], color=ECHO, linewidth=1.2, alpha=0.8, label="echo, its arc")]
+
+
+def draw_cross_paths(axes: Axes, rows: CrossPathRows, half_angle: float, frame: Frame) -> list[Line2D]:
+    """Draw each cross path as the arc of its ellipse.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    rows : structured array (n,)
+        Of `Timeline.cross_paths`, from `cross_arcs.heard_cross_paths`.
+    half_angle : float
+        Of the beam, rad.
+    frame : Frame
+        Coordinates of the figure.
+    """
+    if not len(rows):
+        return []
+    curves = frame.points(cross_arcs(rows, half_angle))
+    drawn = LineCollection(list(curves), colors=CROSS, linewidths=0.5, alpha=0.3, zorder=2.9, gid="cross-paths")
+    axes.add_collection(drawn)
+    return [Line2D([], [], color=CROSS, linewidth=1.2, alpha=0.8, label="cross path, its ellipse")]
 
 
 def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = False) -> list[Line2D]:

@@ -13,11 +13,13 @@ from matplotlib.lines import Line2D
 
 from config.load import load_world
 from config.units import FOOT_M
+from runtime.analysis.plots.cross_arcs import heard_cross_paths
 from runtime.analysis.plots.geometry import Frame, window
 from runtime.analysis.plots.layers import (
     draw_arcs,
     draw_bookmarks,
     draw_clusters,
+    draw_cross_paths,
     draw_evidence_grid,
     draw_objects,
     draw_path,
@@ -25,6 +27,7 @@ from runtime.analysis.plots.layers import (
     draw_walls,
     draw_world,
     received_echoes,
+    thinned,
 )
 from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
 from runtime.analysis.timeline import Timeline
@@ -84,11 +87,16 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
     arcs_shown = received_echoes(timeline.echoes)
     count, shown = int((timeline.echoes["range_m"] < math.inf).sum()), len(arcs_shown)
     few = f", {shown:,} of them drawn" if shown < count else ""
+    crosses = heard_cross_paths(timeline.cross_paths)
+    crosses_shown = thinned(crosses)
+    if len(crosses):
+        few += f"; {len(crosses):,} cross paths"
+        few += f", {len(crosses_shown):,} drawn" if len(crosses_shown) < len(crosses) else ""
     method = "the Bayesian method" if timeline.settings.perception.method == "bayes" else "relaxation"
     frame = canvas.frame
 
     def raw(axes: Axes) -> list[Line2D]:
-        return draw_arcs(axes, arcs_shown, half, frame)
+        return draw_arcs(axes, arcs_shown, half, frame) + draw_cross_paths(axes, crosses_shown, half, frame)
 
     def segments(axes: Axes) -> list[Line2D]:
         return draw_segments(axes, last.segments, frame)

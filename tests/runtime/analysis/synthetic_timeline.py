@@ -11,7 +11,17 @@ from config.load import load_settings
 from drivers.messages import Flags, LinkCounts, Odometry, Pose, Twist
 from perception.detected_object import DetectedObject
 from perception.mapping.grid.known_cells import KnownCells
-from runtime.analysis.timeline import ECHO, BookmarkEntry, Cluster, Echoes, LogEntry, ModeEntry, RunSnapshot, Timeline
+from runtime.analysis.timeline import (
+    CROSS_PATH,
+    ECHO,
+    BookmarkEntry,
+    Cluster,
+    Echoes,
+    LogEntry,
+    ModeEntry,
+    RunSnapshot,
+    Timeline,
+)
 
 SETTINGS = load_settings("hallway")
 ERROR_M = 0.01
@@ -54,6 +64,16 @@ def synthetic_timeline(*, with_world: bool = True) -> Timeline:
     timeline.bookmarks = [BookmarkEntry(1.5, "here", Pose(0.45, 0.0, 0.0))]
     timeline.refinement_stops = {"budget": 20, "nothing": 40}
     timeline.counts = LinkCounts(300, 1, 2)
+    return timeline
+
+
+def with_cross_paths(timeline: Timeline) -> Timeline:
+    """Return the timeline with three cross paths from sensor 6 to sensor 7 at its end; the last is silent."""
+    rows = np.empty(3, CROSS_PATH)
+    for k, half_m in enumerate((1.0, 1.5, np.inf)):
+        place = (0.0, 0.381, np.pi / 2, -0.0986, 0.368, np.radians(105.0))
+        rows[k] = (SECONDS, 6, 7, *place, half_m, 5.0 + SECONDS)
+    timeline.cross_paths = rows
     return timeline
 
 

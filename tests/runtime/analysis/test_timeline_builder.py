@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from drivers.messages import CrossPaths, Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
 from runtime.analysis import timeline_builder
 from runtime.analysis.timeline import Timeline
@@ -49,6 +50,24 @@ def test_echoes_begin_where_their_sensors_were(timeline: Timeline) -> None:
     assert rows["x"] == pytest.approx([1.0, 1.0 - RADIUS_M])
     assert rows["y"] == pytest.approx([2.0 + RADIUS_M, 2.0])
     assert rows["bearing"] == pytest.approx([math.pi / 2, math.pi])
+
+
+def test_cross_paths_have_both_sensors_where_they_were(timeline: Timeline) -> None:
+    builder = TimelineBuilder(timeline)
+    crosses = CrossPaths(np.array([0, 0]), np.array([6, 12]), np.array([1.5, math.inf]))
+    builder.add_firing(0.1, replace(firing(7.0, Pose(9.0, 9.0, 0.0)), cross_paths=crosses))
+    builder.restart(0.2)
+    builder.add_firing(0.5, firing(7.4, Pose(1.0, 2.0, 0.3), s0=1.0))
+    builder.add_firing(0.6, replace(firing(7.5, Pose(1.0, 2.0, 0.3), math.pi / 2), cross_paths=crosses))
+    builder.finish(None)
+    rows = timeline.cross_paths
+    assert rows[["t_s", "transmitter", "listener", "half_path_m", "robot_s"]].tolist() == [
+        (0.6, 0, 6, 1.5, 7.5), (0.6, 0, 12, math.inf, 7.5)
+    ]  # fmt: skip
+    assert rows["x"] == pytest.approx([1.0, 1.0])
+    assert rows["listener_x"] == pytest.approx([1.0 - RADIUS_M, 1.0])
+    assert rows["listener_y"] == pytest.approx([2.0, 2.0 - RADIUS_M])
+    assert rows["listener_bearing"] == pytest.approx([math.pi, 1.5 * math.pi])
 
 
 def test_odometry_is_kept_ten_times_a_second_at_most(timeline: Timeline) -> None:

@@ -68,6 +68,14 @@ def test_a_state_is_on_the_topics_of_the_export(tmp_path: Path) -> None:
     assert found["/state"][0]["phases"] == {"decide": 3.0}
 
 
+def test_cross_paths_are_arcs_from_where_the_ring_stood(tmp_path: Path) -> None:
+    heard = [{"robot_s": 1.0, "pose": [1.0, 2.0, 0.0, math.pi / 2], "paths": [[0, 1, 1.5], [0, 23, 2.0]]}]
+    found = written(tmp_path / "a.mcap", "ears", full_state() | {"cross_paths": heard})
+    lines = found["/cross_paths"][0].entities[0].lines
+    assert [len(line.points) for line in lines] == [9, 9]
+    assert all(point.y > 3.0 for line in lines for point in line.points), "sensor 0 looks along y"
+
+
 def test_an_irregular_ring_is_an_arc_for_each_sensor_that_fired(tmp_path: Path) -> None:
     one = full_state()
     one["ranges"], one["age"] = one["ranges"][:16], one["age"][:16]

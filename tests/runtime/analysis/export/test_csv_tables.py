@@ -11,9 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from runtime.analysis.export.csv_tables import tables, write_csv, write_parquet
-from tests.runtime.analysis.synthetic_timeline import START_NS, synthetic_timeline
+from tests.runtime.analysis.synthetic_timeline import START_NS, synthetic_timeline, with_cross_paths
 
-TABLES = {"echoes", "segments", "objects", "walls", "odometry"}
+TABLES = {"echoes", "cross_paths", "segments", "objects", "walls", "odometry"}
 RUN = synthetic_timeline()
 
 
@@ -52,6 +52,19 @@ def test_parquet(tmp_path: Path) -> None:
     assert read["objects"]["x_m"].to_pylist()[-1] == RUN.objects[-1].x
     assert read["objects"]["probability"].null_count == 6
     assert read["segments"].num_rows == 3
+
+
+def test_a_cross_path_has_both_sensors_and_half_its_length(tmp_path: Path) -> None:
+    run = with_cross_paths(synthetic_timeline())
+    found = tables(run)["cross_paths"]
+    assert [found[name] for name in ("transmitter", "listener", "heard", "half_path_m")] == [
+        [6, 6, 6], [7, 7, 7], [True, True, False], [1.0, 1.5, None]
+    ]  # fmt: skip
+    (path,) = (path for path in write_parquet(run, tmp_path) if path.stem == "cross_paths")
+    read = pq.read_table(path)
+    assert read["listener"].to_pylist() == [7, 7, 7]
+    assert read["listener_y_m"].to_pylist() == run.cross_paths["listener_y"].tolist()
+    assert tables(RUN)["cross_paths"]["t_s"] == [], "no sensor of that ring listens"
 
 
 def test_an_echo_is_placed_along_its_bearing() -> None:

@@ -18,7 +18,7 @@ from drivers.messages import Firing, Pose
 from runtime.analysis.export.foxglove import write_foxglove
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_builder import TimelineBuilder
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_grid
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid
 
 UNEVEN = """
 [ring]
@@ -81,6 +81,13 @@ def test_a_run_for_foxglove(tmp_path: Path) -> None:
     assert [i for i, r in enumerate(scan.ranges) if not math.isnan(r)] == [6]
     assert math.isinf(scan.ranges[6])
     assert newest["/log"].message == "sensor 7 never answers"
+
+
+def test_cross_paths_are_arcs(tmp_path: Path) -> None:
+    (path,) = write_foxglove(with_cross_paths(synthetic_timeline()), tmp_path / "fox.mcap")
+    scenes = [proto.entities[0] for topic, _, _, proto in messages(path) if topic == "/cross_paths"]
+    assert [len(scene.lines) for scene in scenes] == [0, 0, 0, 2], "those of the last second that were heard"
+    assert len(scenes[-1].lines[0].points) == 9
 
 
 def test_the_evidence_grid_lies_where_it_is(tmp_path: Path) -> None:

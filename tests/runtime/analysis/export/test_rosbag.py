@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from runtime.analysis.export.rosbag import write_bag
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_grid
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid
 
 
 def test_a_run_as_a_ros_2_bag(tmp_path: Path) -> None:
@@ -49,6 +49,14 @@ def test_a_run_as_a_ros_2_bag(tmp_path: Path) -> None:
     assert np.allclose(places, [(o.x, o.y) for o in run.objects])
     assert len(newest["/tf_static"].transforms) == 25
     assert len(newest["/truth"].markers) == 6
+
+
+def test_cross_paths_are_markers(tmp_path: Path) -> None:
+    (folder,) = write_bag(with_cross_paths(synthetic_timeline()), tmp_path / "bag")
+    with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        *_, (connection, _, data) = (one for one in reader.messages() if one[0].topic == "/markers")
+        last: Any = reader.deserialize(data, connection.msgtype)
+    assert [len(m.points) for m in last.markers if m.ns == "cross_paths"] == [9, 9]
 
 
 def test_the_evidence_grid_is_an_occupancy_grid(tmp_path: Path) -> None:

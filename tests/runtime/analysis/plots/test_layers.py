@@ -17,7 +17,7 @@ from runtime.analysis.plots import layers
 from runtime.analysis.plots.geometry import Frame
 from runtime.analysis.plots.paper_figures import Canvas
 from runtime.analysis.timeline import BookmarkEntry
-from tests.runtime.analysis.synthetic_timeline import ERROR_M, SETTINGS, synthetic_timeline
+from tests.runtime.analysis.synthetic_timeline import ERROR_M, SETTINGS, synthetic_timeline, with_cross_paths
 
 RUN = synthetic_timeline()
 LAST = RUN.snapshots[-1]
@@ -75,6 +75,13 @@ def test_echoes_are_one_path_of_arcs(axes: Axes) -> None:
     assert gids(axes) == []
     layers.draw_arcs(axes, layers.received_echoes(RUN.echoes), 0.2, FRAME)
     assert gids(axes) == ["echoes"]
+
+
+def test_cross_paths_are_one_collection_of_arcs(axes: Axes) -> None:
+    run = with_cross_paths(synthetic_timeline())
+    assert layers.draw_cross_paths(axes, run.cross_paths[:0], 0.2, FRAME) == []
+    (entry,) = layers.draw_cross_paths(axes, run.cross_paths[:2], 0.2, FRAME)
+    assert (entry.get_label(), gids(axes)) == ("cross path, its ellipse", ["cross-paths"])
 
 
 def test_segments_are_one_collection(axes: Axes) -> None:

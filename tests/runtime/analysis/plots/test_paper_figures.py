@@ -7,12 +7,13 @@ import re
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from config.load import load_world
 from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.paper_figures import HEIGHT_MAX_IN, HEIGHT_MIN_IN, Canvas, paper_figures, pictures
 from runtime.analysis.plots.plot_style import WIDTH_IN
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_grid
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid
 
 RUN = synthetic_timeline()
 
@@ -34,6 +35,12 @@ def test_each_figure_shows_its_own() -> None:
     assert len(seen) == 3
     assert shown["models"] >= {name.replace("model", "centre") for name in seen}
     assert "cluster-1" not in shown["models"]
+
+
+def test_cross_paths_are_drawn_with_the_echoes() -> None:
+    raw = pictures(with_cross_paths(synthetic_timeline()), "m")["raw"]
+    assert "cross-paths" in gids(raw)
+    assert any("2 cross paths" in text.get_text() for text in raw.findobj(Text))
 
 
 def test_the_evidence_grid_lies_in_the_figure_where_it_lay() -> None:
