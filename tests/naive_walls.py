@@ -58,3 +58,17 @@ def bend(u: Array, z: Array, d: Array, sigma: Array, radius: float) -> tuple[flo
 def crossing(normal_a: Array, distance_a: float, normal_b: Array, distance_b: float) -> Array:
     """Return where two lines n · x = distance cross."""
     return np.linalg.solve(np.stack([normal_a, normal_b]), [distance_a, distance_b])
+
+
+def is_edge(way_a: float, normal_a: float, way_b: float, normal_b: float) -> bool | None:
+    """Return whether two half-lines from one point make an edge, by the free sector between them; None: neither.
+
+    Angles (rad) of the half-lines and of their normals away from the sensors: what is free beside a half-line lies
+    opposite to its normal.
+    """
+    turn_a, turn_b = (
+        math.copysign(1.0, math.sin(n + math.pi - w)) for w, n in ((way_a, normal_a), (way_b, normal_b))
+    )
+    if turn_a == turn_b:  # turning from a, what is free, b would be reached from behind
+        return None
+    return turn_a * (way_b - way_a) % (2.0 * math.pi) > math.pi

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
@@ -9,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.claimed_echoes import own_echoes
 from perception.bayes.parameters import (
     CIRCLE_INFLATION,
     PLACED_SIGMA_M,
@@ -23,6 +25,7 @@ from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.track_archive import TrackArchive
 from perception.bayes.wall_contact import EDGE_REACH_M
+from perception.bayes.wall_crossing import CORNER_SINE_MIN
 from perception.bayes.wall_report import has_mirrors, room_report
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
@@ -32,6 +35,7 @@ CIRCLE_FIELDS: Final = (
 )  # fmt: skip
 READINGS: Final = "readings"
 """Field of an archived circle."""
+NO_SURFACES: Final = np.empty((0, 4))
 Row = tuple[float, ...]
 
 
@@ -170,18 +174,22 @@ def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
     Parameters
     ----------
     memory : Memory
-        Its walls tell a corner from an edge.
+        Its walls tell a corner from an edge: an inside corner has two of them, and lies before both.
     x, y, radius : float
         The circle, m.
     """
     if radius > 0.0:
         return round_label(radius)
+    sides = []
     for line in known_walls(memory):
         nx, ny = line["normal_x"], line["normal_y"]
         dx, dy = x - line["origin_x"], y - line["origin_y"]
         along = -ny * dx + nx * dy
         is_within = line["low"] - ROOM_CORNER_M < along < line["high"] + ROOM_CORNER_M
         if is_within and abs(nx * dx + ny * dy - line["distance"]) < ROOM_CORNER_M:
+            sides.append((nx, ny, 1.0 if abs(line["low"] - along) < abs(line["high"] - along) else -1.0))
+    for (ax, ay, way), (bx, by, other_way) in itertools.combinations(sides, 2):
+        if way != other_way and way * (ax * by - ay * bx) < -CORNER_SINE_MIN:
             return "inside corner"
     return "edge"
 
@@ -227,12 +235,14 @@ def other_objects(
     segments, points = room_report(memory)
     corners = [corner_object(point.item()) for point in points]
     # What stands in a corner of the room is the corner: a thin object there is not another one.
-    circles = other_circles(memory.circles, memory, p, least, [*named, *corners])
+    surfaces = [row[:4] for row in segments.tolist()] + [(*row[:2], *row[:2]) for row in points.tolist()]
+    circles = other_circles(memory.circles, memory, p, least, [*named, *corners], np.array(surfaces).reshape(-1, 4))
     return [*(wall_object(segment.item()) for segment in segments), *corners, *circles]
 
 
 def other_circles(
-    circles: NDArray[Any], memory: Memory, p: SettingsRecord, least: float, named: Sequence[DetectedObject]
+    circles: NDArray[Any], memory: Memory, p: SettingsRecord, least: float, named: Sequence[DetectedObject],
+    surfaces: Floats = NO_SURFACES,
 ) -> list[DetectedObject]:  # fmt: skip
     """Return the circles without a model's name.
 
@@ -242,6 +252,9 @@ def other_circles(
         The circles.
     memory, p, least, named
         As for `other_objects`.
+    surfaces : (n, 4) float, optional
+        As for `own_echoes`. Where there are any, only circles with enough echoes of their own are returned, and those
+        that a user marked.
     """
     found: list[DetectedObject] = []
     merge_m, models = float(p[0].merge_m), int(p[0].model_count)
@@ -251,6 +264,10 @@ def other_circles(
     are_mirrors = has_mirrors(memory)
     for at, *row, probability, status, kind, radius in zip(shown.tolist(), *columns, strict=True):
         if any(math.dist(row[:2], (o.x, o.y)) < merge_m for o in named):
+            continue
+        is_marked = bool(circles["marks"][at])
+        is_checked = len(surfaces) > 0 and not is_marked
+        if is_checked and own_echoes(circles[at], surfaces, memory, p) < UNKNOWN_HITS_MIN:
             continue
         is_rival = status == ESTABLISHED and kind >= models and probability >= least
         label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"

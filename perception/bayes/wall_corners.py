@@ -28,6 +28,7 @@ from perception.bayes.wall_contact import (
     wall_normal,
     wall_point,
 )
+from perception.bayes.wall_crossing import CORNER_REACH_M, crossing, is_edge, position_along
 from perception.bayes.wall_records import (
     CORNERS_MAX,
     EDGES_MAX,
@@ -40,12 +41,6 @@ from perception.bayes.wall_records import (
 from perception.kernel import kernel
 from perception.records import Records
 
-CORNER_REACH_M: Final = 2.0
-"""Farthest that a corner may lie beyond the ends of its walls …"""
-CORNER_INSIDE_M: Final = 0.4
-"""… and inside them."""
-CORNER_SINE_MIN: Final = 0.4
-"""Least sine of the angle between the walls."""
 SAME_CORNER_M: Final = 0.2
 CORNER_ECHOES_MIN: Final = 3.0
 """Echoes of a sure corner, which must also outnumber its passes."""
@@ -70,46 +65,6 @@ PASS_SLACK_M: Final = 0.1
 KEPT: Final = 1
 PENDING: Final = 2
 """Values of `RoomCorner.is_used` while points are found again: found, and not yet found."""
-
-
-@kernel
-def crossing(a: Wall, b: Wall) -> tuple[bool, float, float]:
-    """Return whether two walls would meet near their ends, and where their lines cross, m.
-
-    Parameters
-    ----------
-    a, b : Wall
-        The walls.
-    """
-    ax, ay = wall_normal(a)
-    bx, by = wall_normal(b)
-    det = ax * by - ay * bx
-    if not abs(det) >= CORNER_SINE_MIN:
-        return False, 0.0, 0.0
-    level_a = ax * (a.origin_x + a.normal_x * a.offset) + ay * (a.origin_y + a.normal_y * a.offset)
-    level_b = bx * (b.origin_x + b.normal_x * b.offset) + by * (b.origin_y + b.normal_y * b.offset)
-    x = (level_a * by - level_b * ay) / det
-    y = (ax * level_b - bx * level_a) / det
-    along_a = position_along(a, x, y)
-    along_b = position_along(b, x, y)
-    is_near = is_on_span(a, along_a, CORNER_REACH_M) and is_on_span(b, along_b, CORNER_REACH_M)
-    is_within = is_on_span(a, along_a, -CORNER_INSIDE_M) or is_on_span(b, along_b, -CORNER_INSIDE_M)
-    return is_near and not is_within, x, y
-
-
-@kernel
-def position_along(wall: Wall, x: float, y: float) -> float:
-    """Return the position of a point along a wall's frame, m."""
-    return wall.normal_x * (y - wall.origin_y) - wall.normal_y * (x - wall.origin_x)
-
-
-@kernel
-def is_edge(a: Wall, b: Wall, x: float, y: float) -> bool:
-    """Return whether the corner of two walls is an edge that juts out: one of them leaves it behind the other."""
-    along = position_along(a, x, y)
-    side = 1.0 if 0.5 * (a.spans[0].low + a.spans[a.span_count - 1].high) > along else -1.0
-    nx, ny = wall_normal(b)
-    return bool(side * (nx * -a.normal_y + ny * a.normal_x) > 0.0)
 
 
 @kernel

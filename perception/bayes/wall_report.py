@@ -12,13 +12,8 @@ from numpy.typing import NDArray
 from perception.bayes.state import Memory
 from perception.bayes.wall_bins import bin_of
 from perception.bayes.wall_contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
-from perception.bayes.wall_corners import (
-    CORNER_ECHOES_MIN,
-    CORNER_INSIDE_M,
-    CORNER_REACH_M,
-    EDGE_ECHOES_MIN,
-    EDGE_SAME_M,
-)
+from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
+from perception.bayes.wall_crossing import CORNER_INSIDE_M, CORNER_REACH_M
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_fit import OPENING_PASSES_MIN
 from perception.bayes.wall_numbers import SPAN_MIN_M
@@ -30,7 +25,7 @@ WALL_CHI2_MIN: Final = 20.0
 """Least evidence of the best span, or of all together."""
 SPAN_WEIGHT_MIN: Final = 3.0
 """Least weight of a span that is reported, …"""
-MISFIT_MAX: Final = 3.0
+MISFIT_MAX: Final = 2.5
 LIGHT_MISFIT_MAX: Final = 2.0
 LIGHT_WEIGHT: Final = 20.0
 """Greatest χ² of a wall's line for each degree of freedom, and that of a wall of less weight, which may be the side
@@ -64,8 +59,9 @@ CORNER_MET_M: Final = 0.3
 """A corner is reported if both walls come so near it, …"""
 ALONE_ECHOES: Final = 8.0
 ALONE_LEAD: Final = 2.0
-"""… or, where walls are mirrors, if so many echoes come from it from afar, and so many times its passes. So many show
-an edge, too, whatever is known of its wall."""
+ROUGH_LEAD: Final = 5.0
+"""… or if so many echoes come from it, and so many times its passes, whatever is known of its walls: from an inside
+corner between mirrors, from afar, or from an edge. Where slanting walls answer, some of them may be a wall's."""
 POINT_PRIOR_NAT: Final = 0.0
 POINT_ECHO_NAT: Final = 1.0
 """Log prior odds of a corner where walls end, and evidence of each echo."""
@@ -129,12 +125,16 @@ class Straight:
         off = offset + slope * along
         return ox + nx * off - ny * along, oy + ny * off + nx * along
 
-    def beyond(self, x: float, y: float) -> tuple[float, float, int]:
-        """Return a point's position along the line, how far it is beyond the nearer outer end (m), and which end."""
+    def along(self, x: float, y: float) -> float:
+        """Return the position of a point along the line, m."""
         ox, oy, nx, ny, _, _ = self.frame
-        along = nx * (y - oy) - ny * (x - ox)
-        below, above = float(self.ends[0, 0]) - along, along - float(self.ends[-1, 1])
-        return (along, below, 0) if below > above else (along, above, 1)
+        return nx * (y - oy) - ny * (x - ox)
+
+    def beyond(self, x: float, y: float) -> tuple[float, float, tuple[int, int]]:
+        """Return where a point is along the line, how far beyond the nearest end (m), and which end that is."""
+        along = self.along(x, y)
+        span, side = divmod(int(np.abs(self.ends - along).argmin()), 2)
+        return along, (along - float(self.ends[span, side])) * (2 * side - 1), (span, side)
 
     def is_passed(self, a: float, b: float) -> bool:
         """Return whether ranges passed through the wall between two positions along it, m."""
@@ -234,10 +234,10 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
 def reach_corners(
     walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool
 ) -> list[tuple[float, ...]]:  # fmt: skip
-    """Move the outer ends of walls outwards to the corners in which they end, unless ranges passed there.
+    """Move the ends of walls to the corners in which they end, unless ranges passed there.
 
-    A corner that is heard is reached from afar; one that is not, only if both walls end near it. Nothing but a corner
-    between mirrors answers from afar, so that one is sure whatever is known of its walls.
+    A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
+    an inside corner answers from afar, and elsewhere only an edge: that one is sure whatever is known of its walls.
 
     Parameters
     ----------
@@ -262,13 +262,14 @@ def reach_corners(
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
         is_met = len(owners) == 2
-        for owner, (along, gap, side) in zip(owners, places, strict=True):
-            end = owner.ends[-side, side]
+        for owner, (along, gap, at) in zip(owners, places, strict=True):
+            end = owner.ends[at]
             if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_REACH_M and not owner.is_passed(along, end):
-                owner.ends[-side, side] = along
-            is_met = is_met and abs(owner.ends[-side, side] - along) < CORNER_MET_M
+                owner.ends[at] = along
+            is_met = is_met and abs(owner.ends[at] - along) < CORNER_MET_M
         far = float(corner["far_echoes"])
-        is_proven = are_mirrors and far >= ALONE_ECHOES and far > ALONE_LEAD * passes and corner["is_edge"] == 0
+        lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
+        is_proven = far >= ALONE_ECHOES and far > lead * passes and corner["is_edge"] != are_mirrors
         if is_proven or (is_met and (is_heard or is_near)):
             found.append(_point(corner))
     return found
@@ -301,9 +302,9 @@ def end_at_edges(
         variance = float(edge["covariance_xx"] + edge["covariance_yy"])
         if echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2:
             continue
-        is_sure = are_mirrors and echoes >= ALONE_ECHOES and echoes > ALONE_LEAD * passes
+        is_sure = echoes >= ALONE_ECHOES and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
         if owner is not None:
-            along, side = owner.beyond(float(edge["x"]), float(edge["y"]))[0], int(edge["second"])
+            along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
             reach = EDGE_SAME_M if edge["is_edge"] == 1 else CORNER_REACH_M
             beyond = (along - owner.ends[:, side]) * (2 * side - 1)
             span = int(np.abs(beyond).argmin())

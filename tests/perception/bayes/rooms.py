@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from perception.bayes.elements import Reading
-from perception.bayes.state import Memory
+from perception.bayes.reservoir import copy_reading
+from perception.bayes.state import CircleTrack, Memory
 from perception.bayes.wall_bins import HALF
 from perception.bayes.wall_fit import fit_walls
 from perception.bayes.wall_records import MAX_WALLS, Wall, WallMap
@@ -32,6 +33,15 @@ def reading(x: float, y: float, axis: float, range_m: float) -> Reading:
     array = zeros(Reading, 1)
     array[0] = (x, y, math.cos(axis), math.sin(axis), range_m, 0.0, 0.0)
     return records(Reading, array)[0]
+
+
+def keep(track: CircleTrack, echoes: list[Reading]) -> None:
+    """Let a circle keep these echoes alone, at most as many as there are bearings."""
+    for of in track.bins:
+        of.count = 0
+    for k, q in enumerate(echoes):
+        copy_reading(q, track.bins[k].readings[0])
+        track.bins[k].count = 1
 
 
 def place_wall(wall: Wall, origin: Array, normal: float, offset: float = 0.0) -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from perception.bayes import wall_corners
 from perception.bayes.state import ESTABLISHED, Memory
+from perception.bayes.wall_crossing import position_along
 from perception.bayes.wall_records import CORNERS_MAX, EDGES_MAX, WallMap
-from tests import naive_walls
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, reading
 from tests.perception.bayes.tracks import P, S, examples, pair
 
@@ -24,37 +24,6 @@ def corner_room() -> tuple[Memory, WallMap]:
     fill(memory, room.walls[1], -1.5, 0.0)
     wall_corners.find_corners(memory.s)
     return memory, room
-
-
-@examples(30, 300)
-def test_walls_that_end_near_their_crossing_have_a_corner_there(examples: int) -> None:
-    rng = np.random.default_rng(46)
-    _, room = new_room()
-    first, second = room.walls[0], room.walls[1]
-    for _ in range(examples):
-        a, turn = rng.uniform(-3, 3), rng.uniform(0.2, 2.5)
-        place = rng.uniform(-1, 1, 2)
-        for wall, normal in ((first, a), (second, a + turn)):
-            place_wall(wall, place, normal, float(rng.uniform(0.5, 1.5)))
-        normals = [np.array([math.cos(v), math.sin(v)]) for v in (a, a + turn)]
-        point = naive_walls.crossing(
-            normals[0],
-            float(normals[0] @ place) + first.offset,
-            normals[1],
-            float(normals[1] @ place) + second.offset,
-        )
-        feet = [float(np.array([-n[1], n[0]]) @ (point - place)) for n in normals]
-        for wall, foot in zip((first, second), feet, strict=True):
-            wall.span_count, wall.spans[0].low, wall.spans[0].high = 1, foot + 0.3, foot + 2.0
-        is_corner, *found = wall_corners.crossing(first, second)
-        assert is_corner == (math.sin(turn) > 0.4)
-        if is_corner:
-            assert found == pytest.approx(point, abs=1e-9)
-            # The first wall leaves the point along its tangent: before the second wall, or behind it.
-            tangent = np.array([-normals[0][1], normals[0][0]])
-            assert wall_corners.is_edge(first, second, *found) == (normals[1] @ tangent > 0.0)
-        second.spans[0].low = feet[1] - 1.0
-        assert not wall_corners.crossing(first, second)[0]
 
 
 def test_a_corner_keeps_its_echoes_while_its_walls_last() -> None:
@@ -88,7 +57,7 @@ def test_the_place_of_a_corner_is_the_weighted_mean_of_its_lines_and_echoes(exam
         levels: list[float] = []
         weights: list[float] = []
         for wall, normal in ((room.walls[0], (1.0, 0.0)), (room.walls[1], (0.0, 1.0))):
-            u = wall_corners.position_along(wall, 2.0, 2.0)
+            u = position_along(wall, 2.0, 2.0)
             rows.append(normal)
             levels.append(2.0)
             variance = wall.variance_offset + 2.0 * u * wall.covariance + u * u * wall.variance_slope

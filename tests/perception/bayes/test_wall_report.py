@@ -33,6 +33,23 @@ def test_spans_are_segments_and_reach_a_corner_that_is_heard() -> None:
     assert wall_ends(memory)[1] == pytest.approx([2, 0, 2, 1.5], abs=0.05)
 
 
+def test_the_mouth_of_a_dead_end_in_a_long_wall_has_two_edges() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    for low, high in ((-3.0, -1.06), (1.06, 2.5)):  # one wall on both sides of the mouth
+        fill(memory, room.walls[0], low, high)
+    for k, side in ((1, 1.0), (2, -1.0)):
+        place_wall(room.walls[k], np.array([3.5, 0.0]), side * math.pi / 2, 1.0)
+        fill(memory, room.walls[k], *sorted((side * -1.4, side * 1.44)))
+    find_corners(memory.s)
+    for corner in room.corners:
+        corner.echoes = 6.0 * corner.is_used
+    points = [corner_object(point.item()) for point in room_report(memory)[1]]
+    assert [seen.model for seen in points] == ["edge", "edge"]
+    assert sorted(seen.y for seen in points) == pytest.approx([-1.0, 1.0], abs=0.01)
+    assert [seen.x for seen in points] == pytest.approx([2.0, 2.0], abs=0.01)
+
+
 def test_walls_that_end_near_each_other_meet_in_a_corner_that_no_range_passed() -> None:
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
@@ -58,9 +75,9 @@ def test_short_light_and_bent_lines_are_no_walls() -> None:
     free(wall)
     place_wall(wall, np.zeros(2), 0.0, 2.0)
     fill(memory, wall, -0.6, 0.6)
-    wall.misfit = 4.0
+    wall.misfit = 2.6
     assert len(wall_ends(memory)) == 0
-    wall.misfit = 2.5
+    wall.misfit = 2.4
     assert len(wall_ends(memory)) == 1
     wall.weight = 19.0
     assert len(wall_ends(memory)) == 0, "a barrel's side"
@@ -137,7 +154,11 @@ def test_between_mirrors_a_corner_or_an_edge_that_is_heard_often_is_reported_wha
     assert len(room_report(memory)[1]) == 0, "too many ranges went on"
     corner.passes, room.edge_echoes = 0.0, 100.0
     assert len(room_report(memory)[1]) == 0, "where everything answers, edges are heard from afar, too"
-    room.edge_echoes, corner.echoes = 0.0, 0.0
+    corner.is_edge = 1
+    assert [corner_object(point.item()).model for point in room_report(memory)[1]] == ["edge"]
+    corner.passes = 3.0
+    assert len(room_report(memory)[1]) == 0, "some of so few may be a wall's"
+    room.edge_echoes, corner.echoes, corner.is_edge = 0.0, 0.0, 0
     corner.far_echoes = 0.0
     edge = room.edges[20]
     edge.is_used, edge.is_edge, edge.first, edge.echoes = 1, 1, 15, 9.0
