@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 from behaviors.response import Response
@@ -18,7 +19,15 @@ CANCELLED: Final = 1e-9
 """A sum shorter than this share of its terms' lengths is what rounding leaves of pushes that cancel."""
 
 
-def repulsion(gap_m: float, config: AvoidStaticObstacleConfig) -> float:
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """Where obstacles push: nearer than `sphere_m` to the rim, and without bound nearer than `margin_m`, m."""
+
+    sphere_m: float
+    margin_m: float
+
+
+def repulsion(gap_m: float, zone: Zone, gain: float) -> float:
     """Return the magnitude of the repulsion from an obstacle.
 
     Arkin, *Motor Schema-Based Mobile Robot Navigation*, IJRR 8(4), 1989: 0 for d > S, (S − d)/(S − R)·G for
@@ -28,17 +37,21 @@ def repulsion(gap_m: float, config: AvoidStaticObstacleConfig) -> float:
     ----------
     gap_m
         d, from the robot's rim to the echo, negative for an echo from inside the rim.
-    config
-        S is `avoid_obstacle_sphere_m`, R `avoid_obstacle_safety_margin_m`, G `avoid_obstacle_gain`.
+    zone
+        S is its `sphere_m`, R its `margin_m`.
+    gain
+        G.
     """
-    sphere, margin = config.avoid_obstacle_sphere_m, config.avoid_obstacle_safety_margin_m
+    sphere, margin = zone.sphere_m, zone.margin_m
     # Comparisons with NaN are false, so a NaN distance stays NaN and reaches the arbiter, which stops for it.
     if gap_m > sphere:
         return 0.0
-    return config.avoid_obstacle_gain * (UNBOUNDED if gap_m <= margin else (sphere - gap_m) / (sphere - margin))
+    return gain * (UNBOUNDED if gap_m <= margin else (sphere - gap_m) / (sphere - margin))
 
 
-def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidStaticObstacleConfig) -> Response:
+def avoid_static_obstacle(
+    percept: Percept, body_radius_m: float, config: AvoidStaticObstacleConfig, zone: Zone | None = None
+) -> Response:
     """Return the sum of all repulsions, each directly away from its echo.
 
     With ``summing="largest"`` the sum keeps its direction, and its magnitude is limited to the largest single
@@ -52,12 +65,16 @@ def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidS
         Distances are measured from the rim, this far from the pose, m.
     config
         The schema's settings.
+    zone
+        In place of that of the settings, beside a schema that keeps another distance.
     """
+    if zone is None:
+        zone = Zone(config.avoid_obstacle_sphere_m, config.avoid_obstacle_safety_margin_m)
     pose, pushes = percept.pose, list[tuple[float, float]]()
     for x, y in percept.obstacles.tolist():  # two dozen: numpy's calls would take longer
         dx, dy = pose.x - x, pose.y - y
         distance = math.hypot(dx, dy)
-        push = repulsion(distance - body_radius_m, config)
+        push = repulsion(distance - body_radius_m, zone, config.avoid_obstacle_gain)
         if push == 0.0 and distance < math.inf:  # one at infinity has none, and must not go unnoticed
             continue
         if distance == 0.0:

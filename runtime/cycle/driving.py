@@ -21,7 +21,6 @@ from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response, summed
 from behaviors.schema_call import ODOM_FRAME, Scene
-from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
 from behaviors.turn import is_aligned
 from config.mission import StepConfig
@@ -94,22 +93,21 @@ def drive(
     trail : Trail
         Of the cycle before.
     """
-    away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     match drive_request:
         case Teleoperate():
-            return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings, away)
+            return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings)
         case Goal():
-            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away, trail, map_frame)
+            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame)
         case Mission():
             return _on_mission(drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s)
         case _:
-            return _along_legs(drive_request, run_s, leg, percept, settings, away, trail)
+            return _along_legs(drive_request, run_s, leg, percept, settings, trail)
 
 
 def _teleoperate(
-    drive_request: Teleoperate, age_s: float, leg: Leg, percept: Percept, settings: Settings, away: Response
+    drive_request: Teleoperate, age_s: float, leg: Leg, percept: Percept, settings: Settings
 ) -> DriveResult:
-    """Return what an operator's velocity leads to; `away` is avoid-static-obstacle's response."""
+    """Return what an operator's velocity leads to."""
     behaviors, body = settings.behaviors, settings.body
     # The last cycle before the deadline stops: the next one would come after it.
     if drive_request != TELEOPERATION_ENDED and is_expired(
@@ -117,8 +115,10 @@ def _teleoperate(
     ):
         drive_request = TELEOPERATION_ENDED
     steer = teleoperation(percept, drive_request, behaviors.arbiter.base_velocity_m_s)
-    avoids = behaviors.teleoperation.avoid
-    responses, expected = ((steer, away), (TELEOPERATION, AVOID)) if avoids else ((steer,), (TELEOPERATION,))
+    responses: tuple[Response, ...] = (steer,)
+    if behaviors.teleoperation.avoid:
+        responses = (steer, avoid_static_obstacle(percept, body.radius_m, behaviors.avoid_static_obstacle))
+    expected = tuple(response.schema for response in responses)
     requested = Twist(drive_request.v, drive_request.w)
     decision = limit_velocity(requested, responses, percept, body, behaviors.arbiter, expected)
     hold_reason = NO_CONTROL if drive_request == TELEOPERATION_ENDED else None
@@ -131,7 +131,7 @@ def _teleoperate(
 
 def _to_goal(
     drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
-    percept: Percept, settings: Settings, away: Response, trail: Trail, map_frame: Pose | None,
+    percept: Percept, settings: Settings, trail: Trail, map_frame: Pose | None,
 ) -> DriveResult:  # fmt: skip
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
     if place is None and not drive_request.reached:
@@ -140,7 +140,7 @@ def _to_goal(
     way_rad = math.atan2(there.y - percept.pose.y, there.x - percept.pose.x)
     others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
     there, goal_drive, responses, decision, hold_reason = drive_to_goal(
-        there, goal_drive, percept, run_s, (away, *others), settings
+        there, goal_drive, percept, run_s, others, settings
     )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
@@ -180,9 +180,8 @@ def _turn_to(
 
 
 def _along_legs(
-    drive_request: DriveRequest, run_s: float, leg: Leg, percept: Percept, settings: Settings, away: Response,
-    trail: Trail,
-) -> DriveResult:  # fmt: skip
+    drive_request: DriveRequest, run_s: float, leg: Leg, percept: Percept, settings: Settings, trail: Trail
+) -> DriveResult:
     """Return what the configured legs lead to."""
     ahead, leg = move_ahead(percept, leg, settings.behaviors.move_ahead)
     others: tuple[Response, ...] = ()
@@ -190,6 +189,7 @@ def _along_legs(
         way_rad = math.radians(settings.behaviors.move_ahead.move_ahead_direction_deg)
         way_rad += 0.0 if leg.outbound else math.pi
         others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
+    away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     responses = (ahead, away, *others)
     expected = (AHEAD, AVOID, *(response.schema for response in others))
     decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
@@ -217,12 +217,11 @@ def _on_mission(
     mission, step = asked.mission, asked.mission.step
     settings = _of_step(step, settings)
     others = percept if asked.own_echoes is None else replace(percept, obstacles=percept.obstacles[~asked.own_echoes])
-    away = avoid_static_obstacle(others, body.radius_m, settings.behaviors.avoid_static_obstacle)
     hold_reason = None
     if asked.goal is not None:
         beside = (r for r in (*asked.leads, *asked.helpers) if r.schema not in {TO_GOAL, VALLEY, CANYON})
         _, goal_drive, responses, decision, hold_reason = drive_to_goal(
-            asked.goal, goal_drive, percept, run_s, (away, *beside), settings
+            asked.goal, goal_drive, percept, run_s, tuple(beside), settings
         )
         if goal_drive.progress.fault is not None:
             mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")
@@ -234,6 +233,7 @@ def _on_mission(
             Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, run_s, tuple(beside), settings
         )
     else:
+        away = avoid_static_obstacle(others, body.radius_m, settings.behaviors.avoid_static_obstacle)
         responses = (*asked.leads, *asked.helpers, away)
         decision = arbitrate(responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID))
     if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate
-from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.avoid_static_obstacle import Zone, avoid_static_obstacle
 from behaviors.follow_valley import Valley, follow_valley
 from behaviors.goal_progress import Progress, observe_progress
 from behaviors.leave_canyon import NO_DETOUR, Detour, leave_canyon
@@ -45,7 +45,7 @@ class GoalDrive:
 
 
 def drive_to_goal(
-    goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, pushes: tuple[Response, ...],
+    goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, beside: tuple[Response, ...],
     settings: Settings,
 ) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
     """Return the goal and the drive for the next cycle, the responses, the decision, and why the robot holds.
@@ -60,8 +60,8 @@ def drive_to_goal(
         What the robot sees.
     run_s : float
         Now, by the run's clock, s.
-    pushes : tuple of Response
-        Of avoid-static-obstacle and of schemas beside it.
+    beside : tuple of Response
+        Of schemas beside avoid-static-obstacle.
     settings : Settings
         The run's.
     """
@@ -69,7 +69,7 @@ def drive_to_goal(
     distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
     now = GoalDrive(Progress.starting_at(percept.pose, distance_m, run_s)) if before is None else before
     response, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
-    around, hold_reason = None, None
+    around, hold_reason, room_m = None, None, None
     if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:
         has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
         around, detour = leave_canyon(
@@ -82,7 +82,7 @@ def drive_to_goal(
         now = replace(now, valley=replace(now.valley, direction_rad=direction_rad))
         driven_rad = held(percept.pose.theta, direction_rad)
         response = Response(around.schema, length * math.cos(driven_rad), length * math.sin(driven_rad))
-        pushes = (_underneath(percept, behaviors.leave_canyon.room_m, settings), *pushes[1:])
+        room_m = behaviors.leave_canyon.room_m
         if now.detour.rounds < ROUNDS_MAX:
             now = replace(now, progress=replace(now.progress, nearer_run_s=run_s))
     elif behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
@@ -92,8 +92,8 @@ def drive_to_goal(
         )
         now = replace(now, valley=valley)
         hold_reason = NO_VALLEY if valley.direction_rad is None else None
-        pushes = (_underneath(percept, behaviors.follow_valley.safety_m, settings), *pushes[1:])
-    responses = (response, *pushes)
+        room_m = behaviors.follow_valley.safety_m
+    responses = (response, _pushes(percept, room_m, settings), *beside)
     decision = _arbitrate(responses, percept, settings)
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
@@ -126,7 +126,7 @@ def drive_through_valley(
     now = GoalDrive(Progress.starting_at(percept.pose, 0.0, run_s)) if before is None else before
     config, radius_m = settings.behaviors.follow_valley, settings.body.radius_m
     response, valley = follow_valley(percept, way, distance_m, now.valley, Search(), radius_m, config)
-    responses = (response, _underneath(percept, config.safety_m, settings), *beside)
+    responses = (response, _pushes(percept, config.safety_m, settings), *beside)
     expected = tuple(r.schema for r in responses)
     decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
     is_closed = valley.direction_rad is None and math.hypot(way.x, way.y) > 0.0
@@ -135,10 +135,9 @@ def drive_through_valley(
 
 def _arbitrate(responses: tuple[Response, ...], percept: Percept, settings: Settings) -> Decision:
     """Return the arbiter's decision for a robot that turns no faster than it should on its way."""
-    body, behaviors = settings.body, settings.behaviors
-    rate_rad_s = min(body.turn_max_rad_s, behaviors.move_to_goal.turn_rate_max_rad_s)
-    gentle = body.model_copy(update={"turn_max_rad_s": rate_rad_s})
-    return arbitrate(responses, percept, gentle, behaviors.arbiter, tuple(r.schema for r in responses))
+    behaviors, expected = settings.behaviors, tuple(r.schema for r in responses)
+    rate_rad_s = behaviors.move_to_goal.turn_rate_max_rad_s
+    return arbitrate(responses, percept, settings.body, behaviors.arbiter, expected, rate_rad_s)
 
 
 def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
@@ -147,16 +146,15 @@ def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
     return bool((cells_near(percept, goal.x, goal.y, body.radius_m, config).certainties == 1.0).any())
 
 
-def _underneath(percept: Percept, room_m: float, settings: Settings) -> Response:
-    """Return avoid-static-obstacle's response beside a schema that keeps `room_m` between rim and obstacle itself.
+def _pushes(percept: Percept, room_m: float | None, settings: Settings) -> Response:
+    """Return avoid-static-obstacle's response, by itself or beside a schema that keeps `room_m` itself.
 
-    It pushes the robot out of that room, and out of the arbiter's clearance without bound.
+    Beside one, it pushes the robot out of that room, and out of the arbiter's clearance without bound.
     """
-    margin_m = settings.behaviors.arbiter.clearance_m
-    config = settings.behaviors.avoid_static_obstacle.model_copy(update={
-        "avoid_obstacle_sphere_m": max(room_m, margin_m + FAINT_M), "avoid_obstacle_safety_margin_m": margin_m,
-    })  # fmt: skip
-    return avoid_static_obstacle(percept, settings.body.radius_m, config)
+    zone, margin_m = None, settings.behaviors.arbiter.clearance_m
+    if room_m is not None:
+        zone = Zone(max(room_m, margin_m + FAINT_M), margin_m)
+    return avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle, zone)
 
 
 def _with_search(now: GoalDrive, goal: Goal, percept: Percept, run_s: float, settings: Settings) -> GoalDrive:

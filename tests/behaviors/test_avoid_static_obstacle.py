@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from behaviors.avoid_static_obstacle import SCHEMA, UNBOUNDED, avoid_static_obstacle, repulsion
+from behaviors.avoid_static_obstacle import SCHEMA, UNBOUNDED, Zone, avoid_static_obstacle, repulsion
 from config.behaviors import AvoidStaticObstacleConfig
 from perception.percept import Percept, Pose
 from tests.behaviors.views import EVERYWHERE
@@ -69,7 +69,7 @@ def test_inside_the_margin_it_outweighs_every_other_schema(gap: float, config: A
 
 
 def test_at_the_margin_itself() -> None:
-    assert repulsion(SUM.avoid_obstacle_safety_margin_m, SUM) == 2.0 * UNBOUNDED
+    assert repulsion(0.2, Zone(1.0, 0.2), 2.0) == 2.0 * UNBOUNDED
 
 
 def test_a_gain_of_zero_turns_it_off() -> None:

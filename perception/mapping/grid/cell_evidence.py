@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.kernel import kernel
+from perception.kernel import Floats, kernel
 from perception.mapping.grid.window import OCTANTS
 
 UNDIRECTED: Final = OCTANTS
@@ -31,6 +31,8 @@ CERTAIN: Final = 3 * NAT
 """Greatest evidence for and against, so that contradiction is soon seen."""
 NOWHERE: Final = 0
 """The place of evidence that was never renewed; no place has this number."""
+SURE: Final = NAT // 2
+"""A cell of so much evidence answers."""
 FADING_PLACES: Final = 50
 """Evidence loses one unit for each so many places: 1 nat on 5 km of way, on which odometry has drifted through the
 window; the faint evidence of one echo is gone after a few hundred metres."""
@@ -65,23 +67,29 @@ def renew(kept: Cells, place: int) -> None:
 
 
 @kernel
-def base_elsewhere(cell: Cells, own: int, place: int) -> int:
-    """Return the greatest evidence of a cell in any looking direction but one, without this place's readings."""
+def is_sure_elsewhere(cell: Cells, own: int, place: int) -> bool:
+    """Return whether a cell is `SURE` in any looking direction but one, without this place's readings."""
     most = 0
     for k in range(OCTANTS):
+        most = max(most, int(cell[k, BASE]) + int(cell[k, HIT]))
+    if most < SURE:  # as almost everywhere; what was passed and what has faded only lessens it
+        return False
+    for k in range(OCTANTS):
         kept = cell[k]
-        if k != own and kept[STAMP] != NOWHERE:
-            value = int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)
-            most = max(most, value)
-    return most
+        if k != own and (int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)) >= SURE:
+            return True
+    return False
 
 
 @kernel
-def prior(kept: Cells) -> float:
-    """Return how much of an echo a cell draws: the square of its probability, this place's hits left out."""
-    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
-    probability = 1.0 / (1.0 + math.exp(-value / NAT))
-    return probability * probability
+def without_hits(kept: Cells) -> int:
+    """Return the evidence of a cell in one direction, this place's hits left out."""
+    return min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
+
+
+def make_draws() -> Floats:
+    """Return how much of an echo a cell draws by its evidence, from −`CERTAIN`: the square of its probability."""
+    return np.array([(1.0 / (1.0 + math.exp(-value / NAT))) ** 2 for value in range(-CERTAIN, CERTAIN + 1)])
 
 
 @kernel

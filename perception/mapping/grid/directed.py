@@ -35,11 +35,12 @@ from perception.mapping.grid.cell_evidence import (
     STAMP,
     UNDIRECTED,
     Cells,
-    base_elsewhere,
     evidence_now,
     hit_nat,
-    prior,
+    is_sure_elsewhere,
+    make_draws,
     renew,
+    without_hits,
 )
 from perception.mapping.grid.window import OCTANTS, Ring, Window, octant, row_of_beam, set_edges
 from perception.sensor_mounts import mounts_at
@@ -69,7 +70,6 @@ UNDIRECTED_UNIT: Final = 2.0
 """The same for the undirected evidence, in which the passages of all directions count."""
 FAINT: Final = int(0.1 * NAT)
 """Directed evidence up to this is as good as none: any cell of a single echo's arc has it."""
-SURE: Final = NAT // 2
 MIDDLE: Final = 0.75
 """A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
 BEYOND_M: Final = 0.3
@@ -88,7 +88,7 @@ MIRROR_SHARE: Final = 0.5
 def enter_readings(
     cells: Cells, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float, ranges: Floats,
     mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float, mirrors: float,
-    answers: Floats, arc: Ints, shares: Floats, edges: Floats,
+    answers: Floats, arc: Ints, shares: Floats, draws: Floats, edges: Floats,
 ) -> None:  # fmt: skip
     """Enter the readings of a firing: first what they passed, then their hits, so that their order does not matter.
 
@@ -122,8 +122,10 @@ def enter_readings(
         How often a cell that was heard from other directions answered, and how often not. Updated.
     arc : (k, 4) int
         Scratch: the cells of all arcs, their looking directions, and the sensors.
-    shares : (k,) float
-        Scratch: the share of its echo that each of these would have by itself.
+    shares : (k, 2) float
+        Scratch: the share of its echo that each draws, in a looking direction and in the undirected evidence.
+    draws : (2 CERTAIN + 1,) float
+        How much a cell draws by its evidence, from −`CERTAIN`; see `make_draws`.
     edges : (4,) float
         Scratch.
     """
@@ -177,9 +179,9 @@ def enter_readings(
                     arc[m, 1] = ix & mask
                     arc[m, 2] = k if abs(d - r) <= ARC_SIGMAS * sigma else UNDIRECTED
                     arc[m, 3] = i
-                    shares[m] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
+                    shares[m, 0] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
                     m += 1
-                if d < nearest and inside >= MIDDLE and base_elsewhere(cell, k, place) >= SURE:
+                if d < nearest and inside >= MIDDLE and is_sure_elsewhere(cell, k, place):
                     nearest = d
                 if d < passed:
                     own = cell[k]
@@ -198,23 +200,23 @@ def enter_readings(
                 arc[m, 1] = ix & mask
                 arc[m, 2] = octant(px, py)
                 arc[m, 3] = i
-                shares[m] = 1.0
+                shares[m, 0] = 1.0
                 m += 1
         if nearest < math.inf:
             if is_echo and abs(r - nearest) <= 2.0 * sigma + cell_m:
                 answers[0] += 1.0
             elif nearest < passed - BEYOND_M:
                 answers[1] += 1.0
-    enter_hits(cells, place, UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares)
+    enter_hits(cells, place, UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
 
 
 @kernel
-def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats) -> None:
+def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats, draws: Floats) -> None:
     """Share each echo over its arc.
 
     Parameters
     ----------
-    cells, place, shares
+    cells, place, shares, draws
         As of `enter_readings`.
     unit : float
         The unit of evidence in a looking direction.
@@ -228,21 +230,24 @@ def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats)
         total_both = 0.0
         while last < len(arc) and arc[last, 3] == arc[first, 3]:
             cell = cells[arc[last, 0], arc[last, 1]]
+            share = shares[last, 0]
             own = cell[arc[last, 2]]
             renew(own, place)
             both = cell[UNDIRECTED]
             renew(both, place)
+            shares[last, 0] = share * draws[CERTAIN + without_hits(own)]
+            shares[last, 1] = share * draws[CERTAIN + without_hits(both)]
             if arc[last, 2] != UNDIRECTED:
-                total += shares[last] * prior(own)
-            total_both += shares[last] * prior(both)
+                total += shares[last, 0]
+            total_both += shares[last, 1]
             last += 1
         for n in range(first, last):
             cell = cells[arc[n, 0], arc[n, 1]]
             if arc[n, 2] != UNDIRECTED:
                 own = cell[arc[n, 2]]
-                own[HIT] = max(int(own[HIT]), hit_nat(unit * shares[n] * prior(own) / total))
+                own[HIT] = max(int(own[HIT]), hit_nat(unit * shares[n, 0] / total))
             both = cell[UNDIRECTED]
-            both[HIT] = max(int(both[HIT]), hit_nat(UNDIRECTED_UNIT * shares[n] * prior(both) / total_both))
+            both[HIT] = max(int(both[HIT]), hit_nat(UNDIRECTED_UNIT * shares[n, 1] / total_both))
         first = last
 
 
@@ -303,7 +308,7 @@ class DirectedGrid:
         The sensors.
     """
 
-    SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_arc", "_shares", "_edges", "_odds")
+    SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds")
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
@@ -315,7 +320,8 @@ class DirectedGrid:
         self._place = 0
         room = len(ring.mounts) * arc_cells_max(window, ring)
         self._arc = np.zeros((room, 4), np.int64)
-        self._shares = np.zeros(room)
+        self._shares = np.zeros((room, 2))
+        self._draws = make_draws()
         self._edges = np.zeros(4)
         evidence = np.arange(-CERTAIN, CERTAIN + 1) / NAT
         self._odds = (1.0 / (1.0 + np.exp(-evidence))).astype(np.float32)
@@ -336,7 +342,8 @@ class DirectedGrid:
         enter_readings(
             self.cells, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
             float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings, self._half_angle,
-            self._rounding_m, silence_m, self.mirrors, self._answers, self._arc, self._shares, self._edges,
+            self._rounding_m, silence_m, self.mirrors, self._answers, self._arc, self._shares, self._draws,
+            self._edges,
         )  # fmt: skip
         if self._answers.sum() > ANSWERS_MAX:
             self._answers *= 0.5

@@ -18,11 +18,13 @@ from perception.mapping.grid.cell_evidence import (
     NAT,
     PLACES,
     STAMP,
-    base_elsewhere,
+    SURE,
     evidence_now,
     hit_nat,
-    prior,
+    is_sure_elsewhere,
+    make_draws,
     renew,
+    without_hits,
 )
 
 
@@ -47,15 +49,30 @@ def test_a_new_place_keeps_what_was_found_and_the_same_place_changes_nothing() -
     assert (cell[BASE], cell[HIT], cell[FREE], cell[STAMP]) == (350 - 2, 0, 0, 107)
 
 
-def test_evidence_from_other_directions_leaves_out_the_own_and_this_place() -> None:
-    cell = np.stack([kept(10 * k, 1000, 0, 3) for k in range(9)])
-    assert base_elsewhere(cell, 2, 3) == 70
-    assert base_elsewhere(cell, 7, 3) == 60
-    assert base_elsewhere(cell, 7, 4) == 1060
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cell_is_sure_elsewhere_by_its_other_directions_without_this_place(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    found = set()
+    for _ in range(200):
+        place, base, hit = int(rng.integers(1, 900)), rng.integers(-SURE, SURE, 9), rng.integers(0, SURE, 9)
+        stamps = np.where(rng.random(9) < 0.5, place, rng.integers(1, place + 1, 9))
+        cell = np.column_stack([base, hit, rng.integers(-SURE, 1, 9), stamps]).astype(np.int16)
+        own = int(rng.integers(0, 8))
+        most = max(
+            int(cell[k, BASE]) if cell[k, STAMP] == place else evidence_now(cell[k], place)
+            for k in range(8)
+            if k != own
+        )
+        found.add(is_sure_elsewhere(cell, own, place))
+        assert is_sure_elsewhere(cell, own, place) == (most >= SURE)
+    assert found == {False, True}
 
 
 def test_an_echo_is_drawn_by_what_is_probable() -> None:
-    assert prior(kept(0)) == pytest.approx(0.25)
-    assert prior(kept(NAT, 3000, 0)) == pytest.approx((1.0 / (1.0 + math.exp(-1.0))) ** 2)
+    draws = make_draws()
+    assert draws[CERTAIN + without_hits(kept(0))] == pytest.approx(0.25)
+    assert draws[CERTAIN + without_hits(kept(NAT, 3000, 0))] == pytest.approx((1.0 / (1.0 + math.exp(-1.0))) ** 2)
+    assert without_hits(kept(CERTAIN, 0, 0)) == len(draws) - 1 - CERTAIN
+    assert without_hits(kept(-CERTAIN, 0, -7)) == -CERTAIN
     assert hit_nat(0.0) == 0
     assert hit_nat(7.0) == hit_nat(1.0) == int(NAT * math.log(99.0))
