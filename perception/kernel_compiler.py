@@ -12,12 +12,14 @@ import functools
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
+import numpy as np
 from llvmlite.binding import Linkage
 from numba.core import compiler, event, sigutils, typed_passes, types, typing, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.np.numpy_support import from_struct_dtype, map_layout
 
 Untyped = Any
 """What numba gives no types to."""
@@ -134,6 +136,12 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]
         return key, compiled.signature
 
 
+@functools.cache
+def _record_type(dtype: np.dtype[np.void]) -> Untyped:
+    """Return numba's type of a record; with records in it, that takes numba milliseconds, for each array again."""
+    return from_struct_dtype(dtype)
+
+
 class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
     """Compiles a kernel once for each type of its arguments; numba's own does so for each constant in a call."""
 
@@ -142,6 +150,14 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         self._compiler = _Compiler(function, self.targetdescr, self.targetoptions, self.locals, _Pipeline)
         self._inner: dict[Args, tuple[object, Untyped]] = {}
         self.enable_caching()
+
+    def typeof_pyval(self, val: object) -> Untyped:
+        """Return the type of an argument."""
+        if not isinstance(val, np.ndarray) or val.dtype.fields is None:
+            return super().typeof_pyval(val)
+        kind = types.Array(_record_type(val.dtype), val.ndim, map_layout(val), readonly=not val.flags.writeable)
+        self._types_active_call.add(kind)
+        return kind
 
     def get_call_template(self, args: Iterable[object], kws: Mapping[str, object]) -> Untyped:
         """Return what types a call by another kernel, as numba asks for it."""

@@ -89,3 +89,17 @@ def test_an_error_in_a_kernel_for_kernels_names_it() -> None:
 
     with pytest.raises(numba.NumbaError, match="no_such_attribute"):
         calls_wrong(1.0)
+
+
+@kernel
+def nothing(_records: object) -> int:
+    return 0
+
+
+@pytest.mark.parametrize("change", ["none", "part", "readonly"])
+def test_arrays_of_records_have_numbas_own_types(change: str) -> None:
+    inner = np.dtype([("x", np.float64), ("y", np.float64, (3,))], align=True)
+    array = np.zeros((4, 2), np.dtype([("kind", np.int64), ("inner", inner, (2,))], align=True))
+    array = array[::2] if change == "part" else array
+    array.flags.writeable = change != "readonly"
+    assert cast("Any", nothing).typeof_pyval(array) == numba.typeof(array)
