@@ -135,8 +135,10 @@ $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
 
 # The console's page is tested in Debian's browser.
 $(VENV)/browser.stamp: | $(VENV)/bin/python
-	@command -v chromium >/dev/null || { echo "installing chromium for the tests of the console's page"; \
-		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y chromium"; }
+	@command -v chromium-headless-shell >/dev/null || command -v chromium >/dev/null || { \
+		echo "installing chromium for the tests of the console's page"; \
+		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && \
+			{ apt-get -qq install -y chromium-headless-shell || apt-get -qq install -y chromium; }"; }
 	@touch $@
 
 $(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/browser.stamp
