@@ -2,8 +2,9 @@
 
 Rough surfaces answer from the nearest point in the beam (`cone`), smooth ones from the foot of the perpendicular
 (`specular`). Most rooms have both. A smooth surface that sends no sound straight back is silent, or answers late,
-over a second surface. And a real room has more than its map: a reading may be anything. How often each of
-these is the cause is learned on the way.
+over a second surface. One whose foot is a little beside the beam may answer too, for no beam has a sharp edge, and no
+wall is quite smooth: which beams hold an echo is what the heading is known from. And a real room has more than its
+map: a reading may be anything. How often each of these is the cause is learned on the way.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ WILD_HEARD: Final = 0.9
 """Share of the readings that may be anything which hear something: they are of what the map lacks."""
 LATE_M: Final = 2.0
 """An echo over a second surface is late by up to this."""
-SHARES: Final = (0.5, 0.1, 0.1)
-SHARES_MIN: Final = (0.03, 0.02, 0.05)
-SHARES_MAX: Final = (0.97, 0.5, 0.4)
+SHARES: Final = (0.5, 0.1, 0.1, 0.2)
+SHARES_MIN: Final = (0.03, 0.02, 0.05, 0.02)
+SHARES_MAX: Final = (0.97, 0.5, 0.4, 0.9)
 """Shares at the start, and their bounds, in the order of `Shares`."""
 
 
@@ -35,15 +36,19 @@ class Shares(Record):
     """Share of the smooth surfaces without a straight way back that answer over a second one."""
     wild: float
     """Share of the readings that are anything."""
+    beside: float
+    """Share of the smooth surfaces a little beside the beam that answer."""
 
 
 MEMORY: Final = 300.0
 """Readings over which the shares are learned."""
+MEMORY_BESIDE: Final = 60.0
+"""Readings of smooth surfaces beside the beam over which it is learned how many answer: they are few."""
 
-Causes = tuple[float, float, float, float, float, float]
-"""Probabilities that a reading is the echo that `cone` expects, and the one that `specular` expects (0 for silence);
-that it is of a smooth surface, of one without a straight way back, of such a one that answers over a second surface;
-and that it is anything."""
+Causes = tuple[float, float, float, float, float, float, float, float]
+"""Probabilities that a reading is what `cone` expects, what `specular` expects, and what a smooth surface beside the
+beam sends; that it is of a smooth surface, of one without a straight way back, of such a one that answers over a
+second surface; that it is anything; and that a smooth surface beside the beam could have answered."""
 
 
 class Counted(Protocol):
@@ -53,6 +58,8 @@ class Counted(Protocol):
     turned_away: float
     late: float
     wild: float
+    beside: float
+    could_beside: float
 
 
 class LearnedShares:
@@ -82,9 +89,11 @@ class LearnedShares:
         specular = share.specular + (causes.specular - share.specular * readings) / MEMORY
         late = share.late + (causes.late - share.late * causes.turned_away) / MEMORY
         wild = share.wild + (causes.wild - share.wild * readings) / MEMORY
+        beside = share.beside + (causes.beside - share.beside * causes.could_beside) / MEMORY_BESIDE
         share.specular = min(most[0], max(least[0], specular))
         share.late = min(most[1], max(least[1], late))
         share.wild = min(most[2], max(least[2], wild))
+        share.beside = min(most[3], max(least[3], beside))
 
 
 @kernel
@@ -117,7 +126,7 @@ def echo_density(sensor: Records[SensorModel], measured: float, expected: float,
 @kernel
 def mixed_ratio(
     sensor: Records[SensorModel], measured: float, cone_m: float, cone_variance: float, specular_m: float,
-    specular_variance: float, shares: Records[Shares],
+    specular_variance: float, beside_m: float, beside_variance: float, shares: Records[Shares],
 ) -> tuple[float, Causes]:  # fmt: skip
     """Return how well a reading fits: its log likelihood ratio to a reading from anywhere, nat, and its causes.
 
@@ -129,7 +138,9 @@ def mixed_ratio(
         Range, m; inf for silence.
     cone_m, specular_m : float
         Expected by either model, m; inf for silence, and so is what is beyond the window.
-    cone_variance, specular_variance : float
+    beside_m : float
+        That of a mirror beside the beam, m; inf for none.
+    cone_variance, specular_variance, beside_variance : float
         Of the expected ranges, from the pose's, m².
     shares : (1,) Shares
         How often a reading has which cause.
@@ -138,15 +149,19 @@ def mixed_ratio(
     is_silent = measured == math.inf
     known = 1.0 - share.wild
     wild = share.wild * (1.0 - WILD_HEARD if is_silent else WILD_HEARD / window_m)
-    rough = mirror = away = late = 0.0
+    smooth = share.specular * known
+    rough = mirror = beside = away = late = could_beside = 0.0
     if cone_m <= window_m:
         rough = (1.0 - share.specular) * known * echo_density(sensor, measured, cone_m, cone_variance)
     elif is_silent:
         rough = (1.0 - share.specular) * known
+    if beside_m <= window_m:
+        beside = share.beside * smooth * echo_density(sensor, measured, beside_m, beside_variance)
+        smooth *= 1.0 - share.beside
     if specular_m <= window_m:
-        mirror = share.specular * known * echo_density(sensor, measured, specular_m, specular_variance)
+        mirror = smooth * echo_density(sensor, measured, specular_m, specular_variance)
     else:
-        away = share.specular * known
+        away = smooth
         if is_silent:
             away *= 1.0 - share.late
         elif cone_m < measured <= cone_m + LATE_M:
@@ -154,11 +169,12 @@ def mixed_ratio(
             away = 0.0
         else:
             away = 0.0
-    total = rough + mirror + away + late + wild
+    total = rough + mirror + beside + away + late + wild
+    if beside_m <= window_m:
+        could_beside = (mirror + beside + away + late) / total
     anywhere = 1.0 - HEARD_SHARE if is_silent else HEARD_SHARE / window_m
-    smooth, turned_away = (mirror + away + late) / total, (away + late) / total
     causes = (
-        0.0 if is_silent else rough / total, 0.0 if is_silent else mirror / total, smooth, turned_away, late / total,
-        wild / total,
+        rough / total, mirror / total, beside / total, (mirror + beside + away + late) / total,
+        (away + late) / total, late / total, wild / total, could_beside,
     )  # fmt: skip
     return math.log(total / anywhere), causes

@@ -8,7 +8,7 @@ from typing import Final
 from perception.kernel import Floats, kernel
 from perception.localization.mixed_reflection import Shares, mixed_ratio, range_variance
 from perception.localization.pose_particles import HypothesesRecord, Particle
-from perception.localization.surroundings import Surroundings, expect_cone, expect_specular, look_around
+from perception.localization.surroundings import Expected, Surroundings, expect_cone, expect_specular, look_around
 from perception.records import Records
 
 FIT_STEPS: Final = 2
@@ -33,6 +33,12 @@ def inverse(xx: float, xy: float, xs: float, yy: float, ys: float, ss: float) ->
         a / det, b / det, c / det, (xx * ss - xs * xs) / det, (xy * xs - xx * ys) / det, (xx * yy - xy * xy) / det,
         det,
     )  # fmt: skip
+
+
+@kernel
+def variance_along(xx: float, xy: float, yy: float, expected: Expected) -> float:
+    """Return the variance (m²) of an expected range from that of the place."""
+    return xx * expected[1] * expected[1] + 2.0 * xy * expected[1] * expected[2] + yy * expected[2] * expected[2]
 
 
 @kernel
@@ -63,43 +69,42 @@ def update_particle(
     xs = ys = ss = det_information = p.log_ratio = p.specular = 0.0
     for step in range(FIT_STEPS + 1):
         is_fitted = step == FIT_STEPS
-        ax = ay = axy = bx = by = ratio = specular = turned_away = late = wild = 0.0
+        ax = ay = axy = bx = by = ratio = specular = turned_away = late = wild = beside = could_beside = 0.0
         for k in range(count):
             mx, my, c, sn, measured = readings[k]
             at_x, at_y = x + cos * mx - sin * my, y + sin * mx + cos * my
             ux, uy = cos * c - sin * sn, sin * c + cos * sn
-            cone_m, cone_x, cone_y = expect_cone(s, at_x, at_y, ux, uy)
-            specular_m, specular_x, specular_y = expect_specular(s, at_x, at_y, ux, uy)
-            cone_var = specular_var = 0.0
+            cone = expect_cone(s, at_x, at_y, ux, uy)
+            mirrors = expect_specular(s, at_x, at_y, ux, uy, s.sensor[0].cos_fringe)
+            expected = (cone, mirrors[0], mirrors[1])
+            cone_var = specular_var = beside_var = 0.0
             if not is_fitted:
-                cone_var = xx * cone_x * cone_x + 2.0 * xy * cone_x * cone_y + yy * cone_y * cone_y
-                specular_var = xx * specular_x * specular_x + yy * specular_y * specular_y
-                specular_var += 2.0 * xy * specular_x * specular_y
-            log_ratio, causes = mixed_ratio(s.sensor, measured, cone_m, cone_var, specular_m, specular_var, shares)
-            fits_cone, fits_specular = causes[0], causes[1]
+                cone_var = variance_along(xx, xy, yy, cone)
+                specular_var = variance_along(xx, xy, yy, mirrors[0])
+                beside_var = variance_along(xx, xy, yy, mirrors[1])
+            log_ratio, causes = mixed_ratio(
+                s.sensor, measured, cone[0], cone_var, mirrors[0][0], specular_var, mirrors[1][0], beside_var, shares
+            )
             ratio += log_ratio
-            specular += causes[2]
-            turned_away += causes[3]
-            late += causes[4]
-            wild += causes[5]
-            if fits_cone > 0.0:
-                weight = fits_cone / range_variance(s.sensor, cone_m)
-                error = weight * (measured - cone_m)
-                ax += weight * cone_x * cone_x
-                axy += weight * cone_x * cone_y
-                ay += weight * cone_y * cone_y
-                bx += error * cone_x
-                by += error * cone_y
-            if fits_specular > 0.0:
-                weight = fits_specular / range_variance(s.sensor, specular_m)
-                error = weight * (measured - specular_m)
-                ax += weight * specular_x * specular_x
-                axy += weight * specular_x * specular_y
-                ay += weight * specular_y * specular_y
-                bx += error * specular_x
-                by += error * specular_y
+            specular += causes[3]
+            turned_away += causes[4]
+            late += causes[5]
+            wild += causes[6]
+            beside += causes[2]
+            could_beside += causes[7]
+            for cause in range(3):
+                if measured < math.inf and causes[cause] > 0.0:
+                    range_m, grad_x, grad_y = expected[cause]
+                    weight = causes[cause] / range_variance(s.sensor, range_m)
+                    error = weight * (measured - range_m)
+                    ax += weight * grad_x * grad_x
+                    axy += weight * grad_x * grad_y
+                    ay += weight * grad_y * grad_y
+                    bx += error * grad_x
+                    by += error * grad_y
         if is_fitted:
             p.log_ratio, p.specular, p.turned_away, p.late, p.wild = ratio, specular, turned_away, late, wild
+            p.beside, p.could_beside = beside, could_beside
         else:
             dx, dy, ds = p.x - x, p.y - y, p.scale - scale
             bx += lxx * dx + lxy * dy + lxs * ds

@@ -90,7 +90,7 @@ def fill_cell(
     for d in range(DIRECTIONS):
         cos, sin = math.cos(STEP_RAD * d), math.sin(STEP_RAD * d)
         cone_m, _, _ = expect_cone(s, x, y, cos, sin)
-        specular_m, _, _ = expect_specular(s, x, y, cos, sin)
+        (specular_m, _, _), _ = expect_specular(s, x, y, cos, sin, s.sensor[0].cos_half)
         table[0, d, i, j] = int(cone_m * (254.0 / window_m) + 0.5) if cone_m <= window_m else SILENT
         table[1, d, i, j] = int(specular_m * (254.0 / window_m) + 0.5) if specular_m <= window_m else SILENT
 
@@ -221,7 +221,7 @@ class PoseGrid:
         self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
         self._readings = np.zeros((READINGS_MAX, 5))
         self._count = self._searches = 0
-        self._shares = np.array(SHARES)
+        self._shares = np.array(SHARES[:3])
         self._quantum = NONE
         """Of the search; `NONE` without one."""
         self._likely = np.zeros((READINGS_MAX, 3, SILENT + 1))

@@ -62,6 +62,8 @@ class Particle(Record):
     turned_away: float
     late: float
     wild: float
+    beside: float
+    could_beside: float
     """Causes of the readings of the last update, as in `perception.localization.mixed_reflection`, summed."""
 
 
@@ -93,6 +95,8 @@ class Best(Record):
     turned_away: float
     late: float
     wild: float
+    beside: float
+    could_beside: float
     """Mean over its particles of their fields of the same name."""
 
 
@@ -144,7 +148,7 @@ def add_hypothesis(
         p.xx, p.xy, p.xs = place_sigma_m * place_sigma_m, 0.0, 0.0
         p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, SCALE_SIGMA * SCALE_SIGMA
         p.log_weight, p.log_ratio = -math.log(HEADINGS), 0.0
-        p.specular = p.turned_away = p.late = p.wild = 0.0
+        p.specular = p.turned_away = p.late = p.wild = p.beside = p.could_beside = 0.0
     of[0].count = count + 1
 
 
@@ -224,6 +228,7 @@ def copy_particle(source: Records[Particle], i: int, target: Records[Particle], 
     q.xx, q.xy, q.xs, q.yy, q.ys, q.ss = p.xx, p.xy, p.xs, p.yy, p.ys, p.ss
     q.log_weight, q.log_ratio = p.log_weight, p.log_ratio
     q.specular, q.turned_away, q.late, q.wild = p.specular, p.turned_away, p.late, p.wild
+    q.beside, q.could_beside = p.beside, p.could_beside
 
 
 @kernel
@@ -243,7 +248,7 @@ def keep_marked(of: HypothesesRecord, scratch: Records[ParticleScratch]) -> None
         for i in range(HEADINGS):
             p = found[h].particles[i]
             p.heading = p.x = p.y = p.scale = p.log_weight = p.log_ratio = 0.0
-            p.specular = p.turned_away = p.late = p.wild = 0.0
+            p.specular = p.turned_away = p.late = p.wild = p.beside = p.could_beside = 0.0
             p.xx = p.xy = p.xs = p.yy = p.ys = p.ss = 0.0
     of[0].count = count
 
@@ -314,6 +319,7 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
     h, best = summarise(of, scratch), of[0].best
     normalise(of, h, scratch)
     best.log_ratio = best.specular = best.turned_away = best.late = best.wild = 0.0
+    best.beside = best.could_beside = 0.0
     for i in range(HEADINGS):
         p, weight = of[0].hypotheses[h].particles[i], scratch[0].weights[i]
         best.log_ratio += weight * p.log_ratio
@@ -321,6 +327,8 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
         best.turned_away += weight * p.turned_away
         best.late += weight * p.late
         best.wild += weight * p.wild
+        best.beside += weight * p.beside
+        best.could_beside += weight * p.could_beside
     prune(of, least_log, most, scratch)
     resample(of, scratch)
     h, total = summarise(of, scratch), 0.0

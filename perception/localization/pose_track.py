@@ -37,10 +37,12 @@ a search enter its keyframes, over the first of which a wrong place may fit far 
 EVIDENCE_MIN: Final = 20.0
 EVIDENCE_MAX: Final = 7.0
 """Most evidence against and for a place that is remembered, nat: what is heard later must not drown in a long way."""
-ALIKE_GAIN: Final = 1.4
+ALIKE_GAIN: Final = (2.3, 1.4)
 """Gain of evidence per echo, nat, that speaks neither for the right place nor for one in a map of another room that
-is alike. At the right place it is 3.5 to 4.2 in furnished rooms, and in a real building 3.0, or 1.9 where its walls
-are mirrors; with the map of another room it is 1.1 at most."""
+is alike: where nothing is a mirror, and from a share of mirrors of `MIRRORS` on. At the right place it is 3.1 to 4.3
+in furnished rooms, and in real buildings 2.6 to 3.0, or 1.4 to 1.9 where their walls are mirrors. With the map of
+another room it is 1.1 at most, but 1.7 in one of twenty rooms where nothing is a mirror."""
+MIRRORS: Final = 0.4
 ALIKE_WEIGHT: Final = 0.15
 """Weight of what an echo gains beyond that: such gains scatter by more than the two differ."""
 INDEPENDENT_M: Final = 0.5
@@ -223,7 +225,8 @@ class PoseTrack:
         share = min(1.0, way_m / INDEPENDENT_M) if self._is_weighed else 1.0
         weight, heard = TEMPER * share, float(np.isfinite(ranges_m).sum())
         gain = self.best.log_ratio - self._background.log_ratio(ranges_m, shares)
-        alike = ALIKE_WEIGHT * (gain - ALIKE_GAIN * heard)
+        line = float(np.interp(shares.records[0].specular, (0.0, MIRRORS), ALIKE_GAIN))
+        alike = ALIKE_WEIGHT * (gain - line * heard)
         self.likeness = max(-EVIDENCE_MAX, min(EVIDENCE_MAX, self.likeness + share * alike))
         self._gains[self.entered % KEYFRAMES_MAX] = weight * gain
         self.evidence = max(-EVIDENCE_MIN, min(EVIDENCE_MAX, self.evidence + weight * gain))

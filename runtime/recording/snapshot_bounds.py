@@ -130,6 +130,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "shares._memory.late": SHARE,
         "shares._memory.specular": SHARE,
         "shares._memory.wild": SHARE,
+        "shares._memory.beside": SHARE,
         "known_room._stage": Bound(IDLE, WEIGHING),
         "known_room._status": Bound(0, len(STATUSES) - 1),
         "_map_heading._kept": Bound(0, FIRST_FIRINGS),

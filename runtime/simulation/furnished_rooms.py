@@ -8,7 +8,7 @@ odd ones.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -107,6 +107,26 @@ def _wall_with_opening(rng: np.random.Generator, begin: Floats, end: Floats) -> 
         WallConfig(x1_m=float(a[0]), y1_m=float(a[1]), x2_m=float(b[0]), y2_m=float(b[1]))
         for a, b in zip(ends[::2], ends[1::2], strict=True)
     ]
+
+
+def with_moved_wall(room: FurnishedRoom, off_m: float) -> FurnishedRoom:
+    """Return a room whose first wall, both parts of it beside a doorway, stands farther out; its ends stay open.
+
+    Parameters
+    ----------
+    room : FurnishedRoom
+        The room.
+    off_m : float
+        How far the wall is moved, m; at least 0, so that no drum is in its way.
+    """
+    walls = room.world.wall
+    ends = np.array([[[one.x1_m, one.y1_m], [one.x2_m, one.y2_m]] for one in walls])
+    along = ends[0, 1] - ends[0, 0]
+    out = np.array([along[1], -along[0]]) / np.hypot(*along)  # the corners run counter-clockwise
+    is_part = (np.abs((ends - ends[0, 0]) @ out) < 1e-9).all(axis=1)
+    ends += off_m * is_part[:, None, None] * out
+    moved = tuple(WallConfig(x1_m=a[0], y1_m=a[1], x2_m=b[0], y2_m=b[1]) for a, b in ends.tolist())
+    return replace(room, world=room.world.model_copy(update={"wall": moved}))
 
 
 def _drums(rng: np.random.Generator, room: FurnishedRoom, scene: Scene) -> tuple[DrumConfig, ...]:

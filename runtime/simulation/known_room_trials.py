@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from drivers.messages import Firing, Floats, Pose, wrap_angle
 from perception.localization.drift_correction import Status
 from perception.localization.known_room import KnownRoom
 from perception.localization.room import Room, room_of
-from runtime.simulation.furnished_rooms import ACOUSTICS, drive, furnished_room
+from runtime.simulation.furnished_rooms import ACOUSTICS, drive, furnished_room, with_moved_wall
 from runtime.simulation.large_building import Building
 
 STEP_M: Final = 0.03
@@ -78,6 +78,7 @@ def furnished_drive(
     length_m: float = 15.0,
     kidnapped: bool = False,
     standing: bool = False,
+    moved_wall_m: float = 0.0,
 ) -> KnownDrive:
     """Return a drive through a furnished room.
 
@@ -97,15 +98,19 @@ def furnished_drive(
         its odometry does not notice.
     standing : bool
         Whether the robot stands at the start instead, for `STAND_FIRINGS`.
+    moved_wall_m : float
+        A wall stands so much farther out than in the map, m.
     """
-    room = furnished_room(seed, acoustics)
+    mapped = furnished_room(seed, acoustics)
+    room = with_moved_wall(mapped, moved_wall_m)
     truth = _path(drive(room, seed, STEP_M, length_m), seed)
     if standing:
         truth = np.repeat(truth[:1], STAND_FIRINGS, axis=0)
     carried_at = len(truth) if kidnapped else None
     if kidnapped:
         truth = np.concatenate([truth, _path(drive(room, seed + 500_000, STEP_M, length_m), seed)])
-    return heard_on_the_way(ring, room.world, truth, seed, carried_at)
+    heard = heard_on_the_way(ring, room.world, truth, seed, carried_at)
+    return replace(heard, room=room_of(mapped.world))
 
 
 def building_drive(ring: RingConfig, building: Building, seed: int, length_m: float) -> KnownDrive:

@@ -49,7 +49,8 @@ def test_an_update_is_the_formulas() -> None:
         assert after[i]["log_weight"] - before[i]["log_weight"] == pytest.approx(oracle.log_weight)
         assert after[i]["log_ratio"] == pytest.approx(oracle.log_ratio)
         causes = oracle.causes
-        assert after[i]["specular"] == pytest.approx(causes.mirror + causes.away + causes.late)
+        assert after[i]["specular"] == pytest.approx(causes.mirror + causes.beside + causes.away + causes.late)
+        assert (after[i]["beside"], after[i]["could_beside"]) == pytest.approx((causes.beside, oracle.could_beside))
         assert after[i]["turned_away"] == pytest.approx(causes.away + causes.late)
         assert (after[i]["late"], after[i]["wild"]) == pytest.approx((causes.late, causes.wild))
 

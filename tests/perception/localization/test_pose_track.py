@@ -11,7 +11,17 @@ from drivers.messages import Firing, Pose
 from perception.localization.background import Background
 from perception.localization.keyframes import KEYFRAMES_MAX, Keyframes
 from perception.localization.mixed_reflection import LearnedShares
-from perception.localization.pose_track import EVIDENCE_MAX, EVIDENCE_MIN, QUANTA, PoseTrack, heading_noise
+from perception.localization.particle_update import TEMPER
+from perception.localization.pose_track import (
+    ALIKE_GAIN,
+    ALIKE_WEIGHT,
+    EVIDENCE_MAX,
+    EVIDENCE_MIN,
+    MIRRORS,
+    QUANTA,
+    PoseTrack,
+    heading_noise,
+)
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.surroundings import make_surroundings
 from runtime.simulation.random_rooms import ACOUSTICS
@@ -61,6 +71,22 @@ def test_a_keyframe_takes_quanta_for_each_hypothesis_and_the_right_one_is_left()
     track.clear()
     assert len(track) == 0
     assert not track.is_behind(keyframes)
+
+
+def test_where_nothing_is_a_mirror_a_place_must_explain_more() -> None:
+    """A right place explains rough surfaces wherever they are, and mirrors only where they answer."""
+    found = []
+    for specular in (0.0, 0.5 * MIRRORS, MIRRORS):
+        keyframes, shares = keyframes_of(1), LearnedShares()
+        shares.records[0].specular = specular
+        track = track_at(TRUTH, keyframes=keyframes)
+        while track.is_behind(keyframes):
+            track.enter(keyframes, shares)
+        heard = float(np.isfinite(STAND.ranges_m).sum())
+        gain = track.gained_since(0) / TEMPER
+        found.append((gain - track.likeness / ALIKE_WEIGHT) / heard)
+    low, high = ALIKE_GAIN
+    assert found == pytest.approx([low, 0.5 * (low + high), high])
 
 
 def test_what_speaks_against_a_place_adds_up_from_when_it_began() -> None:

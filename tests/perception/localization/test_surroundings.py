@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
+from perception.localization.expected_ranges import Beams, Expected, Reflection, expected_ranges
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import make_room, room_of
 from perception.localization.surroundings import (
+    FRINGE_RAD,
     NEAR_MAX,
     expect_cone,
     expect_specular,
@@ -25,26 +28,39 @@ MODEL = RangeModel.of_ring(RING)
 BEAMS = 40
 
 
-@pytest.mark.parametrize("reflection", ["cone", "specular"])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_expected_ranges_are_numpys(seed: int, reflection: Reflection) -> None:
-    room = room_of(furnished_room(seed).world)
-    around = make_surroundings(room, MODEL, HALF_ANGLE)
-    expect = expect_cone if reflection == "cone" else expect_specular
-    rng = np.random.default_rng(seed)
-    (x, y), axis = rng.uniform(*room.bounds, (BEAMS, 2)).T, rng.uniform(-4.0, 4.0, BEAMS)
-    oracle = expected_ranges(room, Beams(x, y, axis), HALF_ANGLE, reflection)
-    found = []
-    for k in range(BEAMS):
-        look_around(around, x[k] + 0.2, y[k] - 0.1, 0.3)
-        found.append(expect(around, x[k], y[k], math.cos(axis[k]), math.sin(axis[k])))
+def assert_is(found: list[tuple[float, float, float]], oracle: Expected, heard: NDArray[np.bool_]) -> None:
+    """Expected ranges and their derivatives are the oracle's where it hears something, and silence elsewhere."""
     range_m, grad_x, grad_y = np.array(found).T
-    heard = oracle.range_m <= MODEL.window_m
-    assert heard.any()
     assert range_m[heard] == pytest.approx(oracle.range_m[heard])
     assert (range_m[~heard] > MODEL.window_m).all()
     assert grad_x[heard] == pytest.approx(oracle.grad_x[heard], abs=1e-9)
     assert grad_y[heard] == pytest.approx(oracle.grad_y[heard], abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_expected_ranges_are_numpys(seed: int) -> None:
+    room = room_of(furnished_room(seed).world)
+    around = make_surroundings(room, MODEL, HALF_ANGLE)
+    rng = np.random.default_rng(seed)
+    (x, y), axis = rng.uniform(*room.bounds, (BEAMS, 2)).T, rng.uniform(-4.0, 4.0, BEAMS)
+    cone, mirror = (expected_ranges(room, Beams(x, y, axis), HALF_ANGLE, one) for one in get_args(Reflection))
+    wider = expected_ranges(room, Beams(x, y, axis), HALF_ANGLE + FRINGE_RAD, "specular")
+    rough, inside, beside, alone = [], [], [], []
+    for k in range(BEAMS):
+        look_around(around, x[k] + 0.2, y[k] - 0.1, 0.3)
+        at = float(x[k]), float(y[k]), math.cos(axis[k]), math.sin(axis[k])
+        rough.append(expect_cone(around, *at))
+        inner, outer = expect_specular(around, *at, around.sensor[0].cos_fringe)
+        inside.append(inner)
+        beside.append(outer)
+        alone.append(expect_specular(around, *at, around.sensor[0].cos_half))
+    assert_is(rough, cone, cone.range_m <= MODEL.window_m)
+    assert_is(inside, mirror, mirror.range_m <= MODEL.window_m)
+    # The nearest mirror of the wider beam is beside the beam where the beam's own nearest one is farther away.
+    is_beside = (wider.range_m <= MODEL.window_m) & (wider.range_m < mirror.range_m - 1e-9)
+    assert 0 < is_beside.sum() < BEAMS
+    assert_is(beside, wider, is_beside)
+    assert alone == [(inner, (math.inf, 0.0, 0.0)) for inner in inside]
 
 
 def test_what_is_near_is_listed_nearest_first() -> None:
@@ -76,6 +92,6 @@ def test_a_wall_between_hides_a_mirror_point() -> None:
     room = make_room(np.array([[2.0, -1.0, 2.0, 1.0], [1.0, -0.2, 1.2, 0.2]]))
     around = make_surroundings(room, MODEL, HALF_ANGLE)
     look_around(around, 0.0, 0.0, 0.0)
-    assert expect_specular(around, 0.0, 0.0, 1.0, 0.0)[0] == math.inf
-    assert expect_specular(around, 0.0, 0.6, 1.0, 0.0)[0] == pytest.approx(2.0)
-    assert expect_specular(around, 0.0, 0.6, -1.0, 0.0)[0] == math.inf
+    assert expect_specular(around, 0.0, 0.0, 1.0, 0.0, around.sensor[0].cos_half)[0][0] == math.inf
+    assert expect_specular(around, 0.0, 0.6, 1.0, 0.0, around.sensor[0].cos_half)[0][0] == pytest.approx(2.0)
+    assert expect_specular(around, 0.0, 0.6, -1.0, 0.0, around.sensor[0].cos_half)[0][0] == math.inf

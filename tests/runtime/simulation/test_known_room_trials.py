@@ -41,6 +41,13 @@ def test_a_kidnapped_robot_is_carried_and_its_odometry_does_not_notice() -> None
     assert drive.way_m()[-1] == pytest.approx(steps.sum() - steps.max())
 
 
+def test_a_moved_wall_is_heard_where_it_stands_and_mapped_where_it_stood() -> None:
+    drive, moved = (furnished_drive(RING, 4, length_m=2.0, moved_wall_m=off) for off in (0.0, 0.6))
+    assert np.array_equal(moved.room.walls, drive.room.walls)
+    heard, other = (np.array([firing.ranges_m for firing in one.firings[:20]]) for one in (drive, moved))
+    assert not np.array_equal(heard, other, equal_nan=True)
+
+
 def test_figures_count_what_was_said() -> None:
     way = np.arange(7.0)
     error = np.array([9.0, 0.1, 0.1, 2.0, 2.0, 2.0, 0.1])
