@@ -18,7 +18,7 @@ from runtime.cli.bridge_commands import foxglove, ros2, ros2_robot_command
 from runtime.cli.experiment_commands import experiment, sweep, tune
 from runtime.cli.first_signals import EXIT_CODE_BASE
 from runtime.cli.init_commands import init_app
-from runtime.cli.recording_commands import calibrate, export, figures, map_command, recover, replay, report
+from runtime.cli.recording_commands import calibrate, export, figures, map_command, recover, replay, report, stand
 from runtime.cli.robot_commands import check, emulate, run, service, settings_command
 from runtime.cli.start_signals import ending_in_order
 
@@ -41,7 +41,7 @@ app = App(
 )
 for title, commands in (
     ("Robot", (run, emulate, check, settings_command, service)),
-    ("Recordings", (replay, report, figures, export, map_command, calibrate, recover)),
+    ("Recordings", (replay, report, figures, export, map_command, calibrate, stand, recover)),
     ("Simulation", (experiment, sweep, tune)),
     ("Other programs", (ros2, ros2_robot_command, foxglove)),
     ("A robot of your own", (probe_command, firmware, ring_test_command)),

@@ -323,3 +323,38 @@ def calibrate(
     from runtime.cli.commands.calibrate import calibrate_robot
 
     return calibrate_robot(file, out, way_m=way, radii_m=drum, robot=robot, force=force)
+
+
+def stand(
+    file: File,
+    /,
+    *,
+    at: float | None = None,
+    robot: RobotFile = None,
+    json: JsonFile = None,
+    force: Force = False,
+    units: UnitsOption = "m",
+) -> int:
+    """List what a robot heard where it stood: kind, place and bearing of each surface, odds of the kinds.
+
+    To name kinds takes sensors that listen while others fire (robot file `ears`) and fine ranges. What the readings
+    leave open is unknown, or convex if it may be an edge or a cylinder.
+
+    Parameters
+    ----------
+    file
+        Recording or ring log.
+    at
+        A moment of the stand by the robot's clock, s; by default the end.
+    robot
+        Ring logs: robot file, or the name of a shipped one; None for the default.
+    json
+        File for the surfaces (JSON).
+    force
+        Overwrite it if it exists already.
+    units
+        Units of the table.
+    """
+    from runtime.cli.commands.stand import show_stand
+
+    return show_stand(file, at, robot=robot, json_file=json, force=force, units=units)

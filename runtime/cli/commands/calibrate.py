@@ -44,7 +44,7 @@ def calibrate_robot(
     for option, value in (*(("--drum", radius) for radius in radii_m), ("--way", way_m)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise UserError(f"{option} {value}: must be a length above 0, in metres", WRONG_CALL)
-    settings, firings = _drive(file, robot, lambda: check_outputs({"--out": out}, (file,), force=force))
+    settings, firings = read_firings(file, robot, lambda: check_outputs({"--out": out}, (file,), force=force))
     if len(firings) < FIRINGS_MIN:
         raise UserError(f"{file}: holds only {len(firings)} firings; record the whole drive and try again", FAILED)
     if settings.ring.turning:
@@ -174,8 +174,23 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
     return "\n".join([*head, *tomli_w.dumps(tables).splitlines(), ""])
 
 
-def _drive(file: str, robot: str | None, check: Callable[[], None]) -> tuple[Settings, list[Firing]]:
-    """Return the nominal robot's settings and the firings of a drive; `check` is called between the two."""
+def read_firings(file: str, robot: str | None, check: Callable[[], None]) -> tuple[Settings, list[Firing]]:
+    """Return the settings and the firings of a recording or ring log; `check` is called between the two.
+
+    Parameters
+    ----------
+    file : str
+        The file.
+    robot : str, optional
+        Of a ring log: robot file, or the name of a shipped one.
+    check : callable
+        Raises an error if outputs cannot be written.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read.
+    """
     from runtime.analysis.export.ring_log_export import recorded_firings
     from runtime.recording.reader import is_recording, open_recording
     from runtime.recording.ring_log import read_ring_log

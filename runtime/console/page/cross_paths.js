@@ -52,18 +52,18 @@ export function reflectorOf(path, run) {
   let best = null, least = GATE_M;
   for (const object of run.state.objects) {
     if (object.hidden_by !== null) continue;
-    for (const [kind, way] of waysOver(object, run, t, l)) {
-      const off = Math.abs(way.half - half);
-      if (off < least && sees(t, way, beam) && sees(l, way, SOUND_REACH * beam)) {
-        [best, least] = [{ object, kind, x: way.x, y: way.y }, off];
+    for (const [kind, found] of waysOver(object, run, path)) {
+      const off = Math.abs(found.half - half);
+      if (off < least && sees(t, found, beam) && sees(l, found, SOUND_REACH * beam)) {
+        [best, least] = [{ object, kind, x: found.x, y: found.y }, off];
       }
     }
   }
   return best;
 }
 
-// How an object may reflect: [kind, { half, x, y }] of each of its surfaces.
-function waysOver(object, run, t, l) {
+// How an object may reflect a path: [kind, { half, x, y }] of each of its surfaces; none that cannot be near it.
+function waysOver(object, run, { transmitter: t, listener: l, half }) {
   if (object.ends) return overSide(t, l, object.ends, WALL_BEYOND_M).map((way) => ["wall", way]);
   if (object.model === "inside corner") return [["corner", overCorner(t, l, object)]];
   const model = run.model(object.model);
@@ -75,7 +75,8 @@ function waysOver(object, run, t, l) {
     return ways.slice(0, 1).map((way) => ["outline", way]);
   }
   const radius = model?.arc_radius_m ?? run.session.radii?.[object.model];
-  if (radius === undefined) return [];
+  // The way over a circle differs from that over its centre by the radius at most.
+  if (radius === undefined || Math.abs(way(t, l, object.x, object.y).half - half) > radius + GATE_M) return [];
   return [[radius === 0 ? "edge" : "round", overCircle(t, l, object, radius)]];
 }
 

@@ -61,6 +61,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "figures": ("figures", "my.csv", "--model my_model.toml", "--out folder"),
     "map": ("map", "my.csv", "--set models=['my_model.toml']", "--out {0}", "--grid {1}", "--geojson {2}"),
     "calibrate": ("calibrate", "my.csv", "--robot my_robot.toml", "--out {0}"),
+    "stand": ("stand", "my.csv", "--robot my_robot.toml", "--json {0}"),
     "tables": ("export", "my.csv", "--to csv", "--out folder"),
     "ring log": ("export", "my.mcap", "--to ringlog", "--out {0}"),
     "MCAP": ("export", "my.mcap", "--to foxglove", "--out {0}"),

@@ -1,0 +1,102 @@
+"""`echolocate stand`: what one stand of the ring hears: kind, place and bearing of each surface."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from config.errors import DONE, FAILED, UserError
+from runtime.cli.commands.calibrate import read_firings
+from runtime.cli.commands.offline_io import plain_console
+from runtime.cli.commands.output_files import check_outputs
+from runtime.cycle.summary import write_json
+from runtime.support.length_format import Units, format_length, format_point
+
+if TYPE_CHECKING:
+    from drivers.messages import Pose
+    from perception.stand import StandSurface
+
+
+def show_stand(
+    file: str, at_s: float | None, *, robot: str | None, json_file: str | None, force: bool, units: Units
+) -> int:
+    """Print the surfaces around a robot that stood, and return the exit code.
+
+    Parameters
+    ----------
+    file, at_s, robot, json_file, force, units
+        As of `runtime.cli.recording_commands.stand`.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read or written, or no surface was heard often enough.
+    """
+    from drivers.messages import Pose
+    from perception.stand import stand_of, surfaces_of_stand
+
+    settings, firings = read_firings(file, robot, lambda: check_outputs({"--json": json_file}, (file,), force=force))
+    stand = stand_of(firings, math.inf if at_s is None else at_s)
+    if not stand:
+        first = f" the first firing is at {firings[0].robot_s:.2f} s" if firings else " it holds no firing"
+        raise UserError(f"{file}: nothing was fired up to --at {at_s} by the robot's clock;{first}", FAILED)
+    surfaces = surfaces_of_stand(settings.ring, stand)
+    last = stand[-1]
+    ring = Pose(last.pose.x, last.pose.y, last.ring_yaw)
+    if json_file is not None:
+        write_json(json_file, {"firings": len(stand), "surfaces": [surface_row(one, ring) for one in surfaces]})
+    if not surfaces:
+        raise UserError(
+            f"{file}: no surface was heard over three different paths in the {len(stand)} firings of this stand; let "
+            "the robot stand for a round of its firing pattern, or name another moment with --at",
+            FAILED,
+        )
+    output = plain_console()
+    output.print(stand_table(surfaces, ring, last.pose, units))
+    output.print(f"{len(stand)} firings from {stand[0].robot_s:.2f} to {last.robot_s:.2f} s by the robot's clock")
+    return DONE
+
+
+def stand_table(surfaces: tuple[StandSurface, ...], ring: Pose, robot: Pose, units: Units) -> Table:
+    """Return a table of the surfaces, with the odds of plane, corner, edge and cylinder in per cent.
+
+    Parameters
+    ----------
+    surfaces : tuple of StandSurface
+        What was heard.
+    ring : Pose
+        The ring's centre and direction.
+    robot : Pose
+        The robot, from whose heading bearings count.
+    units : {"m", "ft"}
+        Of the lengths.
+    """
+    title = "Surfaces heard from this stand; places in odometry's frame, odds in %"
+    table = Table(title=title, title_justify="left")
+    table.add_column("kind")
+    for name in (f"place ({units})", "range", "bearing", "plane : corner :\nedge : cylinder"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for surface in surfaces:
+        echo = surface.echo
+        bearing = math.remainder(ring.theta + echo.bearing - robot.theta, 2.0 * math.pi)
+        odds = " : ".join(f"{100.0 * share:.0f}" for share in echo.probabilities)
+        table.add_row(
+            surface.kind, format_point(*surface.place(ring), units), format_length(echo.range_m, units, 3),
+            f"{math.degrees(bearing):.1f} ± {math.degrees(echo.sigma_bearing):.2f}°",
+            odds if surface.is_one else "more than one",
+        )  # fmt: skip
+    return table
+
+
+def surface_row(surface: StandSurface, ring: Pose) -> dict[str, Any]:
+    """Return a surface as JSON, m and rad; its bearing is from the ring's sensor 0."""
+    echo = surface.echo
+    x, y = surface.place(ring)
+    odds = dict(zip(("plane", "corner", "edge", "cylinder"), echo.probabilities, strict=True))
+    return {
+        "kind": surface.kind, "x": x, "y": y, "bearing": echo.bearing, "range": echo.range_m,
+        "sigma_bearing": echo.sigma_bearing, "sigma_range": echo.sigma_range_m, "probabilities": odds,
+        "radius": None if math.isnan(echo.radius_m) else echo.radius_m, "misfit": echo.misfit, "paths": surface.paths,
+    }  # fmt: skip
