@@ -30,7 +30,7 @@ def cross_paths(*, json: str = "cross_paths.json", rooms: int = 30, first: int =
 
 def ear_halls(
     *, json: str = "ear_halls.json", scene: list[SceneName] | None = None, ring: list[str] | None = None,
-    seeds: int = 2, first: int = 700,
+    seeds: int = 2, first: int = 700, sure: float | None = None,
 ) -> int:  # fmt: skip
     """Measure first sure fixes, wrong names, drums found and cost in the halls, with and without listening sensors.
 
@@ -46,6 +46,8 @@ def ear_halls(
         Seeds of each scene; `moved` and `jit10` have ten halls a seed, the others one.
     first
         The first of them.
+    sure
+        Probability from which on a drum is reported, near and far; that of the settings if not given.
     """
     from bench.ear_halls import SCENES, measure, rings, settings_of
 
@@ -55,7 +57,7 @@ def ear_halls(
         for what in scene or SCENES:
             for name, one in chosen.items():
                 rows[f"{what}, {name}"] = measure(
-                    what, settings_of(one), range(first, first + max(1, seeds)), status.update
+                    what, settings_of(one, sure), range(first, first + max(1, seeds)), status.update
                 )
     return report(json, rows, rows_table("the halls with listening sensors", rows))
 

@@ -187,6 +187,7 @@ def costs(name: SceneName, seeds: Sequence[int]) -> dict[str, dict[str, float]]:
     }  # fmt: skip
 
 
-def settings_of(ring: RingConfig) -> Settings:
-    """Return the settings of the halls with another ring."""
-    return load_settings("hallway", ["perception.method=bayes"]).model_copy(update={"ring": ring})
+def settings_of(ring: RingConfig, sure: float | None = None) -> Settings:
+    """Return the settings of the halls with another ring, and the probability from which on models are reported."""
+    options = [] if sure is None else [f"perception.bayes.report_probability{near}={sure}" for near in ("", "_near")]
+    return load_settings("hallway", ["perception.method=bayes", *options]).model_copy(update={"ring": ring})

@@ -87,6 +87,25 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
 
 
 @kernel
+def is_near_circle(q: Reading, d: float, radius: float, gate: float) -> bool:
+    """Return whether half a cross path may be within `gate` (m) of what a circle predicts.
+
+    The way to the listener is longer or shorter than the way back by the distance of the two at most.
+
+    Parameters
+    ----------
+    q : Reading
+        A reading.
+    d, radius : float
+        Distance of the circle's centre from the sensor that fired, and its radius, m.
+    gate : float
+        m
+    """
+    slack = gate + 0.5 * (abs(q.listener_x) + abs(q.listener_y))
+    return abs(q.range_m + radius - d) <= slack
+
+
+@kernel
 def circle_error(q: Reading, dx: float, dy: float, d: float, radius: float) -> float:
     """Return a range, or half a cross path, less what a circle predicts, m.
 

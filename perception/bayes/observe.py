@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.cross_path import circle_error, is_crossed
+from perception.bayes.cross_path import circle_error, is_crossed, is_near_circle
 from perception.bayes.elements import CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.model_check import count_surroundings
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
@@ -116,8 +116,11 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
             d = math.sqrt(dx * dx + dy * dy)
             if dot <= 0.0 or dot < p[0].cos_may_answer * d - ASSOCIATION_MARGIN_M:
                 continue
+            tolerance = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx
+            if not is_near_circle(q, d, track.radius, tolerance):
+                continue
             e = abs(circle_error(q, dx, dy, d, track.radius))
-            if e < best and e < tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx:
+            if e < best and e < tolerance:
                 best = e
                 s[0].scratch.explained_by[i] = t
 
@@ -146,6 +149,8 @@ def bears_on_circle(
         return False
     d = math.sqrt(dx * dx + dy * dy)
     if dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
+        return False
+    if is_crossed(q) and not is_near_circle(q, d, radius, p[0].gate_m):
         return False
     e = circle_error(q, dx, dy, d, radius)
     if is_crossed(q) and abs(e) > p[0].gate_m:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.cross_path import circle_error, is_crossed
+from perception.bayes.cross_path import circle_error, is_crossed, is_near_circle
 from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.reservoir import copy_reading
@@ -99,9 +99,10 @@ def is_explained_elsewhere(
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = abs(circle_error(q, dx, dy, d, track.radius))
         tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx
-        if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d and e < min(off, tight):
+        if dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d or not is_near_circle(q, d, track.radius, tight):
+            continue
+        if abs(circle_error(q, dx, dy, d, track.radius)) < min(off, tight):
             return True
     return False
 

@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from bench.ear_halls import firings, is_drum, octets, poses, rings
+from bench.ear_halls import firings, is_drum, octets, poses, rings, settings_of
 from perception.detected_object import DetectedObject
 from runtime.simulation.scenes import SPEED_M_S, halls
 
@@ -52,3 +52,10 @@ def test_a_post_is_no_drum() -> None:
     seen = DetectedObject("drum", drum.x_m + 0.1, drum.y_m, 0.0, 0.01, 9, 1.0)
     assert is_drum(seen, HALL.world.drum, (drum.radius_m,))
     assert not is_drum(seen, HALL.world.drum, (drum.radius_m + 0.1,))
+
+
+def test_a_drum_may_have_to_be_surer_than_by_the_settings() -> None:
+    ring = rings()["ears"]
+    assert settings_of(ring).perception.bayes.report_probability == 0.95
+    bayes = settings_of(ring, 0.99).perception.bayes
+    assert (bayes.report_probability, bayes.report_probability_near) == (0.99, 0.99)

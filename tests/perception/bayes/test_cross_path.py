@@ -55,6 +55,23 @@ def test_half_the_way_over_a_circle_is_exact_to_a_tenth_of_a_micrometre(examples
         assert cross_path.circle_error(q, to.real, to.imag, abs(to), radius) == pytest.approx(1.0 - half, abs=1e-12)
 
 
+@examples(300, 20000)
+def test_no_cross_path_within_the_gate_is_taken_for_a_far_one(examples: int) -> None:
+    rng, gate, within, far = np.random.default_rng(20), 0.05, 0, 0
+    for _ in range(examples):
+        t, l, towards, gap = stand(rng, (0.1, 3.0))  # noqa: E741
+        radius = float(rng.choice([0.0, 0.1067, 0.3048, 0.67]))
+        to, across = 0.5 * (l - t) + (gap + radius) * towards, l - t
+        range_m = abs(to) - radius + rng.uniform(-0.3, 0.3)
+        q = crosses(np.array([[0.0, 0.0, 1.0, 0.0, range_m, across.real, across.imag]]))[0]
+        is_near = cross_path.is_near_circle(q, abs(to), radius, gate)
+        is_within = abs(cross_path.circle_error(q, to.real, to.imag, abs(to), radius)) <= gate
+        assert is_near or not is_within
+        within, far = within + is_within, far + (not is_near)
+    assert within > 0.08 * examples
+    assert far > 0.1 * examples
+
+
 @examples(60, 2000)
 def test_half_the_way_over_a_line_is_that_to_the_mirrored_listener(examples: int) -> None:
     rng = np.random.default_rng(2)
