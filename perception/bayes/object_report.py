@@ -258,17 +258,17 @@ def other_circles(
     """
     found: list[DetectedObject] = []
     merge_m, models = float(p[0].merge_m), int(p[0].model_count)
-    shown = np.flatnonzero((circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN))
+    is_shown = (circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN)
+    for o in named:
+        is_shown &= np.hypot(circles["x"] - o.x, circles["y"] - o.y) >= merge_m
+    shown = np.flatnonzero(is_shown)
+    if len(surfaces) > 0 and len(shown) > 0:
+        is_own = own_echoes(circles[shown], surfaces, memory, p) >= UNKNOWN_HITS_MIN
+        shown = shown[is_own | (circles["marks"][shown] != 0)]
     names = (*CIRCLE_FIELDS, "probability", "status", "kind", "radius")
     columns = (circles[name][shown].tolist() for name in names)  # at once: a value at a time takes five times as long
     are_mirrors = has_mirrors(memory)
     for at, *row, probability, status, kind, radius in zip(shown.tolist(), *columns, strict=True):
-        if any(math.dist(row[:2], (o.x, o.y)) < merge_m for o in named):
-            continue
-        is_marked = bool(circles["marks"][at])
-        is_checked = len(surfaces) > 0 and not is_marked
-        if is_checked and own_echoes(circles[at], surfaces, memory, p) < UNKNOWN_HITS_MIN:
-            continue
         is_rival = status == ESTABLISHED and kind >= models and probability >= least
         label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"
         if label == "edge" and are_mirrors and is_heard_from_afar(circles[at]):
