@@ -103,7 +103,8 @@ def arbitrate(
     seen = seen_speed_m_s(percept, body, config.clearance_m, w)
     if seen == 0.0 and (unseen := _unseen_ways(percept, course, body, config)) is not None:
         return Unseen(f"{unseen.reason}; check the ring's cables and what covers it, then re-arm", unseen.age_s)
-    v = min(speed, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m), seen)
+    stoppable = stoppable_speed_m_s(percept, body, config.clearance_m, config.cautious_velocity_m_s)
+    v = min(speed, body.speed_max_m_s, stoppable, seen)
     # Not `v > limit or …`: only this form also refuses NaN.
     if not (0.0 <= v <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
         return _outside(v, w)
@@ -152,13 +153,13 @@ def limit_velocity(
     lateral = max(-1.0, min(1.0, c * y - s * x))
     w = requested.w
     if requested.v > 0.0:
-        fastest = min(requested.v, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
-        v = max(0.0, min(along, fastest))
+        stoppable = stoppable_speed_m_s(percept, body, config.clearance_m, config.cautious_velocity_m_s)
+        v = max(0.0, min(along, requested.v, body.speed_max_m_s, stoppable))
         w += config.turn_gain_per_s * lateral * v / config.base_velocity_m_s
         v = min(v, seen_speed_m_s(percept, body, config.clearance_m, w))
     else:
         behind = replace(percept, pose=replace(percept.pose, theta=percept.pose.theta + math.pi))
-        stoppable = stoppable_speed_m_s(behind, body, config.clearance_m)
+        stoppable = stoppable_speed_m_s(behind, body, config.clearance_m, config.cautious_velocity_m_s)
         seen = seen_speed_m_s(behind, body, config.clearance_m, w)
         v = min(0.0, max(along, requested.v, -body.speed_max_m_s, -stoppable, -seen))
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))

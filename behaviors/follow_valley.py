@@ -12,7 +12,7 @@ from typing import Final
 
 from behaviors.response import Response
 from behaviors.steady_heading import held, turned_towards
-from behaviors.valley.choice import apart, candidates, cheapest
+from behaviors.valley.choice import apart, candidates, cheapest, gaps
 from behaviors.valley.look_ahead import Search, carrot
 from behaviors.valley.polar_histogram import (
     SECTOR_RAD,
@@ -23,6 +23,7 @@ from behaviors.valley.polar_histogram import (
     room_m,
 )
 from config.behaviors import FollowValleyConfig
+from config.robot import PASSAGE_M
 from perception.percept import Percept
 
 SCHEMA: Final = "follow_valley"
@@ -81,23 +82,29 @@ def follow_valley(
     cells = cells_near(percept, pose.x, pose.y, config.free_m + max(room_max_m, comfort_m), config)
     radius_m = room_m(cells, body_radius_m, room_max_m)
     flags = before.blocked.encode("ascii").translate(_FLAGS)
-    blocked, near = blocked_sectors(
-        cells, flags, radius_m, max(radius_m, comfort_m), max(target_m, LEAST_WAY_M), config
+    # A gap that the robot drives through is not given up for an echo at a post that comes and goes.
+    is_in_gap = before.direction_rad is not None and flags[round(before.direction_rad / SECTOR_RAD) % SECTORS] == 1
+    least_m = min(radius_m, body_radius_m + (0.0 if is_in_gap else PASSAGE_M))
+    blocked, near, closed = blocked_sectors(
+        cells, flags, (radius_m, max(radius_m, comfort_m), least_m), max(target_m, LEAST_WAY_M), config
     )
     kept = blocked
     if config.turning_radius_m > 0.0:
-        kept = blocked | masked_by_turning(cells, pose.theta, radius_m, config.turning_radius_m)
+        masked = masked_by_turning(cells, pose.theta, radius_m, config.turning_radius_m)
+        kept, closed = blocked | masked, closed | masked
     target = target_rad / SECTOR_RAD
     last = None if before.direction_rad is None else before.direction_rad / SECTOR_RAD
-    found = candidates(kept.tobytes(), target, math.radians(config.wide_valley_deg) / SECTOR_RAD)
-    chosen = cheapest(found, target, pose.theta / SECTOR_RAD, last, near.tobytes(), config)
+    wide = math.radians(config.wide_valley_deg) / SECTOR_RAD
+    found = candidates(kept.tobytes(), target, wide) + gaps(closed.tobytes(), kept.tobytes())
+    # A gap is offered only where nothing wider leads the same way, and costs no more for being one.
+    chosen = cheapest(found, target, pose.theta / SECTOR_RAD, last, (near & ~kept).tobytes(), config)
     shown = blocked.tobytes().translate(_DIGITS).decode("ascii")
     if chosen is None:
         return Response(SCHEMA, 0.0, 0.0), Valley(shown, None)
     direction = chosen * SECTOR_RAD
     if before.direction_rad is not None:
         turned = turned_towards(before.direction_rad, direction, config.turn_share)
-        if not blocked[round(turned / SECTOR_RAD) % SECTORS]:
+        if not (closed if blocked[round(chosen) % SECTORS] else blocked)[round(turned / SECTOR_RAD) % SECTORS]:
             direction = turned
     driven = held(pose.theta, direction)
     return Response(SCHEMA, length * math.cos(driven), length * math.sin(driven)), Valley(shown, direction)

@@ -30,6 +30,7 @@ from behaviors.near_memory import NearEchoes, remember
 from behaviors.response import Response
 from behaviors.steady_heading import turned_towards
 from config.behaviors import LeaveCanyonConfig
+from config.robot import PASSAGE_M
 from perception.percept import Canyon, Floats, Percept, Pose, wrap_angle
 
 SCHEMA: Final = "leave_canyon"
@@ -63,8 +64,6 @@ FAR_M: Final = 1e6
 NO_POINTS: Final = np.empty((0, 2))
 TURN_SHARE: Final = 0.15
 """The direction turns by this share of the angle to the chosen one in each cycle."""
-PASSAGE_M: Final = 0.165
-"""Least room on either side of the robot where it passes between two objects: just above the arbiter's clearance."""
 THROUGH_M: Final = 1.5
 """A gap is passed if the robot sees so far through it, m."""
 TURNS: Final = np.arange(0.0, 2.0 * math.pi, math.radians(5.0))
@@ -146,13 +145,13 @@ def leave_canyon(
     near, remembered = remember(detour.near, echoes, pose, detour.driven_m, body_radius_m)
     detour = replace(detour, near=near)
     points = np.concatenate([echoes, remembered, *virtual])
-    free = _free_m(points, pose, bearing, room)
+    free = _free_m(points, pose, bearing, body_radius_m + PASSAGE_M)
     if to_goal < detour.nearest_m - NEARER_M:
         detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
     is_held = any(holds(canyon, pose, goal, config) for canyon in percept.canyons)
     if detour.side == 0:
         if waits and detour.driven_m - detour.nearest_driven_m < STALL_M:
-            free = _free_m(np.concatenate([NO_POINTS, *virtual]), pose, bearing, room)
+            free = _free_m(np.concatenate([NO_POINTS, *virtual]), pose, bearing, body_radius_m + PASSAGE_M)
         if free >= min(to_goal, config.look_m) and not is_held:
             return None, detour
         detour = _begin(points, pose, goal, percept.canyons, detour, room, config)

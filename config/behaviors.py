@@ -78,7 +78,8 @@ class FollowValleyConfig(Strict):
     follow_valley_gain: float = Field(default=1.0, ge=0.0, le=100.0)
     """Factor on move-to-goal's vector, whose direction this schema replaces; 0 drives straight towards the goal."""
     safety_m: float = Field(default=0.2, ge=0.0, le=10.0)
-    """Room to keep between rim and obstacle, m. Choose it above the arbiter's clearance, which stops the robot."""
+    """Room to keep between rim and obstacle, m. Choose it above the arbiter's clearance, which stops the robot. Where
+    nothing so wide leads the same way, a gap is passed that leaves .085 m on either side."""
     comfort_m: float = Field(default=0.35, ge=0.0, le=10.0)
     """A direction that passes an obstacle nearer than this is chosen only if it saves a turn or a way, m."""
     block_m: float = Field(default=0.7, gt=0.0, le=100.0)
@@ -138,7 +139,7 @@ class LeaveCanyonConfig(Strict):
     """Length of the schema's vector; 0 turns the schema off."""
     room_m: float = Field(default=0.25, ge=0.0, le=10.0)
     """Distance that is kept between the rim and what is gone round, m. A gap with less room on either side is passed
-    in its middle, down to just above the arbiter's default clearance."""
+    in its middle, down to .085 m."""
     look_m: float = Field(default=0.6, gt=0.0, le=10.0)
     """The detour begins where something is nearer than this to the robot and its room, m."""
     look_ahead_m: float = Field(default=8.0, ge=0.0, le=100.0)
@@ -208,7 +209,8 @@ class ArbiterConfig(Strict):
     turn_gain_per_s: float = Field(default=2.0, gt=0.0, le=100.0)
     """Turning rate for each radian between the drive heading and the sum's direction, rad/s."""
     clearance_m: float = Field(default=0.16, ge=0.0, le=10.0)
-    """Distance between rim and echo at which the base can still stop, m; it limits the speed.
+    """Distance between rim and echo at which the base can still stop, m; it limits the speed. At its cautious
+    velocity the robot keeps .085 m to what it only passes, as the posts of a doorway.
 
     Choose it just above the ring's least range: an echo at that range may come from anything nearer.
     """

@@ -18,6 +18,14 @@ SOUND_SPEED_M_S = 343.0
 SENSORS_MAX = 255
 """Largest number of sensors in a ring, and of sets in a firing pattern; bounds the memory for a faulty file."""
 
+PASSAGE_M: Final = 0.085
+"""Room on either side of its rim with which a robot passes a gap at its cautious velocity.
+
+The one measure of a gap: the arbiter lets the robot through, the schemas look for a way through, and what is narrower
+counts as closed where dead ends are recognised. A doorway of 1.1 m leaves a robot of 2.5 ft twice as much, for echoes
+and ends of walls that are known within some centimetres.
+"""
+
 _WITHOUT_LISTENERS: Final = ("arcos", "rflex", "ros2")
 """Shipped drivers of rings whose sensors hear only their own echoes."""
 

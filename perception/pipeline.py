@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from config.model import ModelConfig
-from config.robot import RingConfig
+from config.robot import PASSAGE_M, RingConfig
 from config.settings import PerceptionConfig
 from config.world import WorldConfig
 from drivers.messages import Firing, Pose
@@ -38,7 +38,7 @@ from perception.localization.drift_correction import LocalizedPose
 from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
-from perception.mapping.canyons import PASSAGE_M, CanyonMap
+from perception.mapping.canyons import CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method, make_method
 from perception.percept import Canyon, FieldOfView, OccupancyWindow

@@ -64,6 +64,24 @@ def candidates(blocked: bytes, target: float, wide: float) -> list[float]:
     return found
 
 
+def gaps(closed: bytes, blocked: bytes) -> list[float]:
+    """Return the middles of the valleys that the robot just passes, and nowhere with the room that it wants.
+
+    Parameters
+    ----------
+    closed : bytes
+        A byte for each sector, 0 where the robot just passes.
+    blocked : bytes
+        The same, 0 where it passes with the room that it wants.
+    """
+    just = [(first, count) for first, count in valleys(closed) if count < SECTORS]
+    return [
+        (first + 0.5 * (count - 1)) % SECTORS
+        for first, count in just
+        if all(blocked[(first + k) % SECTORS] for k in range(count))
+    ]
+
+
 def cheapest(
     found: Sequence[float], target: float, heading: float, last: float | None, near: bytes, config: FollowValleyConfig
 ) -> float | None:

@@ -18,7 +18,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from behaviors.valley.choice import apart, candidates
+from behaviors.valley.choice import apart, candidates, gaps
 from behaviors.valley.polar_histogram import (
     SECTOR_RAD,
     SECTORS,
@@ -27,6 +27,7 @@ from behaviors.valley.polar_histogram import (
     room_m,
 )
 from config.behaviors import FollowValleyConfig
+from config.robot import PASSAGE_M
 from perception.percept import OccupancyWindow, Percept
 
 Place: TypeAlias = tuple[float, float]
@@ -140,10 +141,15 @@ def _children(
     comfort_m = body_radius_m + config.comfort_m
     cells = cells_near(percept, node.x, node.y, step_m + comfort_m, config)
     radius_m = room_m(cells, body_radius_m, room_max_m) if number == 0 else room_max_m
-    blocked, near = map(bytes, crossed(cells, np.array([radius_m, max(radius_m, comfort_m)]), np.full(2, step_m)))
+    # The room in a gap is for errors in the places of its posts. A way ahead is not asked for it: from afar they
+    # would count twice, and a way that is in force would come and go with them.
+    is_first = number == 0 and not search.way
+    least_m = min(radius_m, body_radius_m + (PASSAGE_M if is_first else 0.0))
+    radii = np.array([radius_m, max(radius_m, comfort_m), least_m])
+    blocked, near, closed = map(bytes, crossed(cells, radii, np.full(3, step_m)))
     target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
-    found, same = [], (SAME * step_m) ** 2
-    for c in candidates(blocked, target, math.radians(config.wide_valley_deg) / SECTOR_RAD):
+    found, same, wide = [], (SAME * step_m) ** 2, math.radians(config.wide_valley_deg) / SECTOR_RAD
+    for c in candidates(blocked, target, wide) + gaps(closed, blocked):
         turned_rad = apart(c, node.direction) * SECTOR_RAD
         cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
         angle = c * SECTOR_RAD

@@ -183,9 +183,9 @@ def masked_by_turning(cells: Cells, heading_rad: float, radius_m: float, turning
 
 
 def blocked_sectors(
-    cells: Cells, before: bytes, radius_m: float, comfort_m: float, target_m: float, config: FollowValleyConfig
-) -> tuple[Sectors, Sectors]:
-    """Return the blocked sectors, and those that pass something near.
+    cells: Cells, before: bytes, radii_m: tuple[float, float, float], target_m: float, config: FollowValleyConfig
+) -> tuple[Sectors, Sectors, Sectors]:
+    """Return the blocked sectors, those that pass something near, and those that the robot cannot even just pass.
 
     A sector is blocked if the disc cannot drive one way, or was blocked and the disc cannot drive a longer way.
 
@@ -195,15 +195,16 @@ def blocked_sectors(
         Around the robot, at least as far as it looks.
     before : bytes
         The blocked sectors before, a byte each.
-    radius_m, comfort_m : float
-        Of the disc that is driven, and of the one for which there is room where nothing is near, m.
+    radii_m : tuple of float
+        Of the disc that is driven, of the one for which there is room where nothing is near, and of the least, m.
     target_m : float
         What lies farther than the target does not block, m.
     config : FollowValleyConfig
         The two ways for a sure cell; an uncertain one blocks a part of them.
     """
     block_m = min(config.block_m, target_m)
-    radii = np.array([radius_m, radius_m, comfort_m])
-    ways = np.array([block_m, min(config.free_m, target_m), block_m])
-    blocks, keeps, near = crossed(cells, radii, ways, cells.certainties)
-    return blocks | (keeps & np.frombuffer(before, dtype=np.bool_)), near
+    radius_m, comfort_m, least_m = radii_m
+    radii = np.array([radius_m, radius_m, comfort_m, least_m])
+    ways = np.array([block_m, min(config.free_m, target_m), block_m, block_m])
+    blocks, keeps, near, closed = crossed(cells, radii, ways, cells.certainties)
+    return blocks | (keeps & np.frombuffer(before, dtype=np.bool_)), near, closed

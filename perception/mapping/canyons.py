@@ -52,9 +52,6 @@ REMEMBERED_MAX: Final = 16
 DOUBT: Final = 0.6
 FORGOTTEN: Final = 0.3
 """The probability of a canyon that is not found again falls by this factor, down to where it is forgotten."""
-PASSAGE_M: Final = 0.085
-"""Room on either side of the robot below which a gap is closed; less than the arbiter's clearance, as the ends of
-walls are known within some centimetres only, and a doorway that the robot can pass must stay one."""
 EVERY_FIRINGS: Final = 10
 """One place is examined after so many firings: half a second."""
 

@@ -16,6 +16,7 @@ from behaviors.response import Response
 from behaviors.steady_heading import held
 from behaviors.valley.look_ahead import Search, begin, expand
 from behaviors.valley.polar_histogram import cells_near
+from config.robot import PASSAGE_M
 from config.settings import Settings
 from perception.percept import Percept
 from runtime.cycle.drive_requests import STANDSTILL
@@ -149,9 +150,10 @@ def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
 def _pushes(percept: Percept, room_m: float | None, settings: Settings) -> Response:
     """Return avoid-static-obstacle's response, by itself or beside a schema that keeps `room_m` itself.
 
-    Beside one, it pushes the robot out of that room, and out of the arbiter's clearance without bound.
+    Beside one, it pushes the robot out of that room, and without bound out of what the arbiter keeps to all that is
+    passed.
     """
-    zone, margin_m = None, settings.behaviors.arbiter.clearance_m
+    zone, margin_m = None, min(settings.behaviors.arbiter.clearance_m, PASSAGE_M)
     if room_m is not None:
         zone = Zone(max(room_m, margin_m + FAINT_M), margin_m)
     return avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle, zone)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from behaviors.clearance import free_path_m, stoppable_speed_m_s
-from config.robot import BodyConfig
+from config.robot import PASSAGE_M, BodyConfig
 from perception.percept import Percept, Pose
 from tests.behaviors.views import EVERYWHERE
 
@@ -57,3 +57,14 @@ def test_the_speed_is_that_from_which_full_braking_keeps_the_clearance() -> None
     assert stoppable_speed_m_s(seen((0.75, 0.0)), BODY, 0.1) == pytest.approx(0.5)
     assert stoppable_speed_m_s(seen((0.75, 0.0)), BODY, 0.35) == 0.0
     assert stoppable_speed_m_s(seen(), BODY, 0.1) == math.inf
+
+
+def test_a_cautious_robot_passes_what_is_beside_its_way_and_stops_before_what_is_in_it() -> None:
+    """Rim 0.4 m, clearance 0.2 m: posts 1.1 m apart leave 0.15 m on either side."""
+    posts = seen((0.1, 0.55), (0.1, -0.55))
+    assert stoppable_speed_m_s(posts, BODY, 0.2) == 0.0
+    assert stoppable_speed_m_s(posts, BODY, 0.2, 0.1) == 0.1
+    assert stoppable_speed_m_s(seen((0.9, 0.55)), BODY, 0.2, 0.1) > 0.1, "from afar no slower than without caution"
+    assert stoppable_speed_m_s(seen((0.1, 0.4 + PASSAGE_M - 0.01)), BODY, 0.2, 0.1) == 0.0
+    assert stoppable_speed_m_s(seen((0.6, 0.0)), BODY, 0.2, 0.1) == 0.0
+    assert stoppable_speed_m_s(seen((0.1, 0.45)), BODY, 0.02, 0.1) == math.inf, "a clearance below that is kept"

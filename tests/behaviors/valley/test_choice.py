@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from behaviors.valley.choice import apart, candidates, cheapest, valleys
+from behaviors.valley.choice import apart, candidates, cheapest, gaps, valleys
 from behaviors.valley.polar_histogram import ALL_FREE, SECTORS
 from config.behaviors import FollowValleyConfig
 
@@ -52,6 +52,14 @@ def test_a_narrow_valley_is_driven_in_the_middle_and_a_wide_one_beside_its_borde
     assert candidates(blocked(range(10, 30)), 40.0, 8.0) == [13.5, 25.5]
     assert candidates(blocked(range(10, 30)), 20.25, 8.0) == [13.5, 25.5, 20.25]
     assert candidates(blocked(range(65, 85)), 1.0, 8.0) == [68.5, 8.5, 1.0]
+
+
+def test_a_gap_is_a_valley_that_is_nowhere_as_wide_as_wanted() -> None:
+    assert gaps(blocked(range(10, 15)), blocked()) == [12.0]
+    assert gaps(blocked(range(70, 75)), blocked()) == [0.0]
+    assert gaps(blocked(range(10, 15), range(30, 50)), blocked(range(40, 45))) == [12.0], "the other has a wide part"
+    assert gaps(ALL_FREE, blocked()) == []
+    assert gaps(blocked(), blocked()) == []
 
 
 def test_the_target_outweighs_heading_and_last_choice_but_does_not_flip_between_equal_ways() -> None:

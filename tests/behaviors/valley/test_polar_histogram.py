@@ -36,7 +36,7 @@ def one_crossed(found: Cells, radius_m: float, way_m: float) -> Sectors:
 
 
 def blocked_within(found: Cells, before: bytes, target_m: float = 9.0) -> bytes:
-    return blocked_sectors(found, before, 0.5, 0.6, target_m, CONFIG)[0].tobytes()
+    return blocked_sectors(found, before, (0.5, 0.6, 0.45), target_m, CONFIG)[0].tobytes()
 
 
 def gap_m(x: float, y: float, sector: int, way_m: float) -> float:
@@ -84,10 +84,15 @@ def test_a_sure_cell_blocks_within_one_way_and_frees_beyond_another() -> None:
 
 
 def test_a_sector_that_passes_nearer_than_is_comfortable_is_near() -> None:
-    _, near = blocked_sectors(cells((0.5, 0.55)), ALL_FREE, 0.5, 0.6, 9.0, CONFIG)
-    blocked, _ = blocked_sectors(cells((0.5, 0.55)), ALL_FREE, 0.5, 0.6, 9.0, CONFIG)
+    blocked, near, _ = blocked_sectors(cells((0.5, 0.55)), ALL_FREE, (0.5, 0.6, 0.45), 9.0, CONFIG)
     assert near[0]
     assert not blocked[0]
+
+
+def test_a_sector_with_less_room_than_is_wanted_is_blocked_and_closed_only_if_the_robot_cannot_just_pass() -> None:
+    for y, is_closed in ((0.47, False), (0.44, True)):
+        blocked, near, closed = blocked_sectors(cells((0.5, y)), ALL_FREE, (0.5, 0.6, 0.45), 9.0, CONFIG)
+        assert (blocked[0], near[0], closed[0]) == (True, True, is_closed)
 
 
 def test_cells_are_those_of_the_grid_and_the_fresh_echoes() -> None:
