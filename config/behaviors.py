@@ -62,7 +62,7 @@ class MoveToGoalConfig(Strict):
     """See `stuck_after_s`, m."""
     unreachable_after_s: float = Field(default=120.0, ge=1.0, le=1e5)
     """The goal is given up after the robot has not come nearer to it than ever before for so long, s."""
-    turn_rate_max_rad_s: float = Field(default=0.5, gt=0.0, le=20.0)
+    turn_rate_max_rad_s: float = Field(default=0.3, gt=0.0, le=20.0)
     """On its way to a goal the robot turns no faster than this, rad/s."""
 
     @model_validator(mode="after")
@@ -100,7 +100,7 @@ class FollowValleyConfig(Strict):
     """μ₃: the same from the direction chosen before."""
     near_cost: float = Field(default=20.0, ge=0.0, le=1e6)
     """Cost of a direction that passes an obstacle nearer than `comfort_m`."""
-    turn_share: float = Field(default=0.15, gt=0.0, le=1.0)
+    turn_share: float = Field(default=0.07, gt=0.0, le=1.0)
     """The direction turns by this share of the angle to the chosen one in each cycle; 1 turns at once."""
     turning_radius_m: float = Field(default=0.0, ge=0.0, le=100.0)
     """Least radius that the robot drives, m; 0 if it can turn on the spot."""

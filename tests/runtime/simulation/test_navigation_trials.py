@@ -25,7 +25,7 @@ from runtime.simulation.navigation_trials import (
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("count", "grid"),
-    [(2, "off"), pytest.param(60, "directed", marks=pytest.mark.soak)],
+    [(4, "off"), pytest.param(60, "directed", marks=pytest.mark.soak)],
 )
 def test_it_arrives_across_random_rooms_and_touches_nothing(count: int, grid: str) -> None:
     settings = load_settings("hallway", ["perception.method=paper", f"perception.grid.method={grid}"])
