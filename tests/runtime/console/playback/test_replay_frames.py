@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import orjson
 import pytest
 
+from config.load import load_settings
 from perception.edits import DeleteSegments
 from runtime.cli.commands.serve_console import REPLAY_PROGRAM
 from runtime.console.playback.replay_client import ReplayClient
@@ -81,3 +83,23 @@ async def test_a_client_is_shown_a_recording(folder: Path, monkeypatch: pytest.M
         assert page.last["controller"] is True
     finally:
         await client.close()
+
+
+def test_frames_of_a_recording_have_its_cross_paths(tmp_path: Path) -> None:
+    record(load_settings("hallway", ["perception.method=paper"], robot="ears"), tmp_path / "ears.mcap", 1.0)
+    with open_recording(tmp_path / "ears.mcap") as recording:
+        cursor = ReplayCursor(recording)
+        frames = make_replay_frames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
+        for at in (cursor.cycles, cursor.cycles // 2):
+            heard: list[float] = []
+            for replayed in cursor.seek(at):
+                frames.take(replayed.record)
+                heard += [
+                    firing.robot_s
+                    for firing in replayed.record.inputs.received.firings
+                    if firing.cross_paths is not None and np.isfinite(firing.cross_paths.half_paths_m).any()
+                ]
+            parts = frames.frame(replayed, PlaybackPosition(cursor.t_s, is_playing=False, speed=1.0))
+            shown = orjson.loads(parts.head + b"}")["cross_paths"]
+            assert shown[-1]["robot_s"] == pytest.approx(heard[-1], abs=1e-3), "the newest of this position"
+            assert all(row["paths"] for row in shown)
