@@ -87,6 +87,13 @@ def test_balanced_responses_stop(vectors: tuple[tuple[float, float], ...]) -> No
     assert twist(decide(*vectors)) == Twist(0.0, 0.0)
 
 
+def test_schemas_may_respond_in_any_order() -> None:
+    responses = [Response("left", 0.0, 0.5), Response("ahead", 1.0, 0.0)]
+    found = [arbitrate(responses, at(), BODY, CONFIG, names) for names in (["left", "ahead"], ["ahead", "left"])]
+    assert isinstance(found[0], Drive)
+    assert found[0] == found[1]
+
+
 def test_missing_schema_stops_and_names_it() -> None:
     given = [Response("move_ahead", 1.0, 0.0)]
     decision = arbitrate(given, at(), BODY, CONFIG, ["move_ahead", "avoid_static_obstacle"])

@@ -204,6 +204,13 @@ def test_the_arbiter_turns_to_where_it_sees() -> None:
     assert isinstance(decide(ring_view(ages(s6=9.0)), math.pi / 2, math.pi / 2), Unseen)
 
 
+@pytest.mark.parametrize(("ahead_s", "left_s"), [(2.0, 9.0), (9.0, 2.0)])
+def test_where_neither_heading_nor_course_is_seen_the_younger_look_is_reported(ahead_s: float, left_s: float) -> None:
+    decision = decide(ring_view(ages(s0=ahead_s, s6=left_s)), math.pi / 2)
+    assert isinstance(decision, Unseen)
+    assert decision.age_s == 2.0
+
+
 def test_an_unseen_direction_that_the_sensors_will_look_in_next_is_no_reason_to_stop() -> None:
     """The ring has turned by half of a beam's distance and more since the looks."""
     view = ring_view(NEW)

@@ -40,7 +40,11 @@ TARGETS: dict[str, tuple[str, ...]] = {
         "tests/drivers/denning/test_wire_units.py",
     ),
     "drivers/firing_pattern.py": ("tests/drivers/test_firing_pattern.py",),
-    "behaviors/arbiter.py": ("tests/behaviors/test_arbiter.py", "tests/behaviors/test_teleoperation.py"),
+    "behaviors/arbiter.py": (
+        "tests/behaviors/test_arbiter.py",
+        "tests/behaviors/test_field_of_view.py",
+        "tests/behaviors/test_teleoperation.py",
+    ),
     "runtime/cycle/modes.py": ("tests/runtime/cycle/test_modes.py",),
 }
 KILLED_MIN = 0.85
