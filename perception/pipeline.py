@@ -38,7 +38,7 @@ from perception.localization.drift_correction import LocalizedPose
 from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
-from perception.mapping.canyons import CanyonMap
+from perception.mapping.canyons import ENDS_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method, make_method
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
@@ -96,7 +96,8 @@ class Perception:
         self._models = tuple(models)
         self.vacant = VacantAreas()
         """In the frame of `method`."""
-        self.canyon_map = CanyonMap(2.0 * (max(math.hypot(*mount[:2]) for mount in mounts.tolist()) + PASSAGE_M))
+        radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
+        self.canyon_map = CanyonMap(2.0 * (radius_m + PASSAGE_M) - ENDS_M)
         """The box canyons found so far, in odometry's frame."""
 
     @property

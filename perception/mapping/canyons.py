@@ -38,6 +38,9 @@ SURFACES_MAX: Final = 16
 """Walls, and other objects, that count, the nearest to the robot: time must not grow with the room."""
 BRIDGES_MAX: Final = 24
 """Gaps that are closed at most, the narrowest."""
+ENDS_M: Final = 0.1
+"""Posts of a gap are known within half of this each: a gap is closed if it is narrower than what the robot passes by
+this. Otherwise two drums reported at the corners of an open end are a back."""
 POST_RADIUS_M: Final = 0.1
 """Radius of what has a place but no known shape."""
 STEP_RAD: Final = math.radians(5.0)
