@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.state import Memory
+from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_bins import bin_of
 from perception.bayes.wall_contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
 from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
@@ -65,6 +65,9 @@ corner between mirrors, from afar, or from an edge. Where slanting walls answer,
 POINT_PRIOR_NAT: Final = 0.0
 POINT_ECHO_NAT: Final = 1.0
 """Log prior odds of a corner where walls end, and evidence of each echo."""
+THROUGH: Final = 0.8
+"""A wall this near to the middle of a named object, as a share of its radius, would go through it."""
+TINY_M2: Final = 1e-12
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed: readings are not independent."""
 FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y", "offset", "slope")
@@ -159,7 +162,8 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
             *reach_corners(walls, room["corners"], are_mirrors),
             *end_at_edges(walls, room["edges"], are_mirrors),
         ]
-        segments = [row for wall in walls.values() for row in _segments(wall)]
+        bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
+        segments = [row for wall in walls.values() for row in _segments(wall) if not is_through(row, bodies)]
         return np.array(segments, WallSegment.DTYPE), np.array(points, CornerPoint.DTYPE)
 
 
@@ -167,6 +171,23 @@ def has_mirrors(memory: Memory) -> bool:
     """Return whether the walls are known to be mirrors, as `wall_contact.are_mirrors` does in compiled code."""
     echoes, silences = (float(memory.state["room"][name][0]) for name in ("edge_echoes", "edge_silences"))
     return silences >= MIRRORS_SILENCES and not echoes > EDGES_SHARE * silences + EDGES_LEAD
+
+
+def is_through(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
+    """Return whether a segment goes through a round object: drums in a row have a line along them, and no wall.
+
+    Parameters
+    ----------
+    segment : tuple of float
+        Begins with its ends x, y, x, y, m.
+    bodies : (n,) record of `CircleTrack`
+        The objects.
+    """
+    x1, y1, x2, y2 = segment[:4]
+    tx, ty = x2 - x1, y2 - y1
+    dx, dy = bodies["x"] - x1, bodies["y"] - y1
+    share = np.clip((dx * tx + dy * ty) / max(tx * tx + ty * ty, TINY_M2), 0.0, 1.0)
+    return bool((np.hypot(dx - share * tx, dy - share * ty) < THROUGH * bodies["radius"]).any())
 
 
 def _segments(of: Straight) -> Iterator[tuple[float, ...]]:

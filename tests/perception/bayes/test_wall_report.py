@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.object_report import corner_object, wall_object
+from perception.bayes.state import ESTABLISHED
 from perception.bayes.wall_bins import bin_of, enter_pass, free
 from perception.bayes.wall_corners import find_corners
 from perception.bayes.wall_report import room_report, wall_ends, wall_segments
@@ -81,6 +82,21 @@ def test_short_light_and_bent_lines_are_no_walls() -> None:
     assert len(wall_ends(memory)) == 1
     wall.weight = 19.0
     assert len(wall_ends(memory)) == 0, "a barrel's side"
+
+
+def test_a_line_through_a_named_drum_is_no_wall() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -0.9, 0.9)
+    drum = memory.tracks[0]
+    drum.status, drum.is_named, drum.radius, drum.y = ESTABLISHED, 1, 0.3, 0.5
+    for x, is_wall in ((2.2, False), (1.7, True), (2.2, False)):
+        drum.x = x
+        assert len(wall_ends(memory)) == is_wall
+    drum.y = 1.3
+    assert len(wall_ends(memory)) == 1, "beyond its end"
+    drum.y, drum.is_named = 0.5, 0
+    assert len(wall_ends(memory)) == 1
 
 
 def test_a_segment_is_an_object_with_its_length_in_its_covariance() -> None:
