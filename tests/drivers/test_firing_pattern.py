@@ -78,7 +78,9 @@ def test_sets_are_fired_in_turn_and_rotated_round_the_ring() -> None:
 
 
 def test_an_unknown_sensor_is_named() -> None:
-    with pytest.raises(FiringError, match="names sensor 24, 30, and this ring has sensors 0 to 23"):
+    with pytest.raises(
+        FiringError, match=r"ring\.firing\.sets names sensor 24, 30, and this ring has sensors 0 to 23"
+    ):
         firing_pattern(ring(FiringConfig(sets=((30, 1), (24,)))))
 
 
@@ -128,6 +130,8 @@ def test_presets_listen_beside_those_that_fire() -> None:
     pattern = firing_pattern(listening("neighbours", preset="octets"))
     assert pattern.masks == OCTETS
     assert all(fired ^ heard == (1 << 24) - 1 for fired, heard in zip(pattern.masks, pattern.listeners, strict=True))
+    beside = firing_pattern(listening("neighbours", preset="quadrants"))
+    assert sensors(beside.listeners[0]) == (1, 5, 7, 11, 13, 17, 19, 23)
     second = firing_pattern(listening("second", preset="quadrants"))
     assert sensors(second.listeners[0]) == (2, 4, 8, 10, 14, 16, 20, 22)
     assert firing_pattern(ring(FiringConfig(preset="octets"))).listeners == ()
@@ -146,7 +150,8 @@ def test_each_listener_hears_the_sensor_that_looks_most_nearly_its_way() -> None
     assert pattern_pairs(ring(FiringConfig(preset="octets"))) == ()
     axes = tuple(mount.angle_rad for mount in ring(FiringConfig(preset="octets")).mounts)
     assert cross_pairs(axes, 0b1, 0b10 | 1 << 30) == ((0, 1),), "a bit beyond the ring"
-    assert cross_pairs(axes, 1 << 30, 0b10) == ()
+    assert cross_pairs(axes, 1 << 24, 0b10) == ()
+    assert cross_pairs(axes, 0b1, 1 << 24) == ()
     assert cross_pairs(axes, 0b101, 0b10) == ((0, 1),), "of two that are equally near, the lower one"
 
 

@@ -11,8 +11,16 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "encode: True → False": "a layout has as many fields as codes, which are written side by side",
             "encode: low <= value <= high → low < value <= high": "a value on the bound is checked a second time",
             "encode: low <= value <= high → low <= value < high": "a value on the bound is checked a second time",
+            "Decoder._parse #2: 0 → 1": "of a frame without payload no version is read",
         },
         "drivers/firing_pattern.py": {
+            "_listeners: i + turn → i - turn": "the listeners lie on both sides alike",
+            "_listeners: True → False": "both have one mask a step, which was checked just before",
+            "_nearest: 0.0 → 1.0": "without a sensor that fires there is none to compare with it",
+            "_nearest: angle <= least + _SAME_ANGLE_RAD → angle < least + _SAME_ANGLE_RAD": (
+                "they differ only for angles that differ by exactly a millionth: either answer is right"
+            ),
+            "pattern_pairs: True → False": "a pattern has one mask of listeners for each of those that fire, or none",
             "_check_step: step_period_s >= needed_s - _TOLERANCE_S → step_period_s > needed_s - _TOLERANCE_S": (
                 "they differ only if a step is short by exactly the tolerance of a nanosecond: either answer is right"
             ),

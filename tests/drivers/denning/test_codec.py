@@ -9,7 +9,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.denning.codec import FRAME_MAX, Decoder, crc, encode
-from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Halt, Hello, Ident, Listen, NakCode, Odom, Pattern
+from drivers.denning.frames import (
+    CAN_LISTEN,
+    FAULT,
+    NO_ECHO,
+    NO_ECHO_COUNT,
+    Ack,
+    Drive,
+    Echo,
+    Echo2,
+    Frame,
+    Halt,
+    Hello,
+    Ident,
+    Listen,
+    NakCode,
+    Odom,
+    Pattern,
+)
 from tests.drivers.vectors import BAD, GOOD, Side
 
 U8 = st.integers(0, 255)
@@ -255,6 +272,8 @@ ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
         (Ident(0, 2, 24, 1, 1, 1, 1, "a"), "Ident.range_unit_um", "1 to 65535"),
         (Ident(0, 2, 24, 1, 1, 1, 1, "a", 1, 256), "Ident.capabilities", "0 to 255"),
         (Listen(0, (1,) * 25), "Listen.masks", "0 to 24"),
+        (Echo2(0, 0, 0, 1 << 24, 0, (9,)), "Echo2.fired", "0 to 16777215"),
+        (Echo2(0, 0, 0, 0, 1 << 24, (9,)), "Echo2.heard", "0 to 16777215"),
         (Echo2(0, 0, 0, 3, 0, (9,)), "Echo2.counts", "asks for 2"),
         (Echo2(0, 0, 0, 3, 1, (9, 9)), "Echo2.heard", "cannot listen"),
         (Echo2(0, 0, 0, 3, 0, (9, 65536)), "Echo2.counts[1]", "0 to 65535"),
@@ -265,6 +284,18 @@ def test_a_value_out_of_range_is_refused_and_its_field_named(frame: Frame, field
         encode(frame)
     assert field in str(caught.value)
     assert limits in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "frame", [Listen(5, (1,) * 24), Ident(5, 1, 24, 381, 500, 50, 7, "ring")], ids=["most", "v1"]
+)
+def test_the_longest_list_and_the_shortest_ident_come_back(frame: Frame) -> None:
+    side: Side = "robot" if isinstance(frame, Ident) else "host"
+    assert Decoder(side).feed(encode(frame)) == [frame]
+
+
+def test_the_numbers_that_the_protocol_names() -> None:
+    assert (NO_ECHO, FAULT, NO_ECHO_COUNT, CAN_LISTEN) == (255, 0, 0xFFFF, 1)
 
 
 @pytest.mark.parametrize("midway", [True, False])
