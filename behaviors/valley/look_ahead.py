@@ -36,6 +36,8 @@ SQUARES_M: Final = 0.5
 """Places in one square of this share of a step are the same place."""
 SAME: Final = 0.7
 """A place within this share of a step of one on the way in force is on that way."""
+TOWARDS: Final = math.radians(45.0) / SECTOR_RAD
+"""A gap that is considered leads within this many sectors of the goal's direction."""
 AWAY_M: Final = 1.0
 """A robot farther than this from its way needs another one, m."""
 
@@ -149,7 +151,9 @@ def _children(
     blocked, near, closed = map(bytes, crossed(cells, radii, np.full(3, step_m)))
     target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
     found, same, wide = [], (SAME * step_m) ** 2, math.radians(config.wide_valley_deg) / SECTOR_RAD
-    for c in candidates(blocked, target, wide) + gaps(closed, blocked):
+    # A gap elsewhere than towards the goal is rather one between two echoes than a doorway on the way.
+    towards = [c for c in gaps(closed, blocked) if apart(c, target) <= TOWARDS]
+    for c in candidates(blocked, target, wide) + towards:
         turned_rad = apart(c, node.direction) * SECTOR_RAD
         cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
         angle = c * SECTOR_RAD
