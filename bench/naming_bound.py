@@ -43,17 +43,17 @@ def heard(ring: RingConfig, hall: Hall, drum: DrumConfig) -> tuple[np.ndarray, n
     """
     pattern, axes = firing_pattern(ring), tuple(mount.angle_rad for mount in ring.mounts)
     listening = pattern.listeners or (0,) * len(pattern.masks)
-    t_places, l_places = [], []
+    transmitters, listeners_at = [], []
     for k, (_, pose, yaw) in enumerate(poses(hall, pattern.step_period_s)):
         if pose.x > drum.x_m - EARLY_FIX_M:
             break
         fired, listeners = pattern.masks[k % len(pattern.masks)], listening[k % len(pattern.masks)]
         pairs = [(i, i) for i in sensors(fired)] + list(cross_pairs(axes, fired, listeners))
         place, turn = complex(pose.x, pose.y), np.exp(1j * yaw)
-        t, l = audible_pairs(ring, pairs, (complex(drum.x_m, drum.y_m) - place) / turn)  # noqa: E741
-        t_places.append(place + turn * t)
-        l_places.append(place + turn * l)
-    return np.concatenate(t_places), np.concatenate(l_places)
+        sending, hearing = audible_pairs(ring, pairs, (complex(drum.x_m, drum.y_m) - place) / turn)
+        transmitters.append(place + turn * sending)
+        listeners_at.append(place + turn * hearing)
+    return np.concatenate(transmitters), np.concatenate(listeners_at)
 
 
 def named_too(apart_by: Sequence[float]) -> float:
@@ -91,14 +91,16 @@ def bounds(name: SceneName, seed: int) -> dict[str, float]:
     sound = hall.world.acoustics
     kept = (1.0 - sound.dropout) * (1.0 - sound.outliers) * SIGMA_M**2 / (SIGMA_M**2 + sound.noise_m**2)
     ways = [heard(ring, hall, drum) for drum in hall.world.drum]
-    row = {"paths of a drum": float(np.mean([len(t) for t, _ in ways]))}
+    row = {"paths of a drum": float(np.mean([len(sending) for sending, _ in ways]))}
     for rival, radius in RIVALS.items():
         d = []
-        for drum, (t, l) in zip(hall.world.drum, ways, strict=True):  # noqa: E741
-            origin = complex(t.mean())
+        for drum, (sending, hearing) in zip(hall.world.drum, ways, strict=True):
+            origin = complex(sending.mean())
             to = complex(drum.x_m, drum.y_m) - origin
             bearing, away = math.atan2(to.imag, to.real), abs(to) - drum.radius_m
-            d.append(math.sqrt(kept) * apart(t - origin, l - origin, bearing, away, drum.radius_m, radius))
+            d.append(
+                math.sqrt(kept) * apart(sending - origin, hearing - origin, bearing, away, drum.radius_m, radius)
+            )
         row |= {f"{rival}, nats from": 0.5 * min(d) ** 2, f"{rival}, to": 0.5 * max(d) ** 2}
         row[f"{rival} named, %"] = 100.0 * named_too(d)
     return row
