@@ -50,9 +50,9 @@ def heard(ring: RingConfig, hall: Hall, drum: DrumConfig) -> tuple[np.ndarray, n
         fired, listeners = pattern.masks[k % len(pattern.masks)], listening[k % len(pattern.masks)]
         pairs = [(i, i) for i in sensors(fired)] + list(cross_pairs(axes, fired, listeners))
         place, turn = complex(pose.x, pose.y), np.exp(1j * yaw)
-        sending, hearing = audible_pairs(ring, pairs, (complex(drum.x_m, drum.y_m) - place) / turn)
+        sending, receiving = audible_pairs(ring, pairs, (complex(drum.x_m, drum.y_m) - place) / turn)
         transmitters.append(place + turn * sending)
-        listeners_at.append(place + turn * hearing)
+        listeners_at.append(place + turn * receiving)
     return np.concatenate(transmitters), np.concatenate(listeners_at)
 
 
@@ -94,12 +94,12 @@ def bounds(name: SceneName, seed: int) -> dict[str, float]:
     row = {"paths of a drum": float(np.mean([len(sending) for sending, _ in ways]))}
     for rival, radius in RIVALS.items():
         d = []
-        for drum, (sending, hearing) in zip(hall.world.drum, ways, strict=True):
+        for drum, (sending, receiving) in zip(hall.world.drum, ways, strict=True):
             origin = complex(sending.mean())
             to = complex(drum.x_m, drum.y_m) - origin
             bearing, away = math.atan2(to.imag, to.real), abs(to) - drum.radius_m
             d.append(
-                math.sqrt(kept) * apart(sending - origin, hearing - origin, bearing, away, drum.radius_m, radius)
+                math.sqrt(kept) * apart(sending - origin, receiving - origin, bearing, away, drum.radius_m, radius)
             )
         row |= {f"{rival}, nats from": 0.5 * min(d) ** 2, f"{rival}, to": 0.5 * max(d) ** 2}
         row[f"{rival} named, %"] = 100.0 * named_too(d)
