@@ -21,6 +21,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import cross_pairs, firing_pattern, sensors
 from drivers.messages import CrossPaths, Firing, Pose
+from perception.bayes.parameters import NAMED_SIGMA_MAX_M
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
 from runtime.simulation.evaluation import GATE_M
@@ -29,6 +30,8 @@ from runtime.simulation.open_loop import RADIUS_TOLERANCE_M, match_objects, perc
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import FROM_FT, SPEED_M_S, TO_FT, Hall, halls
 
+FLAT: Final = ("wall", "inside corner")
+"""Objects that have no centre."""
 SCENES: Final[tuple[SceneName, ...]] = ("moved", "noisy", "jit10", "halls")
 
 
@@ -110,6 +113,17 @@ def is_drum(one: DetectedObject, drums: Sequence[DrumConfig], radii: Sequence[fl
     )
 
 
+def early_percent(fixes: Sequence[float | None]) -> float:
+    """Return how many of the first fixes (m before the drum) are early ones, per cent; NaN without any."""
+    early = [fix is not None and fix >= EARLY_FIX_M - ROUNDING_M for fix in fixes]
+    return 100.0 * float(np.mean(early)) if early else math.nan
+
+
+def is_placed(one: DetectedObject) -> bool:
+    """Return whether the place of an object is as sure as that of a named drum must be, whatever its kind."""
+    return one.model not in FLAT and one.sigma <= NAMED_SIGMA_MAX_M
+
+
 def measure(
     name: SceneName, settings: Settings, seeds: Sequence[int], tell: Callable[[str], None]
 ) -> dict[str, float]:
@@ -123,6 +137,7 @@ def measure(
         Called with each step.
     """
     fixes: list[float | None] = []
+    placed: list[float | None] = []
     took_ms: list[float] = []
     radii = [model.arc_radius_m for model in settings.models if model.arc_radius_m is not None]
     there = found = false = wrong = drives = 0
@@ -130,22 +145,25 @@ def measure(
         for i, hall in enumerate(halls(name, seed)):
             tell(f"{name} {seed}.{i}")
             perception = Perception(settings.ring, settings.models, settings.perception)
-            tracker = FirstFixTracker(() if hall.path else hall.world.drum)
+            drums = () if hall.path else hall.world.drum
+            tracker, places = FirstFixTracker(drums), FirstFixTracker(drums)
             names, seen = set[int | None](), tuple[DetectedObject, ...]()
             for firing in firings(settings.ring, hall, 1000 * seed + i):
                 begin_s = time.thread_time()
                 seen = perceive(perception, firing)
                 took_ms.append(1e3 * (time.thread_time() - begin_s))
                 tracker.update(float(firing.pose.x), seen)
+                if drums:
+                    places.update(float(firing.pose.x), filter(is_placed, perception.labelled_objects()))
                 names |= {one.number for one in seen if not is_drum(one, hall.world.drum, radii)}
             rows, _, more = match_objects(hall.world, seen, settings.models)
             fixes += tracker.fixes()
+            placed += places.fixes()
             there, found = there + len(rows), found + sum(row["estimate"] is not None for row in rows)
             false, wrong, drives = false + more, wrong + len(names), drives + 1
-    early = [fix is not None and fix >= EARLY_FIX_M - ROUNDING_M for fix in fixes]
     return {
         "halls": drives, "drums": there, "found": found, "false": false,
-        "4 ft before %": 100.0 * float(np.mean(early)) if early else math.nan,
+        "4 ft before %": early_percent(fixes), "placed by then %": early_percent(placed),
         "median ft": float(np.median([fix for fix in fixes if fix is not None])) / FOOT_M if fixes else math.nan,
         "wrong names a hall": wrong / drives, "firing ms, p50": float(np.median(took_ms)),
         "mean": float(np.mean(took_ms)),

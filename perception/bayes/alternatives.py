@@ -24,10 +24,10 @@ HOPELESS_NAT: Final = -1e9
 
 
 @kernel
-def bearing_sum(
+def mean_bearing(
     readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
-) -> tuple[int, float, float]:
-    """Return the number of readings that end near a circle, and the sum of their unit bearings to its centre.
+) -> tuple[float, float]:  # fmt: skip
+    """Return the mean unit direction from the sensors that hear a circle to its centre; zeros without such a sensor.
 
     Parameters
     ----------
@@ -36,7 +36,6 @@ def bearing_sum(
     cx, cy, radius, gate : float
         The circle, and the greatest distance of a reading's end from it, m.
     """
-    count = 0
     sx = 0.0
     sy = 0.0
     for j in range(len(readings)):
@@ -47,26 +46,10 @@ def bearing_sum(
         if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
             sx += dx / d
             sy += dy / d
-            count += 1
-    return count, sx, sy
-
-
-@kernel
-def mean_bearing(
-    readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
-) -> tuple[float, float]:  # fmt: skip
-    """Return the mean unit direction from the sensors that hear a circle to its centre; zeros without such a sensor.
-
-    Parameters
-    ----------
-    readings, cx, cy, radius, gate
-        As for `bearing_sum`.
-    """
-    _, x, y = bearing_sum(readings, cx, cy, radius, gate)
-    m = math.hypot(x, y)
+    m = math.hypot(sx, sy)
     if m == 0.0:
         return 0.0, 0.0
-    return x / m, y / m
+    return sx / m, sy / m
 
 
 @kernel

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.alternatives import bearing_sum
 from perception.bayes.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
@@ -31,7 +30,7 @@ from perception.bayes.reservoir import copy_reading
 from perception.bayes.scratch import CornerFit, LineFit
 from perception.bayes.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.state import StateRecord
-from perception.kernel import kernel
+from perception.kernel import Ints, kernel
 from perception.records import Records
 
 IMPOSSIBLE_NAT: Final = -1e9
@@ -115,9 +114,38 @@ def find_edge(cx: float, cy: float, corner: CornerFit) -> bool:
 
 
 @kernel
+def find_facing(
+    readings: Records[Reading], cx: float, cy: float, radius: float, gate: float, facing: Ints
+) -> tuple[int, float, float]:  # fmt: skip
+    """Write the places of the readings that end near a circle; return their number and the sum of their bearings.
+
+    Parameters
+    ----------
+    readings, cx, cy, radius, gate
+        As for `alternatives.mean_bearing`.
+    facing : (≥ n,) int
+        Out.
+    """
+    count = 0
+    sx = 0.0
+    sy = 0.0
+    for j in range(len(readings)):
+        q = readings[j]
+        dx = cx - q.x
+        dy = cy - q.y
+        d = math.sqrt(dx * dx + dy * dy)
+        if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
+            sx += dx / d
+            sy += dy / d
+            facing[count] = j
+            count += 1
+    return count, sx, sy
+
+
+@kernel
 def fit_faces(
-    readings: Records[Reading], face_readings: Records[Reading], cx: float, cy: float, radius: float, cos_may: float,
-    gate: float, var0: float, rel2: float, fit: LineFit, corner: CornerFit,
+    readings: Records[Reading], facing: Ints, sx: float, sy: float, face_readings: Records[Reading], cx: float,
+    cy: float, radius: float, cos_may: float, gate: float, var0: float, rel2: float, fit: LineFit, corner: CornerFit,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Fit two faces and their edge, at first to the readings left and right of the mean bearing.
 
@@ -125,6 +153,8 @@ def fit_faces(
     ----------
     readings, cx, cy, radius, cos_may, gate, var0, rel2
         As for `score_corner`.
+    facing, sx, sy
+        From `find_facing`.
     face_readings, fit
         Scratch.
     corner : CornerFit
@@ -135,28 +165,23 @@ def fit_faces(
     (bool, bool)
         Whether there are two faces, and whether they have an edge.
     """
-    count, sx, sy = bearing_sum(readings, cx, cy, radius, gate)
-    if count < CORNER_READINGS_MIN:
-        return False, False
     has_edge = False
     for turn in range(CORNER_ROUNDS):
         for side in range(2):
             k = 0
             ax = 0.0
             ay = 0.0
-            for j in range(len(readings)):
-                q = readings[j]
+            for i in range(len(facing)):
+                q = readings[facing[i]]
                 dx = cx - q.x
                 dy = cy - q.y
-                d = math.sqrt(dx * dx + dy * dy)
-                if abs(circle_error(q, dx, dy, d, radius)) >= gate or d == 0.0:
-                    continue
                 if turn == 0:
                     is_own = (sx * dy - sy * dx > 0.0) == (side == 0)
                 else:
                     is_own = is_of_face(q, cx, cy, corner, side, has_edge, cos_may, gate)
                 if is_own:
                     copy_reading(q, face_readings[k])
+                    d = math.sqrt(dx * dx + dy * dy)
                     ax += dx / d
                     ay += dy / d
                     k += 1
@@ -209,18 +234,19 @@ def score_corner(
     readings = scratch.readings[:n]
     corner = scratch.corner_fit
     cos_may, gate = p[0].cos_may_answer, p[0].gate_m
+    count, sx, sy = find_facing(readings, cx, cy, radius, gate, scratch.facing)
+    if count < CORNER_READINGS_MIN:
+        return IMPOSSIBLE_NAT
+    facing = scratch.facing[:count]
     found, has_edge = fit_faces(
-        readings, scratch.face_readings, cx, cy, radius, cos_may, gate, var0, rel2, scratch.line_fit, corner
-    )
+        readings, facing, sx, sy, scratch.face_readings, cx, cy, radius, cos_may, gate, var0, rel2,
+        scratch.line_fit, corner,
+    )  # fmt: skip
     if not found:
         return IMPOSSIBLE_NAT
     total = 0.0
-    for j in range(len(readings)):
-        q = readings[j]
-        dx = cx - q.x
-        dy = cy - q.y
-        if abs(circle_error(q, dx, dy, math.sqrt(dx * dx + dy * dy), radius)) >= gate:
-            continue
+    for i in range(count):
+        q = readings[facing[i]]
         level = level_of(p, s[0].noise_level, q.range_m)
         v = 0.0
         for side in range(2):

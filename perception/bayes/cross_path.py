@@ -59,30 +59,36 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
     b = max(math.sqrt(bx * bx + by * by), radius + NEAREST_M)
     if radius == 0.0:
         return 0.5 * (a + b), -0.5 * (ax / a + bx / b), -0.5 * (ay / a + by / b)
-    share_a, share_b = (b - radius) / a, (a - radius) / b
+    # (b − ρ) / a and (a − ρ) / b, both times ab: only the direction counts
+    share_a, share_b = b * (b - radius), a * (a - radius)
     wx, wy = share_a * ax + share_b * bx, share_a * ay + share_b * by
-    half = gx = gy = 0.0
+    length2 = wx * wx + wy * wy
+    if length2 == 0.0:  # the circle lies between the sensors
+        return 0.5 * (a + b) - radius, 0.0, 0.0
+    per_bend = half = gx = gy = 0.0
     for turn in range(2):
-        length = math.sqrt(wx * wx + wy * wy)
-        if length == 0.0:  # the circle lies between the sensors
-            return 0.5 * (a + b) - radius, 0.0, 0.0
-        wx /= length
-        wy /= length
+        scale = 1.0 / math.sqrt(length2)
+        wx *= scale
+        wy *= scale
         px, py = ax - radius * wx, ay - radius * wy
         qx, qy = bx - radius * wx, by - radius * wy
         to_a = max(math.sqrt(px * px + py * py), NEAREST_M)
         to_b = max(math.sqrt(qx * qx + qy * qy), NEAREST_M)
-        slope_a = radius * (ax * wy - ay * wx) / to_a
-        slope_b = radius * (bx * wy - by * wx) / to_b
-        bend = (radius * (ax * wx + ay * wy) - slope_a * slope_a) / to_a
-        bend += (radius * (bx * wx + by * wy) - slope_b * slope_b) / to_b
+        per_a, per_b = 1.0 / to_a, 1.0 / to_b
+        slope_a = radius * (ax * wy - ay * wx) * per_a
+        slope_b = radius * (bx * wy - by * wx) * per_b
         slope = slope_a + slope_b
-        if turn == 0 and bend > 0.0:
-            wx, wy = wx + slope / bend * wy, wy - slope / bend * wx
+        if turn == 0:
+            bend = (radius * (ax * wx + ay * wy) - slope_a * slope_a) * per_a
+            bend += (radius * (bx * wx + by * wy) - slope_b * slope_b) * per_b
+            per_bend = 1.0 / bend if bend > 0.0 else 0.0
+            step = slope * per_bend
+            wx, wy = wx + step * wy, wy - step * wx
+            length2 = 1.0 + step * step
         else:
-            half = 0.5 * (to_a + to_b - (0.5 * slope * slope / bend if bend > 0.0 else 0.0))
-            gx = -0.5 * (px / to_a + qx / to_b)
-            gy = -0.5 * (py / to_a + qy / to_b)
+            half = 0.5 * (to_a + to_b - 0.5 * slope * slope * per_bend)
+            gx = -0.5 * (px * per_a + qx * per_b)
+            gy = -0.5 * (py * per_a + qy * per_b)
     return half, gx, gy
 
 

@@ -20,7 +20,10 @@ BIN_CAPACITY: Final = 20
 MAX_LINES: Final = 24
 HISTORY: Final = 28
 """Readings kept of each sensor, hits and silences of any object."""
-CROSS_HISTORY: Final = 3072
+CROSS_EVERY: Final = 7
+"""Of this many cross paths one is kept for good, like an echo; so few that they do not replace the echoes, and no
+divisor of the number of listeners, so that it is not always the same one."""
+CROSS_HISTORY: Final = 438 * CROSS_EVERY
 """Cross paths kept of all sensors: those of the last metre or two."""
 CROSSES_MAX: Final = 192
 """Cross paths compared at a time."""

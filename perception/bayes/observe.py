@@ -9,13 +9,14 @@ import math
 from typing import Final
 
 from perception.bayes.cross_path import circle_error, is_crossed, is_near_circle
-from perception.bayes.elements import CROSS_HISTORY, HISTORY, Reading
+from perception.bayes.elements import CROSS_EVERY, CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.model_check import count_surroundings
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.occlusion import is_elsewhere
 from perception.bayes.pairing import make_segments
 from perception.bayes.parameters import (
     ASSOCIATION_MARGIN_M,
+    CERTAIN_PROBABILITY,
     HYPOTHESES_PER_FIRING,
     KEEPING_MARGIN_M,
     STILL_COS,
@@ -164,7 +165,10 @@ def bears_on_circle(
 
 @kernel
 def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
-    """Put each fired reading into the reservoirs of the circles that it bears on.
+    """Put each fired reading into the reservoirs of the circles that it bears on, of the cross paths a few.
+
+    The others do not make a sure circle due for refinement: eight at a time, they would several times in a metre, and
+    with each its name would be at stake anew, on readings that say the same.
 
     Parameters
     ----------
@@ -173,11 +177,13 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
     m : int
         Number of echoes, the first of the scratch; its cross paths follow them.
     """
+    offset = s[0].crosses_kept - s[0].scratch.crosses - m  # from a place in the scratch to one in the memory
     for t in range(len(tracks)):
         track = tracks[t]
         if track.status == FREE:
             continue
         track.idle_firings += 1
+        is_sure = track.is_named == 1 and track.probability >= CERTAIN_PROBABILITY
         cx = track.x
         cy = track.y
         for i in range(m + s[0].scratch.crosses):
@@ -187,9 +193,11 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
             if 0 <= owner < len(tracks) and not is_own:  # a part of the same body answered
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
             if bears_on_circle(q, cx, cy, track.radius, owner == UNEXPLAINED, is_own, p):
-                if not is_crossed(q):
+                is_kept = i < m or (i + offset) % CROSS_EVERY == 0
+                if is_kept:
                     keep_reading(track, cx, cy, q)
-                track.unseen += 1
+                if is_kept or not is_sure:
+                    track.unseen += 1
                 track.idle_firings = 0
                 track.final_refinements = p[0].final_refinements
 

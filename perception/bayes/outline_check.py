@@ -165,7 +165,10 @@ def round_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) ->
         dx = track.x - q.x
         dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = circle_error(q, dx, dy, d, track.radius)
+        predicted, crossed_x, crossed_y = d - track.radius, 0.0, 0.0
+        if is_crossed(q):
+            predicted, crossed_x, crossed_y = over_circle(q, dx, dy, track.radius)
+        e = q.range_m - predicted
         if abs(e) > p[0].gate_m or q.range_m - e < p[0].range_min_m:
             continue
         if dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
@@ -177,7 +180,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) ->
         uy = dy / d
         along = 1.0  # fall of the range with the radius
         if is_crossed(q):
-            _, ux, uy = over_circle(q, dx, dy, track.radius)
+            ux, uy = crossed_x, crossed_y
             along = math.hypot(ux, uy)
         xx += ux * ux / variance
         xy += ux * uy / variance

@@ -4,8 +4,9 @@ Hits and silences share the bins, so that new silences replace the hits of an ob
 from which the robot observes it again. No reading is dropped for its age. Readings of one bearing never replace those
 of another, because a position needs readings from many bearings.
 
-Cross paths come eight at a time and would fill a circle's bins with the last decimetre. All circles share one memory
-of them, of the last metre or two, and each takes those that it may explain.
+Cross paths come eight at a time and would fill a circle's bins with the last decimetre, so that one in a few is kept
+there, for good. All circles share one memory of the others, of the last metre or two, and each takes those that it
+may explain. Without any for good a drum was lost that cross paths alone had held against silence.
 """
 
 from __future__ import annotations
@@ -13,7 +14,15 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.elements import BEARING_BINS, BIN_CAPACITY, CROSS_HISTORY, CROSSES_MAX, HISTORY, Reading
+from perception.bayes.elements import (
+    BEARING_BINS,
+    BIN_CAPACITY,
+    CROSS_EVERY,
+    CROSS_HISTORY,
+    CROSSES_MAX,
+    HISTORY,
+    Reading,
+)
 from perception.bayes.parameters import HYPOTHESIS_MARGIN_M
 from perception.bayes.settings_record import Settings
 from perception.bayes.state import CircleTrack, PolygonTrack, State
@@ -90,6 +99,8 @@ def add_crosses(
     found, cos2 = s[0].scratch.crosses_found, p[0].cos_may_answer ** 2
     count = 0
     for k in range(min(s[0].crosses_kept, CROSS_HISTORY)):
+        if k % CROSS_EVERY == 0:  # it is among the circle's own readings
+            continue
         q = s[0].crosses[k]
         dx = cx - q.x
         dy = cy - q.y

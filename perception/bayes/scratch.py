@@ -163,6 +163,8 @@ class Scratch(Record):
     readings: Annotated[Records[Reading], READINGS_MAX]
     """The readings of one object."""
     face_readings: Annotated[Records[Reading], READINGS_MAX]
+    facing: Annotated[Ints, READINGS_MAX]
+    """Places of those readings that end near the circle with which a corner is compared."""
     linear: Annotated[Records[LinearReading], READINGS_MAX]
     cells: Annotated[Floats, GRID_CELLS]
     """Log likelihood of each cell of a posterior's grid, nat."""

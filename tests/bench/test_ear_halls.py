@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from bench.ear_halls import firings, is_drum, octets, poses, rings, settings_of
+from bench.ear_halls import early_percent, firings, is_drum, is_placed, octets, poses, rings, settings_of
 from perception.detected_object import DetectedObject
 from runtime.simulation.scenes import SPEED_M_S, halls
 
@@ -52,6 +52,17 @@ def test_a_post_is_no_drum() -> None:
     seen = DetectedObject("drum", drum.x_m + 0.1, drum.y_m, 0.0, 0.01, 9, 1.0)
     assert is_drum(seen, HALL.world.drum, (drum.radius_m,))
     assert not is_drum(seen, HALL.world.drum, (drum.radius_m + 0.1,))
+
+
+def test_a_place_may_be_sure_before_the_kind_is_and_walls_have_none() -> None:
+    assert is_placed(DetectedObject("unknown", 0.0, 0.0, 0.0, 0.05, 9, 0.5))
+    assert not is_placed(DetectedObject("unknown", 0.0, 0.0, 0.0, 0.06, 9, 0.5))
+    assert not is_placed(DetectedObject("wall", 0.0, 0.0, 0.0, 0.01, 9, 1.0))
+
+
+def test_a_fix_four_feet_ahead_is_early_and_none_is_late() -> None:
+    assert early_percent([1.3, 1.2192, 1.1, None]) == 50.0
+    assert math.isnan(early_percent([]))
 
 
 def test_a_drum_may_have_to_be_surer_than_by_the_settings() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from perception.bayes import circle_posterior, cross_path, observe, occlusion, range_fit, reservoir
-from perception.bayes.elements import CROSS_HISTORY, CROSSES_MAX, GRID_CELLS
+from perception.bayes.elements import CROSS_EVERY, CROSS_HISTORY, CROSSES_MAX, GRID_CELLS
 from perception.bayes.scratch import UNEXPLAINED, CircleFit, CirclePosterior, LinearReading, LineFit, Score
 from perception.bayes.state import ESTABLISHED
 from perception.kernel import Floats
@@ -212,7 +212,17 @@ def test_cross_paths_of_a_firing_are_placed_remembered_and_associated() -> None:
     assert numbers(memory.state["crosses"][0])[:2] == pytest.approx(rows)
     observe.keep_readings(memory.s, memory.tracks, P, 0)
     assert track.unseen == 1  # one that came from elsewhere is no evidence
-    assert memory.circles["bins"]["count"][0].sum() == 0  # all circles share the memory of them
+    assert memory.circles["bins"]["count"][0].sum() == 1  # the first of every seven is the circle's own
+    memory.s[0].crosses_kept += 1
+    observe.keep_readings(memory.s, memory.tracks, P, 0)
+    assert memory.circles["bins"]["count"][0].sum() == 1  # all circles share the memory of the others
+    assert track.unseen == 2
+    track.is_named, track.probability = 1, 0.99
+    observe.keep_readings(memory.s, memory.tracks, P, 0)
+    assert track.unseen == 2  # which do not make a sure circle due
+    memory.s[0].crosses_kept += CROSS_EVERY - 1
+    observe.keep_readings(memory.s, memory.tracks, P, 0)
+    assert track.unseen == 3
     assert hear(halves) == 0  # the robot has not moved
     assert hear(np.full(3, np.inf), (1.3, 1.0, 0.2)) == 0  # nothing was heard
     assert hear(halves, (1.3, 1.0, 0.2)) == 2
@@ -234,6 +244,7 @@ def test_a_circle_takes_of_the_remembered_cross_paths_those_that_it_may_explain_
     to = centre - rows[:, 0] - 1j * rows[:, 1]
     bears = (to * axes.conj()).real >= P[0].cos_may_answer * abs(to)
     bears &= abs(rows[:, 4] + radius - abs(to)) < P[0].gate_m + 0.5 * abs(rows[:, 5:]).sum(1)
+    bears &= np.arange(CROSS_HISTORY) % CROSS_EVERY > 0  # the circle has those itself
     step = math.ceil(bears.sum() / CROSSES_MAX)
     assert step > 1
     assert taken == pytest.approx(rows[bears][::step])
