@@ -24,7 +24,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from behaviors.blocked_ahead import Ahead, Block, between, blocked_ahead, outline, presume, widen
+from behaviors.blocked_ahead import Ahead, Block, between, blocked_ahead, outline, pocket_ahead, presume, widen
 from behaviors.clearance import free_paths_m
 from behaviors.near_memory import NearEchoes, remember
 from behaviors.response import Response
@@ -208,17 +208,20 @@ def _presume(
     """Return the detour with the way driven and what is presumed far ahead brought up to date."""
     step = 0.0 if detour.x is None or detour.y is None else math.hypot(pose.x - detour.x, pose.y - detour.y)
     detour = replace(detour, x=pose.x, y=pose.y, driven_m=detour.driven_m + step)
+    reach = min(reach_m, to_goal_m)
     if detour.block is not None:
-        return replace(detour, block=widen(detour.block, echoes, pose))
+        pocket = pocket_ahead(echoes, pose, detour.block.axis_rad, reach)
+        return replace(detour, block=widen(detour.block, echoes, pose, pocket))
     if detour.side != 0:
         return detour
-    reach = min(reach_m, to_goal_m)
-    detour = replace(detour, ahead=blocked_ahead(echoes, pose, bearing_rad, reach, detour.ahead, step, room_m))
+    pocket = pocket_ahead(echoes, pose, bearing_rad, reach)
+    ahead = blocked_ahead(echoes, pose, bearing_rad, reach, detour.ahead, step, room_m, pocket)
+    detour = replace(detour, ahead=ahead)
     if detour.ahead is None or not detour.ahead.is_sure or to_goal_m > detour.presume_below_m:
         return detour
     if not _open_sides(echoes, pose, bearing_rad, room_m):
         return detour
-    return replace(detour, block=presume(detour.ahead, pose, front_m))
+    return replace(detour, block=presume(detour.ahead, pose, bearing_rad, front_m, pocket))
 
 
 def _open_sides(points: Floats, pose: Pose, way_rad: float, room_m: float) -> list[Side]:
