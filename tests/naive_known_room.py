@@ -108,7 +108,7 @@ def naive_update(
             summed += np.array(causes) / sum(causes)
             for cause, (range_m, _), gradient in zip(causes[:3], expected, gradients, strict=True):
                 if cause > 0.0 and not math.isinf(measured):
-                    weight = cause / sum(causes) / float(model.sigma(np.array(range_m))) ** 2
+                    weight = TEMPER * cause / sum(causes) / float(model.sigma(np.array(range_m))) ** 2
                     information += weight * np.outer(gradient, gradient)
                     rhs += weight * (measured - range_m) * gradient
         if step < FIT_STEPS:

@@ -14,7 +14,8 @@ from perception.records import Records
 FIT_STEPS: Final = 2
 """Linear solutions of an update."""
 TEMPER: Final = 0.5
-"""Weight of a reading's log likelihood: errors of the map are common to readings of one wall."""
+"""Weight of a reading, in the likelihood and in the fit of the place: errors of the map are common to readings of one
+wall."""
 SPREAD_M: Final = 1.0
 """Greatest distance of a particle from its hypothesis's mean for which all surfaces in reach are found."""
 COLUMNS: Final = 5
@@ -95,7 +96,7 @@ def update_particle(
             for cause in range(3):
                 if measured < math.inf and causes[cause] > 0.0:
                     range_m, grad_x, grad_y = expected[cause]
-                    weight = causes[cause] / range_variance(s.sensor, range_m)
+                    weight = TEMPER * causes[cause] / range_variance(s.sensor, range_m)
                     error = weight * (measured - range_m)
                     ax += weight * grad_x * grad_x
                     axy += weight * grad_x * grad_y

@@ -26,11 +26,12 @@ PLACE_WALK: Final = 0.02**2
 """Variance of a displacement by odometry on each axis, m²/m."""
 SCALE_WALK: Final = 0.002**2
 """Variance by which the scale changes, 1/m."""
-HEADING_WALK: Final = math.radians(1.0) ** 2
-"""Variance of the heading by odometry, rad²/m."""
-TURN_SHARE: Final = 0.03
+HEADING_WALK: Final = math.radians(0.7) ** 2
+"""Variance of the heading by odometry, rad²/m. Where few sensors hear something, a walk twice that of the
+odometry makes the heading worse than the odometry leaves it."""
+TURN_SHARE: Final = 0.02
 """Standard deviation of a turn by odometry as a share of it."""
-TURN_WALK: Final = 0.0015
+TURN_WALK: Final = 0.0005
 """Variance of a turn by odometry beyond that, rad²/rad: an error of scale adds up over many turns to one side."""
 SHARE_TEMPER: Final = 0.5
 """Weight of log evidence between hypotheses: places that look alike differ by what is common to many readings."""
