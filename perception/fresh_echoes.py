@@ -9,7 +9,7 @@ has not looked: its last echo ages.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,14 +93,14 @@ def record_echoes(
 
 @kernel
 def select_looks(
-    bearings: Floats, times: Floats, robot_s: float, age_max_s: float, fresh: Floats, ages: Floats,
-    sensor_ages: Floats,
-) -> int:  # fmt: skip
-    """Find the looks that are young enough, and how long ago each sensor last looked; return the looks' number k.
+    bearings: Floats, times: Floats, heard: NDArray[np.bool_], points: Floats, robot_s: float, age_max_s: float,
+    fresh: Floats, ages: Floats, sensor_ages: Floats, fresh_points: Floats,
+) -> tuple[int, int]:  # fmt: skip
+    """Find the looks that are young enough, their echoes, and how long ago each sensor last looked.
 
     Parameters
     ----------
-    bearings, times : (n, looks) float
+    bearings, times, heard, points : (n, looks) float, bool; (n, looks, 2) float
         As in `record_echoes`.
     robot_s : float
         The robot's time now, s.
@@ -110,8 +110,16 @@ def select_looks(
         The first k are the bearings and ages of the looks, rad and s, sensor by sensor. Overwritten.
     sensor_ages : (n,) float
         Age of each sensor's last look, s; infinite for one that has not looked yet. Overwritten.
+    fresh_points : (n · looks, 2) float
+        The first h are the places of the echoes among them, m. Overwritten.
+
+    Returns
+    -------
+    (int, int)
+        k and h, the numbers of looks and of echoes.
     """
     k = 0
+    h = 0
     for i in range(times.shape[0]):
         sensor_ages[i] = math.inf
         for j in range(times.shape[1]):
@@ -121,7 +129,24 @@ def select_looks(
                 fresh[k] = bearings[i, j]
                 ages[k] = age
                 k += 1
-    return k
+                if heard[i, j]:
+                    fresh_points[h, 0] = points[i, j, 0]
+                    fresh_points[h, 1] = points[i, j, 1]
+                    h += 1
+    return k, h
+
+
+class Looks(NamedTuple):
+    """What the ring has seen lately."""
+
+    bearings_rad: Floats
+    """(k,): where it looked, sensor by sensor, rad, and …"""
+    ages_s: Floats
+    """(k,): how long ago, s."""
+    sensor_ages_s: Floats
+    """(n,): how long ago each sensor last looked, s; infinite for one that has not looked yet."""
+    points: Floats
+    """(h, 2): the places of the echoes that it heard there, m."""
 
 
 class FreshEchoes:
@@ -158,23 +183,23 @@ class FreshEchoes:
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
         """Return a copy of the echoes no older than `age_max_s` at the robot's time `robot_s`: shape (k, 2), m."""
-        fresh: Floats = self._points[self._heard & (robot_s - self._times <= age_max_s)]
-        return fresh
+        return self.looks(robot_s, age_max_s).points
 
     def steady_points(self, robot_s: float, age_max_s: float) -> Floats:
         """Return a copy of those echoes with which another look agrees, shape (k, 2), m: no random ones."""
         fresh: Floats = self._points[self._heard & self._steady & (robot_s - self._times <= age_max_s)]
         return fresh
 
-    def looks(self, robot_s: float, age_max_s: float) -> tuple[Floats, Floats, Floats]:
-        """Return where the ring looked, and how long ago, at the robot's time `robot_s`: shapes (k,), rad and s.
-
-        Older looks than `age_max_s` are left out. The third is how long ago each sensor last looked, shape (n,), s;
-        infinite for one that has not looked yet.
-        """
-        fresh, ages, sensor_ages = np.empty(self._times.size), np.empty(self._times.size), np.empty(len(self._times))
-        k = select_looks(self._bearings, self._times, float(robot_s), float(age_max_s), fresh, ages, sensor_ages)
-        return fresh[:k], ages[:k], sensor_ages
+    def looks(self, robot_s: float, age_max_s: float) -> Looks:
+        """Return what the ring has seen up to `age_max_s` before the robot's time `robot_s`, as copies."""
+        size = self._times.size
+        fresh, ages, points = np.empty(size), np.empty(size), np.empty((size, 2))
+        sensor_ages = np.empty(len(self._times))
+        k, h = select_looks(
+            self._bearings, self._times, self._heard, self._points, float(robot_s), float(age_max_s), fresh, ages,
+            sensor_ages, points,
+        )  # fmt: skip
+        return Looks(fresh[:k], ages[:k], sensor_ages, points[:h])
 
     def clear(self) -> None:
         """Remove all readings."""

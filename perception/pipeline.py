@@ -282,8 +282,10 @@ class Perception:
         """Return those of the obstacles with which another look agrees: shape (k, 2), m."""
         return self._echoes.steady_points(robot_s, age_max_s)
 
-    def field_of_view(self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float) -> FieldOfView:
-        """Return where the ring has looked.
+    def surroundings(
+        self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float
+    ) -> tuple[FieldOfView, Floats]:
+        """Return where the ring has looked, and the obstacles that it heard there, as `obstacles`.
 
         Parameters
         ----------
@@ -296,11 +298,12 @@ class Perception:
         age_max_s : float
             Longest age at which a direction counts as seen, s.
         """
-        bearings, ages, sensor_ages = self._echoes.looks(robot_s, age_max_s)
+        bearings, ages, sensor_ages, points = self._echoes.looks(robot_s, age_max_s)
         axes = ring_yaw + self._axes
         if self._turning:
             axes[self._turning] += travel - ring_yaw
-        return FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s)
+        view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s)
+        return view, points
 
     def canyons(self) -> tuple[Canyon, ...]:
         """Return the box canyons found so far, in odometry's frame, those left behind included."""

@@ -352,7 +352,7 @@ AnyTrack: TypeAlias = CircleTrack | PolygonTrack
 class Memory:
     """The arrays of the memory, as numpy arrays and as kernels take them."""
 
-    SCRATCH: Final = ("s", "tracks")
+    SCRATCH: Final = ("s", "tracks", "firings", "objects_numbered")
     """Views of the same memory, left out of snapshots."""
 
     def __init__(self, sensors: int, tracks: int = MAX_TRACKS) -> None:
@@ -360,6 +360,9 @@ class Memory:
         self.circles = zeros(CircleTrack, tracks)
         self.s = records(State, self.state)
         self.tracks = records(CircleTrack, self.circles)
+        # What Python reads at each firing: to find a field anew takes numpy ten times as long as to read it.
+        self.firings = self.state["room"]["firings"]
+        self.objects_numbered = self.state["objects_numbered"]
         self.state["sensor_count"] = sensors
         self.clear()
 

@@ -75,7 +75,7 @@ class TrackArchive:
             Least probability with which a polygon is reported.
         """
         has_changed = False
-        numbered = int(memory.state["objects_numbered"][0])
+        numbered: int = memory.objects_numbered.item()
         if numbered != self._numbered:
             for kind in self._kinds(memory, p, sure):
                 has_changed |= kind.recognise_new(self._numbered, float(p[0].merge_m))

@@ -234,7 +234,7 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
 def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
     """Update the walls by the `m` readings of the firing that `observe` has processed."""
     newest = enter_firing(memory.s, memory.tracks, p, m)
-    firings = int(memory.state["room"]["firings"][0])
+    firings: int = memory.firings.item()
     fit_walls(memory.s, p, firings % FIT_FIRINGS, MAX_WALLS, FIT_FIRINGS)
     is_new = newest >= 0 and try_wall(memory, p, newest)
     turn, phase = divmod(firings, TIDY_FIRINGS)

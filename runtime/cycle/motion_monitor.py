@@ -128,7 +128,9 @@ class MotionMonitor:
         body : BodyConfig
             The base's limits.
         """
-        commands = tuple(c for c in self.commands[:-1] if run_s - c.run_s <= AGE_S) + self.commands[-1:]
+        commands = self.commands
+        while len(commands) > 1 and run_s - commands[0].run_s > AGE_S:
+            commands = commands[1:]
         last, fine = self.odometry, Movement.AS_COMMANDED
         if odometry is None:
             return replace(self, movement=fine, commands=commands)
@@ -172,15 +174,30 @@ class MotionMonitor:
         self, commands: tuple[Command, ...], along: float, turned: float, passed_s: float, body: BodyConfig
     ) -> tuple[tuple[Direction, ...], bool]:
         """Return the directions after a motion, and whether too much is unexplained; the sum then starts anew."""
-        v, w = [command.twist.v for command in commands], [command.twist.w for command in commands]
+        v_max = v_min = w_max = w_min = 0.0  # a velocity explains nothing in the direction opposite to its own
+        for command in commands:
+            v, w = command.twist.v, command.twist.w
+            if v > v_max:
+                v_max = v
+            elif v < v_min:
+                v_min = v
+            if w > w_max:
+                w_max = w
+            elif w < w_min:
+                w_min = w
         braked, slowed = body.acceleration_max_m_s2 * passed_s, body.turn_acceleration_max_rad_s2 * passed_s
         ahead, back, left, right = self.directions
-        ahead = _direction(ahead, max(v, default=0.0), along, braked, passed_s, NOISE.along)
-        back = _direction(back, -min(v, default=0.0), -along, braked, passed_s, NOISE.along)
-        left = _direction(left, max(w, default=0.0), turned, slowed, passed_s, NOISE.turned)
-        right = _direction(right, -min(w, default=0.0), -turned, slowed, passed_s, NOISE.turned)
-        directions = ahead, back, left, right
-        is_excessive = max(ahead.excess, back.excess) > EXCESS.along or max(left.excess, right.excess) > EXCESS.turned
+        directions = (
+            _direction(ahead, v_max, along, braked, passed_s, NOISE.along),
+            _direction(back, 0.0 - v_min, -along, braked, passed_s, NOISE.along),
+            _direction(left, w_max, turned, slowed, passed_s, NOISE.turned),
+            _direction(right, 0.0 - w_min, -turned, slowed, passed_s, NOISE.turned),
+        )
+        ahead, back, left, right = directions
+        is_excessive = (
+            ahead.excess > EXCESS.along or back.excess > EXCESS.along
+            or left.excess > EXCESS.turned or right.excess > EXCESS.turned
+        )  # fmt: skip
         return tuple(Direction(d.explained) for d in directions) if is_excessive else directions, is_excessive
 
     def _ask(self, run_s: float) -> tuple[float, Amount]:
@@ -204,7 +221,7 @@ def _direction(
     before
         The direction before.
     fastest
-        Greatest velocity commanded in it.
+        Greatest velocity commanded in it, not below zero.
     moved
         Motion, m or rad.
     braked
@@ -214,9 +231,13 @@ def _direction(
     noise
         Velocity that is none.
     """
-    explained = max(0.0, fastest, before.explained - braked)
-    allowed = (GAIN * max(explained, before.explained) + noise) * passed_s
-    return Direction(explained, max(0.0, before.excess + moved - allowed))
+    # Comparisons, as calls of `max` would take longer, a dozen in each cycle.
+    explained = before.explained - braked
+    if explained < fastest:
+        explained = fastest
+    greatest = explained if explained > before.explained else before.explained
+    excess = before.excess + moved - (GAIN * greatest + noise) * passed_s
+    return Direction(explained, excess if excess > 0.0 else 0.0)
 
 
 def _between(before: Pose, after: Pose) -> tuple[float, float]:

@@ -295,7 +295,9 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
-    view = state.perception.field_of_view(odometry.robot_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)
+    view, obstacles = state.perception.surroundings(
+        odometry.robot_s, odometry.ring_yaw, odometry.pose.theta, age_max_s
+    )
     blind_s = min(*view.sensor_ages_s.tolist(), odometry.robot_s)  # numpy's call would take longer
     if blind_s > age_max_s:
         likely = inputs.line_problem or "check the ring's power and cable"
@@ -308,7 +310,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
-    percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view, objects)
+    percept = Percept(odometry.pose, obstacles, view, objects)
     if needs_space(state.drive_request):
         percept = replace(
             percept, occupancy=state.perception.occupancy(), canyons=state.perception.canyons(),

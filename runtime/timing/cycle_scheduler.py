@@ -52,13 +52,16 @@ class CycleScheduler:
         self._step_s = settings.ring.firing.step_period_s
         self._overruns_max = settings.cycle.overruns_max
         self._clock = run_clock(clock)
-        self._read = ClockSampler(self._clock).read
+        sampler = ClockSampler(self._clock)
+        self._read = sampler.read
         self._waker = Waker(self._clock)
         self._clock.on_change(self._waker.wake)
         self._stall_sampler = StallSampler()
         self._pacer: Pacer | None = None
         self.stats = CycleStats(LATE_SHARE * self._period_s, is_touched=True)
-        self.timing_monitor = TimingMonitor(self.stats, self._read, lambda: self._stall_sampler.sample, callbacks)
+        self.timing_monitor = TimingMonitor(
+            self.stats, sampler.read, lambda: self._stall_sampler.sample, callbacks, sampler.read_after
+        )
 
     def start(self, run_s: float, gap_max_s: float) -> AbstractContextManager[None]:
         """Plan the first cycle for `run_s`; return a context in which stalls are sampled.

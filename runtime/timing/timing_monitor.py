@@ -9,6 +9,7 @@ outside.
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import MappingProxyType
 from typing import Final, NamedTuple, ParamSpec, TypedDict, TypeVar
 
 from runtime.timing.clock_sampler import ClockSample
@@ -24,7 +25,8 @@ OUTSIDE: Final = "outside the process"
 THREAD: Final = "another thread of this process"
 UNTIMED: Final = "a callback that is not timed"
 
-_PHASES: Final = frozenset(phase.value for phase in Phase)
+_NAMES: Final = MappingProxyType({phase: phase.value for phase in Phase})
+"""`value` is a property in Python, and each phase of each cycle would ask for it."""
 
 MOST: Final = 0.5
 """A span of time counts as spent on what took more than this share of it."""
@@ -94,6 +96,8 @@ class TimingMonitor:
         Returns what ran when a cycle was overdue, if that was sampled.
     callbacks : tuple of str
         Names of the callbacks that will be measured.
+    read_after : callable, optional
+        Returns all clocks at the end of work that began at a sample; by default `read` does.
     """
 
     def __init__(
@@ -102,9 +106,11 @@ class TimingMonitor:
         read: Callable[[], ClockSample],
         stack_sample: Callable[[], StackSample | None] = lambda: None,
         callbacks: tuple[str, ...] = (),
+        read_after: Callable[[ClockSample], ClockSample] | None = None,
     ) -> None:
         self._stats = stats
         self._read = read
+        self._read_after = (lambda _: read()) if read_after is None else read_after
         self._stack_sample = stack_sample
         self._phases = {phase: Series(is_touched=True) for phase in Phase}
         self._callbacks = {name: Series(is_touched=True) for name in callbacks}
@@ -160,11 +166,11 @@ class TimingMonitor:
 
     def mark(self, phase: Phase) -> None:
         """End `phase`: it took the time since the last mark."""
-        now = self._read()
-        if self._mark is not None:
-            self._phases[phase].add(now.host_s - self._mark.host_s)
-            self._add_span(Span(phase.value, self._mark, now))
-            self._mark = now
+        begin = self._mark
+        if begin is not None:
+            self._mark = now = self._read_after(begin)
+            self._phases[phase].add(now.host_s - begin.host_s)
+            self._add_span(Span(_NAMES[phase], begin, now))
 
     def end(self) -> None:
         """End the cycle."""
@@ -180,7 +186,7 @@ class TimingMonitor:
             try:
                 return call(*args, **kwargs)
             finally:
-                end = self._read()
+                end = self._read_after(begin)
                 self._callbacks[name].add(end.host_s - begin.host_s)
                 self._add_span(Span(name, begin, end))
 
@@ -198,7 +204,7 @@ class TimingMonitor:
 
     def last_cycle(self) -> LastCycle:
         """Return the timing of the newest cycle, with the phases that have ended."""
-        phases_s = {s.name: s.took_s for s in self._spans if s.name in _PHASES}
+        phases_s = {s.name: s.took_s for s in self._spans if s.name in self._phases}
         return LastCycle(phases_s, 0.0 if self._start is None else self._start.late_s)
 
     def summary(self) -> TimingSummary:

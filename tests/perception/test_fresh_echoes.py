@@ -56,11 +56,11 @@ def test_a_sensor_that_does_not_fire_keeps_its_echo_and_the_age_limit_is_inclusi
 def test_only_a_usable_range_or_a_silence_is_a_look() -> None:
     echoes = FreshEchoes(MOUNTS, BEAM)
     assert np.isinf(echoes.looks(5.0, 60.0)[2]).all()
-    assert [len(found) for found in echoes.looks(5.0, 60.0)] == [0, 0, 2]
+    assert [len(found) for found in echoes.looks(5.0, 60.0)] == [0, 0, 2, 0]
     echoes.update(at(5.0, 0.1, 1.0, math.nan))
     echoes.update(at(6.0, 0.1, math.nan, math.inf))
     echoes.update(at(7.0, 0.1, math.nan, math.nan))
-    bearings, ages, sensor_ages = echoes.looks(7.0, 2.0)
+    bearings, ages, sensor_ages, _ = echoes.looks(7.0, 2.0)
     np.testing.assert_allclose(bearings, [0.1, 0.1 + math.pi / 2])
     np.testing.assert_allclose(ages, [2.0, 1.0])
     assert sensor_ages == pytest.approx([2.0, 1.0])
@@ -73,7 +73,7 @@ def test_a_ring_that_turns_keeps_what_it_heard_in_other_directions() -> None:
     echoes = FreshEchoes(MOUNTS[:1], BEAM)
     for k, turn in enumerate((0.0, 0.09, 0.2, 0.2 + 2.0 * math.pi, 0.4 - 2.0 * math.pi)):
         echoes.update(at(float(k), turn, 1.0))
-    bearings, ages, _ = echoes.looks(4.0, 60.0)
+    bearings, ages, *_ = echoes.looks(4.0, 60.0)
     kept = sorted(zip(ages.tolist(), np.remainder(bearings, 2.0 * math.pi).tolist(), strict=True))
     assert [age for age, _ in kept] == [0.0, 1.0, 3.0], "a look replaces those within half of a beam's half width"
     assert [bearing for _, bearing in kept] == pytest.approx([0.4, 0.2, 0.09])
@@ -86,7 +86,7 @@ def test_where_more_directions_are_heard_than_kept_the_oldest_goes() -> None:
     echoes = FreshEchoes(MOUNTS[:1], BEAM)
     for k in range(LOOKS + 3):
         echoes.update(at(float(k), 0.2 * k, 1.0))
-    _, ages, _ = echoes.looks(LOOKS + 2.0, 60.0)
+    _, ages, *_ = echoes.looks(LOOKS + 2.0, 60.0)
     assert sorted(ages.tolist()) == list(range(LOOKS))
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import threading
 import time
 
+import pytest
+
 from drivers.emulator.time_scale import TimeScale
-from runtime.timing.clock_sampler import OTHERS_AGE_S, ClockSampler
+from runtime.timing.clock_sampler import OTHERS_AGE_S, QUICK_S, ClockSampler
 from runtime.timing.run_clock import ScaledClock
 
 
@@ -41,3 +43,16 @@ def test_the_work_of_other_threads_is_read_once_in_a_millisecond() -> None:
     assert sampler.read().others_s == before.others_s
     host_s[0] += 0.2 * OTHERS_AGE_S
     assert sampler.read().others_s > before.others_s
+
+
+def test_the_end_of_quick_work_is_read_from_the_run_s_clock_only() -> None:
+    host_s = [5.0]
+    sampler = ClockSampler(lambda: host_s[0])
+    begin = sampler.read()
+    host_s[0] += 0.9 * QUICK_S
+    quick = sampler.read_after(begin)
+    assert (quick.run_s, quick.host_s, quick.waits) == (host_s[0], host_s[0], begin.waits)
+    assert quick.thread_s - begin.thread_s == pytest.approx(0.9 * QUICK_S)
+    time.sleep(0.001)  # a wait, which only the clocks of the thread show
+    host_s[0] += QUICK_S
+    assert sampler.read_after(quick).waits > begin.waits

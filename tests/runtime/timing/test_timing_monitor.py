@@ -16,7 +16,7 @@ from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
 from runtime.cycle.inputs import Request
 from runtime.cycle.step import Command, Inputs, Order, State, step
-from runtime.timing.clock_sampler import ClockSample
+from runtime.timing.clock_sampler import QUICK_S, ClockSample
 from runtime.timing.cycle_stats import CAUSES_MAX, OTHERS, CycleStats
 from runtime.timing.pacing import CycleStart, Pacer
 from runtime.timing.phases import Phase
@@ -38,6 +38,14 @@ class Machine:
     def read(self) -> ClockSample:
         host_s = self.host_us * US
         return ClockSample(host_s, host_s, self.thread_us * US, self.others_us * US, self.waits)
+
+    def read_after(self, begin: ClockSample) -> ClockSample:
+        """As `ClockSampler.read_after`."""
+        host_s = self.host_us * US
+        took_s = host_s - begin.host_s
+        if took_s >= QUICK_S:
+            return self.read()
+        return begin._replace(run_s=host_s, host_s=host_s, thread_s=begin.thread_s + took_s)
 
     def work(self, us: int) -> None:
         self.host_us, self.thread_us = self.host_us + us, self.thread_us + us
@@ -87,7 +95,9 @@ class Run:
         self.machine = Machine()
         self.pacer = Pacer(BEGIN_US * US, PERIOD_US * US)
         self.stats = CycleStats(LATE_US * US)
-        self.timing_monitor = TimingMonitor(self.stats, self.machine.read, callbacks=("link receive",))
+        self.timing_monitor = TimingMonitor(
+            self.stats, self.machine.read, callbacks=("link receive",), read_after=self.machine.read_after
+        )
         self.receive = self.timing_monitor.timed("link receive", self._at_receive)
         self._delay = Delay("nowhere", 0, Machine.work, "")
         # The account.
