@@ -51,7 +51,7 @@ class ClockSampler:
         self._others_s, self._others_host_s = 0.0, -math.inf
 
     def read(self) -> ClockSample:
-        """Return all clocks as of now; takes about 4 µs, and four times as long where the caches are cold."""
+        """Return all clocks as of now; takes about 4 µs, and twice as long where the caches are cold."""
         thread = getrusage(RUSAGE_THREAD)
         run_s, host_s = self._clock.both()
         thread_s = thread.ru_utime + thread.ru_stime
