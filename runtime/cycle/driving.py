@@ -46,6 +46,15 @@ NO_WAY: Final = (
 
 
 @dataclass(frozen=True, slots=True)
+class StepSettings:
+    """The run's settings with the gains and times of a mission's step, and the two that they were made from."""
+
+    step: StepConfig
+    run: Settings
+    settings: Settings
+
+
+@dataclass(frozen=True, slots=True)
 class DriveResult:
     """What a drive request led to in one cycle."""
 
@@ -61,12 +70,14 @@ class DriveResult:
     """What a drive to a goal keeps for the next cycle."""
     trail: Trail = ()
     """Where the robot has been, if avoid-past is in use."""
+    step_settings: StepSettings | None = None
+    """Of the mission's step, for the next cycle."""
 
 
 def drive(
     drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
     place: GoalPlace | None = None, goal_drive: GoalDrive | None = None, map_frame: Pose | None = None,
-    cycle_s: float = 0.0, trail: Trail = (),
+    cycle_s: float = 0.0, trail: Trail = (), step_settings: StepSettings | None = None,
 ) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
@@ -92,6 +103,8 @@ def drive(
         Time since the cycle before, s.
     trail : Trail
         Of the cycle before.
+    step_settings : StepSettings, optional
+        Of the cycle before, for a mission.
     """
     match drive_request:
         case Teleoperate():
@@ -99,7 +112,9 @@ def drive(
         case Goal():
             return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame)
         case Mission():
-            return _on_mission(drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s)
+            return _on_mission(
+                drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s, step_settings
+            )
         case _:
             return _along_legs(drive_request, run_s, leg, percept, settings, trail)
 
@@ -199,7 +214,7 @@ def _along_legs(
 
 def _on_mission(
     mission: Mission, run_s: float, leg: Leg, goal_drive: GoalDrive | None, percept: Percept, settings: Settings,
-    map_frame: Pose | None, cycle_s: float,
+    map_frame: Pose | None, cycle_s: float, step_settings: StepSettings | None,
 ) -> DriveResult:  # fmt: skip
     """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
     behaviors, body = settings.behaviors, settings.body
@@ -215,7 +230,8 @@ def _on_mission(
     if asked.mission.progress.changes != mission.progress.changes:
         goal_drive = None
     mission, step = asked.mission, asked.mission.step
-    settings = _of_step(step, settings)
+    step_settings = of_step(step, settings, step_settings)
+    settings = step_settings.settings
     others = percept if asked.own_echoes is None else replace(percept, obstacles=percept.obstacles[~asked.own_echoes])
     hold_reason = None
     if asked.goal is not None:
@@ -238,11 +254,24 @@ def _on_mission(
         decision = arbitrate(responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID))
     if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:
         hold_reason = NO_WAY.format(step.name)
-    return DriveResult(decision, with_sum(responses, decision), mission, leg, hold_reason, goal_drive)
+    vectors = with_sum(responses, decision)
+    return DriveResult(decision, vectors, mission, leg, hold_reason, goal_drive, step_settings=step_settings)
 
 
-def _of_step(step: StepConfig, settings: Settings) -> Settings:
-    """Return the run's settings with a step's gains and times."""
+def of_step(step: StepConfig, settings: Settings, before: StepSettings | None) -> StepSettings:
+    """Return the settings of a step: those of the cycle before, unless the step or the run's settings are others.
+
+    Parameters
+    ----------
+    step : StepConfig
+        The step that is driven.
+    settings : Settings
+        The run's.
+    before : StepSettings or None
+        Of the cycle before.
+    """
+    if before is not None and before.step is step and before.run is settings:
+        return before
     behaviors = settings.behaviors
     to_goal, avoid = behaviors.move_to_goal, behaviors.avoid_static_obstacle
     updates: dict[str, dict[str, float]] = {
@@ -255,7 +284,9 @@ def _of_step(step: StepConfig, settings: Settings) -> Settings:
         **{name: {f"{name}_gain": step.gains[name]} for name in (VALLEY, CANYON) if name in step.gains},
     }
     tables = {name: getattr(behaviors, name).model_copy(update=update) for name, update in updates.items()}
-    return settings.model_copy(update={"behaviors": behaviors.model_copy(update=tables)})
+    return StepSettings(
+        step, settings, settings.model_copy(update={"behaviors": behaviors.model_copy(update=tables)})
+    )
 
 
 def with_sum(responses: tuple[Response, ...], decision: Decision) -> tuple[Response, ...]:

@@ -26,7 +26,7 @@ MOVED_M: Final = 0.1
 FAINT_M: Final = 0.01
 """Least depth of the zone in which avoid-static-obstacle pushes with a bound, m."""
 STANDS_S: Final = 5.0
-"""Whether there is a valley says nothing of a robot that has stood for so long, s."""
+"""Whether there is a valley says nothing of a robot that stands for so much longer than half a turn takes, s."""
 ROUNDS_MAX: Final = 2
 """A detour may lead away from the goal until it has led round what closes the way so often, once on either side."""
 NO_VALLEY: Final = "obstacles on all sides: no direction is free"
@@ -73,9 +73,10 @@ def drive_to_goal(
     around, hold_reason, room_m = None, None, None
     if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:
         has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
+        stands_s = STANDS_S + math.pi / min(behaviors.move_to_goal.turn_rate_max_rad_s, body.turn_max_rad_s)
         around, detour = leave_canyon(
             percept, (goal.x, goal.y), now.detour, body.radius_m, behaviors.leave_canyon,
-            waits=has_valley and run_s - now.progress.moved_run_s < STANDS_S, last_rad=now.valley.direction_rad,
+            waits=has_valley and run_s - now.progress.moved_run_s < stands_s, last_rad=now.valley.direction_rad,
         )  # fmt: skip
         now = replace(now, detour=detour)
     if around is not None:

@@ -40,7 +40,7 @@ from runtime.cycle.drive_requests import (
     refusal,
     requested,
 )
-from runtime.cycle.driving import drive
+from runtime.cycle.driving import StepSettings, drive
 from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
@@ -120,6 +120,8 @@ class State:
     """The drive to a goal so far; None without a goal, or before its first cycle in DRIVE."""
     percept: Percept | None = None
     """What the last cycle decided on; None if it did not drive. It is made anew each cycle and not recorded."""
+    step_settings: StepSettings | None = None
+    """Of the mission's step; None without one. They follow from mission and settings and are not recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,10 +320,10 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
-        state.goal_drive, map_frame, gap_s, state.trail,
+        state.goal_drive, map_frame, gap_s, state.trail, state.step_settings,
     )  # fmt: skip
     state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
-    state.trail = result.trail
+    state.trail, state.step_settings = result.trail, result.step_settings
     state.percept = percept
     state.vectors, state.hold_reason = result.vectors, result.hold_reason
     if isinstance(result.decision, Unseen):

@@ -192,7 +192,7 @@ class ObjectList(TimedPayload):
 
 
 _HINTS: Final = get_type_hints(State)
-_CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in {"perception", "percept"})
+_CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in {"perception", "percept", "step_settings"})
 _ADDED: Final = MappingProxyType(
     {"motion_monitor": MotionMonitor(), "goal_place": None, "goal_drive": None, "trail": ()}
 )

@@ -11,6 +11,7 @@ from behaviors.move_to_goal import Goal
 from config.mission import MissionConfig
 from drivers.messages import Flags, Pose
 from runtime.cycle.drive_requests import needs_space
+from runtime.cycle.driving import of_step
 from runtime.cycle.step import STANDSTILL
 from tests.runtime.cycle.requested_robot import RequestedRobot, driving, hold_reason
 
@@ -88,3 +89,20 @@ def test_a_goal_that_is_given_up_leads_on_once_and_the_robot_stands_with_the_rea
     assert record.command == STANDSTILL
     assert "the mission test is done: stuck in its step one" in hold_reason(script)
     assert script.state.goal_drive is None
+
+
+def test_settings_of_a_step_are_made_once_for_each_step_and_anew_for_other_settings() -> None:
+    script = driving()
+    asked = mission(FAR, stuck_after_s=7.0, avoid_gain=0.5)
+    script.request_drive(asked)
+    made = script.state.step_settings
+    assert made is not None
+    behaviors = made.settings.behaviors
+    assert (behaviors.move_to_goal.stuck_after_s, behaviors.avoid_static_obstacle.avoid_obstacle_gain) == (7.0, 0.5)
+    script.request_drive(None)
+    assert script.state.step_settings is made
+    for other in (of_step(made.step.model_copy(), made.run, made), of_step(made.step, made.run.model_copy(), made)):
+        assert other is not made
+        assert other.settings == made.settings
+    script.request_drive(Goal(5.5, 0.0))
+    assert script.state.step_settings is None
