@@ -19,6 +19,7 @@ from behaviors.valley.polar_histogram import (
     SECTORS,
     blocked_sectors,
     cells_near,
+    heard_at,
     masked_by_turning,
     room_m,
 )
@@ -29,6 +30,8 @@ from perception.percept import Percept
 SCHEMA: Final = "follow_valley"
 LEAST_WAY_M: Final = 0.1
 """A direction is blocked if the robot cannot drive so far in it, however near the target is, m."""
+AT_GOAL_M: Final = 1.5
+"""From so near the ring hears what stands at the goal, m; the grid still shows the arcs of echoes from afar there."""
 STRAIGHT: Final = 0.5
 """A target within so many sectors of the goal's direction is the goal: the way is straight."""
 
@@ -66,20 +69,25 @@ def follow_valley(
     config : FollowValleyConfig
         The schema's settings.
     """
-    length = config.follow_valley_gain * math.hypot(to_goal.x, to_goal.y)
+    norm = math.hypot(to_goal.x, to_goal.y)
+    length = config.follow_valley_gain * norm
     pose = percept.pose
     if not (math.isfinite(length) and math.isfinite(pose.theta)) or length == 0.0:
         return Response(SCHEMA, to_goal.x, to_goal.y), before
     target_rad, target_m = math.atan2(to_goal.y, to_goal.x), goal_m
     # Of a goal beside a wall one look-ahead finds that it can be reached, and the next that it cannot.
     is_there = goal_m < config.look_ahead_step_m
+    goal_x, goal_y, aim_m = goal_m * to_goal.x / norm, goal_m * to_goal.y / norm, 0.0
     if not is_there and (ahead := carrot(search, pose.x, pose.y, config.carrot_m)) is not None:
         dx, dy = ahead[0] - pose.x, ahead[1] - pose.y
         bearing = math.atan2(dy, dx)
         if apart(bearing / SECTOR_RAD, target_rad / SECTOR_RAD) > STRAIGHT:
             target_rad, target_m = bearing, math.hypot(dx, dy)
+            aim_m = math.hypot(dx - goal_x, dy - goal_y)
     room_max_m, comfort_m = body_radius_m + config.safety_m, body_radius_m + config.comfort_m
     cells = cells_near(percept, pose.x, pose.y, config.free_m + max(room_max_m, comfort_m), config)
+    if goal_m < AT_GOAL_M and aim_m < room_max_m:
+        cells = heard_at(cells, (goal_x, goal_y), room_max_m, percept)
     radius_m = room_m(cells, body_radius_m, room_max_m)
     flags = before.blocked.encode("ascii").translate(_FLAGS)
     # A gap that the robot drives through is not given up for an echo at a post that comes and goes.

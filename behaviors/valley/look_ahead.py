@@ -38,6 +38,9 @@ SAME: Final = 0.7
 """A place within this share of a step of one on the way in force is on that way."""
 TOWARDS: Final = math.radians(45.0) / SECTOR_RAD
 """A gap that is considered leads within this many sectors of the goal's direction."""
+LINE_M: Final = np.array([0.1])
+"""The last step to a goal is free unless something lies so near its line, m: what the grid shows beside a goal may be
+the arc of an echo, which a robot that is there does not hear."""
 AWAY_M: Final = 1.0
 """A robot farther than this from its way needs another one, m."""
 
@@ -151,16 +154,25 @@ def _children(
     blocked, near, closed = map(bytes, crossed(cells, radii, np.full(3, step_m)))
     target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
     found, same, wide = [], (SAME * step_m) ** 2, math.radians(config.wide_valley_deg) / SECTOR_RAD
-    # A gap elsewhere than towards the goal is rather one between two echoes than a doorway on the way.
-    towards = [c for c in gaps(closed, blocked) if apart(c, target) <= TOWARDS]
-    for c in candidates(blocked, target, wide) + towards:
-        turned_rad = apart(c, node.direction) * SECTOR_RAD
-        cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
+    free, narrow = candidates(blocked, target, wide), gaps(closed, blocked)
+    if (
+        step_m == distance
+        and target not in free
+        and not crossed(cells, LINE_M, np.array([step_m]))[0, round(target) % SECTORS]
+    ):
+        free.append(target)
+    for c in free + narrow:
         angle = c * SECTOR_RAD
         x, y = node.x + step_m * math.cos(angle), node.y + step_m * math.sin(angle)
         if c == target and step_m == distance:
             x, y = goal
-        if any((kx - x) ** 2 + (ky - y) ** 2 < same for kx, ky in search.way):
+        is_kept = any((kx - x) ** 2 + (ky - y) ** 2 < same for kx, ky in search.way)
+        # A gap elsewhere than towards the goal is rather one between two echoes than a doorway on the way.
+        if c in narrow and not is_kept and apart(c, target) > TOWARDS:
+            continue
+        turned_rad = apart(c, node.direction) * SECTOR_RAD
+        cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
+        if is_kept:
             cost_m *= 1.0 - config.keep_share
         cost_m += config.turn_cost_m_per_rad * turned_rad
         found.append(Node(x, y, c, node.cost_m + cost_m, number))

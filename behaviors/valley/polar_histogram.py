@@ -92,6 +92,29 @@ def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: Fol
     return Cells(*table.compress(distances < reach_m, axis=1))
 
 
+def heard_at(cells: Cells, place: tuple[float, float], radius_m: float, percept: Percept) -> Cells:
+    """Return the cells with those near a place left out, and all fresh echoes.
+
+    Parameters
+    ----------
+    cells : Cells
+        Around the robot.
+    place : tuple of float
+        Seen from the robot in odometry's directions, m.
+    radius_m : float
+        What is nearer to the place is left out, m.
+    percept : Percept
+        Its pose and its echoes.
+    """
+    away = np.hypot(cells.dx - place[0], cells.dy - place[1]) >= radius_m
+    fresh = percept.obstacles - (percept.pose.x, percept.pose.y)
+    return Cells(
+        np.append(cells.dx[away], fresh[:, 0]), np.append(cells.dy[away], fresh[:, 1]),
+        np.append(cells.distances[away], np.hypot(fresh[:, 0], fresh[:, 1])),
+        np.append(cells.certainties[away], np.ones(len(fresh))),
+    )  # fmt: skip
+
+
 def room_m(cells: Cells, body_radius_m: float, room_max_m: float) -> float:
     """Return the radius of the disc that is driven along a direction: the wanted one, or what there is room for.
 

@@ -111,3 +111,13 @@ def test_close_to_the_goal_no_look_ahead_leads_away_from_it() -> None:
     for goal_m, along in ((0.3, 0.5), (2.0, -0.5)):
         found, _ = follow_valley(at(0.0, 0.0), TO_GOAL, goal_m, Valley(), back, RADIUS_M, CONFIG)
         assert found.x == pytest.approx(along)
+
+
+def test_near_the_goal_what_is_heard_counts_and_not_what_the_grid_shows_there() -> None:
+    arc: list[Wall] = [(1.1, 0.2, 1.2, -0.1)]
+    for goal_m, echoes, goes_straight in ((1.2, [], True), (1.2, [(1.1, 0.1)], False), (1.6, [], False)):
+        found, _ = follow_valley(
+            at(0.0, 0.0, walls=arc, echoes=echoes), TO_GOAL, goal_m, Valley(), Search(), RADIUS_M,
+            CONFIG.model_copy(update={"block_m": 1.0, "free_m": 1.0}),
+        )  # fmt: skip
+        assert (found.y == pytest.approx(0.0)) is goes_straight

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from behaviors.valley.look_ahead import Search, begin, carrot, expand
+from behaviors.valley.look_ahead import Place, Search, begin, carrot, expand
 from config.behaviors import FollowValleyConfig
 from perception.percept import Percept
 from tests.behaviors.valley.windows import Wall, at
@@ -23,8 +23,10 @@ CELL: tuple[Wall, ...] = (
 )
 
 
-def searched(percept: Percept, goal: tuple[float, float], config: FollowValleyConfig = CONFIG) -> tuple[Search, int]:
-    search, quanta = begin(Search(), percept, goal), 0
+def searched(
+    percept: Percept, goal: Place, config: FollowValleyConfig = CONFIG, way: tuple[Place, ...] = ()
+) -> tuple[Search, int]:
+    search, quanta = begin(Search(way=way), percept, goal), 0
     while not search.is_done:
         search = expand(search, percept, RADIUS_M, config)
         quanta += 1
@@ -67,6 +69,24 @@ def test_a_goal_that_is_walled_in_has_no_way_and_the_nearest_place_is_found() ->
     search, _ = searched(at(-4.0, 0.0, walls=CELL), (0.0, 0.0))
     assert not search.reaches
     assert math.hypot(*search.way[-1]) == pytest.approx(1.5 + RADIUS_M + CONFIG.safety_m, abs=0.4)
+
+
+def test_a_goal_with_something_beside_it_is_reached_and_none_behind_a_wall() -> None:
+    beside: Wall = (-0.3, 0.3, 0.3, 0.3)
+    search, _ = searched(at(-2.0, 0.0, walls=[beside]), (0.0, 0.0))
+    assert (search.reaches, search.way[-1]) == (True, (0.0, 0.0))
+    before: Wall = (-0.3, -6.3, -0.3, 6.3)
+    search, _ = searched(at(-2.0, 0.0, walls=[before]), (0.0, 0.0))
+    assert search.way[-1] != (0.0, 0.0)
+    assert all(x < -0.3 for x, _ in search.way)
+
+
+def test_a_gap_away_from_the_goal_is_passed_if_the_way_in_force_leads_through_it() -> None:
+    walls = [*CELL[:3], (-1.5, -1.5, -1.5, -0.5), (-1.5, 0.5, -1.5, 1.5)]
+    percept, goal = at(-0.9, 0.0, walls=walls), (4.0, 0.0)
+    assert not searched(percept, goal)[0].reaches
+    way = tuple((-0.9 - 0.5 * k, 0.0) for k in range(5))
+    assert searched(percept, goal, way=way)[0].reaches
 
 
 def test_a_robot_that_is_walled_in_stays() -> None:

@@ -16,6 +16,7 @@ from behaviors.valley.polar_histogram import (
     blocked_sectors,
     cells_near,
     crossed,
+    heard_at,
     masked_by_turning,
     room_m,
 )
@@ -114,6 +115,15 @@ def test_a_place_outside_the_grid_has_echoes_only() -> None:
     percept = at(0.0, 0.0, walls=[(1.0, -1.0, 1.0, 1.0)], echoes=[(50.5, 0.0), (float("nan"), 0.0)])
     for x in (-50.0, 50.0):
         assert len(cells_near(percept, x, 0.0, 1.5, CONFIG).dx) == (x > 0.0)
+
+
+def test_near_a_place_only_what_is_heard_is_left() -> None:
+    percept = at(0.0, 0.0, echoes=[(1.0, 0.1), (-2.0, 0.0)])
+    found = heard_at(cells((1.2, 0.0), (1.0, 1.0), certainty=0.5), (1.0, 0.0), 0.5, percept)
+    assert list(zip(found.dx.tolist(), found.dy.tolist(), found.certainties.tolist(), strict=True)) == [
+        (1.0, 1.0, 0.5), (1.0, 0.1, 1.0), (-2.0, 0.0, 1.0),
+    ]  # fmt: skip
+    np.testing.assert_allclose(found.distances, np.hypot(found.dx, found.dy))
 
 
 def test_an_uncertain_cell_counts_in_part() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from behaviors.leave_canyon import leave_canyon
 from behaviors.move_to_goal import Goal
 from drivers.messages import Pose, Twist
 from runtime.cycle.drive_requests import Legs
@@ -133,3 +134,19 @@ def test_on_its_way_the_robot_turns_no_faster_than_it_should() -> None:
         command = script.request_drive(Goal(-5.0, 0.5)).command
         assert isinstance(command, Twist)
         assert abs(command.w) == expected
+
+
+def test_a_half_turn_on_the_spot_is_no_standing_that_begins_a_detour(monkeypatch: pytest.MonkeyPatch) -> None:
+    script, waited = driving(), list[tuple[float, bool]]()
+
+    def seen(*arguments: Any, waits: bool, **named: Any) -> Any:
+        waited.append((script.run_s, waits))
+        return leave_canyon(*arguments, waits=waits, **named)
+
+    monkeypatch.setattr("runtime.cycle.goal_drive.leave_canyon", seen)
+    script.request_drive(FAR)
+    begin_s, until_s = script.run_s, 5.0 + math.pi / script.settings.behaviors.move_to_goal.turn_rate_max_rad_s
+    while script.run_s < begin_s + until_s + 1.0:
+        script.request_drive(None)
+    stood = [(run_s - begin_s, waits) for run_s, waits in waited[1:]]
+    assert all(waits is (stood_s < until_s) for stood_s, waits in stood if abs(stood_s - until_s) > 0.1)
