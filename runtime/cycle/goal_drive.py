@@ -78,7 +78,8 @@ def drive_to_goal(
             percept, (goal.x, goal.y), now.detour, body.radius_m, behaviors.leave_canyon,
             waits=has_valley and run_s - now.progress.moved_run_s < stands_s, last_rad=now.valley.direction_rad,
         )  # fmt: skip
-        if now.detour.side == 0 != detour.side:  # it gets its own time to turn before the robot counts as stuck
+        # A detour for a robot that stands gets its own time to turn before that robot counts as stuck.
+        if now.detour.side == 0 != detour.side and run_s - now.progress.moved_run_s >= stands_s:
             now = replace(now, progress=replace(now.progress, moved_run_s=run_s))
         now = replace(now, detour=detour)
     if around is not None:
