@@ -45,14 +45,31 @@ def line_fit(u: Array, z: Array, w: Array) -> tuple[Array, Array]:
     return solution, np.linalg.inv(rows.T @ rows)
 
 
-def bend(u: Array, z: Array, d: Array, sigma: Array, radius: float) -> tuple[float, float]:
-    """Return χ² of a circle less that of a line, each with its own place and turn, and that of the line."""
-    sagitta = np.hypot(d + radius, u) - d - radius
-    rows, chi2 = np.column_stack([np.ones_like(u), u]) / sigma[:, None], []
-    for target in (z - sagitta, z):
-        solution = np.linalg.lstsq(rows, target / sigma, rcond=None)[0]
-        chi2.append(float(((target / sigma - rows @ solution) ** 2).sum()))
-    return chi2[0] - chi2[1], chi2[1]
+def line_chi2(u: Array, e: Array, sigma: Array) -> tuple[float, float]:
+    """Return χ² of the best line, where each error counts 16 at most, and without that bound."""
+    rows = np.column_stack([np.ones_like(u), u]) / sigma[:, None]
+    squares = (e / sigma - rows @ np.linalg.lstsq(rows, e / sigma, rcond=None)[0]) ** 2
+    return float(np.minimum(squares, 16.0).sum()), float(squares.sum())
+
+
+def best_circle(u: Array, e: Array, d: Array, sigma: Array, radius: float) -> tuple[Array, Array]:
+    """Return where a circle's centre lies best, along and behind a line, and its squared errors, by gradients.
+
+    Sensors lie before the line's positions `u`, and hear ranges `d`, longer by `e` than to the line.
+    """
+
+    def errors(centre: Array) -> Array:
+        return np.asarray((d - np.hypot(u - centre[0], d - e + centre[1]) + radius) / sigma)
+
+    def residuals(centre: Array) -> Array:
+        return np.append(errors(centre), [centre[0] / 0.5, (centre[1] - radius) / 0.2])
+
+    centre = np.array([0.0, radius])
+    for _ in range(40):
+        left = residuals(centre)
+        slopes = np.column_stack([(residuals(centre + h) - left) / 1e-6 for h in 1e-6 * np.eye(2)])
+        centre = centre - np.linalg.lstsq(slopes, left, rcond=None)[0]
+    return centre, errors(centre) ** 2
 
 
 def crossing(normal_a: Array, distance_a: float, normal_b: Array, distance_b: float) -> Array:

@@ -36,6 +36,10 @@ CIRCLE_FIELDS: Final = (
 READINGS: Final = "readings"
 """Field of an archived circle."""
 NO_SURFACES: Final = np.empty((0, 4))
+WALL_END_M: Final = 0.2
+WALL_OFF_M: Final = 0.05
+"""A post this near to the end of a sure wall, and this near to touching its line, is the edge in which the wall ends:
+their ranges differ by less than the noise, and every wall ends somewhere."""
 Row = tuple[float, ...]
 
 
@@ -194,6 +198,32 @@ def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
     return "edge"
 
 
+def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[float, float] | None:
+    """Return the point of a wall's line beside a thin circle at the wall's end, m; None if no wall ends there.
+
+    Parameters
+    ----------
+    surfaces : (n, 4) float
+        As for `own_echoes`.
+    x, y, radius : float
+        The circle, m.
+    """
+    tx, ty = (surfaces[:, 2:] - surfaces[:, :2]).T
+    length = np.hypot(tx, ty)
+    walls = surfaces[length > 0.0]
+    tx, ty, length = (
+        of[length > 0.0] for of in (tx / np.maximum(length, 1e-9), ty / np.maximum(length, 1e-9), length)
+    )
+    dx, dy = x - walls[:, 0], y - walls[:, 1]
+    along, across = tx * dx + ty * dy, tx * dy - ty * dx
+    beyond = np.abs(np.maximum(-along, along - length))
+    beyond[np.abs(across) > radius + WALL_OFF_M] = math.inf
+    if not (beyond < WALL_END_M).any():
+        return None
+    k = int(beyond.argmin())
+    return x + float(across[k] * ty[k]), y - float(across[k] * tx[k])
+
+
 def is_heard_from_afar(circle: NDArray[Any]) -> bool:
     """Return whether most readings of a point are from where, between mirrors, an edge is not heard.
 
@@ -273,5 +303,8 @@ def other_circles(
         label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"
         if label == "edge" and are_mirrors and is_heard_from_afar(circles[at]):
             label = "inside corner"
+        edge = wall_edge(surfaces, row[0], row[1], radius) if label == "post" else None
+        if edge is not None:
+            label, row[:2] = "edge", edge
         found.append(circle_object(tuple(row), label, probability if is_rival else 1.0 - probability))
     return found

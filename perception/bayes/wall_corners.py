@@ -140,7 +140,7 @@ def corner_at(room: WallMap, x: float, y: float) -> int:
 
 
 @kernel
-def edge_at(room: WallMap, wall: Wall, end: float, side: int) -> int:
+def edge_at(room: WallMap, wall: Wall, end: float, side: int, reach: float) -> int:
     """Return the edge that is an end of a wall's, else a free place, cleared; −1 if there is none.
 
     Parameters
@@ -151,9 +151,11 @@ def edge_at(room: WallMap, wall: Wall, end: float, side: int) -> int:
         Position of the end along the wall, m.
     side : int
         1 for a high end, 0 for a low one.
+    reach : float
+        Greatest distance beyond the end, m: what lies beyond the wall's next span is another end.
     """
     at = -1
-    nearest = CORNER_REACH_M
+    nearest = reach
     free = -1
     for c in range(EDGES_MAX):
         edge = room.edges[c]
@@ -163,8 +165,8 @@ def edge_at(room: WallMap, wall: Wall, end: float, side: int) -> int:
             continue
         distance, along = distance_and_foot(wall, edge.x, edge.y)
         beyond = along - end if side == 1 else end - along
-        reach = CORNER_REACH_M if edge.echoes >= EDGE_ECHOES_MIN else EDGE_SAME_M
-        if abs(distance) < EDGE_OFF_M and -EDGE_SAME_M < beyond < reach and abs(beyond) < nearest:
+        farthest = CORNER_REACH_M if edge.echoes >= EDGE_ECHOES_MIN else EDGE_SAME_M
+        if abs(distance) < EDGE_OFF_M and -EDGE_SAME_M < beyond < farthest and abs(beyond) < nearest:
             nearest = abs(beyond)
             at = c
     if at < 0 and free >= 0:
@@ -219,7 +221,12 @@ def find_edges(room: WallMap) -> None:
             x, y = wall_point(wall, end)
             if is_near_corner(room, k, x, y):
                 continue
-            at = edge_at(room, wall, end, e % 2)
+            reach = CORNER_REACH_M
+            if e % 2 == 1 and e < 2 * wall.span_count - 1:
+                reach = min(reach, wall.spans[e // 2 + 1].low - end)
+            elif e % 2 == 0 and e > 0:
+                reach = min(reach, end - wall.spans[e // 2 - 1].high)
+            at = edge_at(room, wall, end, e % 2, reach)
             if at < 0:
                 continue
             edge = room.edges[at]

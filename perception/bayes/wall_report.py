@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
@@ -21,8 +22,10 @@ from perception.bayes.wall_records import MAX_WALLS, WALL_BINS
 from perception.kernel import Floats
 from perception.records import Record
 
-WALL_CHI2_MIN: Final = 20.0
-"""Least evidence of the best span, or of all together."""
+WALL_CHI2_MIN: Final = 14.0
+"""Least evidence of the best span, or of all together, where there are walls, …"""
+FIRST_CHI2_MIN: Final = 40.0
+"""… and of the best span of the first one: where nothing but drums stands, thousands of their tangents are tried."""
 SPAN_WEIGHT_MIN: Final = 3.0
 """Least weight of a span that is reported, …"""
 MISFIT_MAX: Final = 2.5
@@ -67,7 +70,9 @@ POINT_ECHO_NAT: Final = 1.0
 """Log prior odds of a corner where walls end, and evidence of each echo."""
 THROUGH: Final = 0.8
 """A wall this near to the middle of a named object, as a share of its radius, would go through it."""
-TINY_M2: Final = 1e-12
+SIDE_M: Final = 0.08
+"""A wall no longer than an object is wide, this near to touching it, is the object's side."""
+TINY_M: Final = 1e-6
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed: readings are not independent."""
 FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y", "offset", "slope")
@@ -163,7 +168,7 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
             *end_at_edges(walls, room["edges"], are_mirrors),
         ]
         bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
-        segments = [row for wall in walls.values() for row in _segments(wall) if not is_through(row, bodies)]
+        segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
         return np.array(segments, WallSegment.DTYPE), np.array(points, CornerPoint.DTYPE)
 
 
@@ -173,8 +178,10 @@ def has_mirrors(memory: Memory) -> bool:
     return silences >= MIRRORS_SILENCES and not echoes > EDGES_SHARE * silences + EDGES_LEAD
 
 
-def is_through(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
-    """Return whether a segment goes through a round object: drums in a row have a line along them, and no wall.
+def is_of_body(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
+    """Return whether a segment goes through a round object or is the side of one.
+
+    Drums in a row have a line along them, and no wall.
 
     Parameters
     ----------
@@ -185,9 +192,12 @@ def is_through(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
     """
     x1, y1, x2, y2 = segment[:4]
     tx, ty = x2 - x1, y2 - y1
-    dx, dy = bodies["x"] - x1, bodies["y"] - y1
-    share = np.clip((dx * tx + dy * ty) / max(tx * tx + ty * ty, TINY_M2), 0.0, 1.0)
-    return bool((np.hypot(dx - share * tx, dy - share * ty) < THROUGH * bodies["radius"]).any())
+    length = max(math.hypot(tx, ty), TINY_M)
+    dx, dy, radius = bodies["x"] - x1, bodies["y"] - y1, bodies["radius"]
+    share = np.clip((dx * tx + dy * ty) / length**2, 0.0, 1.0)
+    away = np.hypot(dx - share * tx, dy - share * ty)
+    is_side = (length < 2.0 * radius) & (np.abs(away - radius) < SIDE_M)
+    return bool(((away < THROUGH * radius) | is_side).any())
 
 
 def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
@@ -218,6 +228,11 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
     first, second = walls[heard["first"]], walls[heard["second"]]
     sine = first["normal_x"] * second["normal_y"] - first["normal_y"] * second["normal_x"]
     pairs = np.column_stack([heard["first"], heard["second"]])[np.abs(sine) > PROOF_SINE]
+    spans = walls["spans"][fitting]
+    is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
+    is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= WALL_WEIGHT_MIN)
+    if not (spans["chi2"][is_long] >= FIRST_CHI2_MIN).any():
+        return found
     for is_neighbour in (False, True):
         proven = {int(b if a in found else a) for a, b in pairs if (a in found) != (b in found)}
         for number in fitting if not is_neighbour else sorted(proven.intersection(fitting)):

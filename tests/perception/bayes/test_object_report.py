@@ -28,6 +28,15 @@ from tests.perception.bayes.tracks import (
 )
 
 
+def test_a_post_at_the_end_of_a_wall_is_its_edge() -> None:
+    surfaces = np.array([(0.0, 1.0, 2.0, 1.0), (5.0, 5.0, 5.0, 5.0)])  # a wall, and a corner
+    assert object_report.wall_edge(surfaces, 2.08, 1.1, 0.1) == pytest.approx((2.08, 1.0))
+    assert object_report.wall_edge(surfaces, -0.05, 0.93, 0.1) == pytest.approx((-0.05, 1.0))
+    for x, y in ((1.0, 1.1), (2.3, 1.1), (2.08, 1.2), (5.0, 5.0)):
+        assert object_report.wall_edge(surfaces, x, y, 0.1) is None
+    assert object_report.wall_edge(np.empty((0, 4)), 2.08, 1.1, 0.1) is None
+
+
 def is_inside_corner(a: Line, b: Line, place: np.ndarray) -> bool:
     """Return whether two walls meet near a place, and what is free between them is less than half a turn."""
     ways, normals = [], []

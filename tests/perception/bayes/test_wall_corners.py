@@ -26,6 +26,24 @@ def corner_room() -> tuple[Memory, WallMap]:
     return memory, room
 
 
+def test_an_edge_beyond_a_doorway_stays_that_of_the_next_span() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.2, -0.42)
+    fill(memory, room.walls[0], 0.42, 1.2)
+    wall_corners.find_corners(memory.s)
+    ends = [-1.2, -0.42, 0.42, 1.2]
+    edges = [room.edges[k] for k in range(EDGES_MAX) if room.edges[k].is_used == 1]
+    assert sorted(it.y for it in edges) == pytest.approx(ends, abs=0.07)
+    edges[1].is_used = 0  # as if it had not been found before
+    last = max(edges, key=lambda it: it.y)
+    last.echoes = 9.0
+    wall_corners.find_corners(memory.s)
+    edges = [room.edges[k] for k in range(EDGES_MAX) if room.edges[k].is_used == 1]
+    assert sorted(it.y for it in edges) == pytest.approx(ends, abs=0.07)
+    assert max(edges, key=lambda it: it.echoes).y == pytest.approx(1.2, abs=0.07)
+
+
 def test_a_corner_keeps_its_echoes_while_its_walls_last() -> None:
     memory, room = corner_room()
     corner = room.corners[0]

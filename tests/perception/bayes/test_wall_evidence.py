@@ -11,12 +11,12 @@ from perception.bayes import wall_evidence
 from perception.bayes.wall_bins import enter_reading, free
 from perception.bayes.wall_contact import FOOT
 from tests import naive_walls
-from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, reading, refit, spans
+from tests.perception.bayes.rooms import fill, new_room, place_wall, reading, refit, spans
 from tests.perception.bayes.tracks import P, examples
 
 
-@examples(10, 200)
-def test_evidence_against_a_circle_is_that_of_two_least_squares_fits(examples: int) -> None:
+@examples(5, 100)
+def test_evidence_against_a_circle_is_that_of_its_best_place(examples: int) -> None:
     rng = np.random.default_rng(45)
     memory, room = new_room()
     wall = room.walls[0]
@@ -24,22 +24,26 @@ def test_evidence_against_a_circle_is_that_of_two_least_squares_fits(examples: i
         place_wall(wall, np.zeros(2), 0.0, 2.0)
         free(wall)
         wall.weight = 1.0
-        fill(memory, wall, -0.6, 0.6, 4.0, float(rng.uniform(0.8, 1.9)))
+        before = float(rng.uniform(0.8, 1.9))
+        fill(memory, wall, -0.6, 0.6, 4.0, before)
         bins = np.arange(86, 106)
-        u, z, n, d = np.zeros(20), np.zeros(20), rng.uniform(1.0, 9.0, 20), rng.uniform(0.8, 1.9, 20)
+        z, n, d = 2.0 + rng.normal(0, 0.02, 20), rng.uniform(1.0, 9.0, 20), rng.uniform(0.8, 1.9, 20)
         for k, b in enumerate(bins.tolist()):
             of = wall.bins[b]
-            z[k] = 2.0 + rng.normal(0, 0.003)
-            of.weight, of.precision = n[k], n[k] / SIGMA**2
+            of.weight, of.precision = n[k], n[k] / 0.15**2
             of.offset_sum, of.range_sum = of.precision * z[k], of.precision * d[k]
         low, high = spans(wall)[0]
-        u = (bins - 95.5) * 0.06 - 0.5 * (low + high)
-        expected, line = naive_walls.bend(u, z, d, np.hypot(SIGMA / np.sqrt(n), 0.005), 0.7)
+        at = (bins - 95.5) * 0.06
+        u, e, sigma = at - 0.5 * (low + high), z - wall.offset - wall.slope * at, np.hypot(0.15 / np.sqrt(n), 0.005)
+        circles = []
+        for radius in (0.7, 0.3):
+            centre, squares = naive_walls.best_circle(u, e, d, sigma, radius)
+            is_outside = np.abs(np.arctan2(centre[0] - u, before + centre[1])) > math.acos(P[0].cos_may_answer)
+            circles.append(np.minimum(squares + 4.0 * is_outside, 16.0).sum())
+        line, unbounded = naive_walls.line_chi2(u, e, sigma)
         found, misfit = wall_evidence.flatness(wall, 0, 1, P)
-        outside = round((found - expected) / 4.0)
-        assert found == pytest.approx(expected + 4.0 * outside, abs=1e-3)
-        assert outside >= 0
-        assert misfit == pytest.approx(line / 18.0, rel=1e-4)
+        assert found == pytest.approx(min(circles) - line, abs=0.05)
+        assert misfit == pytest.approx(unbounded / 18.0, rel=1e-4)
 
 
 def test_a_long_flat_line_has_evidence_and_a_drums_tangent_has_none() -> None:

@@ -15,6 +15,32 @@ from perception.bayes.wall_report import room_report, wall_ends, wall_segments
 from tests.perception.bayes.rooms import fill, new_room, place_wall
 
 
+def test_the_first_wall_needs_more_evidence_than_the_others() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.0)
+    place_wall(room.walls[1], np.zeros(2), math.pi, 2.0)
+    fill(memory, room.walls[1], -1.0, 1.0)
+    for first, second, reported in ((39.0, 30.0, 0), (41.0, 30.0, 2), (41.0, 13.0, 1)):
+        for wall, chi2 in zip(room.walls, (first, second), strict=False):
+            wall.chi2 = wall.spans[0].chi2 = chi2
+        assert len(wall_segments(memory)) == reported
+
+
+def test_a_short_wall_that_touches_a_named_drum_is_its_side() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -2.0, -0.5)
+    fill(memory, room.walls[0], 0.5, 0.98)
+    assert len(wall_segments(memory)) == 2
+    drum = memory.tracks[0]
+    drum.status, drum.is_named, drum.radius = ESTABLISHED, 1, 0.3
+    drum.x, drum.y = 2.3, 0.74
+    assert wall_segments(memory)["y2"] == pytest.approx([-0.5], abs=0.1)
+    drum.x = 2.5  # stands behind it
+    assert len(wall_segments(memory)) == 2
+
+
 def test_spans_are_segments_and_reach_a_corner_that_is_heard() -> None:
     memory, room = new_room()
     place_wall(room.walls[2], np.zeros(2), 0.0, 2.0)
