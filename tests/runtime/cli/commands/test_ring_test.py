@@ -18,6 +18,7 @@ from runtime.cli.commands.ring_test import judge_motion, judge_sensor, only_port
 from tests.drivers.firmware.board import install, start
 
 INF = math.inf
+TIMEOUT_S = 120.0
 
 
 @pytest.mark.parametrize(
@@ -79,8 +80,13 @@ def test_no_rounds_are_a_wrong_call(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.fixture
-def plugged(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[list[str]]:
-    """Yield the arguments that name a robot with the real firmware on a pty."""
+def plugged(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Yield the arguments that name a robot with the real firmware on a pty.
+
+    On a busy machine the firmware's start takes longer than a board's, and so do its firings.
+    """
+    monkeypatch.setattr("runtime.cycle.connection.CONNECT_MAX_S", TIMEOUT_S)
+    monkeypatch.setattr(ring_test, "SLACK_S", TIMEOUT_S)
     install(tmp_path, "pico", request.param)
     assert run_command(["firmware", "--board", "pico", "--out", str(tmp_path / "files")]) == DONE
     board, port = os.openpty()
