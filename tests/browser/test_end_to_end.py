@@ -88,7 +88,7 @@ async def edit_the_map(opened: Opened) -> None:
     await opened.until(f"{json.dumps(chosen)}.some((n) => run.segments.get(n)?.pinned)", "pins")
     await delete(opened, chosen)
 
-    await page.locator("#objects li").first.click()
+    await page.locator("#objects li", has_text="drum").first.click()  # what no model explains cannot be confirmed
     await opened.says("#evidence", "for it")
     await opened.save_screenshot("evidence")
     number = await opened.world("selection.object")
