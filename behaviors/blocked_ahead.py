@@ -145,12 +145,8 @@ def blocked_ahead(
 
     Parameters
     ----------
-    echoes
-        Fresh ones, shape (n, 2), m.
-    pose, way_rad
-        The robot's place, and the direction of its way.
-    reach_m
-        How far along the way an echo counts.
+    echoes, pose, way_rad, reach_m
+        As for `pocket_ahead`.
     ahead
         The one so far.
     step_m

@@ -147,9 +147,10 @@ class ForkedTests:
                 if data is None:
                     under_way[receiver] = index
                 elif data != DONE:
-                    hook.pytest_runtest_logreport(
-                        report=hook.pytest_report_from_serializable(config=session.config, data=data)
-                    )
+                    if not session.shouldfail:  # else the others may have gone on to a failure of their own
+                        hook.pytest_runtest_logreport(
+                            report=hook.pytest_report_from_serializable(config=session.config, data=data)
+                        )
                 else:
                     missing.discard(under_way.pop(receiver))
                     hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)

@@ -93,12 +93,12 @@ def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: Fol
 
 
 def heard_at(cells: Cells, place: tuple[float, float], radius_m: float, percept: Percept) -> Cells:
-    """Return the cells with those near a place left out, and all fresh echoes.
+    """Return the cells and fresh echoes, near a place the fresh echoes alone.
 
     Parameters
     ----------
     cells : Cells
-        Around the robot.
+        Around the robot, from `cells_near`.
     place : tuple of float
         Seen from the robot in odometry's directions, m.
     radius_m : float
@@ -108,6 +108,7 @@ def heard_at(cells: Cells, place: tuple[float, float], radius_m: float, percept:
     """
     away = np.hypot(cells.dx - place[0], cells.dy - place[1]) >= radius_m
     fresh = percept.obstacles - (percept.pose.x, percept.pose.y)
+    fresh = fresh[np.hypot(fresh[:, 0] - place[0], fresh[:, 1] - place[1]) < radius_m]
     return Cells(
         np.append(cells.dx[away], fresh[:, 0]), np.append(cells.dy[away], fresh[:, 1]),
         np.append(cells.distances[away], np.hypot(fresh[:, 0], fresh[:, 1])),

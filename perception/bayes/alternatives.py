@@ -24,6 +24,25 @@ HOPELESS_NAT: Final = -1e9
 
 
 @kernel
+def bearing_if_near(q: Reading, cx: float, cy: float, radius: float, gate: float) -> tuple[float, float]:
+    """Return the unit direction from a sensor to a circle's centre; zeros if its reading ends elsewhere.
+
+    Parameters
+    ----------
+    q : Reading
+        The reading.
+    cx, cy, radius, gate : float
+        As for `mean_bearing`.
+    """
+    dx = cx - q.x
+    dy = cy - q.y
+    d = math.sqrt(dx * dx + dy * dy)
+    if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
+        return dx / d, dy / d
+    return 0.0, 0.0
+
+
+@kernel
 def mean_bearing(
     readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
 ) -> tuple[float, float]:  # fmt: skip
@@ -39,13 +58,9 @@ def mean_bearing(
     sx = 0.0
     sy = 0.0
     for j in range(len(readings)):
-        q = readings[j]
-        dx = cx - q.x
-        dy = cy - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
-            sx += dx / d
-            sy += dy / d
+        ux, uy = bearing_if_near(readings[j], cx, cy, radius, gate)
+        sx += ux
+        sy += uy
     m = math.hypot(sx, sy)
     if m == 0.0:
         return 0.0, 0.0

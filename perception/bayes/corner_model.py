@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.alternatives import bearing_if_near
 from perception.bayes.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
@@ -130,13 +131,10 @@ def find_facing(
     sx = 0.0
     sy = 0.0
     for j in range(len(readings)):
-        q = readings[j]
-        dx = cx - q.x
-        dy = cy - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
-            sx += dx / d
-            sy += dy / d
+        ux, uy = bearing_if_near(readings[j], cx, cy, radius, gate)
+        if ux != 0.0 or uy != 0.0:
+            sx += ux
+            sy += uy
             facing[count] = j
             count += 1
     return count, sx, sy

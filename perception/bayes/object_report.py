@@ -208,12 +208,9 @@ def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[floa
     x, y, radius : float
         The circle, m.
     """
-    tx, ty = (surfaces[:, 2:] - surfaces[:, :2]).T
-    length = np.hypot(tx, ty)
-    walls = surfaces[length > 0.0]
-    tx, ty, length = (
-        of[length > 0.0] for of in (tx / np.maximum(length, 1e-9), ty / np.maximum(length, 1e-9), length)
-    )
+    lengths = np.hypot(surfaces[:, 2] - surfaces[:, 0], surfaces[:, 3] - surfaces[:, 1])
+    walls, length = surfaces[lengths > 0.0], lengths[lengths > 0.0]
+    tx, ty = (walls[:, 2:] - walls[:, :2]).T / length
     dx, dy = x - walls[:, 0], y - walls[:, 1]
     along, across = tx * dx + ty * dy, tx * dy - ty * dx
     beyond = np.abs(np.maximum(-along, along - length))

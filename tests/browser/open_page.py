@@ -116,6 +116,8 @@ class Opened:
     async def steady(self) -> None:
         """Turn off automatic fitting of the map, so that screen positions stay valid."""
         await self.until("run.fresh && run.state.objects.length > 0 && view.width > 1", "objects on the map")
+        if not self.is_real_time:
+            await self.drawn()  # the first values make the header, and with it the map, another height
         await self.page.evaluate(f"async () => {{ const {{ view }} = await {MODULE}; view.touched = true; }}")
 
     async def crash(self) -> None:

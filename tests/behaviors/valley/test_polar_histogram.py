@@ -118,11 +118,16 @@ def test_a_place_outside_the_grid_has_echoes_only() -> None:
 
 
 def test_near_a_place_only_what_is_heard_is_left() -> None:
-    percept = at(0.0, 0.0, echoes=[(1.0, 0.1), (-2.0, 0.0)])
-    found = heard_at(cells((1.2, 0.0), (1.0, 1.0), certainty=0.5), (1.0, 0.0), 0.5, percept)
-    assert list(zip(found.dx.tolist(), found.dy.tolist(), found.certainties.tolist(), strict=True)) == [
-        (1.0, 1.0, 0.5), (1.0, 0.1, 1.0), (-2.0, 0.0, 1.0),
-    ]  # fmt: skip
+    echoes = [(1.0, 0.1), (-2.0, 0.0)]
+    percept = at(0.0, 0.0, walls=[(1.2, -1.0, 1.2, 1.0)], echoes=echoes)
+    around = cells_near(percept, 0.0, 0.0, 3.0, CONFIG)
+    found = heard_at(around, (1.0, 0.0), 0.5, percept)
+    before = list(zip(around.dx.tolist(), around.dy.tolist(), around.certainties.tolist(), strict=True))
+    kept = [cell for cell in before if math.dist(cell[:2], (1.0, 0.0)) >= 0.5]
+    assert 4 < len(kept) < len(before) - 4
+    after = list(zip(found.dx.tolist(), found.dy.tolist(), found.certainties.tolist(), strict=True))
+    assert after == [*kept, (1.0, 0.1, 1.0)], "each echo once"
+    assert (-2.0, 0.0, 1.0) in kept
     np.testing.assert_allclose(found.distances, np.hypot(found.dx, found.dy))
 
 
