@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.parameters import CELL_M
-from perception.bayes.segment_list import mapped_segments, put_segment
+from perception.bayes.segment_list import count_again, mapped_segments, put_segment
 from perception.bayes.state import Memory
 from perception.kernel import Ints
 from perception.records import zeros
@@ -124,6 +124,7 @@ def delete(memory: Memory, pins: Pins, numbers: Collection[int]) -> set[int]:
         segments = buckets["segments"][k]
         segments[: len(left)] = segments[left]
         buckets["count"][k] = len(left)
+    count_again(memory)
     pins.remove(gone)
     return set(numbers) - gone
 

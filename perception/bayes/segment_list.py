@@ -8,11 +8,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.elements import BUCKET_CAPACITY
+from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.parameters import CELL_M
 from perception.bayes.segment_pairs import add_to_map, bucket_index
 from perception.bayes.state import FREE, CircleTracks, Memory, StateRecord
 from perception.kernel import Floats, kernel
+from perception.records import Records, records, zeros
 
 SHOWN_M: Final = 0.1
 """Length at which a mapped segment is shown; the map keeps its middle and normal."""
@@ -30,15 +31,28 @@ def put_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number
         As for `segment_pairs.add_to_map`.
     """
     buckets = s[0].buckets
-    bucket = buckets[bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), len(buckets))]
+    k = bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), len(buckets))
+    bucket = buckets[k]
     before = min(bucket.count, BUCKET_CAPACITY)
+    if before == 0:
+        used = s[0].used_buckets
+        at = s[0].buckets_used
+        while at > 0 and used[at - 1] > k:
+            used[at] = used[at - 1]
+            at -= 1
+        used[at] = k
+        s[0].buckets_used += 1
     add_to_map(buckets, CELL_M, x, y, nx, ny, number, time_s)
     s[0].segments_held += min(bucket.count, BUCKET_CAPACITY) - before
 
 
 def count_again(memory: Memory) -> None:
-    """Count the segments in the map, after others than `put_segment` changed it."""
-    memory.state["segments_held"] = np.minimum(memory.state["buckets"][0]["count"], BUCKET_CAPACITY).sum()
+    """Count the segments and the used buckets of the map, after others than `put_segment` changed it."""
+    counts, used_buckets = memory.state["buckets"][0]["count"], memory.state["used_buckets"][0]
+    used = np.flatnonzero(counts)
+    memory.state["segments_held"] = np.minimum(counts, BUCKET_CAPACITY).sum()
+    memory.state["buckets_used"] = len(used)
+    used_buckets[: len(used)], used_buckets[len(used) :] = used, 0
 
 
 @kernel
@@ -52,14 +66,37 @@ def count_map(s: StateRecord, tracks: CircleTracks) -> tuple[int, int, int]:
     return s[0].segments_held, s[0].segments_made, held
 
 
+@kernel
+def copy_segments(s: StateRecord, out: Records[MappedSegment]) -> None:
+    """Copy the segments in the map, bucket by bucket.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    out : (n,) MappedSegment
+        Out; as many as the map holds.
+    """
+    n = 0
+    for i in range(s[0].buckets_used):
+        bucket = s[0].buckets[s[0].used_buckets[i]]
+        for j in range(min(bucket.count, BUCKET_CAPACITY)):
+            segment = bucket.segments[j]
+            copied = out[n]
+            copied.x = segment.x
+            copied.y = segment.y
+            copied.normal_x = segment.normal_x
+            copied.normal_y = segment.normal_y
+            copied.number = segment.number
+            copied.time_s = segment.time_s
+            n += 1
+
+
 def mapped_segments(memory: Memory) -> NDArray[Any]:
     """Return the segments in the map as records of `state.MappedSegment`, shape (n,), a copy."""
-    # Of thousands of buckets a hundred are in use, and this is called between two cycles.
-    buckets = memory.state["buckets"][0]
-    counts = buckets["count"]
-    used = np.flatnonzero(counts)
-    held = np.arange(BUCKET_CAPACITY) < counts[used, None]
-    return buckets["segments"][used][held]  # type: ignore[no-any-return]  # numpy types a field as Any
+    segments = zeros(MappedSegment, memory.state["segments_held"].item())
+    copy_segments(memory.s, records(MappedSegment, segments))
+    return segments
 
 
 def drawn(segments: NDArray[Any]) -> Floats:

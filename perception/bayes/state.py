@@ -36,7 +36,7 @@ from perception.bayes.parameters import START_NOISE, START_NOISE_NAT
 from perception.bayes.scratch import Scratch
 from perception.bayes.settings_record import NOISES
 from perception.bayes.wall_records import WallMap
-from perception.kernel import Floats
+from perception.kernel import Floats, Ints
 from perception.records import Record, Records, records, zeros
 
 FREE, TENTATIVE, ESTABLISHED = range(3)
@@ -305,6 +305,10 @@ class State(Record):
     segments_made: int
     segments_held: int
     """Segments in the outline map: to count them anew would drive everything else out of the processor's caches."""
+    buckets_used: int
+    """Buckets of the outline map that hold segments, …"""
+    used_buckets: Annotated[Ints, BUCKETS]
+    """… and which they are, in ascending order, for the same reason."""
     refinements: int
     ring_x: float
     """Position of the ring at its last firing, m."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -132,21 +131,25 @@ def move_bins(main: Wall, part: Wall) -> None:
     free(part)
 
 
-def frameless(walls: NDArray[Any]) -> Iterator[int]:
-    """Yield the walls that have turned away from their frames, or come near the frames' ends, by their numbers."""
-    used = np.flatnonzero(walls["weight"][:MAX_WALLS] > 0.0)
-    spans, last = walls["spans"], np.maximum(walls["span_count"][used] - 1, 0)
-    is_out = (spans["first_bin"][used, 0] < EDGE_BINS) | (spans["end_bin"][used, last] > WALL_BINS - EDGE_BINS)
-    is_turned = np.abs(walls["slope"][used]) > FRAME_TURN_MAX
-    for k, turned in zip(used[is_out | is_turned].tolist(), is_turned[is_out | is_turned].tolist(), strict=True):
-        filled = np.flatnonzero(walls["bins"]["weight"][k] > 0.0)
-        if len(filled) and (turned or abs(_middle(filled)) >= EDGE_BINS // 2):
-            yield k
-
-
-def _middle(filled: NDArray[np.int64]) -> int:
-    """Return the middle of the filled bins, from the frame's."""
-    return int(filled[0] + filled[-1] + 1) // 2 - HALF
+@kernel
+def find_frameless(s: StateRecord, first: int) -> int:
+    """Return the first wall, from `first` on, that has turned away from its frame or come near its ends, or −1."""
+    for k in range(first, MAX_WALLS):
+        wall = s[0].room.walls[k]
+        is_turned = abs(wall.slope) > FRAME_TURN_MAX
+        last = wall.spans[max(wall.span_count - 1, 0)]
+        is_out = wall.spans[0].first_bin < EDGE_BINS or last.end_bin > WALL_BINS - EDGE_BINS
+        if not (wall.weight > 0.0 and (is_turned or is_out)):
+            continue
+        low = -1
+        high = -1
+        for b in range(WALL_BINS):
+            if wall.bins[b].weight > 0.0:
+                low = b if low < 0 else low
+                high = b
+        if low >= 0 and (is_turned or abs((low + high + 1) // 2 - HALF) >= EDGE_BINS // 2):
+            return k
+    return -1
 
 
 def reframe(walls: NDArray[Any], k: int) -> None:
@@ -161,7 +164,8 @@ def reframe(walls: NDArray[Any], k: int) -> None:
     """
     wall, old = walls[k], walls[CANDIDATE]
     walls[CANDIDATE] = wall
-    u = _middle(np.flatnonzero(np.asarray(old.bins)["weight"] > 0.0)) * WALL_BIN_M
+    filled = np.flatnonzero(np.asarray(old.bins)["weight"] > 0.0)
+    u = (int(filled[0] + filled[-1] + 1) // 2 - HALF) * WALL_BIN_M
     off, c = old.offset + old.slope * u, 1.0 / math.hypot(1.0, old.slope)
     nx, ny, slope = old.normal_x, old.normal_y, old.slope
     free(wall)
@@ -174,13 +178,15 @@ def reframe(walls: NDArray[Any], k: int) -> None:
 
 def merge_walls(memory: Memory, p: SettingsRecord) -> None:
     """Merge walls that are one into the heaviest one; give walls that outgrow or leave their frames new ones."""
-    walls: NDArray[Any] = memory.state["room"]["walls"][0]
     while (pair := find_same(memory.s)) >= 0:
+        walls = memory.state["room"]["walls"][0]
         move_bins(walls[pair // MAX_WALLS], walls[pair % MAX_WALLS])
         fit_walls(memory.s, p, 0, MAX_WALLS, 1)
-    for k in frameless(walls):
-        reframe(walls, k)
+    k = find_frameless(memory.s, 0)
+    while k >= 0:
+        reframe(memory.state["room"]["walls"][0], k)
         fit_walls(memory.s, p, k, k + 1, 1)
+        k = find_frameless(memory.s, k + 1)
 
 
 @kernel

@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 
 from perception.bayes.range_fit import FAR
 from perception.bayes.settings_record import SettingsRecord
-from perception.bayes.state import Memory
-from perception.bayes.wall_contact import EDGE_REACH_M, HEARD_REACH_M
+from perception.bayes.state import Memory, StateRecord
+from perception.bayes.wall_contact import EDGE_REACH_M, HEARD_REACH_M, are_mirrors
 from perception.bayes.wall_corners import (
     EDGE_WALL_WEIGHT_MIN,
     KEPT,
     PASS_SLACK_M,
     SYSTEMATIC_M,
 )
-from perception.bayes.wall_records import MAX_WALLS, RECENT_MAX
-from perception.bayes.wall_report import has_mirrors
-from perception.kernel import Floats
+from perception.bayes.wall_records import EDGES_MAX, MAX_WALLS, RECENT_MAX
+from perception.kernel import Floats, kernel
 
 ECHOES_MIN: Final = 8
 """Recent echoes, from afar, that show a corner …"""
@@ -43,6 +42,34 @@ APART_M: Final = 0.3
 """Least distance from a corner or an edge that is known."""
 
 
+@kernel
+def choose_wall(s: StateRecord, turn: int) -> tuple[int, int]:
+    """Return the wall on whose line a corner is looked for, and the place of a free edge; −1, −1 without such.
+
+    Parameters
+    ----------
+    s, turn
+        As for `find_heard_corner`.
+    """
+    room = s[0].room
+    place = -1
+    for c in range(EDGES_MAX):
+        if place < 0 and room.edges[c].is_used == 0:
+            place = c
+    known = 0
+    for k in range(MAX_WALLS):
+        known += room.walls[k].weight >= EDGE_WALL_WEIGHT_MIN
+    if place < 0 or known == 0 or not are_mirrors(room):
+        return -1, -1
+    left = turn % known
+    for k in range(MAX_WALLS):
+        if room.walls[k].weight >= EDGE_WALL_WEIGHT_MIN:
+            if left == 0 and room.walls[k].span_count > 0:
+                return k, place
+            left -= 1
+    return -1, -1
+
+
 def find_heard_corner(memory: Memory, p: SettingsRecord, turn: int) -> None:
     """Look for a corner on the line of one wall, and add it to the edges.
 
@@ -53,15 +80,11 @@ def find_heard_corner(memory: Memory, p: SettingsRecord, turn: int) -> None:
     turn : int
         Counts the calls: each looks at the next wall.
     """
+    k, place = choose_wall(memory.s, turn)
+    if k < 0:
+        return
     room = memory.state["room"][0]
-    walls = np.flatnonzero(room["walls"]["weight"][:MAX_WALLS] >= EDGE_WALL_WEIGHT_MIN)
-    places = np.flatnonzero(room["edges"]["is_used"] == 0)
-    if len(walls) == 0 or len(places) == 0 or not has_mirrors(memory):
-        return
-    k = int(walls[turn % len(walls)])
     wall, readings = room["walls"][k], room["recent"]["reading"][: min(int(room["recent_count"]), RECENT_MAX)]
-    if wall["span_count"] == 0:
-        return
     ends = float(wall["spans"]["low"][0]), float(wall["spans"]["high"][int(wall["span_count"]) - 1])
     cuts = _cuts(wall, readings, float(p[0].cos_half_angle))
     for side, beyond in enumerate((ends[0] - cuts, cuts - ends[1])):
@@ -74,8 +97,8 @@ def find_heard_corner(memory: Memory, p: SettingsRecord, turn: int) -> None:
             reach = float(np.median(near[low : low + count[low]]))
             x, y = _point(wall, ends[side] + (reach if side == 1 else -reach))
             if not _is_known(room, x, y):
-                _enter(room, room["edges"][places[0]], (x, y), readings, p)
-                room["edges"][places[0]]["first"], room["edges"][places[0]]["second"] = k, side
+                _enter(room, room["edges"][place], (x, y), readings, p)
+                room["edges"][place]["first"], room["edges"][place]["second"] = k, side
                 return
 
 

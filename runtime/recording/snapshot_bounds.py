@@ -150,6 +150,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "_sensors.last_set": Bound(0, SETS_MAX - 1),
         "buckets.cell_x": SIGNED,
         "buckets.cell_y": SIGNED,
+        "buckets_used": Bound(0, BUCKETS),
         "circles.alternative": Bound(0, CIRCLES_MAX + 1),
         "circles.kind": Bound(0, CIRCLES_MAX - 1),
         "circles.radius": Bound(0.0, 1e3),
@@ -194,6 +195,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "spans.first_bin": Bound(0, WALL_BINS),
         "spans.high": WALL_EXTENT,
         "spans.low": WALL_EXTENT,
+        "used_buckets": Bound(0, BUCKETS - 1),
         "walls.is_changed": Bound(0, 1),
         "walls.span_count": Bound(0, SPANS_MAX),
     }

@@ -18,6 +18,7 @@ from perception.bayes import naming
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.object_report import CIRCLE_FIELDS, circle_object
 from perception.bayes.range_fit import FAR
+from perception.bayes.segment_list import count_again
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import ConfirmObject, PinSegments, PlaceModel
@@ -207,7 +208,7 @@ def test_a_pinned_segment_survives_the_segments_after_it() -> None:
     assert perception.edit(PinSegments((number,), pinned=True)) is None
     geometry = perception.segments().geometry[0].tolist()
     perception.memory.state["buckets"]["count"] = 0
-    perception.memory.state["segments_held"] = 0
+    count_again(perception.memory)
     perception.observe(Firing(1e3, Pose(0.0, 0.0, 0.0), 0.0, np.full(SENSORS, np.nan)))
     kept = perception.segments()
     assert kept.numbers.tolist() == [number]

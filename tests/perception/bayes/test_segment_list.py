@@ -37,6 +37,21 @@ def test_the_map_knows_how_many_segments_it_holds() -> None:
     assert count_map(memory.s, memory.tracks)[0] == len(mapped_segments(memory)) > 0
 
 
+def test_the_map_knows_which_buckets_hold_segments() -> None:
+    memory, rng = new_memory(), np.random.default_rng(5)
+    state = memory.state
+    for turn in range(2):
+        for x, y in rng.normal(0.0, 5.0 * 100.0**turn, (60, 2)).tolist():
+            put_segment(memory.s, x, y, 1.0, 0.0, 1, 0.0)
+        used = np.flatnonzero(state["buckets"]["count"][0])
+        assert state["used_buckets"][0, : state["buckets_used"][0]].tolist() == used.tolist()
+        state["buckets"]["count"][0, used[::3]] = 0
+        count_again(memory)
+        left = [k for k in used.tolist() if k not in used[::3]]
+        held = state["used_buckets"][0]
+        assert (held[: len(left)].tolist(), held[len(left) :].any()) == (left, False)
+
+
 def test_a_segment_is_drawn_about_its_middle_at_right_angles_to_its_normal() -> None:
     memory, angle = new_memory(), 0.7
     add_segment(memory, np.array([0.4, -0.3, *unit(angle)]), 1)

@@ -11,11 +11,12 @@ import pytest
 
 from config.load import load_settings
 from perception.bayes import reservoir
-from perception.bayes.elements import MAX_LINES, Reading
+from perception.bayes.elements import BUCKETS, MAX_LINES, Reading
 from perception.bayes.kernel_settings import make_settings
 from perception.bayes.parameters import CELL_M
 from perception.bayes.range_fit import FAR
-from perception.bayes.segment_pairs import add_to_map
+from perception.bayes.segment_list import put_segment
+from perception.bayes.segment_pairs import bucket_index
 from perception.bayes.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.state import Memory
 from perception.kernel import Floats
@@ -177,7 +178,8 @@ def place_of(memory: Memory, t: int) -> Floats:
 def add_segment(memory: Memory, row: np.ndarray, number: int) -> int:
     """Put a segment (middle, normal) into the map; return its bucket."""
     x, y, nx, ny = row.tolist()
-    return add_to_map(memory.s[0].buckets, CELL_M, x, y, nx, ny, number, 0.1 * number)
+    put_segment(memory.s, x, y, nx, ny, number, 0.1 * number)
+    return bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), BUCKETS)
 
 
 def places(memory: Memory) -> Floats:
