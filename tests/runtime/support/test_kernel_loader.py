@@ -105,7 +105,7 @@ async def test_a_run_that_ends_does_not_wait_for_a_compiler(tmp_path: Path, monk
     monkeypatch.setattr(asyncio, "create_subprocess_exec", slow)
     ready = asyncio.create_task(_ready(structlog.wrap_logger(None, processors=[LogCapture()])))
     async with asyncio.timeout(60.0):
-        while not started_file.exists():
+        while not (processes and started_file.exists()):  # the process may run before its start has returned
             await asyncio.sleep(0.01)
     ready.cancel()
     with pytest.raises(asyncio.CancelledError):
