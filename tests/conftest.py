@@ -29,7 +29,7 @@ COVERAGE = line_coverage.start()  # before any module of the product is imported
 
 from runtime.support import child_process  # noqa: E402
 from runtime.support.kernel_cache import use_kernel_cache  # noqa: E402
-from tests import promises  # noqa: E402
+from tests import promise_page, promises  # noqa: E402
 from tests.compile_kernels import compile_all  # noqa: E402
 from tests.forked import ForkedTests  # noqa: E402
 
@@ -127,9 +127,9 @@ class _PromisesPlugin:
         results, path = self._config.stash.get(promises.RESULTS, promises.Results()), Path(page)
         soak, day = path.name == promises.SOAK_PAGE.name, datetime.now(UTC).date().isoformat()
         try:
-            before = promises.rows_in(path.read_text("utf-8")) if path.exists() else []
-            rows = promises.merged(results, before, soak=soak, day=day)
-            path.write_text(promises.render(rows, soak=soak), encoding="utf-8")
+            before = promise_page.rows_in(path.read_text("utf-8")) if path.exists() else []
+            rows = promise_page.merged(results, before, soak=soak, day=day)
+            path.write_text(promise_page.render(rows, soak=soak), encoding="utf-8")
         except ValueError as error:
             self._config.get_terminal_writer().line(f"\n{page} was not changed: {error}", red=True)
             session.exitstatus = pytest.ExitCode.USAGE_ERROR

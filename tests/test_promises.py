@@ -1,4 +1,4 @@
-"""Tests of the traceability of promises, `tests/promises.py`."""
+"""Tests of the traceability of promises, `tests/promises.py`, and of their page."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from tests import promises
+from tests.promise_page import listed_in, merged, render, rows_in, rows_of
 from tests.promises import (
     PAGE,
     PROMISES,
@@ -20,11 +21,6 @@ from tests.promises import (
     SOAK_PAGE,
     PromiseTest,
     Results,
-    listed_in,
-    merged,
-    render,
-    rows_in,
-    rows_of,
     unverified,
 )
 

@@ -6,6 +6,7 @@ A peer commands the base directly: neither our schemas nor our arbiter stand bet
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from typing import Final
 
 import numpy as np
@@ -20,7 +21,7 @@ RELEASED_S: Final = 0.5
 """Time after the release before the first velocity, s."""
 
 
-class DrivePeer:
+class DrivePeer(ABC):
     """A controller of `runtime.simulation.navigation_trials` without our cycle.
 
     Parameters
@@ -74,11 +75,12 @@ class DrivePeer:
         return self.settings.behaviors.move_to_goal.success_radius_m
 
     def on_firing(self, firing: Firing) -> None:
-        """Take a firing into the peer's own map."""
+        """Take a firing into the peer's own map; a peer without one keeps the ranges only."""
+        del firing
 
+    @abstractmethod
     def velocity(self, pose: Pose, ring_yaw: float, run_s: float) -> Twist:
         """Return the peer's velocity."""
-        raise NotImplementedError
 
     def goal_bearing(self, pose: Pose) -> float:
         """Return the goal's direction from the drive heading, rad."""

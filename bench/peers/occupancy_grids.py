@@ -6,6 +6,7 @@ Each is fed and asked as `perception.mapping.grid.evidence_grid.GridMethod`. The
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Final
 
@@ -24,7 +25,7 @@ def logit(p: float) -> float:
     return math.log(p / (1.0 - p))
 
 
-class Peer:
+class Peer(ABC):
     """A grid of log odds; a subclass enters one reading.
 
     Parameters
@@ -50,9 +51,9 @@ class Peer:
                 if not math.isnan(r):
                     self.enter(sensor, r, silence_m)
 
+    @abstractmethod
     def enter(self, sensor: list[float], r: float, silence_m: float) -> None:
         """Enter the range `r` (m, inf without an echo) of a sensor at x, y (m) that looks in a direction (rad)."""
-        raise NotImplementedError
 
     def beam(self, sensor: list[float], reach: float, half: float) -> tuple[Cells, Floats, Floats, Floats]:
         """Return rows and columns, distance (m), angle off the axis and direction (rad) of the cells in a beam."""

@@ -12,7 +12,7 @@ from perception.bayes.parameters import CONFIRMED_SIDES, TRUSTED_M
 from perception.bayes.range_fit import FAR
 from perception.bayes.state import ESTABLISHED, FREE, Memory
 from perception.records import array_of
-from tests import naive_bayes, naive_tracks, naive_walls
+from tests import naive_bayes, naive_naming, naive_walls
 from tests.naive_walls import Array
 from tests.perception.bayes.rooms import fill, new_room, place_wall
 from tests.perception.bayes.tracks import (
@@ -81,7 +81,7 @@ def test_misfit_room_and_sides_are_those_of_the_hits(examples: int) -> None:
         w, e, seen_u = (a[(np.abs(e) <= S.gate_m) & (seen.cos >= COSINES[1])] for a in (w, e, seen.u))
         levels = noises()[level].levels[np.minimum((w[:, 4] * noises()[level].per_metre).astype(int), 10_000)]
         by_room = room_evidence(w, walls, corner, edges, level)
-        want = naive_tracks.model_check(
+        want = naive_naming.model_check(
             naive_bayes.evidence(noises()[level], w[:, 4], e), by_room,
             expected[levels], variance[levels], np.arctan2(seen_u[:, 1], seen_u[:, 0]),
         )  # fmt: skip

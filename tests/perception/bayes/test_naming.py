@@ -8,7 +8,7 @@ from perception.bayes import naming
 from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, Memory
 from perception.records import records, zeros
-from tests import naive_tracks
+from tests import naive_naming
 from tests.perception.bayes.tracks import (
     ALTERNATIVES,
     RADII,
@@ -51,12 +51,12 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         circles["refinements"] = rng.integers(0, 12, TRACKS)
         careful = bool(rng.random() < 0.3)
         doubtful = [
-            naive_tracks.is_doubtful(careful, it["misfit"], it["room_lead"], it["sides"], it["is_confirmed"] == 1)
+            naive_naming.is_doubtful(careful, it["misfit"], it["room_lead"], it["sides"], it["is_confirmed"] == 1)
             for it in circles
         ]
         want = [
             t for t, it in enumerate(circles)
-            if not doubtful[t] and naive_tracks.is_called(
+            if not doubtful[t] and naive_naming.is_called(
                 it["is_named"] == 1, it["status"] == ESTABLISHED, it["kind"] < S.model_count, it["probability"], 0.92,
                 0.7, np.delete(leads[t], it["kind"]).tolist(), leads[t, -2], it["dispersion"],
                 it["log_likelihood_ratio"], it["unknown_nat"], [it["covariance_xx"], it["covariance_yy"]],
@@ -86,7 +86,7 @@ def test_of_two_named_circles_that_overlap_the_one_of_more_evidence_is_named(exa
         circles["is_named"] = named
         t = int(rng.integers(TRACKS))
         naming.withdraw_overlapping(memory.tracks, t)
-        want = naive_tracks.without_overlaps(
+        want = naive_naming.without_overlaps(
             t, named, places(memory), circles["radius"].tolist(), circles["log_likelihood_ratio"].tolist()
         )
         assert circles["is_named"].tolist() == want
@@ -118,7 +118,7 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides(examples: int)
             kept.append(w)
         want = [
             t for t, it in enumerate(polygons)
-            if naive_tracks.is_sure_polygon(
+            if naive_naming.is_sure_polygon(
                 it["status"] == ESTABLISHED, it["probability"], 0.9, it["hits"],
                 [it["covariance"]["xx"], it["covariance"]["yy"]], kept[t],
             )

@@ -12,7 +12,7 @@ from perception.bayes import outline_check
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.state import ESTABLISHED, Memory
 from perception.kernel import Floats
-from tests import naive_bayes, naive_tracks
+from tests import naive_bayes, naive_naming
 from tests.perception.bayes.tracks import (
     COSINES,
     NOISES,
@@ -56,9 +56,9 @@ def test_the_leads_are_those_of_a_smooth_outline_and_of_another_radius(examples:
         var0, rel2 = noise_variance(memory.s, P)
         bearings = np.arctan2(seen.u[heard, 1], seen.u[heard, 0])
         variances = var0 + rel2 * w[heard, 4] ** 2
-        want = naive_tracks.outline_lead(bearings, e[heard], variances)
+        want = naive_naming.outline_lead(bearings, e[heard], variances)
         assert found == pytest.approx(want, rel=1e-9, abs=1e-9)
-        other = naive_tracks.round_lead(w[heard], centre, rho, variances)
+        other = naive_naming.round_lead(w[heard], centre, rho, variances)
         assert radius == pytest.approx(other, rel=1e-6, abs=1e-6)
         larger += other > 0.0
         smaller += other < 0.0

@@ -7,15 +7,13 @@ carried out in the turns in which it arrives.
 from __future__ import annotations
 
 import asyncio
-import base64
 import contextlib
 import gc
 import gzip
 import os
-import struct
 import tracemalloc
 import zlib
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -29,6 +27,7 @@ from runtime.console.http.connection_limits import TimedProtocol
 from runtime.console.http.server import JOINS_BURST
 from runtime.cycle.inputs import Request
 from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase, Page, open_console
+from tests.runtime.console.raw_page import raw_page
 
 pytestmark = pytest.mark.promise("P22")
 
@@ -37,51 +36,6 @@ BOUNDLESS = Limits(messages_per_s=1e9, bytes_burst=1e12)
 TEXT, PING, PONG, CONTINUATION = 0x1, 0x9, 0xA, 0x0
 TURNS_MAX = 3
 """Turns of the loop from the arrival of a message until it is carried out: two to wake its task, and one spare."""
-
-
-@dataclass
-class RawPage:
-    """A websocket whose every frame the test writes."""
-
-    reader: asyncio.StreamReader
-    writer: asyncio.StreamWriter
-
-    def write(
-        self, opcode: int, payload: bytes = b"", *, fin: bool = True, compressed: bool = False, count: int = 1
-    ) -> None:
-        """Write a frame, masked with zeros, so many times."""
-        first = bytes([opcode | (0x80 if fin else 0) | (0x40 if compressed else 0)])
-        size = bytes([0x80 | len(payload)]) if len(payload) < 126 else b"\xfe" + struct.pack(">H", len(payload))
-        self.writer.write((first + size + bytes(4) + payload) * count)
-
-    async def rest(self) -> bytes:
-        """Return what the server sends until it drops the connection."""
-        received = bytearray()
-        with contextlib.suppress(ConnectionError):
-            while data := await asyncio.wait_for(self.reader.read(65_536), TIMEOUT_S):
-                received += data
-        return bytes(received)
-
-
-@contextlib.asynccontextmanager
-async def raw_page(case: ConsoleCase, *headers: str) -> AsyncIterator[RawPage]:
-    """Connect a websocket by hand; the server agrees to no extension."""
-    reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
-    lines = [
-        f"GET /ws?token={case.token} HTTP/1.1", f"Host: 127.0.0.1:{case.url.port}", f"Origin: {case.origin}",
-        "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
-        f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}", *headers, "", "",
-    ]  # fmt: skip
-    writer.write("\r\n".join(lines).encode())
-    answer = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), TIMEOUT_S)
-    assert answer.startswith(b"HTTP/1.1 101")
-    assert b"extensions" not in answer.lower()
-    try:
-        yield RawPage(reader, writer)
-    finally:
-        writer.transport.abort()
-        with contextlib.suppress(ConnectionError):
-            await writer.wait_closed()
 
 
 @dataclass
