@@ -16,6 +16,9 @@ from runtime.cycle.step import STANDSTILL
 CONNECT_MAX_S: Final = 5.0
 """Longest wait for the robot's first answer, s; beyond it the run ends with an error."""
 
+ANSWER_TIMEOUT_S: Final = 2.0
+"""Least wait, s, also where the driver gave up earlier: a robot may be starting, or its emulator kept waiting."""
+
 HALT_MAX_S: Final = 0.5
 """Longest wait at the end of a run until the base confirms that it has stopped, s."""
 
@@ -45,13 +48,14 @@ class Connection(NamedTuple):
         """
         link, driver = self.link, self.driver
         await link.open_once()
-        deadline_run_s = self.clock() + CONNECT_MAX_S
+        begin_run_s = self.clock()
         while driver.state is not LineState.READY and not is_stopping():
             run_s = self.clock()
             driver.tick(run_s)
             self.send()
             lost = None if link.is_open else link.last_error
-            if run_s > deadline_run_s or lost is not None or driver.state is LineState.DOWN:
+            waited_max_s = ANSWER_TIMEOUT_S if driver.state is LineState.DOWN else CONNECT_MAX_S
+            if run_s - begin_run_s > waited_max_s or lost is not None:
                 await link.stop()
                 no_answer = f"no robot answers on {link.config.port}; check its power and link.baud"
                 text = lost or driver.problem or no_answer

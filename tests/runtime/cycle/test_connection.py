@@ -11,7 +11,7 @@ import structlog
 from config.errors import FAILED, UserError
 from drivers.emulator.faults import Deaf, Fault, Garbage, Mute
 from drivers.messages import Flags
-from runtime.cycle.connection import CONNECT_MAX_S, HALT_MAX_S, POLL_S
+from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, HALT_MAX_S, POLL_S
 from runtime.cycle.process import Observers, RobotProcess
 from tests.runtime.virtual_time import STEP_S, MemoryLink, in_virtual_time
 
@@ -121,3 +121,12 @@ def test_a_base_that_does_not_confirm_its_halt_is_left_after_a_while(monkeypatch
         begin_s = loop.time()
         loop.run_until_complete(process.run(arm=True, seconds=None))
         assert loop.time() - begin_s == pytest.approx(4.0 + HALT_MAX_S, abs=2.0 * POLL_S)
+
+
+def test_a_robot_that_answers_late_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It starts, or runs on a busy machine: the usual number of tries is over after a third of a second."""
+    late = Mute(kind="mute", at_s=0.0, duration_s=ANSWER_TIMEOUT_S - 0.5)
+    with in_virtual_time(monkeypatch, faults=(late,)) as (loop, settings, *_):
+        process = RobotProcess(settings, LOG, clock=loop.time)
+        summary = loop.run_until_complete(process.run(arm=True, seconds=1.0))
+    assert summary["mode"] == "DRIVE"
