@@ -155,6 +155,13 @@ def test_an_identity_whose_name_is_not_text_is_refused() -> None:
         assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
 
 
+def test_an_identity_whose_ranges_have_no_unit_is_refused() -> None:
+    decoder = Decoder("robot")
+    head = bytes((0x81, 0, 2, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
+    assert decoder.feed(stuffed(head + b"x" * 16 + bytes(3))) == []
+    assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
+
+
 def test_an_identity_with_a_name_field_of_another_length_is_refused() -> None:
     body = bytes((0x81, 0, 1, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
     for name in (b"", b"x" * 15, b"x" * 17):
@@ -287,7 +294,9 @@ def test_a_value_out_of_range_is_refused_and_its_field_named(frame: Frame, field
 
 
 @pytest.mark.parametrize(
-    "frame", [Listen(5, (1,) * 24), Ident(5, 1, 24, 381, 500, 50, 7, "ring")], ids=["most", "v1"]
+    "frame",
+    [Listen(5, (1,) * 24), Ident(5, 1, 24, 381, 500, 50, 7, "ring"), Ident(5, 2, 24, 381, 500, 50, 7, "ring", 1, 0)],
+    ids=["most", "v1", "finest unit, hears nothing"],
 )
 def test_the_longest_list_and_the_shortest_ident_come_back(frame: Frame) -> None:
     side: Side = "robot" if isinstance(frame, Ident) else "host"
