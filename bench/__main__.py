@@ -41,7 +41,8 @@ from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
 from config.errors import UserError
 from config.load import load_settings
-from runtime.support.kernel_cache import PARTS, prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import PARTS, use_kernel_cache
+from runtime.support.kernel_warmup import prepare_kernels
 
 OURS: Final = (
     Method("echolocate, bayes", ("perception.method=bayes",)),

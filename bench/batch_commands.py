@@ -20,7 +20,8 @@ from bench.batch import (
 )  # fmt: skip
 from bench.table import report
 from config.load import load_settings
-from runtime.support.kernel_cache import prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import use_kernel_cache
+from runtime.support.kernel_warmup import prepare_kernels
 
 
 def tune(

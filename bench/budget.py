@@ -30,7 +30,7 @@ from perception.pipeline import Perception
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import Inputs, State, apply_command, step
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.timing.memory_policy import MemoryPolicy
 from runtime.timing.phases import Phase
 from runtime.timing.refinement_budget import CpuTimeBudget

@@ -22,7 +22,8 @@ from drivers.emulator.robot_device import GroundTruth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
-from runtime.support.kernel_cache import compiled_signatures, prepare_kernels
+from runtime.support.kernel_cache import compiled_signatures
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.timing.footprint import own_mb
 from runtime.timing.memory_policy import OLD_EVERY_CYCLES, MemoryPolicy
 

@@ -15,7 +15,8 @@ from bench.table import report, rows_table, wide
 from config.errors import UserError
 from config.load import load_settings
 from config.settings import Settings
-from runtime.support.kernel_cache import EMULATOR, GRIDS, prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import EMULATOR, GRIDS, use_kernel_cache
+from runtime.support.kernel_warmup import prepare_kernels
 
 STEPS_FT: Final = (0.05, 0.2, 0.5, 1.0)
 """Distances between two firings of one sensor in the rooms with walls, ft."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 
 from config.load import load_settings
-from runtime.support.kernel_cache import PARTS, prepare_kernels
+from runtime.support.kernel_cache import PARTS
+from runtime.support.kernel_warmup import prepare_kernels
 
 
 def compile_all() -> None:

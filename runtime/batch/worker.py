@@ -68,7 +68,7 @@ def run_one(run: Run) -> Row:
 @functools.lru_cache(maxsize=64)
 def prepared_settings(text: str) -> Settings:
     """Return settings from JSON, with their kernels loaded in this process: once for all seeds."""
-    from runtime.support.kernel_cache import prepare_kernels
+    from runtime.support.kernel_warmup import prepare_kernels
 
     settings = Settings.model_validate_json(text)
     prepare_kernels(settings, Console(quiet=True))

@@ -1,4 +1,4 @@
-"""The cache of compiled kernels, and compiling them before the robot needs them.
+"""The cache of compiled kernels: its folder, and which parts of it a run needs.
 
 Numba's own cache lies beside the sources, does not notice a change in another file, and fails where it cannot write.
 So each version of the sources gets a folder of its own in the user's cache, named by a digest of their content, and
@@ -15,7 +15,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,12 +24,9 @@ from typing import TYPE_CHECKING, Final
 from platformdirs import user_cache_path
 
 from config.errors import UserError
-from runtime.support.progress import progress
 from runtime.support.user_folders import users_own
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from config.settings import Settings
 
 PACKAGES: Final = (
@@ -137,22 +134,6 @@ def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:
     return [part for part in parts if not (folder / part).exists()]
 
 
-def warm_up(settings: Settings, parts: Iterable[str]) -> None:
-    """Run every kernel of these parts once, the operator's edits included, so that no cycle compiles or loads one.
-
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants of the run.
-    parts : iterable of str
-        Of `PARTS`.
-    """
-    from runtime.support import kernel_warmup
-
-    for part in parts:
-        kernel_warmup.RUN_ONCE[part](settings)
-
-
 def compiled_signatures() -> int:
     """Return how many kernel signatures this process has compiled or loaded; a drive must not add to them."""
     dispatchers = sys.modules.get("numba.core.dispatcher")
@@ -167,53 +148,3 @@ def compiled_signatures() -> int:
         if isinstance(value, dispatchers.Dispatcher)
     }
     return sum(len(kernel.overloads) for kernel in kernels.values())
-
-
-def prepare_kernels(settings: Settings, console: Console, parts: Iterable[str] | None = None) -> None:
-    """Load every kernel, and first compile those that never were, with a notice that this takes a while.
-
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants of the run.
-    console : Console
-        Where the notice is shown.
-    parts : iterable of str, optional
-        Of `PARTS`; by default those that a run with these settings needs.
-    """
-    folder = use_kernel_cache()
-    if is_interpreted():
-        return
-    parts = needed_parts(settings) if parts is None else tuple(parts)
-    uncompiled = uncompiled_parts(folder, parts)
-    if not uncompiled:
-        warm_up(settings, (part for part in parts if part != EMULATOR))
-        return
-    with progress(console, "compiling kernels; this happens once"):
-        compile_parts(settings, folder, uncompiled)
-        warm_up(settings, (part for part in parts if part not in {*uncompiled, EMULATOR}))
-
-
-def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> None:
-    """Compile these parts and mark them as compiled, in two processes where there are two processors.
-
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants of the run.
-    folder : Path
-        The cache folder.
-    parts : sequence of str
-        Of `PARTS`.
-    """
-    from runtime.support import kernel_warmup
-
-    if BAYES in parts and (os.cpu_count() or 1) > 1:
-        # What the other process compiles is in the cache afterwards; this one starts with what shares none of it.
-        with kernel_warmup.compile_in_parallel(POLYGONS if POLYGONS in parts else BAYES):
-            kernel_warmup.observe_only(settings)
-            if POLYGONS in parts:
-                kernel_warmup.RUN_ONCE[BAYES](settings)
-    for part in parts:
-        warm_up(settings, [part])
-        (folder / part).touch()

@@ -31,8 +31,8 @@ from runtime.support.kernel_cache import (
     needed_parts,
     uncompiled_parts,
     use_kernel_cache,
-    warm_up,
 )
+from runtime.support.kernel_warmup import warm_up
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger

@@ -11,9 +11,10 @@ from __future__ import annotations
 import contextlib
 import gc
 import math
+import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
@@ -28,12 +29,17 @@ from runtime.support.kernel_cache import (
     LOCALIZATION,
     PAPER,
     POLYGONS,
-    compile_parts,
+    is_interpreted,
+    needed_parts,
+    uncompiled_parts,
     use_kernel_cache,
 )
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from rich.console import Console
 
     from config.model import ModelConfig
     from config.settings import Settings
@@ -257,6 +263,68 @@ def compile_refinement(part: str) -> None:
         best_line(memory.s, constants, 0)
         drop_explained(memory.s, memory.tracks, constants, 0)
         find_corners(memory.s)
+
+
+def warm_up(settings: Settings, parts: Iterable[str]) -> None:
+    """Run every kernel of these parts once, the operator's edits included, so that no cycle compiles or loads one.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    parts : iterable of str
+        Of `PARTS`.
+    """
+    for part in parts:
+        RUN_ONCE[part](settings)
+
+
+def prepare_kernels(settings: Settings, console: Console, parts: Iterable[str] | None = None) -> None:
+    """Load every kernel, and first compile those that never were, with a notice that this takes a while.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    console : Console
+        Where the notice is shown.
+    parts : iterable of str, optional
+        Of `PARTS`; by default those that a run with these settings needs.
+    """
+    folder = use_kernel_cache()
+    if is_interpreted():
+        return
+    parts = needed_parts(settings) if parts is None else tuple(parts)
+    uncompiled = uncompiled_parts(folder, parts)
+    if not uncompiled:
+        warm_up(settings, (part for part in parts if part != EMULATOR))
+        return
+    with progress(console, "compiling kernels; this happens once"):
+        compile_parts(settings, folder, uncompiled)
+        warm_up(settings, (part for part in parts if part not in {*uncompiled, EMULATOR}))
+
+
+def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> None:
+    """Compile these parts and mark them as compiled, in two processes where there are two processors.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    folder : Path
+        The cache folder.
+    parts : sequence of str
+        Of `PARTS`.
+    """
+    if BAYES in parts and (os.cpu_count() or 1) > 1:
+        # What the other process compiles is in the cache afterwards; this one starts with what shares none of it.
+        with compile_in_parallel(POLYGONS if POLYGONS in parts else BAYES):
+            observe_only(settings)
+            if POLYGONS in parts:
+                RUN_ONCE[BAYES](settings)
+    for part in parts:
+        warm_up(settings, [part])
+        (folder / part).touch()
 
 
 def compile_whole(parts: Sequence[str]) -> None:

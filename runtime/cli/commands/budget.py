@@ -11,7 +11,7 @@ from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.terminal.escaping_console import EscapingConsole
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.terminal.escaping_console import EscapingConsole
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 REFLECTIONS: Final[tuple[Literal["specular", "cone"], ...]] = ("specular", "cone")

@@ -9,7 +9,8 @@ from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.terminal.escaping_console import EscapingConsole
-from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
+from runtime.support.kernel_cache import LOCALIZATION, needed_parts
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:

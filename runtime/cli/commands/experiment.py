@@ -16,7 +16,7 @@ from runtime.cli.commands.output_files import check_outputs, make_output_folder
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.simulation.scene_names import SceneName
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.pattern_check import refuse_undrivable
 from runtime.support.progress import progress

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from config.errors import FAILED, UserError
 from runtime.cli.terminal.escaping_console import EscapingConsole
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:

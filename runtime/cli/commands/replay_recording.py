@@ -20,7 +20,7 @@ from runtime.cli.tables import objects_table, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
 from runtime.recording.replay_summary import ReplaySummary
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units, format_length
 from runtime.support.progress import progress
 

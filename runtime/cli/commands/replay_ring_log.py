@@ -12,7 +12,8 @@ from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.cli.tables import objects_table, pose_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import write_json
-from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
+from runtime.support.kernel_cache import LOCALIZATION, needed_parts
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 

@@ -27,8 +27,8 @@ from runtime.cli.tables import objects_table, timing_line, timing_table, walls_t
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
-from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.kernel_loader import KernelPreparation, begin_preparation
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, log_path, open_log
 from runtime.support.sd_notify import SdNotifier

@@ -17,7 +17,8 @@ from runtime.cli.commands.offline_io import plain_console, require_package
 from runtime.cli.commands.output_files import make_output_folder, writing
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.file_lock import file_lock
-from runtime.support.kernel_cache import needed_parts, prepare_kernels
+from runtime.support.kernel_cache import needed_parts
+from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:

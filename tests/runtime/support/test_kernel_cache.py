@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 import runtime.support.kernel_cache as kernels
 from config.errors import UserError
 from config.load import load_settings, with_known_room
-from config.settings import Settings
 from runtime.support import kernel_warmup as warming
 
 ROOT = Path(__file__).parents[3]
@@ -181,155 +176,6 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     with_grid = load_settings("hallway", ["perception.grid.method=directed"])
     assert kernels.needed_parts(with_grid) == (kernels.EMULATOR, kernels.BAYES, "directed")
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
-
-
-def test_each_part_is_compiled_once_and_then_warmed_up(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
-    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    home.mkdir()
-    happened: list[str] = []
-
-    def compile_parts(_settings: Settings, folder: Path, parts: Sequence[str]) -> None:
-        for part in parts:
-            (folder / part).touch()
-            happened.append(f"compile {part}")
-
-    monkeypatch.setattr(kernels, "compile_parts", compile_parts)
-    monkeypatch.setattr(kernels, "warm_up", lambda _settings, parts: happened.extend(parts))
-    settings, console = load_settings("hallway"), Console(quiet=True)
-    kernels.prepare_kernels(settings, console)
-    assert happened == ["compile emulator", "compile bayes"]
-    happened.clear()
-    kernels.prepare_kernels(settings, console)
-    assert happened == ["bayes"], "the emulator is another process"
-    happened.clear()
-    kernels.prepare_kernels(load_settings("hallway", models=["box"]), console)
-    assert happened == ["compile polygons", "bayes"]
-    (home / kernels.BAYES).unlink()
-    assert kernels.uncompiled_parts(home, kernels.PARTS) == [
-        kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM, *kernels.GRIDS,
-    ]  # fmt: skip
-    happened.clear()
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    kernels.prepare_kernels(settings, console)
-    assert happened == [], "there is nothing to compile"
-
-
-@pytest.mark.parametrize(
-    ("parts", "processors", "helped"),
-    [
-        ((kernels.EMULATOR, kernels.BAYES), 2, ["helper bayes", "observe_only"]),
-        ((kernels.BAYES, kernels.POLYGONS), 2, ["helper polygons", "observe_only", "bayes"]),
-        ((kernels.POLYGONS,), 2, []),
-        ((kernels.EMULATOR, kernels.BAYES), 1, []),
-    ],
-)
-def test_a_second_process_compiles_the_last_part(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: tuple[str, ...], processors: int, helped: list[str]
-) -> None:
-    happened: list[str] = []
-
-    @contextlib.contextmanager
-    def compile_in_parallel(part: str) -> Iterator[None]:
-        happened.append(f"helper {part}")
-        yield
-        happened.append("waited")
-
-    def noted(name: str) -> Callable[[Settings], None]:
-        return lambda _settings: happened.append(name)
-
-    monkeypatch.setattr(warming, "compile_in_parallel", compile_in_parallel)
-    monkeypatch.setattr(warming, "observe_only", noted("observe_only"))
-    monkeypatch.setattr(warming, "RUN_ONCE", {part: noted(part) for part in kernels.PARTS})
-    monkeypatch.setattr(os, "cpu_count", lambda: processors)
-    kernels.compile_parts(load_settings("hallway"), tmp_path, parts)
-    assert happened == [*helped, *(["waited"] if helped else []), *parts]
-    assert {path.name for path in tmp_path.iterdir()} == set(parts)
-
-
-COMPILED_LATER = """
-import sys
-from runtime.support.kernel_cache import needed_parts, prepare_kernels, use_kernel_cache
-use_kernel_cache()
-from config.load import load_settings
-from rich.console import Console
-settings = load_settings("hallway", sys.argv[1].split(), models=sys.argv[2].split())
-prepare_kernels(settings, Console(quiet=True))
-from numba.core import event
-late = []
-class Listener(event.Listener):
-    def on_start(self, e): late.append(str(e.data["dispatcher"].py_func.__name__))
-    def on_end(self, e): pass
-from config.load import load_model
-from perception.edits import (
-    ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RemoveObject,
-)
-from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
-from runtime.cycle.inputs import Request
-from runtime.cycle.modes import Mode
-from runtime.simulation.closed_loop import OperatorInput, simulate
-
-further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
-assert set(needed_parts(further)) <= set(needed_parts(settings))
-
-encoder = FrameEncoder(settings)
-
-def by_hand(cycle, state):
-    # every half second one action after the other, also with a model that came late
-    perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
-    if cycle % 10 or state.odometry is None:
-        return OperatorInput(arm)
-    encoder.frame(state, None, FrameContext(host_s=0.0))
-    seen = [o for o in perception.objects() if o.number is not None]
-    for known in seen:
-        perception.evidence(known.number)
-    first = perception.segments().numbers[:4].tolist()
-    x, y = state.odometry.pose.x, state.odometry.pose.y
-    pose = (x + 1.5, y + 0.5, 0.3)
-    edits = (
-        [PlaceModel(m.name, *pose) for m in further.models[: None if cycle > 100 else -1]],
-        [PinSegments(tuple(first), True)], [DeleteSegments(tuple(first[:2]))],
-        [MoveObject(o.number, o.x + 0.2, o.y, 0.1) for o in seen], [ConfirmObject(o.number) for o in seen],
-        [RemoveObject(o.number) for o in seen], [ClearMap()] if cycle > 200 else [],
-    )
-    return OperatorInput(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
-
-with event.install_listener("numba:compile", Listener()):
-    run = simulate(
-        settings, settings.world, 0, 15.0, operator=by_hand, reload=lambda n: further if n == 100 else None,
-    )
-assert run.state.cycle > 280 and run.state.odometry.pose.x > 1.0, run.state
-sys.exit(" ".join(late))
-"""
-
-
-@pytest.mark.compiled
-@pytest.mark.usefixtures("warm_kernels")
-@pytest.mark.parametrize(
-    ("sets", "models", "further"),
-    [
-        ("perception.method=bayes", "semicircle", "keg.toml"),
-        ("perception.method=bayes", "semicircle box", "hexagon.toml"),
-        ("perception.localization.correct_drift=true", "semicircle", "keg.toml"),
-        ("perception.method=paper", "semicircle", "box"),
-    ],
-)
-def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_edits(
-    tmp_path: Path, sets: str, models: str, further: str
-) -> None:
-    """The emulator's kernels may still load: it is another process when it matters."""
-    hexagon = [[math.cos(a), math.sin(a)] for a in (k * math.pi / 3.0 for k in range(6))]
-    (tmp_path / "hexagon.toml").write_text(f'name = "hexagon"\nclosed = true\nvertices_m = {hexagon}\n')
-    (tmp_path / "keg.toml").write_text(f'name = "keg"\nclosed = true\narc_radius_m = 1.0\nvertices_m = {hexagon}\n')
-    further = str(tmp_path / further) if "." in further else further
-    done = subprocess.run(
-        [sys.executable, "-c", COMPILED_LATER, sets, models, further],
-        cwd=ROOT, text=True, capture_output=True, check=False,
-    )  # fmt: skip
-    sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
-    assert "Traceback" not in done.stderr, done.stderr
-    late = [name for name in done.stderr.split() if f"def {name}(" in sources]
-    assert late == [], done.stderr
 
 
 @pytest.mark.compiled

@@ -224,7 +224,8 @@ class Listener(event.Listener):
     def on_start(self, e): compiled.append(str(e.data["dispatcher"].py_func.__name__))
     def on_end(self, e): pass
 from config.load import load_settings
-from runtime.support.kernel_cache import BAYES, POLYGONS, use_kernel_cache, warm_up
+from runtime.support.kernel_cache import BAYES, POLYGONS, use_kernel_cache
+from runtime.support.kernel_warmup import warm_up
 use_kernel_cache()
 warm_up(load_settings("hallway"), [BAYES])
 with event.install_listener("numba:compile", Listener()):
