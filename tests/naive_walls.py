@@ -89,3 +89,45 @@ def is_edge(way_a: float, normal_a: float, way_b: float, normal_b: float) -> boo
     if turn_a == turn_b:  # turning from a, what is free, b would be reached from behind
         return None
     return turn_a * (way_b - way_a) % (2.0 * math.pi) > math.pi
+
+
+def corner_and_lines(
+    angles: Array, distances: Array, roots: list[Array], sensors: Array, ranges: Array, sigma: float, start: Array
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return two lines' corrections of angle and distance, and their corner, by Gauss-Newton over all at once.
+
+    Parameters
+    ----------
+    angles, distances : (2,) float
+        The lines: normals, rad, and distances from the origin, m.
+    roots : list of (2, 2) float
+        Roots of the information on each line's angle and distance.
+    sensors, ranges : (n, 2) and (n,) float
+        Who heard the corner, and at which range, m.
+    sigma : float
+        Of a range, m.
+    start : (2,) float
+        The corner at first, m.
+    """
+    x = np.concatenate([np.zeros(4), start])
+    for _ in range(20):
+        rows, errors = [], []
+        for k in range(2):
+            block = np.zeros((2, 6))
+            block[:, 2 * k : 2 * k + 2] = roots[k]
+            rows.append(block)
+            errors.append(-block @ x)
+            a, c = angles[k] + x[2 * k], distances[k] + x[2 * k + 1]
+            n, t = np.array([math.cos(a), math.sin(a)]), np.array([-math.sin(a), math.cos(a)])
+            on = np.zeros((1, 6))
+            on[0, 2 * k], on[0, 2 * k + 1], on[0, 4:] = -(t @ x[4:]), 1.0, -n
+            rows.append(on * 1e5)
+            errors.append(np.array([n @ x[4:] - c]) * 1e5)
+        delta = x[4:] - sensors
+        reach = np.hypot(*delta.T)
+        block = np.zeros((len(ranges), 6))
+        block[:, 4:] = delta / reach[:, None]
+        rows.append(block / sigma)
+        errors.append((ranges - reach) / sigma)
+        x = x + np.linalg.lstsq(np.concatenate(rows), np.concatenate(errors), rcond=None)[0]
+    return x[:4], x[4:]

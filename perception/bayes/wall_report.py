@@ -17,8 +17,9 @@ from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, ED
 from perception.bayes.wall_crossing import CORNER_INSIDE_M, CORNER_REACH_M
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_fit import OPENING_PASSES_MIN
+from perception.bayes.wall_joint_fit import Lines, fit_together
 from perception.bayes.wall_numbers import SPAN_MIN_M
-from perception.bayes.wall_records import MAX_WALLS, WALL_BINS
+from perception.bayes.wall_records import CORNERS_MAX, MAX_WALLS, WALL_BINS
 from perception.kernel import Floats
 from perception.records import Record
 
@@ -118,6 +119,8 @@ class Straight:
     ----------
     frame : tuple of float
         Origin (m), normal, offset (m) and slope, as in `Wall`.
+    variances : tuple of float
+        Variance of the offset (m²), covariance (m), and variance of the slope.
     ends : (n, 2) float
         The ends of the spans along it in ascending order, m.
     """
@@ -125,6 +128,7 @@ class Straight:
     wall: Any
     spans: NDArray[Any]
     frame: tuple[float, ...]
+    variances: tuple[float, ...]
     ends: Floats
 
     def point(self, along: float) -> tuple[float, float]:
@@ -160,13 +164,11 @@ def wall_segments(memory: Memory) -> NDArray[Any]:
 def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
     with np.errstate(all="ignore"):  # numbers of a damaged recording
-        room = memory.state["room"][0]
+        room, are_mirrors = memory.state["room"][0], has_mirrors(memory)
         walls = sure_walls(room["walls"][:MAX_WALLS], room["corners"])
-        are_mirrors = has_mirrors(memory)
-        points = [
-            *reach_corners(walls, room["corners"], are_mirrors),
-            *end_at_edges(walls, room["edges"], are_mirrors),
-        ]
+        corners = straighten(walls, room["corners"], room["edges"])
+        points = reach_corners(walls, corners[:CORNERS_MAX], are_mirrors)
+        points += end_at_edges(walls, corners[CORNERS_MAX:], are_mirrors)
         bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
         segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
         return np.array(segments, WallSegment.DTYPE), np.array(points, CornerPoint.DTYPE)
@@ -201,7 +203,7 @@ def is_of_body(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
 
 
 def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
-    variance, covariance, variance_turn = (float(of.wall[name]) for name in VARIANCES)
+    variance, covariance, variance_turn = of.variances
     columns = (of.ends.tolist(), *(of.spans[name] for name in ("weight", "chi2", "number")))
     for (low, high), weight, chi2, number in zip(*columns, strict=True):
         middle = 0.5 * (low + high)
@@ -240,8 +242,9 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
             spans = wall["spans"][: wall["span_count"]]
             spans = spans[sure_spans(spans, wall["chi2"], is_neighbour)]
             if len(spans):
-                frame = tuple(float(wall[name]) for name in FRAME)
-                found[number] = Straight(wall, spans, frame, np.column_stack([spans["low"], spans["high"]]))
+                frame, variances = (tuple(float(wall[name]) for name in names) for names in (FRAME, VARIANCES))
+                ends = np.column_stack([spans["low"], spans["high"]])
+                found[number] = Straight(wall, spans, frame, variances, ends)
     return found
 
 
@@ -265,6 +268,32 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
         is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
     return np.asarray(sure)
+
+
+def straighten(walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray[Any]) -> NDArray[Any]:
+    """Fit the walls and the corners that are heard together.
+
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their lines are updated.
+    corners, edges : (n,) record of `RoomCorner`
+        All corners and edges.
+
+    Returns
+    -------
+    (2 n,) record of `RoomCorner`
+        The corners and then the edges, with their corrected places.
+    """
+    points = np.concatenate([corners, edges])
+    ends = points[len(corners) :]["second"].copy()
+    points["second"][len(corners) :] = -1
+    rows = np.array([(*of.frame, *of.variances) for of in walls.values()]).reshape(-1, 9)
+    lines = fit_together(Lines(rows[:, :4], rows[:, 4:]), points, list(walls))
+    points["second"][len(corners) :] = ends
+    for of, line in zip(walls.values(), lines.tolist(), strict=True):
+        of.frame, of.variances = (*of.frame[:4], *line[:2]), tuple(line[2:])
+    return points
 
 
 def reach_corners(
