@@ -131,3 +131,27 @@ def corner_and_lines(
         errors.append((ranges - reach) / sigma)
         x = x + np.linalg.lstsq(np.concatenate(rows), np.concatenate(errors), rcond=None)[0]
     return x[:4], x[4:]
+
+
+def likeliest_cover(evidence: Array, switch: float, unheard: float, most: float) -> list[bool]:
+    """Return which places of a wall are covered, by the best of all sequences, each kept as a whole.
+
+    Parameters
+    ----------
+    evidence : (n,) float
+        For each place to be covered, nat; 0 where nothing was heard.
+    switch, unheard, most : float
+        Cost of a change, that of a covered place where nothing was heard, and the greatest evidence of a place, nat.
+    """
+    best: dict[bool, tuple[float, list[bool]]] = {False: (0.0, [])}
+    for value in evidence.tolist():
+        gain = {False: 0.0, True: float(np.clip(value, -most, most)) if value != 0.0 else -unheard}
+        best = {
+            now: max(
+                (score + gain[now] - (switch if now != before else 0.0), [*places, now])
+                for before, (score, places) in best.items()
+            )
+            for now in (False, True)
+        }
+    closed = {state: score - (switch if state else 0.0) for state, (score, _) in best.items()}
+    return best[max(closed, key=lambda state: closed[state])][1]

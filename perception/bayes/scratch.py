@@ -17,7 +17,7 @@ from perception.bayes.elements import (
     Pose,
     Reading,
 )
-from perception.bayes.wall_records import RECENT_MAX
+from perception.bayes.wall_records import RECENT_MAX, WALL_BINS
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
 
@@ -158,6 +158,10 @@ class Scratch(Record):
     """Explanation of each fired reading; see `UNEXPLAINED`."""
     near_recent: Annotated[Ints, RECENT_MAX]
     """Places of the recent readings that may bear on a new wall."""
+    wall_evidence: Annotated[Floats, WALL_BINS]
+    """Evidence that a wall covers each of its bins, nat."""
+    wall_covered: Annotated[Ints, WALL_BINS]
+    """Whether the bin before is covered: 1 if so where this one is open, plus 2 if so where this one is covered."""
     segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
     """The segments of this firing."""
     readings: Annotated[Records[Reading], READINGS_MAX]

@@ -57,6 +57,7 @@ def mean_error(wall: Wall, b: int) -> float:
 def clear_wall(wall: Wall) -> None:
     """Free a wall's place."""
     wall.weight = 0.0
+    wall.reviewed.information = 0.0
     wall.is_changed = 0
     wall.span_count = 0
     clear_bins(wall)
@@ -73,6 +74,7 @@ def clear_bins(wall: Wall) -> None:
         of.range_sum = 0.0
         of.passes = 0.0
         of.number = 0
+        of.is_held = 0
 
 
 def free(wall: Wall) -> None:
@@ -83,7 +85,7 @@ def free(wall: Wall) -> None:
     wall : Wall
         A record of numpy.
     """
-    wall.weight, wall.is_changed, wall.span_count = 0.0, 0, 0
+    wall.weight, wall.reviewed.information, wall.is_changed, wall.span_count = 0.0, 0.0, 0, 0
     np.asarray(wall.bins).view(np.uint8)[...] = 0
 
 
@@ -124,6 +126,7 @@ def enter_reading(room: WallMap, wall: Wall, q: Reading, kind: int, p: SettingsR
     of = wall.bins[b]
     if of.weight >= BIN_WEIGHT_MAX:
         fade(of, (BIN_WEIGHT_MAX - 1.0) / of.weight)
+    of.is_held = 1
     of.weight += weight
     # A near echo places the wall better than a far one.
     precision = weight / range_sigma(room, q.range_m) ** 2

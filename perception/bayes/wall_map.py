@@ -54,6 +54,7 @@ from perception.bayes.wall_records import (
     WALL_BINS,
     WallMap,
 )
+from perception.bayes.wall_review import remember, review
 from perception.kernel import kernel
 
 GROWTH_M: Final = 0.75
@@ -67,6 +68,8 @@ TIDY_FIRINGS: Final = 8
 """Firings between two passes over pairs of walls."""
 HEARD_TURNS: Final = 2
 """So many of them for each look for corners that are heard: a third of a millisecond, where walls are mirrors."""
+REVIEW_FIRINGS: Final = 4
+"""Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
 EDGE_WITHIN_M: Final = 0.15
 """Walls of this weight show, this far inside their ends, whether slanting walls answer from the beam's edge."""
@@ -215,6 +218,7 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
                     expected, along = distance_and_foot(room.walls[own], q.x, q.y)
                     add_residual(room, room.walls[own], q.range_m - expected, along, expected)
                 enter_reading(room, room.walls[own], q, kind, p)
+        remember(room, scratch.fired_sensors[i], q)
         weaken(room, tracks, q, own, p)
         enter_looks(room, tracks, room.corners, CORNERS_MAX, q, p)
         enter_looks(room, tracks, room.edges, EDGES_MAX, q, p)
@@ -246,3 +250,5 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
         find_corners(memory.s)
     elif phase == TIDY_FIRINGS - 1 and turn % HEARD_TURNS == 0:
         find_heard_corner(memory, p, turn // HEARD_TURNS)
+    if phase % REVIEW_FIRINGS == 1:
+        review(memory.s, memory.tracks, p, firings // REVIEW_FIRINGS)

@@ -125,6 +125,7 @@ def move_bins(main: Wall, part: Wall) -> None:
     for name in ("weight", "precision", "range_sum"):
         np.add.at(target[name], at, source[name])
     np.maximum.at(target["passes"], at, source["passes"])
+    np.maximum.at(target["is_held"], at, source["is_held"])
     target["newest"][at] = source["newest"]
     target["number"][at] = source["number"]
     main.is_changed = 1

@@ -27,6 +27,8 @@ CORNERS_MAX: Final = 24
 EDGES_MAX: Final = 24
 RECENT_MAX: Final = 768
 """Spaced readings of all sensors that are remembered for new walls."""
+REMEMBERED_MAX: Final = 4096
+"""Spaced readings of all sensors by which walls are reviewed: those of some 25 m."""
 IS_KNOWN: Final = 0
 IS_FREE: Final = 1
 IS_TAKEN: Final = 2
@@ -49,6 +51,8 @@ class WallBin(Record):
     """Ranges that passed through, less with each new echo."""
     number: int
     """That of the numbered span that held it last, 0 before."""
+    is_held: int
+    """1 where the last review found that the wall covers it by echoes, or one was entered since."""
     newest: Reading
 
 
@@ -70,6 +74,18 @@ class Span(Record):
     """The object's number, of the same sequence as those of tracks; 0 of a span too short to be reported."""
 
 
+class ReviewedLine(Record):
+    """A wall's line by the readings that are remembered, in the wall's frame."""
+
+    information: float
+    """Determinant of the information on offset and slope, m⁻²; 0 before the first review."""
+    offset: float
+    slope: float
+    variance_offset: float
+    covariance: float
+    variance_slope: float
+
+
 class Wall(Record):
     """A wall; the line is `offset` + `slope` · u along its frame's normal, u along the frame's tangent."""
 
@@ -89,6 +105,7 @@ class Wall(Record):
     """Evidence of all its spans together that it is straight."""
     misfit: float
     """χ² of the line for each degree of freedom."""
+    reviewed: ReviewedLine
     is_changed: int
     """1 where its bins have changed since it was fitted."""
     span_count: int
@@ -160,6 +177,15 @@ class WallMap(Record):
     kept_y: Annotated[Floats, SENSORS_MAX]
     kept: Annotated[Floats, SENSORS_MAX]
     """1 for each sensor that has a recent reading."""
+    remembered: Annotated[Records[Reading], REMEMBERED_MAX]
+    """Spaced readings of all sensors by which walls are reviewed, a ring buffer."""
+    remembered_count: int
+    """Readings ever put there."""
+    remembered_x: Annotated[Floats, SENSORS_MAX]
+    """Where each sensor was at its last remembered reading, m; meaningless before the first."""
+    remembered_y: Annotated[Floats, SENSORS_MAX]
+    remembered_of: Annotated[Floats, SENSORS_MAX]
+    """1 for each sensor that has one."""
     firings: int
     edge_echoes: float
     """Slanting walls that answered from the beam's edge …"""

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.state import ESTABLISHED, Memory
-from perception.bayes.wall_bins import bin_of
 from perception.bayes.wall_contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
 from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
 from perception.bayes.wall_crossing import CORNER_INSIDE_M, CORNER_REACH_M
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
-from perception.bayes.wall_fit import OPENING_PASSES_MIN
-from perception.bayes.wall_joint_fit import Lines, fit_together
 from perception.bayes.wall_numbers import SPAN_MIN_M
-from perception.bayes.wall_records import CORNERS_MAX, MAX_WALLS, WALL_BINS
+from perception.bayes.wall_records import CORNERS_MAX, MAX_WALLS
+from perception.bayes.wall_straight import Straight, straight, straighten
 from perception.kernel import Floats
 from perception.records import Record
 
@@ -76,8 +73,6 @@ SIDE_M: Final = 0.08
 TINY_M: Final = 1e-6
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed: readings are not independent."""
-FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y", "offset", "slope")
-VARIANCES: Final = ("variance_offset", "covariance", "variance_slope")
 
 
 class WallSegment(Record):
@@ -111,51 +106,6 @@ class CornerPoint(Record):
     log_odds: float
 
 
-@dataclass(slots=True)
-class Straight:
-    """The line of a wall that is sure, and its spans.
-
-    Attributes
-    ----------
-    frame : tuple of float
-        Origin (m), normal, offset (m) and slope, as in `Wall`.
-    variances : tuple of float
-        Variance of the offset (m²), covariance (m), and variance of the slope.
-    ends : (n, 2) float
-        The ends of the spans along it in ascending order, m.
-    """
-
-    wall: Any
-    spans: NDArray[Any]
-    frame: tuple[float, ...]
-    variances: tuple[float, ...]
-    ends: Floats
-
-    def point(self, along: float) -> tuple[float, float]:
-        """Return the point at a position along the line, m."""
-        ox, oy, nx, ny, offset, slope = self.frame
-        off = offset + slope * along
-        return ox + nx * off - ny * along, oy + ny * off + nx * along
-
-    def along(self, x: float, y: float) -> float:
-        """Return the position of a point along the line, m."""
-        ox, oy, nx, ny, _, _ = self.frame
-        return nx * (y - oy) - ny * (x - ox)
-
-    def beyond(self, x: float, y: float) -> tuple[float, float, tuple[int, int]]:
-        """Return where a point is along the line, how far beyond the nearest end (m), and which end that is."""
-        along = self.along(x, y)
-        span, side = divmod(int(np.abs(self.ends - along).argmin()), 2)
-        return along, (along - float(self.ends[span, side])) * (2 * side - 1), (span, side)
-
-    def is_passed(self, a: float, b: float) -> bool:
-        """Return whether ranges passed through the wall between two positions along it, m."""
-        low, high = min(a, b), max(a, b)
-        between = self.wall["bins"][max(0, bin_of(low)) : min(WALL_BINS, bin_of(high))]
-        is_covered = between["weight"] > np.maximum(between["passes"], 0.0)
-        return bool(between["passes"][~is_covered].sum() >= OPENING_PASSES_MIN)
-
-
 def wall_segments(memory: Memory) -> NDArray[Any]:
     """Return the walls that are sure, one segment for each span, as records of `WallSegment`, shape (n,)."""
     return room_report(memory)[0]
@@ -166,6 +116,9 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
     with np.errstate(all="ignore"):  # numbers of a damaged recording
         room, are_mirrors = memory.state["room"][0], has_mirrors(memory)
         walls = sure_walls(room["walls"][:MAX_WALLS], room["corners"])
+        if edges_answer(memory):
+            for of in walls.values():
+                of.hold_to_review()
         corners = straighten(walls, room["corners"], room["edges"])
         points = reach_corners(walls, corners[:CORNERS_MAX], are_mirrors)
         points += end_at_edges(walls, corners[CORNERS_MAX:], are_mirrors)
@@ -176,8 +129,13 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
 
 def has_mirrors(memory: Memory) -> bool:
     """Return whether the walls are known to be mirrors, as `wall_contact.are_mirrors` does in compiled code."""
+    return float(memory.state["room"]["edge_silences"][0]) >= MIRRORS_SILENCES and not edges_answer(memory)
+
+
+def edges_answer(memory: Memory) -> bool:
+    """Return whether slanting walls answer from the beam's edge, as `wall_contact.edges_answer` does."""
     echoes, silences = (float(memory.state["room"][name][0]) for name in ("edge_echoes", "edge_silences"))
-    return silences >= MIRRORS_SILENCES and not echoes > EDGES_SHARE * silences + EDGES_LEAD
+    return echoes > EDGES_SHARE * silences + EDGES_LEAD
 
 
 def is_of_body(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
@@ -242,9 +200,7 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
             spans = wall["spans"][: wall["span_count"]]
             spans = spans[sure_spans(spans, wall["chi2"], is_neighbour)]
             if len(spans):
-                frame, variances = (tuple(float(wall[name]) for name in names) for names in (FRAME, VARIANCES))
-                ends = np.column_stack([spans["low"], spans["high"]])
-                found[number] = Straight(wall, spans, frame, variances, ends)
+                found[number] = straight(wall, spans)
     return found
 
 
@@ -268,32 +224,6 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
         is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
     return np.asarray(sure)
-
-
-def straighten(walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray[Any]) -> NDArray[Any]:
-    """Fit the walls and the corners that are heard together.
-
-    Parameters
-    ----------
-    walls : dict of Straight
-        The walls by their number; their lines are updated.
-    corners, edges : (n,) record of `RoomCorner`
-        All corners and edges.
-
-    Returns
-    -------
-    (2 n,) record of `RoomCorner`
-        The corners and then the edges, with their corrected places.
-    """
-    points = np.concatenate([corners, edges])
-    ends = points[len(corners) :]["second"].copy()
-    points["second"][len(corners) :] = -1
-    rows = np.array([(*of.frame, *of.variances) for of in walls.values()]).reshape(-1, 9)
-    lines = fit_together(Lines(rows[:, :4], rows[:, 4:]), points, list(walls))
-    points["second"][len(corners) :] = ends
-    for of, line in zip(walls.values(), lines.tolist(), strict=True):
-        of.frame, of.variances = (*of.frame[:4], *line[:2]), tuple(line[2:])
-    return points
 
 
 def reach_corners(

@@ -63,7 +63,7 @@ def fill(memory: Memory, wall: Wall, low: float, high: float, count: float = 5.0
     for b in range(round(low / 0.06) + HALF, round(high / 0.06) + HALF):
         of = wall.bins[b]
         u = (b - HALF + 0.5) * 0.06
-        of.weight, of.precision = count, count / SIGMA**2
+        of.weight, of.precision, of.is_held = count, count / SIGMA**2, 1
         of.offset_sum, of.range_sum = of.precision * wall.offset, of.precision * distance
         q = of.newest
         v = wall.offset - distance
