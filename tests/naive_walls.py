@@ -45,11 +45,11 @@ def line_fit(u: Array, z: Array, w: Array) -> tuple[Array, Array]:
     return solution, np.linalg.inv(rows.T @ rows)
 
 
-def line_chi2(u: Array, e: Array, sigma: Array) -> tuple[float, float]:
-    """Return χ² of the best line, where each error counts 16 at most, and without that bound."""
+def line_chi2(u: Array, e: Array, sigma: Array) -> float:
+    """Return χ² of the best line, where each error counts 16 at most."""
     rows = np.column_stack([np.ones_like(u), u]) / sigma[:, None]
     squares = (e / sigma - rows @ np.linalg.lstsq(rows, e / sigma, rcond=None)[0]) ** 2
-    return float(np.minimum(squares, 16.0).sum()), float(squares.sum())
+    return float(np.minimum(squares, 16.0).sum())
 
 
 def best_circle(u: Array, e: Array, d: Array, sigma: Array, radius: float) -> tuple[Array, Array]:

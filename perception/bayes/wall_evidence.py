@@ -40,8 +40,8 @@ WALL_MIN_M: Final = 0.5
 
 
 @kernel
-def line_chi2(wall: Wall, first: int, end: int) -> tuple[float, float, int]:
-    """Return χ² of the best line through some spans of a wall, each bin's bounded, that without bounds, and the bins.
+def line_chi2(wall: Wall, first: int, end: int) -> tuple[float, int]:
+    """Return χ² of the best line through some spans of a wall, each bin's bounded, and the number of bins.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def line_chi2(wall: Wall, first: int, end: int) -> tuple[float, float, int]:
     """
     middle = 0.5 * (wall.spans[first].low + wall.spans[end - 1].high)
     n = 0
-    s0 = su = suu = se = sue = see = 0.0
+    s0 = su = suu = se = sue = 0.0
     for k in range(first, end):
         for b in range(wall.spans[k].first_bin, wall.spans[k].end_bin):
             of = wall.bins[b]
@@ -66,20 +66,19 @@ def line_chi2(wall: Wall, first: int, end: int) -> tuple[float, float, int]:
                 suu += w * u * u
                 se += w * e
                 sue += w * u * e
-                see += w * e * e
     det = s0 * suu - su * su
     if n < FLAT_BINS_MIN or not det > 0.0:
-        return 0.0, 0.0, 0
+        return 0.0, 0
     offset = (suu * se - su * sue) / det
     slope = (s0 * sue - su * se) / det
-    bounded = 0.0
+    chi2 = 0.0
     for k in range(first, end):
         for b in range(wall.spans[k].first_bin, wall.spans[k].end_bin):
             of = wall.bins[b]
             if is_covered(of):
                 e = mean_error(wall, b) - offset - slope * (middle_of(b) - middle)
-                bounded += min(STRAY_CHI2, e * e / (1.0 / of.precision + SYSTEMATIC_M**2))
-    return bounded, see - offset * se - slope * sue, n
+                chi2 += min(STRAY_CHI2, e * e / (1.0 / of.precision + SYSTEMATIC_M**2))
+    return chi2, n
 
 
 @kernel
@@ -162,15 +161,16 @@ def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float
     Returns
     -------
     (float, float)
-        χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom.
+        χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom, each bin's bounded: a few
+        echoes of other things do not make a long line crooked.
     """
-    line, left, n = line_chi2(wall, first, end)
+    line, n = line_chi2(wall, first, end)
     if n < FLAT_BINS_MIN:
         return 0.0, MISFIT_UNKNOWN
     circle = circle_chi2(wall, first, end, BARREL_RADIUS_M, p, line + EXACT_BELOW_CHI2)
     if circle < line + EXACT_BELOW_CHI2:
         circle = min(circle, circle_chi2(wall, first, end, DRUM_RADIUS_M, p, math.inf))
-    return circle - line, left / (n - 2)
+    return circle - line, line / (n - 2)
 
 
 @kernel

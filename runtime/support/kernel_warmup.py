@@ -251,6 +251,7 @@ def compile_refinement(part: str) -> None:
     from perception.bayes.wall_corners import find_corners
     from perception.bayes.wall_initiation import best_line
     from perception.bayes.wall_merging import drop_explained
+    from perception.bayes.wall_review import review
 
     settings = load_settings(None)
     bayes = settings.perception.bayes
@@ -263,6 +264,7 @@ def compile_refinement(part: str) -> None:
         best_line(memory.s, constants, 0)
         drop_explained(memory.s, memory.tracks, constants, 0)
         find_corners(memory.s)
+        review(memory.s, memory.tracks, constants, 0)
 
 
 def warm_up(settings: Settings, parts: Iterable[str]) -> None:

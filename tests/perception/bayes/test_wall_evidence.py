@@ -10,6 +10,8 @@ import pytest
 from perception.bayes import wall_evidence
 from perception.bayes.wall_bins import enter_reading, free
 from perception.bayes.wall_contact import FOOT
+from perception.bayes.wall_fit import fit_walls
+from perception.bayes.wall_report import wall_segments
 from tests import naive_walls
 from tests.perception.bayes.rooms import fill, new_room, place_wall, reading, refit, spans
 from tests.perception.bayes.tracks import P, examples
@@ -40,10 +42,24 @@ def test_evidence_against_a_circle_is_that_of_its_best_place(examples: int) -> N
             centre, squares = naive_walls.best_circle(u, e, d, sigma, radius)
             is_outside = np.abs(np.arctan2(centre[0] - u, before + centre[1])) > math.acos(P[0].cos_may_answer)
             circles.append(np.minimum(squares + 4.0 * is_outside, 16.0).sum())
-        line, unbounded = naive_walls.line_chi2(u, e, sigma)
+        line = naive_walls.line_chi2(u, e, sigma)
         found, misfit = wall_evidence.flatness(wall, 0, 1, P)
         assert found == pytest.approx(min(circles) - line, abs=0.05)
-        assert misfit == pytest.approx(unbounded / 18.0, rel=1e-4)
+        assert misfit == pytest.approx(line / 18.0, rel=1e-4)
+
+
+def test_a_few_echoes_of_other_things_do_not_make_a_long_wall_crooked() -> None:
+    memory, room = new_room()
+    wall = room.walls[0]
+    place_wall(wall, np.zeros(2), 0.0, 2.0)
+    fill(memory, wall, -1.5, 1.5, 4.0)
+    for b in (75, 95, 116):
+        wall.bins[b].offset_sum -= 0.06 * wall.bins[b].precision
+    wall.is_changed = 1
+    fit_walls(memory.s, P, 0, 1, 1)
+    assert wall.span_count == 1
+    assert 0.5 < wall.misfit < 1.5
+    assert len(wall_segments(memory)) == 1
 
 
 def test_a_long_flat_line_has_evidence_and_a_drums_tangent_has_none() -> None:
