@@ -115,12 +115,20 @@ def edge_direction(q: Reading, nx: float, ny: float, p: SettingsRecord) -> tuple
 
 @kernel
 def contact(wall: Wall, q: Reading, p: SettingsRecord) -> tuple[int, float, float, float]:
+    """Return where a reading would touch a wall without ends, as `touch` does, unless it slants too much."""
+    return touch(wall, q, p, SLANTING_MIN_COS)
+
+
+@kernel
+def touch(wall: Wall, q: Reading, p: SettingsRecord, least: float) -> tuple[int, float, float, float]:
     """Return where a reading would touch a wall without ends.
 
     Parameters
     ----------
     wall, q, p
         The wall, the reading and the settings.
+    least : float
+        Least cosine between the sensor's axis and the normal.
 
     Returns
     -------
@@ -130,7 +138,7 @@ def contact(wall: Wall, q: Reading, p: SettingsRecord) -> tuple[int, float, floa
     """
     nx, ny = wall_normal(wall)
     dot = nx * q.axis_x + ny * q.axis_y
-    if dot < SLANTING_MIN_COS:
+    if dot < least:
         return NOWHERE, 0.0, 0.0, dot
     distance, foot = distance_and_foot(wall, q.x, q.y)
     if distance <= 0.0:

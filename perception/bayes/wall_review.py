@@ -33,6 +33,7 @@ from perception.bayes.wall_contact import (
     is_on_span,
     range_sigma,
     tolerance,
+    touch,
     wall_normal,
     wall_point,
 )
@@ -55,6 +56,8 @@ SILENCE_NAT: Final = 2.0
 """Evidence of a range that went on, and of a silence, against the place."""
 PLACE_NAT: Final = 10.0
 """Greatest evidence of one place: the errors of its readings are not independent."""
+GRAZING_MIN_COS: Final = 0.05
+"""Least cosine between a sensor's axis and the normal of the wall under review: its line is known well."""
 AS_WELL: Final = 0.3
 """Another wall explains an echo as well if its error, as a share of the greatest explained, is not larger by this."""
 FORGOTTEN_NAT: Final = 2.0
@@ -137,12 +140,16 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
     s2 = 1.0 / SLOPE_SIGMA**2
     for j in range(min(room.remembered_count, REMEMBERED_MAX)):
         q = room.remembered[j]
-        kind, expected, along, dot = contact(wall, q, p)
+        kind, expected, along, cosine = touch(wall, q, p, GRAZING_MIN_COS)
         b = bin_of(along)
         if kind == NOWHERE or not 0 <= b < WALL_BINS:
             continue
         e = q.range_m - expected
-        slack = tolerance(room, wall, along, expected, dot)
+        ex, ey = nx, ny
+        if kind == BEAM_EDGE:
+            ex, ey = edge_direction(q, nx, ny, p)
+            cosine = nx * ex + ny * ey
+        slack = tolerance(room, wall, along, expected, cosine)
         of = wall.bins[b]
         is_sure = of.weight >= SURE_WEIGHT and of.passes < SURE_PASSES * of.weight and is_on_span(wall, along, 0.0)
         if e > slack and not is_sure:
@@ -154,11 +161,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
             gain = min(ECHO_NAT, end_nat(room, wall, q, along, p)) - 0.5 * z * z
             evidence[b] += gain if kind == FOOT else EDGE_SHARE * gain
             if of.is_held == 1 or is_on_span(wall, along, 0.0):
-                ex, ey, weight = nx, ny, 1.0
-                if kind == BEAM_EDGE:
-                    ex, ey = edge_direction(q, nx, ny, p)
-                    weight = EDGE_WEIGHT
-                w = weight / ((nx * ex + ny * ey) * range_sigma(room, expected)) ** 2
+                w = (1.0 if kind == FOOT else EDGE_WEIGHT) / ((nx * ex + ny * ey) * range_sigma(room, expected)) ** 2
                 dx = q.x + q.range_m * ex - wall.origin_x
                 dy = q.y + q.range_m * ey - wall.origin_y
                 u = wall.normal_x * dy - wall.normal_y * dx
