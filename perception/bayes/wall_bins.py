@@ -126,7 +126,8 @@ def enter_reading(room: WallMap, wall: Wall, q: Reading, kind: int, p: SettingsR
     of = wall.bins[b]
     if of.weight >= BIN_WEIGHT_MAX:
         fade(of, (BIN_WEIGHT_MAX - 1.0) / of.weight)
-    of.is_held = 1
+    if of.weight == 0.0:
+        of.is_held = 1
     of.weight += weight
     # A near echo places the wall better than a far one.
     precision = weight / range_sigma(room, q.range_m) ** 2

@@ -119,6 +119,7 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
         if edges_answer(memory):
             for of in walls.values():
                 of.hold_to_review()
+            walls = {number: of for number, of in walls.items() if len(of.ends)}
         corners = straighten(walls, room["corners"], room["edges"])
         points = reach_corners(walls, corners[:CORNERS_MAX], are_mirrors)
         points += end_at_edges(walls, corners[CORNERS_MAX:], are_mirrors)

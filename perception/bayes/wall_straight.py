@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from perception.bayes.wall_bins import HALF, bin_of
 from perception.bayes.wall_fit import OPENING_PASSES_MIN, ROUGH_GAP_MAX_M
 from perception.bayes.wall_joint_fit import Lines, fit_together
+from perception.bayes.wall_numbers import SPAN_MIN_M
 from perception.bayes.wall_records import WALL_BIN_M, WALL_BINS
 from perception.kernel import Floats
 
@@ -64,7 +65,7 @@ class Straight:
         return bool(between["passes"][~is_covered].sum() >= OPENING_PASSES_MIN)
 
     def hold_to_review(self) -> None:
-        """Let the spans go as far as the last review found, if there was one; what it found open is none."""
+        """Let the spans go as far as the last review found, if there was one; it may leave none."""
         if not self.wall["reviewed"]["information"] > 0.0:
             return
         on = np.flatnonzero(self.wall["bins"]["is_held"] == 1)
@@ -72,7 +73,7 @@ class Straight:
         ends, kept = [], []
         for low, high in ((int(part[0]), int(part[-1]) + 1) for part in parts if len(part)):
             own = self.spans[(self.spans["first_bin"] < high) & (low < self.spans["end_bin"])]
-            if len(own):
+            if len(own) and (high - low) * WALL_BIN_M >= SPAN_MIN_M:
                 kept.append(own[int(own["weight"].argmax())])
                 ends.append(((low - HALF) * WALL_BIN_M, (high - HALF) * WALL_BIN_M))
         self.spans, self.ends = np.array(kept, self.spans.dtype), np.array(ends).reshape(-1, 2)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.state import Memory
+from perception.bayes.wall_corners import find_corners
 from perception.bayes.wall_records import REMEMBERED_MAX, WALL_BINS, WallMap
 from perception.bayes.wall_report import room_report, wall_ends
 from perception.bayes.wall_review import (
@@ -144,3 +145,17 @@ def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:
     room.remembered_count = REMEMBERED_MAX
     remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
     assert room.remembered[0].x == 7.0
+
+
+def test_a_wall_of_which_a_review_leaves_nothing_is_none() -> None:
+    memory, room = rough_wall()
+    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[1], -1.5, 1.9)
+    find_corners(memory.s)
+    room.corners[0].echoes = 9.0
+    look(room, np.arange(-1.9, 0.0, 0.05))
+    review(memory.s, memory.tracks, P, 0)
+    assert len(wall_ends(memory)) == 2
+    for b in range(WALL_BINS):
+        room.walls[0].bins[b].is_held = 0
+    assert len(wall_ends(memory)) == 1
