@@ -162,7 +162,7 @@ def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float
     -------
     (float, float)
         χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom, each bin's bounded: a few
-        echoes of other things do not make a long line crooked.
+        echoes of other surfaces do not make a long line crooked.
     """
     line, n = line_chi2(wall, first, end)
     if n < FLAT_BINS_MIN:

@@ -173,13 +173,13 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
                 t1 += w * u * v
     det = s0 * s2 - s1 * s1
     if det > KNOWN_SHARE * wall.reviewed.information:
-        of = wall.reviewed
-        of.information = det
-        of.offset = (s2 * t0 - s1 * t1) / det
-        of.slope = (s0 * t1 - s1 * t0) / det
-        of.variance_offset = s2 / det
-        of.covariance = -s1 / det
-        of.variance_slope = s0 / det
+        line = wall.reviewed
+        line.information = det
+        line.offset = (s2 * t0 - s1 * t1) / det
+        line.slope = (s0 * t1 - s1 * t0) / det
+        line.variance_offset = s2 / det
+        line.covariance = -s1 / det
+        line.variance_slope = s0 / det
     for b in range(WALL_BINS):
         if evidence[b] == 0.0 and wall.bins[b].is_held == 1 and is_covered(wall.bins[b]):
             evidence[b] = FORGOTTEN_NAT

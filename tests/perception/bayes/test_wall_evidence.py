@@ -48,7 +48,7 @@ def test_evidence_against_a_circle_is_that_of_its_best_place(examples: int) -> N
         assert misfit == pytest.approx(line / 18.0, rel=1e-4)
 
 
-def test_a_few_echoes_of_other_things_do_not_make_a_long_wall_crooked() -> None:
+def test_a_few_echoes_of_other_surfaces_do_not_make_a_long_wall_crooked() -> None:
     memory, room = new_room()
     wall = room.walls[0]
     place_wall(wall, np.zeros(2), 0.0, 2.0)
