@@ -83,5 +83,7 @@ def test_a_point_beyond_an_end() -> None:
     hold(room, 0.0, 1.2)
     of = wall_of(memory)
     assert of.point(0.5) == pytest.approx((2.0, 0.5))
-    assert of.beyond(2.0, -0.3) == (pytest.approx(-0.3), pytest.approx(0.3), (1, 0))
-    assert of.beyond(2.0, -1.3)[1:] == (pytest.approx(-0.1), (0, 1))
+    for y, gap, end in ((-0.3, 0.3, (1, 0)), (-1.3, -0.1, (0, 1))):
+        along, beyond, at = of.beyond(2.0, y)
+        assert (along, beyond) == pytest.approx((y, gap))
+        assert at == end
