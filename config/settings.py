@@ -6,7 +6,7 @@ The sections have the same names as in the files, so that a dotted path names a 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -18,6 +18,8 @@ from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.strict import Strict, TomlList
 from config.world import WorldConfig
+
+TRACKS_MAX: Final = 1000
 
 
 class CycleConfig(Strict):
@@ -109,7 +111,7 @@ class BayesConfig(Strict):
     """Least probability at which a model is reported."""
     report_probability_near: float = Field(default=0.8, gt=0.0, lt=1.0)
     """The same for objects heard from within 6 ft (1.83 m). Farther away unmodelled explanations are more likely."""
-    tracks_max: int = Field(default=48, ge=1, le=1000)
+    tracks_max: int = Field(default=48, ge=1, le=TRACKS_MAX)
     """Largest number of tracks of round objects, models or not."""
     attempts_per_firing: int = Field(default=3, ge=0, le=64)
     """Unexplained outline segments examined for new objects after each firing."""

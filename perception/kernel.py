@@ -43,6 +43,15 @@ def kernel(function: F) -> F:
     return _compiled(function, **BORROWING)
 
 
+def loop_kernel(function: F) -> F:
+    """Compile `function` as `kernel` does, for a loop whose passes the processor computes several at a time.
+
+    That takes a body without branches and without calls: divided by zero, it gives infinity or NaN instead of an
+    error, and what it calls must be a loop kernel, too, which becomes a part of its callers.
+    """
+    return _compiled(function, error_model="numpy", forceinline=True, **BORROWING)
+
+
 def owning_kernel(function: F) -> F:
     """Compile `function` as `kernel` does, with reference counts: for what allocates or takes numba's objects."""
     return _compiled(function)

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.cross_path import circle_error
 from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.parameters import FIT_SOFTNESS
 from perception.bayes.range_fit import fit_circle, fit_line, score_circle, score_line
+from perception.bayes.scratch import Predictions
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
@@ -24,27 +24,27 @@ HOPELESS_NAT: Final = -1e9
 
 
 @kernel
-def bearing_if_near(q: Reading, cx: float, cy: float, radius: float, gate: float) -> tuple[float, float]:
+def bearing_if_near(
+    q: Reading, j: int, predicted: Predictions, cx: float, cy: float, gate: float
+) -> tuple[float, float]:  # fmt: skip
     """Return the unit direction from a sensor to a circle's centre; zeros if its reading ends elsewhere.
 
     Parameters
     ----------
-    q : Reading
-        The reading.
-    cx, cy, radius, gate : float
+    q, j : Reading, int
+        The reading, and which it is.
+    predicted, cx, cy, gate
         As for `mean_bearing`.
     """
-    dx = cx - q.x
-    dy = cy - q.y
-    d = math.sqrt(dx * dx + dy * dy)
-    if abs(circle_error(q, dx, dy, d, radius)) < gate and d > 0.0:
-        return dx / d, dy / d
+    d = predicted.distance[j]
+    if abs(predicted.error[j]) < gate and d > 0.0:
+        return (cx - q.x) / d, (cy - q.y) / d
     return 0.0, 0.0
 
 
 @kernel
 def mean_bearing(
-    readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
+    readings: Records[Reading], predicted: Predictions, cx: float, cy: float, gate: float
 ) -> tuple[float, float]:  # fmt: skip
     """Return the mean unit direction from the sensors that hear a circle to its centre; zeros without such a sensor.
 
@@ -52,13 +52,15 @@ def mean_bearing(
     ----------
     readings : (n,) Reading
         Raw ranges.
-    cx, cy, radius, gate : float
-        The circle, and the greatest distance of a reading's end from it, m.
+    predicted : Predictions
+        What the circle predicts of them.
+    cx, cy, gate : float
+        The circle's centre, and the greatest distance of a reading's end from it, m.
     """
     sx = 0.0
     sy = 0.0
     for j in range(len(readings)):
-        ux, uy = bearing_if_near(readings[j], cx, cy, radius, gate)
+        ux, uy = bearing_if_near(readings[j], j, predicted, cx, cy, gate)
         sx += ux
         sy += uy
     m = math.hypot(sx, sy)
@@ -81,14 +83,15 @@ def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius:
         The circle, m.
     """
     scratch = s[0].scratch
-    score_circle(scratch.readings[:n], x, y, radius, p, s[0].noise_level, scratch.score)
+    score_circle(scratch.readings[:n], x, y, radius, p, s[0].noise_level, scratch.predicted, scratch.score)
     return scratch.score.log_likelihood_ratio
 
 
 @kernel
 def fit_other_circle(
-    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, other: float, steps: int
-) -> float:
+    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, ux: float, uy: float,
+    other: float, steps: int,
+) -> float:  # fmt: skip
     """Return the log ratio (nat) of a circle of another radius on the same surface; write the scratch's `circle_fit`.
 
     Parameters
@@ -97,6 +100,8 @@ def fit_other_circle(
         As for `score`.
     cx, cy, radius : float
         The known circle, m.
+    ux, uy : float
+        Mean bearing of its readings, a unit vector, or zeros without any.
     other : float
         The other radius, m.
     steps : int
@@ -104,13 +109,13 @@ def fit_other_circle(
     """
     scratch = s[0].scratch
     readings = scratch.readings[:n]
-    ux, uy = mean_bearing(readings, cx, cy, radius, p[0].gate_m)
     if ux == 0.0 and uy == 0.0:
         return HOPELESS_NAT
     var0, rel2 = noise_variance(s, p)
     k = other - radius
     if not fit_circle(
-        readings, cx + k * ux, cy + k * uy, other, p, FIT_SOFTNESS, var0, rel2, steps, scratch.circle_fit
+        readings, cx + k * ux, cy + k * uy, other, p, FIT_SOFTNESS, var0, rel2, steps, scratch.predicted,
+        scratch.circle_fit,
     ):  # fmt: skip
         return HOPELESS_NAT
     return score(s, p, n, scratch.circle_fit.x, scratch.circle_fit.y, other)
@@ -118,18 +123,17 @@ def fit_other_circle(
 
 @kernel
 def fit_other_line(
-    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, steps: int
+    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, ux: float, uy: float, steps: int
 ) -> float:  # fmt: skip
     """Return the log ratio (nat) of a line along the same surface; write the scratch's `line_fit` about the centre.
 
     Parameters
     ----------
-    s, p, n, cx, cy, radius, steps
+    s, p, n, cx, cy, radius, ux, uy, steps
         As for `fit_other_circle`.
     """
     scratch = s[0].scratch
     readings = scratch.readings[:n]
-    ux, uy = mean_bearing(readings, cx, cy, radius, p[0].gate_m)
     if ux == 0.0 and uy == 0.0:
         return HOPELESS_NAT
     var0, rel2 = noise_variance(s, p)

@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.cross_path import is_crossed, over_circle
 from perception.bayes.elements import GRID_CELLS, Reading
 from perception.bayes.likelihood import level_of
 from perception.bayes.parameters import (
@@ -28,7 +27,8 @@ from perception.bayes.parameters import (
     GRID_THINNEST,
     GRID_WIDE,
 )
-from perception.bayes.scratch import CirclePosterior, LinearReading
+from perception.bayes.prediction import predict_circle
+from perception.bayes.scratch import CirclePosterior, LinearReading, Predictions
 from perception.bayes.settings_record import TABLE_BINS, SettingsRecord
 from perception.kernel import Floats, kernel
 from perception.records import Records
@@ -40,13 +40,13 @@ SIDE: Final = 7
 @kernel
 def linearise(
     readings: Records[Reading], radius: float, p: SettingsRecord, noise: int, posterior: CirclePosterior,
-    linear: Records[LinearReading],
+    predicted: Predictions, linear: Records[LinearReading],
 ) -> int:  # fmt: skip
     """Write each reading's error and slope along the frame's axes; return the number of readings that count.
 
     Parameters
     ----------
-    readings, radius, p, noise, posterior
+    readings, radius, p, noise, posterior, predicted
         As for `posterior_circle`.
     linear : (≥ n,) LinearReading
         Out.
@@ -55,26 +55,17 @@ def linearise(
     x, y = posterior.x, posterior.y
     root_xx, root_yx, root_yy = posterior.root_xx, posterior.root_yx, posterior.root_yy
     m = 0
+    predict_circle(readings, x, y, radius, predicted)
     for j in range(len(readings)):
-        q = readings[j]
-        dx = x - q.x
-        dy = y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        e = q.range_m - (d - radius)
-        ux = uy = 0.0
-        if is_crossed(q):
-            half, ux, uy = over_circle(q, dx, dy, radius)
-            e = q.range_m - half
-        if abs(e) > gate or d == 0.0 or dx * q.axis_x + dy * q.axis_y < cos_may * d:
+        d, e = predicted.distance[j], predicted.error[j]
+        if abs(e) > gate or d == 0.0 or predicted.ahead[j] < cos_may * d:
             continue
-        if not is_crossed(q):
-            ux = dx / d
-            uy = dy / d
+        ux, uy = predicted.slope_x[j], predicted.slope_y[j]
         row = linear[m]
         row.error = e
         row.slope_a = ux * root_xx + uy * root_yx
         row.slope_b = uy * root_yy
-        row.level = level_of(p, noise, q.range_m)
+        row.level = level_of(p, noise, readings[j].range_m)
         row.bins_per_m = p[0].table_bins_per_m[row.level]
         m += 1
     return m
@@ -216,8 +207,8 @@ def move_frame(
 
 @kernel
 def posterior_circle(
-    readings: Records[Reading], radius: float, p: SettingsRecord, noise: int, linear: Records[LinearReading],
-    cells: Floats, posterior: CirclePosterior,
+    readings: Records[Reading], radius: float, p: SettingsRecord, noise: int, predicted: Predictions,
+    linear: Records[LinearReading], cells: Floats, posterior: CirclePosterior,
 ) -> float:  # fmt: skip
     """Write mean and covariance of a circle's centre under the ranges' likelihood; return the greatest one (nat).
 
@@ -235,6 +226,8 @@ def posterior_circle(
         Beam, gate and likelihood.
     noise : int
         Index of the noise that is assumed.
+    predicted : Predictions
+        Scratch.
     linear : (≥ n,) LinearReading
         Scratch.
     cells : (GRID_CELLS,) float
@@ -249,7 +242,7 @@ def posterior_circle(
     """
     best = 0.0
     for _ in range(GRID_ATTEMPTS):
-        m = linearise(readings, radius, p, noise, posterior, linear)
+        m = linearise(readings, radius, p, noise, posterior, predicted, linear)
         at, best = score_cells(linear[:m], p[0].table, cells)
         i = at // SIDE
         j = at % SIDE

@@ -28,7 +28,7 @@ from perception.bayes.parameters import (
 )
 from perception.bayes.range_fit import fit_line
 from perception.bayes.reservoir import copy_reading
-from perception.bayes.scratch import CornerFit, LineFit
+from perception.bayes.scratch import CornerFit, LineFit, Predictions
 from perception.bayes.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import Ints, kernel
@@ -116,13 +116,13 @@ def find_edge(cx: float, cy: float, corner: CornerFit) -> bool:
 
 @kernel
 def find_facing(
-    readings: Records[Reading], cx: float, cy: float, radius: float, gate: float, facing: Ints
+    readings: Records[Reading], predicted: Predictions, cx: float, cy: float, gate: float, facing: Ints
 ) -> tuple[int, float, float]:  # fmt: skip
     """Write the places of the readings that end near a circle; return their number and the sum of their bearings.
 
     Parameters
     ----------
-    readings, cx, cy, radius, gate
+    readings, predicted, cx, cy, gate
         As for `alternatives.mean_bearing`.
     facing : (≥ n,) int
         Out.
@@ -131,7 +131,7 @@ def find_facing(
     sx = 0.0
     sy = 0.0
     for j in range(len(readings)):
-        ux, uy = bearing_if_near(readings[j], cx, cy, radius, gate)
+        ux, uy = bearing_if_near(readings[j], j, predicted, cx, cy, gate)
         if ux != 0.0 or uy != 0.0:
             sx += ux
             sy += uy
@@ -215,7 +215,8 @@ def score_corner(
     Parameters
     ----------
     s, p
-        Memory, of which the first `n` readings of the scratch count and `corner_fit` is written; and settings.
+        Memory, of which the first `n` readings of the scratch count, `own` holds what the circle predicts, and
+        `corner_fit` is written; and settings.
     n : int
         Readings.
     cx, cy, radius : float
@@ -232,7 +233,7 @@ def score_corner(
     readings = scratch.readings[:n]
     corner = scratch.corner_fit
     cos_may, gate = p[0].cos_may_answer, p[0].gate_m
-    count, sx, sy = find_facing(readings, cx, cy, radius, gate, scratch.facing)
+    count, sx, sy = find_facing(readings, scratch.own, cx, cy, gate, scratch.facing)
     if count < CORNER_READINGS_MIN:
         return IMPOSSIBLE_NAT
     facing = scratch.facing[:count]

@@ -19,10 +19,12 @@ import math
 from typing import Final
 
 from perception.bayes.elements import Reading
-from perception.kernel import kernel
+from perception.kernel import kernel, loop_kernel
 
 NEAREST_M: Final = 1e-6
 """A sensor counts as at least this far from a surface, so that none is inside a body."""
+LENGTH2_MIN: Final = 1e-200
+"""Least divisor: a place without a direction gives numbers, not an error."""
 
 
 @kernel
@@ -31,7 +33,7 @@ def is_crossed(q: Reading) -> bool:
     return bool(q.listener_x != 0.0 or q.listener_y != 0.0)
 
 
-@kernel
+@loop_kernel
 def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float, float, float]:
     """Return half the shortest way over a circle to the listener, and its gradient by the circle's centre.
 
@@ -57,17 +59,14 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
     bx, by = q.listener_x - dx, q.listener_y - dy
     a = max(math.sqrt(ax * ax + ay * ay), radius + NEAREST_M)
     b = max(math.sqrt(bx * bx + by * by), radius + NEAREST_M)
-    if radius == 0.0:
-        return 0.5 * (a + b), -0.5 * (ax / a + bx / b), -0.5 * (ay / a + by / b)
     # (b − ρ) / a and (a − ρ) / b, both times ab: only the direction counts
     share_a, share_b = b * (b - radius), a * (a - radius)
     wx, wy = share_a * ax + share_b * bx, share_a * ay + share_b * by
     length2 = wx * wx + wy * wy
-    if length2 == 0.0:  # the circle lies between the sensors
-        return 0.5 * (a + b) - radius, 0.0, 0.0
+    between = radius if length2 == 0.0 else 0.0  # the circle lies between the sensors
     per_bend = half = gx = gy = 0.0
     for turn in range(2):
-        scale = 1.0 / math.sqrt(length2)
+        scale = 1.0 / math.sqrt(max(length2, LENGTH2_MIN))
         wx *= scale
         wy *= scale
         px, py = ax - radius * wx, ay - radius * wy
@@ -81,12 +80,12 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
         if turn == 0:
             bend = (radius * (ax * wx + ay * wy) - slope_a * slope_a) * per_a
             bend += (radius * (bx * wx + by * wy) - slope_b * slope_b) * per_b
-            per_bend = 1.0 / bend if bend > 0.0 else 0.0
+            per_bend = 1.0 / max(bend, LENGTH2_MIN) if bend > 0.0 else 0.0
             step = slope * per_bend
             wx, wy = wx + step * wy, wy - step * wx
             length2 = 1.0 + step * step
         else:
-            half = 0.5 * (to_a + to_b - 0.5 * slope * slope * per_bend)
+            half = 0.5 * (to_a + to_b - 0.5 * slope * slope * per_bend) - between
             gx = -0.5 * (px * per_a + qx * per_b)
             gy = -0.5 * (py * per_a + qy * per_b)
     return half, gx, gy

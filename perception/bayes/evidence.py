@@ -6,26 +6,29 @@ belong to all readings together (the price of many drop-outs) are left out.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from perception.bayes.cross_path import circle_error
 from perception.bayes.elements import READINGS_MAX, Reading
 from perception.bayes.noise_estimation import noise_variance
-from perception.bayes.occlusion import is_relevant
+from perception.bayes.occlusion import find_others, is_relevant
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.range_fit import FAR, score_circle
 from perception.bayes.reservoir import add_crosses, copy_reservoir
-from perception.bayes.scratch import Score
+from perception.bayes.scratch import Predictions, Score
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTracks, Memory, StateRecord
 from perception.edits import Arc, Evidence
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
 
 
 @kernel
 def circle_evidence(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, readings: Records[Reading],
-    score: Records[Score], nats: Floats,
+    score: Records[Score], predicted: Records[Predictions], others: Ints, nats: Floats,
 ) -> int:  # fmt: skip
     """Write the evidence of each reading for circle `t`, 0 where it does not bear on it; return how many there are.
 
@@ -39,6 +42,10 @@ def circle_evidence(
         Out: the readings.
     score : (1,) Score
         Scratch.
+    predicted : (1,) Predictions
+        Scratch.
+    others : (≥ number of tracks,) int
+        Scratch.
     nats : (READINGS_MAX,) float
         Out: the evidence of each, nat.
     """
@@ -46,10 +53,16 @@ def circle_evidence(
     var0, rel2 = noise_variance(s, p)
     n = copy_reservoir(track, readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, readings, n)
+    known = others[: find_others(tracks, t, others)]
     for j in range(n):
         nats[j] = 0.0
-        if is_relevant(tracks, p, readings[j], track.x, track.y, track.radius, t, var0, rel2):
-            score_circle(readings[j : j + 1], track.x, track.y, track.radius, p, s[0].noise_level, score[0])
+        q = readings[j]
+        d = math.hypot(track.x - q.x, track.y - q.y)
+        e = circle_error(q, track.x - q.x, track.y - q.y, d, track.radius)
+        if is_relevant(tracks, known, p, q, track.x, track.y, track.radius, d, e, var0, rel2):
+            score_circle(
+                readings[j : j + 1], track.x, track.y, track.radius, p, s[0].noise_level, predicted[0], score[0]
+            )
             nats[j] = score[0].log_likelihood_ratio
     return n
 
@@ -97,7 +110,8 @@ def evidence_of(
     readings, score = records(Reading, heard), records(Score, zeros(Score, 1))
     t, rivals = row - len(memory.circles), tuple[tuple[str, float], ...]()
     if t < 0:
-        n = circle_evidence(memory.s, memory.tracks, p, row, readings, score, nats)
+        predicted, others = records(Predictions, zeros(Predictions, 1)), np.zeros(len(memory.circles), np.int64)
+        n = circle_evidence(memory.s, memory.tracks, p, row, readings, score, predicted, others, nats)
         own = int(memory.circles["kind"][row])
         leads = memory.circles["leads"][row, : len(labels)].tolist()
         rivals = tuple((labels[k], v) for k, v in enumerate(leads) if k != own and v != 0.0)

@@ -11,11 +11,41 @@ from __future__ import annotations
 import math
 
 from perception.bayes.alternatives import score
-from perception.bayes.cross_path import circle_error
 from perception.bayes.parameters import LATERAL_LEAD_NAT, LATERAL_PLACES, LATERAL_STEP_M
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTrack, StateRecord
 from perception.kernel import kernel
+
+
+@kernel
+def mean_hearer(s: StateRecord, p: SettingsRecord, n: int) -> tuple[float, float, int]:
+    """Return the mean place of the sensors that hear the circle last predicted for, m, and their number.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch holds the predictions, and settings.
+    n : int
+        Number of readings, the first of the scratch.
+    """
+    readings, predicted = s[0].scratch.readings, s[0].scratch.predicted
+    x = 0.0
+    y = 0.0
+    heard = 0
+    for j in range(n):
+        if abs(predicted.error[j]) < p[0].gate_m:
+            x += readings[j].x
+            y += readings[j].y
+            heard += 1
+    return x / max(heard, 1), y / max(heard, 1), heard
+
+
+@kernel
+def turned(x: float, y: float, dx: float, dy: float, angle: float) -> tuple[float, float]:
+    """Return (x, y) plus (dx, dy) turned by an angle, rad."""
+    c = math.cos(angle)
+    sn = math.sin(angle)
+    return x + c * dx - sn * dy, y + sn * dx + c * dy
 
 
 @kernel
@@ -34,41 +64,22 @@ def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
     n : int
         Number of its readings, the first of the scratch.
     """
-    readings = s[0].scratch.readings
-    x = 0.0
-    y = 0.0
-    heard = 0
-    for j in range(n):
-        q = readings[j]
-        dx = track.x - q.x
-        dy = track.y - q.y
-        if abs(circle_error(q, dx, dy, math.hypot(dx, dy), track.radius)) < p[0].gate_m:
-            x += q.x
-            y += q.y
-            heard += 1
-    if heard == 0:
-        return False
-    x /= heard
-    y /= heard
+    best = score(s, p, n, track.x, track.y, track.radius) + LATERAL_LEAD_NAT
+    x, y, heard = mean_hearer(s, p, n)
     dx = track.x - x
     dy = track.y - y
     d = math.hypot(dx, dy)
-    if d <= track.radius:
+    if heard == 0 or d <= track.radius:
         return False
-    best = score(s, p, n, track.x, track.y, track.radius) + LATERAL_LEAD_NAT
     at = 0
     for k in range(-LATERAL_PLACES, LATERAL_PLACES + 1):
         if k != 0:
-            c = math.cos(k * LATERAL_STEP_M / d)
-            sn = math.sin(k * LATERAL_STEP_M / d)
-            v = score(s, p, n, x + c * dx - sn * dy, y + sn * dx + c * dy, track.radius)
+            there_x, there_y = turned(x, y, dx, dy, k * LATERAL_STEP_M / d)
+            v = score(s, p, n, there_x, there_y, track.radius)
             if v > best:
                 best = v
                 at = k
     if at == 0:
         return False
-    c = math.cos(at * LATERAL_STEP_M / d)
-    sn = math.sin(at * LATERAL_STEP_M / d)
-    track.x = x + c * dx - sn * dy
-    track.y = y + sn * dx + c * dy
+    track.x, track.y = turned(x, y, dx, dy, at * LATERAL_STEP_M / d)
     return True

@@ -111,7 +111,7 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     track : CircleTrack
         Updated.
     n : int
-        Its readings, the first of the scratch.
+        Its readings, the first of the scratch, and what it predicts of them its `own`.
     """
     scratch, room = s[0].scratch, s[0].room
     sides = scratch.sides
@@ -123,11 +123,8 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     lead = 0.0
     for j in range(n):
         q = scratch.readings[j]
-        dx = track.x - q.x
-        dy = track.y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        e = circle_error(q, dx, dy, d, track.radius)
-        if abs(e) > p[0].gate_m or dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
+        e = scratch.own.error[j]
+        if abs(e) > p[0].gate_m or scratch.own.ahead[j] < p[0].cos_half_angle * scratch.own.distance[j]:
             continue
         level = level_of(p, s[0].noise_level, q.range_m)
         v = log_likelihood(p, level, e)
@@ -137,6 +134,8 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
         variance += max(VARIANCE_MIN_NAT2, p[0].variance_nat2[level])
         lead += room_evidence(room, q, p, level, edges) - v
         if v > 0.0:
+            dx = track.x - q.x
+            dy = track.y - q.y
             sides[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * BEARING_BINS) % BEARING_BINS] = 1
     track.misfit = (shortfall - worst) / math.sqrt(max(variance, VARIANCE_MIN_NAT2))
     track.room_lead = lead

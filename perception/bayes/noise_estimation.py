@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.cross_path import circle_error
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import (
@@ -96,7 +95,7 @@ def add_residuals(
     s, tracks, p
         Memory and circles, updated, and settings.
     t : int
-        The track, whose `n` readings are the first of the scratch.
+        The track, whose `n` readings are the first of the scratch, and what it predicts of them its `own`.
     n : int
         Readings.
     careful : bool
@@ -111,15 +110,12 @@ def add_residuals(
         return
     if track.probability < RESIDUAL_PROBABILITY_MIN or track.hits < RESIDUAL_HITS_MIN:
         return
+    own = s[0].scratch.own
     for j in range(n):
-        q = s[0].scratch.readings[j]
-        dx = track.x - q.x
-        dy = track.y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        e = circle_error(q, dx, dy, d, track.radius)
-        if abs(e) < p[0].gate_m and dx * q.axis_x + dy * q.axis_y >= p[0].cos_half_angle * d:
+        e = own.error[j]
+        if abs(e) < p[0].gate_m and own.ahead[j] >= p[0].cos_half_angle * own.distance[j]:
             for h in range(NOISES):
-                track.noise_nat[h] += log_likelihood(p, level_of(p, h, q.range_m), e)
+                track.noise_nat[h] += log_likelihood(p, level_of(p, h, s[0].scratch.readings[j].range_m), e)
     for h in range(NOISES):
         s[0].residuals_nat[h] = 0.0
         for k in range(len(tracks)):

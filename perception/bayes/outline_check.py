@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.cross_path import circle_error, is_crossed, over_circle
+from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import BEARING_BINS, BIN_CAPACITY
 from perception.bayes.likelihood import bounded_exp
 from perception.bayes.noise_estimation import noise_variance
@@ -47,7 +47,8 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     Parameters
     ----------
     s, p, track
-        Memory, of which the first `n` readings of the scratch count, settings, and the circle.
+        Memory, of which the first `n` readings of the scratch count and `own` holds what the circle predicts,
+        settings, and the circle.
     n : int
         Readings.
     """
@@ -56,16 +57,16 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     for b in range(BEARING_BINS):
         scratch.bearings[b].count = 0
         scratch.bearings[b].variance = 0.0
+    own = scratch.own
     for j in range(n):
         q = scratch.readings[j]
-        dx = track.x - q.x
-        dy = track.y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        e = circle_error(q, dx, dy, d, track.radius)
+        e = own.error[j]
         if abs(e) > p[0].gate_m or q.range_m - e < p[0].range_min_m:
             continue
-        if dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
+        if own.ahead[j] < p[0].cos_half_angle * own.distance[j]:
             continue
+        dx = track.x - q.x
+        dy = track.y - q.y
         bearing = scratch.bearings[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * BEARING_BINS) % BEARING_BINS]
         k = bearing.count
         if k == BIN_CAPACITY:
@@ -145,7 +146,7 @@ def outline_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
 
 
 @kernel
-def round_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> float:
+def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
     """Return the lead (nat) of a circle of unknown radius over a circle; 0 where the radius is too uncertain.
 
     A step of least squares on the errors gives the change δ of the radius, with the centre free, and its variance v;
@@ -155,33 +156,24 @@ def round_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) ->
 
     Parameters
     ----------
-    s, p, track, n
+    s, p, n
         As for `sort_errors`.
     """
     var0, rel2 = noise_variance(s, p)
     xx = xy = yy = xr = yr = rr = xe = ye = re = 0.0
+    own = s[0].scratch.own
     for j in range(n):
         q = s[0].scratch.readings[j]
-        dx = track.x - q.x
-        dy = track.y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        predicted, crossed_x, crossed_y = d - track.radius, 0.0, 0.0
-        if is_crossed(q):
-            predicted, crossed_x, crossed_y = over_circle(q, dx, dy, track.radius)
-        e = q.range_m - predicted
+        e = own.error[j]
         if abs(e) > p[0].gate_m or q.range_m - e < p[0].range_min_m:
             continue
-        if dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d:
+        if own.ahead[j] < p[0].cos_half_angle * own.distance[j]:
             continue
         variance = var0 + rel2 * q.range_m * q.range_m
         most = OUTLINE_CLIP_SIGMAS * math.sqrt(variance)
         e = min(most, max(-most, e))
-        ux = dx / d
-        uy = dy / d
-        along = 1.0  # fall of the range with the radius
-        if is_crossed(q):
-            ux, uy = crossed_x, crossed_y
-            along = math.hypot(ux, uy)
+        ux, uy = own.slope_x[j], own.slope_y[j]
+        along = math.sqrt(ux * ux + uy * uy) if is_crossed(q) else 1.0  # fall of the range with the radius
         xx += ux * ux / variance
         xy += ux * uy / variance
         yy += uy * uy / variance

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.cross_path import circle_error, is_crossed, over_circle, over_line
+from perception.bayes.cross_path import is_crossed, over_line
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import (
@@ -23,7 +23,8 @@ from perception.bayes.parameters import (
     FIT_TURN_MAX_RAD,
     FIT_TURN_MIN_RAD,
 )
-from perception.bayes.scratch import CircleFit, LineFit, LineScore, Score
+from perception.bayes.prediction import predict_circle
+from perception.bayes.scratch import CircleFit, LineFit, LineScore, Predictions, Score
 from perception.bayes.settings_record import Settings
 from perception.kernel import kernel
 from perception.records import Records
@@ -57,8 +58,9 @@ def robust_weight(e: float, var: float, soft: float) -> float:
 
 @kernel
 def score_circle(
-    readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], noise: int, score: Score
-) -> None:
+    readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], noise: int,
+    predicted: Predictions, score: Score,
+) -> None:  # fmt: skip
     """Score readings for a circle: write the log ratio to the background and the counts.
 
     ====================================  =====================================================================
@@ -82,6 +84,8 @@ def score_circle(
         Beam, gate and likelihood.
     noise : int
         Index of the noise that is assumed.
+    predicted : Predictions
+        Out: what the circle predicts.
     score : Score
         Out: all but `sure_hits`.
     """
@@ -95,13 +99,10 @@ def score_circle(
     axis_x = 0.0
     axis_y = 0.0
     closest = NONE_YET
+    predict_circle(readings, cx, cy, radius, predicted)
     for j in range(len(readings)):
         q = readings[j]
-        dx = cx - q.x
-        dy = cy - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        ahead = dx * q.axis_x + dy * q.axis_y
-        e = circle_error(q, dx, dy, d, radius)
+        d, ahead, e = predicted.distance[j], predicted.ahead[j], predicted.error[j]
         if abs(e) > gate and is_crossed(q):
             continue
         if e > gate:
@@ -138,7 +139,7 @@ def score_circle(
 @kernel
 def fit_circle(
     readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], soft: float, var0: float,
-    rel2: float, steps: int, fit: CircleFit,
+    rel2: float, steps: int, predicted: Predictions, fit: CircleFit,
 ) -> bool:  # fmt: skip
     """Fit the centre of a circle of known radius by robust, damped Gauss–Newton on the raw ranges.
 
@@ -155,6 +156,8 @@ def fit_circle(
         Variance of a range r: var0 (m²) + rel2 · r².
     steps : int
         At most.
+    predicted : Predictions
+        Scratch.
     fit : CircleFit
         Out: the centre, and the information of the last step without the damping.
 
@@ -175,24 +178,14 @@ def fit_circle(
         c = NO_INFORMATION / var0
         gx = 0.0
         gy = 0.0
+        predict_circle(readings, x, y, radius, predicted)
         for j in range(len(readings)):
-            q = readings[j]
-            dx = x - q.x
-            dy = y - q.y
-            d = math.sqrt(dx * dx + dy * dy)
-            e = q.range_m - (d - radius)
-            ux = uy = 0.0
-            if is_crossed(q):
-                half, ux, uy = over_circle(q, dx, dy, radius)
-                e = q.range_m - half
-            if abs(e) > gate or d == 0.0 or dx * q.axis_x + dy * q.axis_y < cos_may * d:
+            d, e = predicted.distance[j], predicted.error[j]
+            if abs(e) > gate or d == 0.0 or predicted.ahead[j] < cos_may * d:
                 continue
-            g = robust_weight(e, var0 + rel2 * q.range_m * q.range_m, soft)
-            if is_crossed(q):
-                dx, dy = ux, uy
-            else:
-                dx /= d
-                dy /= d
+            r = readings[j].range_m
+            g = robust_weight(e, var0 + rel2 * r * r, soft)
+            dx, dy = predicted.slope_x[j], predicted.slope_y[j]
             a += g * dx * dx
             b += g * dx * dy
             c += g * dy * dy

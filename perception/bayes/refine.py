@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
+from perception.bayes.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
 from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import score_corner
 from perception.bayes.lateral_search import search_across
@@ -51,7 +51,8 @@ from perception.bayes.parameters import (
     UNKNOWN_LEAD_NAT,
     UNSURE_ROOT_M,
 )
-from perception.bayes.range_fit import fit_circle
+from perception.bayes.prediction import predict_circle
+from perception.bayes.range_fit import fit_circle, score_circle
 from perception.bayes.reservoir import add_crosses, copy_reservoir
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
@@ -74,7 +75,8 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
     var0, rel2 = noise_variance(s, p)
     steps = TENTATIVE_FIT_STEPS if track.status == TENTATIVE else TRACK_FIT_STEPS
     if not fit_circle(
-        s[0].scratch.readings[:n], track.x, track.y, track.radius, p, FIT_SOFTNESS, var0, rel2, steps, fit
+        s[0].scratch.readings[:n], track.x, track.y, track.radius, p, FIT_SOFTNESS, var0, rel2, steps,
+        s[0].scratch.predicted, fit,
     ):  # fmt: skip
         return
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
@@ -122,7 +124,8 @@ def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> Non
     posterior.root_yx = track.root_yx
     posterior.root_yy = track.root_yy
     posterior_circle(
-        scratch.readings[:n], track.radius, p, s[0].noise_level, scratch.linear, scratch.cells, posterior
+        scratch.readings[:n], track.radius, p, s[0].noise_level, scratch.predicted, scratch.linear, scratch.cells,
+        posterior,
     )  # fmt: skip
     track.x = posterior.x
     track.y = posterior.y
@@ -140,15 +143,19 @@ def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> Non
 
 @kernel
 def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> float:
-    """Update a track's evidence from its readings; return its log prior as a model, nat.
+    """Update a track's evidence and what it predicts; return its log prior as a model, nat.
 
     Parameters
     ----------
     s, p, track, n
         As for `locate`.
     """
-    track.log_likelihood_ratio = score(s, p, n, track.x, track.y, track.radius)
-    said = s[0].scratch.score
+    scratch = s[0].scratch
+    said = scratch.score
+    score_circle(
+        scratch.readings[:n], track.x, track.y, track.radius, p, s[0].noise_level, scratch.own, said
+    )  # fmt: skip
+    track.log_likelihood_ratio = said.log_likelihood_ratio
     track.hits = said.hits
     track.misses = said.misses
     track.near = said.near
@@ -219,6 +226,8 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
     """
     line, corner = p[0].circle_count, p[0].circle_count + 1
     var0, rel2 = noise_variance(s, p)
+    scratch = s[0].scratch
+    ux, uy = mean_bearing(scratch.readings[:n], scratch.own, track.x, track.y, p[0].gate_m)
     turns = corner + 1 if n < p[0].compare_all_below and track.probability < CERTAIN_PROBABILITY else 1
     for _ in range(turns):
         track.alternative = (track.alternative + 1) % (corner + 1)
@@ -228,7 +237,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
         own_prior = prior if track.kind < p[0].model_count else 0.0
         if k < line:
             v = fit_other_circle(
-                s, p, n, track.x, track.y, track.radius, p[0].circles[k].radius_m, ALTERNATIVE_STEPS
+                s, p, n, track.x, track.y, track.radius, ux, uy, p[0].circles[k].radius_m, ALTERNATIVE_STEPS
             )  # fmt: skip
             track.leads[k] = v - track.log_likelihood_ratio
             leads = (
@@ -237,9 +246,10 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
             )
             if leads and may_become(s, track, k, v):
                 change_kind(s, p, track, k, v)
+                predict_circle(scratch.readings[:n], track.x, track.y, track.radius, scratch.own)
                 break
         elif k == line:
-            v = fit_other_line(s, p, n, track.x, track.y, track.radius, ALTERNATIVE_STEPS)
+            v = fit_other_line(s, p, n, track.x, track.y, track.radius, ux, uy, ALTERNATIVE_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score
@@ -323,7 +333,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
     if track.kind < p[0].model_count and is_due:
         track.outline_lead = outline_lead(s, p, track, n)
-        track.round_lead = round_lead(s, p, track, n)
+        track.round_lead = round_lead(s, p, n)
     track.probability = existence_probability(s, p, track, prior)
     evidence = track.log_likelihood_ratio
     if (evidence < 0.0 or evidence < track.unknown_nat - UNKNOWN_LEAD_NAT) and drop_track(track):

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import (
     BEARING_BINS,
     BIN_CAPACITY,
@@ -66,13 +67,15 @@ def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, readin
 
 @kernel
 def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]) -> int:
-    """Copy all readings of a track to `readings`; return their number."""
+    """Copy all readings of a track to `readings`, echoes before cross paths; return their number."""
     n = 0
-    for b in range(len(track.bins)):
-        kept = track.bins[b].readings
-        for k in range(min(track.bins[b].count, len(kept))):
-            copy_reading(kept[k], readings[n])
-            n += 1
+    for is_cross in (False, True):
+        for b in range(len(track.bins)):
+            kept = track.bins[b].readings
+            for k in range(min(track.bins[b].count, len(kept))):
+                if is_crossed(kept[k]) == is_cross:
+                    copy_reading(kept[k], readings[n])
+                    n += 1
     return n
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Final
 
 from config.robot import SENSORS_MAX
+from config.settings import TRACKS_MAX
 from perception.bayes.elements import (
     ATTRACTING_MAX,
     BEARING_BINS,
@@ -57,6 +58,20 @@ class LinearReading(Record):
     bins_per_m: float
     level: int
     """Row of `Settings.table`."""
+
+
+class Predictions(Record):
+    """What a circle predicts of each reading, field by field, so that the processor computes several at a time."""
+
+    error: Annotated[Floats, READINGS_MAX]
+    """Range, or half a cross path, less the predicted one, m."""
+    slope_x: Annotated[Floats, READINGS_MAX]
+    """Derivatives of the predicted range by the circle's centre."""
+    slope_y: Annotated[Floats, READINGS_MAX]
+    distance: Annotated[Floats, READINGS_MAX]
+    """Of the centre from the sensor that fired, m."""
+    ahead: Annotated[Floats, READINGS_MAX]
+    """The same along the sensor's axis, m."""
 
 
 class Score(Record):
@@ -169,6 +184,12 @@ class Scratch(Record):
     face_readings: Annotated[Records[Reading], READINGS_MAX]
     facing: Annotated[Ints, READINGS_MAX]
     """Places of those readings that end near the circle with which a corner is compared."""
+    others: Annotated[Ints, TRACKS_MAX]
+    """Places of the established circles other than one."""
+    predicted: Predictions
+    """Of the circle that was last asked for."""
+    own: Predictions
+    """Of the circle that is refined, where it is now."""
     linear: Annotated[Records[LinearReading], READINGS_MAX]
     cells: Annotated[Floats, GRID_CELLS]
     """Log likelihood of each cell of a posterior's grid, nat."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
+from perception.bayes.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
 from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import ATTRACTING_MAX, MappedSegment
 from perception.bayes.noise_estimation import noise_variance
@@ -289,11 +289,15 @@ def initiate_circle(
         var0,
         rel2,
         INITIATION_STEPS,
+        scratch.predicted,
         fit,
     ):
         return 0
     n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
-    if not fit_circle(scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, fit):
+    if not fit_circle(
+        scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, scratch.predicted,
+        fit,
+    ):  # fmt: skip
         return 0
     x, y = fit.x, fit.y
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
@@ -302,8 +306,9 @@ def initiate_circle(
     if scratch.score.hits < CIRCLE_READINGS_MIN or llr < CIRCLE_EVIDENCE_MIN_NAT:
         return 1
     prior = p[0].model_prior_nat
+    ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     own = llr + (prior if kind < p[0].model_count else 0.0)
-    if fit_other_line(s, p, n, x, y, radius, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
+    if fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             add_line(s, scratch.line_fit, x, y, line)
@@ -314,7 +319,7 @@ def initiate_circle(
     best_y = y
     for k in range(p[0].circle_count):
         if k != kind:
-            v = fit_other_circle(s, p, n, x, y, radius, p[0].circles[k].radius_m, INITIATION_STEPS) + (
+            v = fit_other_circle(s, p, n, x, y, radius, ux, uy, p[0].circles[k].radius_m, INITIATION_STEPS) + (
                 prior if k < p[0].model_count else 0.0
             )
             if v > best + SWITCH_LEAD_NAT:

@@ -24,6 +24,7 @@ from tests.perception.bayes.tracks import (
     noises,
     numbers,
     pair,
+    predict_own,
     readings_of,
     sigma,
 )
@@ -55,11 +56,12 @@ def test_alternatives_are_fitted_and_scored_on_the_same_readings(examples: int) 
         var0, rel2 = absolute**2 + S.half_resolution_m**2 / 3 + 1e-6 * FT**2, relative**2
         assert noise_estimation.noise_variance(s, P) == pytest.approx((var0, rel2), rel=1e-13)
         aim = naive_tracks.towards(w, centre, rho, S.gate_m)
-        bearing = alternatives.mean_bearing(readings_of(w), *pair(centre), rho, float(S.gate_m))
+        predict_own(memory, n, centre, rho)
+        bearing = alternatives.mean_bearing(readings_of(w), s[0].scratch.own, *pair(centre), float(S.gate_m))
         assert bearing == pytest.approx(aim, abs=1e-12)
-        v = alternatives.fit_other_circle(s, P, n, *pair(centre), rho, rho2, 4)
+        v = alternatives.fit_other_circle(s, P, n, *pair(centre), rho, *bearing, rho2, 4)
         if not aim.any():
-            assert v == hopeless == alternatives.fit_other_line(s, P, n, *pair(centre), rho, 4)
+            assert v == hopeless == alternatives.fit_other_line(s, P, n, *pair(centre), rho, *bearing, 4)
             continue
         compared += 1
         if v != hopeless:
@@ -72,7 +74,7 @@ def test_alternatives_are_fitted_and_scored_on_the_same_readings(examples: int) 
                 w, fit, rho2, COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noises()[h]
             )
             assert v == pytest.approx(score["llr"], rel=1e-12, abs=1e-11)
-        v = alternatives.fit_other_line(s, P, n, *pair(centre), rho, 4)
+        v = alternatives.fit_other_line(s, P, n, *pair(centre), rho, *bearing, 4)
         normal, c = naive_bayes.fit_line(
             w, aim, centre, -rho, S.cos_may_answer, S.gate_m, 9.0, var0, rel2, 4
         )  # fmt: skip

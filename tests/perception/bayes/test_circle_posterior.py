@@ -15,7 +15,7 @@ from perception.kernel import Floats
 from perception.records import Records, records, zeros
 from tests import naive_bayes
 from tests.perception.bayes.range_cases import GATE, HALF_BOX, OPT, Case, cases, noisy_settings, one
-from tests.perception.bayes.tracks import examples, readings_of
+from tests.perception.bayes.tracks import examples, predictions, readings_of
 
 
 def posterior_of(case: Case, readings: Records[Reading], start: tuple[float, ...]) -> Floats:
@@ -23,7 +23,9 @@ def posterior_of(case: Case, readings: Records[Reading], start: tuple[float, ...
     posterior, fields = one(CirclePosterior)
     fields[:5] = start
     linear = records(LinearReading, zeros(LinearReading, len(readings)))
-    posterior_circle(readings, case.rho, case.p, case.level, linear, np.zeros(GRID_CELLS), posterior[0])
+    posterior_circle(
+        readings, case.rho, case.p, case.level, predictions(), linear, np.zeros(GRID_CELLS), posterior[0]
+    )
     return fields
 
 
@@ -54,7 +56,8 @@ def test_the_posterior_beats_least_squares_where_ranges_are_only_rounded() -> No
             w[j] = (*(-d * u), *u, round((d - 0.3) / (2 * HALF_BOX)) * 2 * HALF_BOX)
         fit, out = one(CircleFit)
         pose = posterior_of(case, readings_of(w), (0.01, -0.01, 0.003, 0.0, 0.003))
-        range_fit.fit_circle(readings_of(w), 0.01, -0.01, 0.3, p, 9.0, HALF_BOX**2 / 3, 0.0, 8, fit[0])
+        args = (0.01, -0.01, 0.3, p, 9.0, HALF_BOX**2 / 3, 0.0, 8)
+        range_fit.fit_circle(readings_of(w), *args, predictions(), fit[0])
         exact.append(math.hypot(*pose[:2]))
         fitted.append(math.hypot(*out[:2]))
     assert np.mean(exact) < 0.6 * np.mean(fitted)

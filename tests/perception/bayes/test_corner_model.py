@@ -11,7 +11,7 @@ from perception.bayes.corner_model import IMPOSSIBLE_NAT, score_corner
 from perception.bayes.state import Memory
 from tests import naive_bayes
 from tests.perception.bayes.range_cases import GATE, OPT, cases
-from tests.perception.bayes.tracks import P, S, enter_readings, examples, new_memory, noises, pair, unit
+from tests.perception.bayes.tracks import P, S, enter_readings, examples, new_memory, noises, pair, predict_own, unit
 
 
 @examples(50, 700)
@@ -20,6 +20,7 @@ def test_a_corners_score_equals_its_oracle(examples: int) -> None:
     for case in cases(examples, 6, ("circle", "edge"), least=12):
         enter_readings(memory, case.used)
         memory.s[0].noise_level = case.level
+        predict_own(memory, case.n, case.centre, case.rho)
         got = score_corner(memory.s, case.p, case.n, *case.place, case.rho, case.var0, case.rel2)
         want = naive_bayes.corner(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
         if want is None:
@@ -46,6 +47,7 @@ def test_a_corner_explains_the_ranges_of_a_corner_better_than_a_circle_does() ->
         w, centre, 0.3, (S.cos_may_answer, S.cos_half_angle, S.cos_must_answer), S.gate_m, S.missed_echo_nat,
         S.short_echo_nat, noise,
     )  # fmt: skip
+    predict_own(memory, 40, centre, 0.3)
     corner = score_corner(memory.s, P, 40, *pair(centre), 0.3, 1e-4, 0.0)
     assert corner > circle["llr"] - 1.0
     assert corner > 0.0

@@ -20,7 +20,7 @@ from perception.records import records, zeros
 from tests import naive_acoustics, naive_bayes
 from tests.perception.bayes.cross_cases import RING_M, STEP, P, crosses, stand
 from tests.perception.bayes.range_cases import GATE, HALF, OPT, cases, one
-from tests.perception.bayes.tracks import MOUNTS, examples, new_memory, numbers
+from tests.perception.bayes.tracks import MOUNTS, examples, new_memory, numbers, predictions
 
 
 def half_over_circle(t: complex, l: complex, centre: complex, radius: float) -> float:  # noqa: E741
@@ -113,9 +113,9 @@ def test_cross_paths_add_their_own_evidence_to_a_circles_score(examples: int) ->
                 v = float(naive_bayes.evidence(case.noise, row[4:5], np.array([off]))[0])
                 want += max(v, 0.0) if ahead < HALF else v
                 hits += v > 0.0
-        own, both = one(Score), one(Score)
-        range_fit.score_circle(crosses(rows[:n]), *case.place, case.rho, case.p, case.level, own[0][0])
-        range_fit.score_circle(crosses(rows), *case.place, case.rho, case.p, case.level, both[0][0])
+        own, both, out = one(Score), one(Score), predictions()
+        range_fit.score_circle(crosses(rows[:n]), *case.place, case.rho, case.p, case.level, out, own[0][0])
+        range_fit.score_circle(crosses(rows), *case.place, case.rho, case.p, case.level, out, both[0][0])
         if own[0][0].misses == 0.0:  # the price of many drop-outs falls with more hits
             assert both[0][0].log_likelihood_ratio - own[0][0].log_likelihood_ratio == pytest.approx(want, abs=1e-4)
         assert both[0][0].hits - own[0][0].hits == hits
@@ -145,7 +145,7 @@ def test_one_stand_gives_the_place_of_a_circle_and_a_line() -> None:
     fit, out = one(CircleFit)
     start = centre * cmath.exp(0.1j)
     args = (start.real, start.imag, radius, P, 9.0, 1e-6, 0.0, 600)
-    assert range_fit.fit_circle(crosses(rows), *args, fit[0])
+    assert range_fit.fit_circle(crosses(rows), *args, predictions(), fit[0])
     assert complex(*out[:2]) == pytest.approx(centre, abs=3e-3)  # steps are damped, and end when they are short
     normal = cmath.exp(0.15j)
     for row in rows:
@@ -167,13 +167,13 @@ def test_the_posterior_with_cross_paths_is_that_of_a_fine_grid() -> None:
     post = record[0]
     post.x, post.y, post.root_xx, post.root_yy = centre.real, centre.imag, 0.004, 0.03
     linear = records(LinearReading, zeros(LinearReading, len(rows)))
-    circle_posterior.posterior_circle(readings, radius, P, noise, linear, np.zeros(GRID_CELLS), post)
+    circle_posterior.posterior_circle(readings, radius, P, noise, predictions(), linear, np.zeros(GRID_CELLS), post)
     xs, ys = centre.real + np.linspace(-0.03, 0.03, 25), centre.imag + np.linspace(-0.15, 0.15, 41)
-    nats = np.empty((len(xs), len(ys)))
+    nats, out = np.empty((len(xs), len(ys))), predictions()
     for a, x in enumerate(xs):
         for b, y in enumerate(ys):
             score, _ = one(Score)
-            range_fit.score_circle(readings, x, y, radius, P, noise, score[0])
+            range_fit.score_circle(readings, x, y, radius, P, noise, out, score[0])
             nats[a, b] = score[0].log_likelihood_ratio
     weight = np.exp(nats - nats.max())
     weight /= weight.sum()
@@ -261,7 +261,10 @@ def test_a_cross_path_that_a_named_drum_must_have_answered_sooner_is_no_other_bo
     q = crosses(np.array([[0.0, 0.0, 1.0, 0.0, half, across.real, across.imag]]))[0]
 
     def counts(own: int) -> bool:
-        return bool(occlusion.is_relevant(memory.tracks, P, q, to.real, to.imag, 0.3, own, 1e-6, 0.0))
+        others = np.zeros(len(memory.tracks), np.int64)
+        others = others[: occlusion.find_others(memory.tracks, own, others)]
+        e = cross_path.circle_error(q, to.real, to.imag, abs(to), 0.3)
+        return bool(occlusion.is_relevant(memory.tracks, others, P, q, to.real, to.imag, 0.3, abs(to), e, 1e-6, 0.0))
 
     assert not counts(1)
     near.is_named = 0

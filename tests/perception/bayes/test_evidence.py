@@ -10,13 +10,14 @@ import pytest
 from perception.bayes.elements import READINGS_MAX
 from perception.bayes.evidence import circle_evidence, evidence_of, polygon_evidence
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.scratch import Score
+from perception.bayes.scratch import Predictions, Score
 from perception.bayes.state import ESTABLISHED
 from perception.records import array_of, records, zeros
 from tests import naive_bayes, naive_polygon
 from tests.perception.bayes import box_readings
 from tests.perception.bayes.tracks import (
     COSINES,
+    TRACKS,
     P,
     S,
     around,
@@ -40,8 +41,8 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
         place, rho = place_of(memory, 0), float(memory.circles["radius"][0])
         keep(memory, 0, around(rng, 40, place, rho))
         readings, nats = readings_of(np.zeros((READINGS_MAX, 5))), np.zeros(READINGS_MAX)
-        score = records(Score, zeros(Score, 1))
-        assert circle_evidence(memory.s, memory.tracks, P, 0, readings, score, nats) == 40
+        scratch = records(Score, zeros(Score, 1)), records(Predictions, zeros(Predictions, 1)), np.zeros(TRACKS, int)
+        assert circle_evidence(memory.s, memory.tracks, P, 0, readings, *scratch, nats) == 40
         w = numbers(array_of(readings))[:40, :5]
         noise = noises()[int(memory.s[0].noise_level)]
         want = [
@@ -56,7 +57,7 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
         random_track(rng, memory, 1, ESTABLISHED)
         memory.circles["x"][1], memory.circles["y"][1] = 0.5 * (place + w[0, :2])
         memory.circles["radius"][1] = 0.05
-        circle_evidence(memory.s, memory.tracks, P, 0, readings, score, nats)
+        circle_evidence(memory.s, memory.tracks, P, 0, readings, *scratch, nats)
         is_silent = w[0, 4] - (math.dist(place, w[0, :2]) - rho) > S.gate_m
         if is_silent and math.dist(place, w[0, :2]) > 0.1 + 2.5 * rho:
             assert nats[0] == 0.0

@@ -26,6 +26,7 @@ from tests.perception.bayes.tracks import (
     noises,
     pair,
     place_of,
+    predict_own,
     random_track,
 )
 
@@ -75,6 +76,7 @@ def test_misfit_room_and_sides_are_those_of_the_hits(examples: int) -> None:
         track, centre, rho = memory.tracks[0], place_of(memory, 0), float(memory.tracks[0].radius)
         w = around(rng, 60, centre, rho)
         enter_readings(memory, w)
+        predict_own(memory, len(w), centre, rho)
         model_check.check_model(memory.s, P, track, len(w))
         seen = naive_bayes.look(w, centre)
         e = w[:, 4] - (seen.d - rho)

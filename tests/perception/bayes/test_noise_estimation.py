@@ -20,6 +20,7 @@ from tests.perception.bayes.tracks import (
     new_memory,
     noises,
     place_of,
+    predict_own,
     random_track,
     readings_of,
     scratch_readings,
@@ -77,6 +78,7 @@ def test_evidence_from_residuals_and_the_chosen_noise_equal_their_oracles(exampl
                     S.gate_m, noises(),
                 )  # fmt: skip
                 total = want[circles["status"] == ESTABLISHED].sum(0)
+        predict_own(memory, n, place_of(memory, t), float(circles["radius"][t]))
         noise_estimation.add_residuals(memory.s, memory.tracks, P, t, n, careful)
         assert circles["noise_nat"] == pytest.approx(want, rel=1e-12, abs=1e-11)
         assert residual == pytest.approx(total, rel=1e-12, abs=1e-11)

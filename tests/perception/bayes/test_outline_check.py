@@ -23,6 +23,7 @@ from tests.perception.bayes.tracks import (
     examples,
     new_memory,
     place_of,
+    predict_own,
     random_track,
 )
 
@@ -34,6 +35,7 @@ DRUM_M = 0.3048
 def lead(memory: Memory, w: Floats) -> float:
     """Return the lead of an unknown outline over the first track on these readings."""
     enter_readings(memory, w)
+    predict_own(memory, len(w), place_of(memory, 0), float(memory.tracks[0].radius))
     return float(outline_check.outline_lead(memory.s, P, memory.tracks[0], len(w)))
 
 
@@ -50,7 +52,7 @@ def test_the_leads_are_those_of_a_smooth_outline_and_of_another_radius(examples:
         if rng.random() < 0.5:
             w[:, 4] += 0.06 * np.cos(2.0 * np.arctan2(seen.u[:, 1], seen.u[:, 0]))
         found = lead(memory, w)
-        radius = outline_check.round_lead(memory.s, P, memory.tracks[0], len(w))
+        radius = outline_check.round_lead(memory.s, P, len(w))
         e = w[:, 4] - (seen.d - rho)
         heard = (np.abs(e) <= S.gate_m) & (seen.cos >= COSINES[1]) & (seen.d - rho >= S.range_min_m)
         var0, rel2 = noise_variance(memory.s, P)
@@ -109,7 +111,8 @@ def test_a_round_body_between_a_drum_and_a_rival_is_no_drum() -> None:
         shift = np.array((DRUM_M - radius, 0.0))
         w = look(rng, lambda at, r=radius, c=shift: math.hypot(*(at - c)) - r, -60.0, 120)  # type: ignore[misc]
         enter_readings(memory, w)
-        found = outline_check.round_lead(memory.s, P, memory.tracks[0], len(w))
+        predict_own(memory, len(w), place_of(memory, 0), DRUM_M)
+        found = outline_check.round_lead(memory.s, P, len(w))
         assert found < -1.5 if is_drum else found > 3.0, (radius, found)
 
 

@@ -12,13 +12,13 @@ from perception.kernel import Floats
 from perception.records import Records
 from tests import naive_bayes
 from tests.perception.bayes.range_cases import COSINES, GATE, MISS, OPT, SHORT, Case, cases, one
-from tests.perception.bayes.tracks import examples, pair, readings_of
+from tests.perception.bayes.tracks import examples, pair, predictions, readings_of
 
 
 def score_circle(case: Case, readings: Records[Reading], x: float, y: float) -> Floats:
     """Return the fields of the score: evidence, hits, misses, near, shorts, closest, dispersion, sure hits."""
     score, fields = one(Score)
-    range_fit.score_circle(readings, x, y, case.rho, case.p, case.level, score[0])
+    range_fit.score_circle(readings, x, y, case.rho, case.p, case.level, predictions(), score[0])
     return fields
 
 
@@ -46,7 +46,7 @@ def test_a_circles_fit_equals_its_oracle(examples: int) -> None:
     for case in cases(examples, 2):
         fit, out = one(CircleFit)
         assert range_fit.fit_circle(
-            case.readings, *case.place, case.rho, case.p, 9.0, case.var0, case.rel2, 4, fit[0]
+            case.readings, *case.place, case.rho, case.p, 9.0, case.var0, case.rel2, 4, predictions(), fit[0]
         )  # fmt: skip
         p, info = naive_bayes.fit_circle(
             case.used, case.centre, case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4
@@ -77,7 +77,8 @@ def test_without_an_echo_a_fit_does_not_move_and_the_score_has_no_hits() -> None
     silent = case.used.copy()
     silent[:, 4] = range_fit.FAR
     fit, out = one(CircleFit)
-    assert range_fit.fit_circle(readings_of(silent), 0.2, 0.3, 0.3, case.p, 9.0, case.var0, case.rel2, 4, fit[0])
+    args = (0.2, 0.3, 0.3, case.p, 9.0, case.var0, case.rel2, 4)
+    assert range_fit.fit_circle(readings_of(silent), *args, predictions(), fit[0])
     assert out[:2] == pytest.approx([0.2, 0.3], abs=1e-12)
     fields = score_circle(case._replace(rho=0.3), readings_of(silent), 0.2, 0.3)
     assert fields[1] == 0

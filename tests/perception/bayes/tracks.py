@@ -14,7 +14,9 @@ from perception.bayes import reservoir
 from perception.bayes.elements import BUCKETS, MAX_LINES, Reading
 from perception.bayes.kernel_settings import make_settings
 from perception.bayes.parameters import CELL_M
+from perception.bayes.prediction import predict_circle
 from perception.bayes.range_fit import FAR
+from perception.bayes.scratch import Predictions
 from perception.bayes.segment_list import put_segment
 from perception.bayes.segment_pairs import bucket_index
 from perception.bayes.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
@@ -98,6 +100,17 @@ def enter_readings(memory: Memory, rows: Floats) -> None:
     """Put readings to the beginning of the scratch."""
     readings = numbers(memory.state["scratch"]["readings"][0])[: len(rows)]
     readings[:, :5], readings[:, 5:] = rows, 0.0
+
+
+def predict_own(memory: Memory, n: int, centre: Floats, radius: float) -> None:
+    """Write what a circle predicts of the first readings of the scratch to its `own`."""
+    scratch = memory.s[0].scratch
+    predict_circle(scratch.readings[:n], *pair(centre), radius, scratch.own)
+
+
+def predictions() -> Predictions:
+    """Return memory for what a circle predicts."""
+    return records(Predictions, zeros(Predictions, 1))[0]
 
 
 def scratch_readings(memory: Memory, n: int) -> Floats:
