@@ -27,7 +27,7 @@ from perception.bayes.elements import (
 from perception.bayes.parameters import HYPOTHESIS_MARGIN_M
 from perception.bayes.settings_record import Settings
 from perception.bayes.state import CircleTrack, PolygonTrack, State
-from perception.kernel import kernel
+from perception.kernel import Ints, kernel, loop_kernel
 from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
@@ -79,6 +79,34 @@ def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]
     return n
 
 
+@loop_kernel
+def mark_crosses(
+    crosses: Records[Reading], cx: float, cy: float, radius: float, cos_may: float, gate: float, marks: Ints
+) -> None:
+    """Mark the cross paths that a circle may explain by 1, others by 0; without a branch, as there are thousands.
+
+    Parameters
+    ----------
+    crosses : (n,) Reading
+        The cross paths.
+    cx, cy, radius : float
+        The circle, m.
+    cos_may, gate : float
+        As in `Settings`.
+    marks : (≥ n,) int
+        Out.
+    """
+    for k in range(len(crosses)):
+        q = crosses[k]
+        dx = cx - q.x
+        dy = cy - q.y
+        d = math.sqrt(dx * dx + dy * dy)
+        # Half the way to the listener differs by less than half the distance to it.
+        most = gate + 0.5 * (abs(q.listener_x) + abs(q.listener_y))
+        inside = min(most - abs(q.range_m + radius - d), dx * q.axis_x + dy * q.axis_y - cos_may * d)
+        marks[k] = 1 if inside > 0.0 else 0
+
+
 @kernel
 def add_crosses(
     s: Records[State], p: Records[Settings], cx: float, cy: float, radius: float, readings: Records[Reading], n: int
@@ -99,21 +127,12 @@ def add_crosses(
     n : int
         Readings there.
     """
-    found, cos2 = s[0].scratch.crosses_found, p[0].cos_may_answer ** 2
+    found = s[0].scratch.crosses_found
+    kept = s[0].crosses[: min(s[0].crosses_kept, CROSS_HISTORY)]
+    mark_crosses(kept, cx, cy, radius, p[0].cos_may_answer, p[0].gate_m, found)
     count = 0
-    for k in range(min(s[0].crosses_kept, CROSS_HISTORY)):
-        if k % CROSS_EVERY == 0:  # it is among the circle's own readings
-            continue
-        q = s[0].crosses[k]
-        dx = cx - q.x
-        dy = cy - q.y
-        dot = dx * q.axis_x + dy * q.axis_y
-        d2 = dx * dx + dy * dy
-        if dot <= 0.0 or dot * dot < cos2 * d2:
-            continue
-        # Half the way to the listener differs by less than half the distance to it.
-        most = p[0].gate_m + 0.5 * (abs(q.listener_x) + abs(q.listener_y))
-        if abs(q.range_m + radius - math.sqrt(d2)) < most:
+    for k in range(len(kept)):
+        if found[k] == 1 and k % CROSS_EVERY > 0:  # one of so many is among the circle's own readings
             found[count] = k
             count += 1
     step = (count + CROSSES_MAX - 1) // CROSSES_MAX
