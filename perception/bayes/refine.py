@@ -152,9 +152,7 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     """
     scratch = s[0].scratch
     said = scratch.score
-    score_circle(
-        scratch.readings[:n], track.x, track.y, track.radius, p, s[0].noise_level, scratch.own, said
-    )  # fmt: skip
+    score_circle(scratch.readings[:n], track.x, track.y, track.radius, p, s[0].noise_level, scratch.own, said)
     track.log_likelihood_ratio = said.log_likelihood_ratio
     track.hits = said.hits
     track.misses = said.misses
