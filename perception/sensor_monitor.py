@@ -114,10 +114,10 @@ class SensorMonitor:
         mounts = mounts_array(ring.mounts)
         count = len(mounts)
         self.changes = 0
-        self._axes = np.ascontiguousarray(mounts[:, 2])
+        self._mounts = mounts
         self._turns = np.zeros(count)
         self._turning = list(ring.turning)
-        self._neighbours = neighbours_of(self._axes, ring.turning)
+        self._neighbours = neighbours_of(mounts[:, 2], ring.turning)
         self._expected = fires(ring)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
@@ -140,7 +140,7 @@ class SensorMonitor:
         if self._turning:
             self._turns[self._turning] = pose.theta - firing.ring_yaw
         changed = check_firing(
-            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._axes, self._turns,
+            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._mounts, self._turns,
             self._neighbours, self._expected, self._half_angle, self._tolerance, self._near, self._sensor_records,
             self._ring_records, self._sets, trusted, possible,
         )  # fmt: skip

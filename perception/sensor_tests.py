@@ -17,6 +17,7 @@ from perception.records import Records
 from perception.sensor_crosstalk import count_short_readings, is_doubtful
 from perception.sensor_memory import RingMemory, SensorMemory
 from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
+from perception.sensor_wall import NOISE_SHARE, is_along_wall
 
 # The thresholds below were tuned on the simulated halls of tests/perception/test_sensor_monitor.py: no healthy sensor
 # is masked in any hall, and every faulty one is found.
@@ -38,8 +39,6 @@ SILENT_MIN_M: Final = 5.0
 """Silent: the base has moved at least this far without an echo, m; free space is common."""
 NEAR_ECHO_SHARE: Final = 0.5
 """Silent: near echoes of either neighbour for each firing without an echo."""
-NOISE_SHARE: Final = 0.04
-"""A neighbour's reading has changed only beyond the tolerance and this share: four deviations of 1 % noise."""
 LEAP_M: Final = 0.3
 """A change of the reading by more than this is a leap, m."""
 REGULARITY_GAIN: Final = 0.05
@@ -292,7 +291,7 @@ def update_run_faults(
 
 @kernel
 def check_firing(
-    ranges: Floats, x: float, y: float, yaw: float, axes: Floats, turns: Floats, neighbours: Ints,
+    ranges: Floats, x: float, y: float, yaw: float, mounts: Floats, turns: Floats, neighbours: Ints,
     expected: NDArray[np.bool_],
     half_angle: float, tolerance: float, near: float, sensors: Records[SensorMemory], ring: Records[RingMemory],
     sets: NDArray[np.uint8], trusted: Floats, possible: Floats,
@@ -305,8 +304,8 @@ def check_firing(
         As in a `Firing`, m.
     x, y, yaw : float
         Place (m) and direction (rad) of the ring.
-    axes : (n,) float
-        Direction of each sensor in the ring, rad.
+    mounts : (n, 3) float
+        Place x, y (m) and direction (rad) of each sensor in the ring.
     turns : (n,) float
         By how much each sensor's part has turned in the ring, rad.
     neighbours : (n, 2) int
@@ -361,11 +360,13 @@ def check_firing(
         if c.run_length == 0 or not (r == c.run_m or abs(r - c.run_m) <= tolerance):
             c.run_firing = ring[0].firings
             begin_run(i, r, x, y, own_yaw, neighbours, sensors)
-        elif abs(own_yaw - c.run_yaw) > 0.5 * half_angle:
+        elif abs(own_yaw - c.run_yaw) > 0.5 * half_angle or is_along_wall(
+            i, x, y, own_yaw, yaw, mounts, turns, half_angle, tolerance, neighbours, sensors
+        ):
             begin_run(i, c.run_m, x, y, own_yaw, neighbours, sensors)
         else:
             c.run_length += 1
-        update_run_faults(i, r, x, y, own_yaw + axes[i], half_angle, tolerance, neighbours, sensors)
+        update_run_faults(i, r, x, y, own_yaw + mounts[i, 2], half_angle, tolerance, neighbours, sensors)
         if ring[0].regularity >= REGULARITY_MIN:
             count_short_readings(c, r, fired_set)
             if is_doubtful(c, r, x, y, fired_set):

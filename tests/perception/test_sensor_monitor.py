@@ -52,10 +52,10 @@ def ring(
 
 
 def firings(
-    config: RingConfig, world: WorldConfig, path: Path, lies: Mapping[int, float] | None = None
+    config: RingConfig, world: WorldConfig, path: Path, lies: Mapping[int, float] | None = None, seed: int = 1
 ) -> Iterator[Firing]:
     """Yield the firings along a path, one for each pose; the sensors in `lies` always report that range."""
-    sonar = Sonar(config, compile_scene(world), world.acoustics, np.random.default_rng(1))
+    sonar = Sonar(config, compile_scene(world), world.acoustics, np.random.default_rng(seed))
     masks = [sensors(mask) for mask in firing_pattern(config).masks]
     for k, ((x, y, yaw), fired) in enumerate(zip(path, itertools.cycle(masks), strict=False)):
         ranges = sonar.fire(Pose(x, y, yaw), yaw, fired)
@@ -118,6 +118,21 @@ def test_equal_readings_are_legitimate_if_nothing_should_change_them(
         )
         assert found(config, slipping) == {}, "the base slips, and no sensor is to blame"
     measured("at rest, along walls at 6 angles and with slipping wheels: 0 masked")
+
+
+@promise
+@few_or(20, 100)
+def test_a_rough_wall_along_the_way_is_no_fault_of_the_sensors_that_look_along_it(
+    halls: int, measured: Callable[[str], None]
+) -> None:
+    """Straight into the dead end of the shipped office: a sensor repeats its reading for metres, beside strays."""
+    world = load_settings("office").world
+    assert world is not None
+    for k in range(halls):
+        y = 3.4 + 0.5 * (k / halls - 0.5)
+        into = [(3.2 + 0.015 * step, y, 0.0) for step in range(420)]
+        assert found(RING, firings(RING, world, into, seed=k)) == {}, k
+    measured(f"{halls} drives between rough walls: 0 honest sensors masked")
 
 
 @promise

@@ -34,7 +34,7 @@ from perception.sensor_tests import (
 COUNT = 4
 NEIGHBOURS = np.array([[1, 3], [2, 0], [3, 1], [0, 2]])
 ALONE = np.full((COUNT, 2), -1)
-AXES = np.array([0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi])
+MOUNTS = np.array([[0.0, 0.0, 0.5 * math.pi * k] for k in range(COUNT)])
 HALF = math.radians(12.0)
 
 
@@ -158,7 +158,7 @@ class Checker:
 
     def __call__(self, ranges: Floats, x: float = 0.0, yaw: float = 0.0) -> int:
         return check_firing(
-            ranges, x, 0.0, yaw, AXES, np.zeros(COUNT), NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors,
+            ranges, x, 0.0, yaw, MOUNTS, np.zeros(COUNT), NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors,
             self.ring, self.sets, self.trusted, self.possible,
         )  # fmt: skip
 

@@ -1,0 +1,76 @@
+"""Whether a wall along the path is why a sensor repeats its reading: then it is not stuck."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import Floats, Ints, kernel
+from perception.records import Records
+from perception.sensor_memory import SensorMemory
+
+BESIDE_MIN_M: Final = 0.5
+"""Stuck: a wall along the path is looked for once the base has moved so far, m."""
+NOISE_SHARE: Final = 0.04
+"""A neighbour's reading has changed only beyond the tolerance and this share: four deviations of 1 % noise."""
+
+
+@kernel
+def is_along_wall(
+    i: int, x: float, y: float, own_yaw: float, yaw: float, mounts: Floats, turns: Floats, half_angle: float,
+    tolerance: float, neighbours: Ints, sensors: Records[SensorMemory],
+) -> bool:  # fmt: skip
+    """Return whether a wall along the path explains the run of sensor `i`, as a neighbour hears the same wall.
+
+    A healthy sensor repeats a reading on the way only if what answers is parallel to the path. A rough wall beside
+    it at the distance h answers a sensor from the direction e in its beam that is nearest to the wall's normal, so
+    that the range is h/sin e for as long as the wall goes on.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    x, y : float
+        Place of the ring, m.
+    own_yaw, yaw : float
+        Direction of the sensor's part and of the ring, rad.
+    mounts : (n, 3) float
+        Place x, y (m) and direction (rad) of each sensor in the ring.
+    turns, half_angle, tolerance, neighbours, sensors
+        As for `check_firing`.
+    """
+    c = sensors[i]
+    dx, dy = x - c.run_x, y - c.run_y
+    if not math.isfinite(c.run_m) or math.hypot(dx, dy) < BESIDE_MIN_M:
+        return False
+    path = math.atan2(dy, dx)
+    side = 1.0 if math.sin(own_yaw + mounts[i, 2] - path) > 0.0 else -1.0
+    beside = beside_m(c.run_m, own_yaw - path, side, mounts[i], half_angle)
+    for k in neighbours[i]:
+        if k >= 0 and math.isfinite(sensors[k].steady_m):
+            heard = beside_m(sensors[k].steady_m, yaw + turns[k] - path, side, mounts[k], half_angle)
+            if abs(heard - beside) <= tolerance + NOISE_SHARE * min(c.run_m, sensors[k].steady_m):
+                return True
+    return False
+
+
+@kernel
+def beside_m(r: float, turn: float, side: float, mount: Floats, half_angle: float) -> float:
+    """Return how far beside the path of the ring's centre a wall along it lies that answers a sensor, m.
+
+    Parameters
+    ----------
+    r : float
+        The range, m.
+    turn : float
+        Direction of the sensor's part from the path, rad.
+    side : float
+        1 for a wall on the left of the path, −1 on the right.
+    mount : (3,) float
+        The sensor's place x, y (m) and direction (rad) in its part.
+    half_angle : float
+        Half the beam's width, rad.
+    """
+    axis = side * ((turn + mount[2] + math.pi) % (2.0 * math.pi) - math.pi)
+    nearest = min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
+    return side * (mount[0] * math.sin(turn) + mount[1] * math.cos(turn)) + r * math.sin(nearest)
