@@ -43,6 +43,13 @@ LINE_M: Final = np.array([0.1])
 the arc of an echo, which a robot that is there does not hear."""
 AWAY_M: Final = 1.0
 """A robot farther than this from its way needs another one, m."""
+FAILED_SEEN_M: Final = 2.5
+"""From farther off a way is not known to have failed, m: what closes it may be the arc of an echo."""
+FAILED_NEAR_M: Final = 0.6
+FAILED_COST_M: Final = 1.0
+"""A step that ends so near a place where a way has failed costs so much more each time, m."""
+FAILED_MAX: Final = 64
+"""Places where ways have failed that are remembered, the newest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,10 @@ class Search:
     """The way in force, from where its search began; empty without one."""
     reaches: bool = True
     """Whether that way leads to the goal; otherwise to the place nearest to it that can be reached."""
+    closed: tuple[Place, ...] = ()
+    """The places on that way to which this search has found no step."""
+    failed: tuple[Place, ...] = ()
+    """Such places of former ways, which were given up for them: as the grid forgets, they would be tried again."""
 
     @property
     def is_done(self) -> bool:
@@ -94,7 +105,8 @@ def begin(search: Search, percept: Percept, goal: Place) -> Search:
     """
     pose = percept.pose
     root = Node(pose.x, pose.y, pose.theta / SECTOR_RAD, 0.0, -1)
-    return Search(goal, (root,), ((math.dist((pose.x, pose.y), goal), 0),), (), search.way, search.reaches)
+    waiting = ((math.dist((pose.x, pose.y), goal), 0),)
+    return Search(goal, (root,), waiting, (), search.way, search.reaches, failed=search.failed)
 
 
 def expand(search: Search, percept: Percept, body_radius_m: float, config: FollowValleyConfig) -> Search:
@@ -122,9 +134,11 @@ def expand(search: Search, percept: Percept, body_radius_m: float, config: Follo
         if distance < 1e-9 or _is_beyond(percept.occupancy, node, search.nodes[0]):
             return _ended(search, number, reaches=True)
         nodes = [*search.nodes]
-        for child in _children(node, number, distance, search, percept, body_radius_m, config):
+        children = _children(node, number, distance, search, percept, body_radius_m, config)
+        for child in children:
             heappush(heap, (child.cost_m + math.dist((child.x, child.y), goal), len(nodes)))
             nodes.append(child)
+        search = replace(search, closed=_closed(search, node, children, SAME * step_m))
         if len(nodes) > config.look_ahead_nodes_max:
             break
         return replace(search, nodes=tuple(nodes), waiting=tuple(heap), passed=(*search.passed, square))
@@ -175,6 +189,7 @@ def _children(
         if is_kept:
             cost_m *= 1.0 - config.keep_share
         cost_m += config.turn_cost_m_per_rad * turned_rad
+        cost_m += FAILED_COST_M * sum(math.dist((x, y), place) < FAILED_NEAR_M for place in search.failed)
         found.append(Node(x, y, c, node.cost_m + cost_m, number))
     return found
 
@@ -189,13 +204,33 @@ def _is_beyond(window: OccupancyWindow | None, node: Node, root: Node) -> bool:
     )
 
 
+def _closed(search: Search, node: Node, children: list[Node], same_m: float) -> tuple[Place, ...]:
+    """Return the closed places of the way in force, with the next one if no step from a node on it leads there."""
+    away = [math.dist(place, (node.x, node.y)) for place in search.way[:-1]]
+    if not away or min(away) >= same_m:
+        return search.closed
+    there = search.way[away.index(min(away)) + 1]
+    if there in search.closed or any(math.dist(there, (child.x, child.y)) < same_m for child in children):
+        return search.closed
+    return (*search.closed, there)
+
+
 def _ended(search: Search, number: int, *, reaches: bool) -> Search:
+    """Return the search with the way to a node in force; closed places that it keeps away from have failed."""
     way: list[Place] = []
     while number >= 0:
         node = search.nodes[number]
         way.append((node.x, node.y))
         number = node.parent
-    return Search(search.goal, way=tuple(reversed(way)), reaches=reaches)
+    root = search.nodes[0]
+    given_up = [
+        place
+        for place in search.closed
+        if math.dist(place, (root.x, root.y)) < FAILED_SEEN_M
+        and min(math.dist(place, other) for other in way) > FAILED_NEAR_M
+    ]
+    failed = (*search.failed, *given_up)[-FAILED_MAX:]
+    return Search(search.goal, way=tuple(reversed(way)), reaches=reaches, failed=failed)
 
 
 def carrot(search: Search, x: float, y: float, ahead_m: float) -> Place | None:

@@ -8,7 +8,7 @@ from typing import Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate
 from behaviors.avoid_static_obstacle import Zone, avoid_static_obstacle
-from behaviors.follow_valley import Valley, follow_valley
+from behaviors.follow_valley import AT_GOAL_M, Valley, follow_valley
 from behaviors.goal_progress import Progress, observe_progress
 from behaviors.leave_canyon import NO_DETOUR, Detour, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
@@ -103,7 +103,7 @@ def drive_to_goal(
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
             now.progress, percept.pose, distance_m, run_s, hold_reason, behaviors.move_to_goal,
-            is_blocked=not now.search.reaches, is_occupied=_is_occupied(percept, goal, settings),
+            is_blocked=not now.search.reaches, is_occupied=_is_occupied(percept, goal, distance_m, settings),
         )  # fmt: skip
         now = replace(now, progress=progress)
         if progress.given_up is not None:
@@ -145,10 +145,15 @@ def _arbitrate(responses: tuple[Response, ...], percept: Percept, settings: Sett
     return arbitrate(responses, percept, settings.body, behaviors.arbiter, expected, rate_rad_s)
 
 
-def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
-    """Return whether something sure stands where the robot would stand at the goal."""
-    config, body = settings.behaviors.follow_valley, settings.body
-    return bool((cells_near(percept, goal.x, goal.y, body.radius_m, config).certainties == 1.0).any())
+def _is_occupied(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> bool:
+    """Return whether something sure stands where the robot would stand at the goal, which it is near.
+
+    From afar it may be no more than the arc of an echo.
+    """
+    if distance_m >= AT_GOAL_M:
+        return False
+    there = cells_near(percept, goal.x, goal.y, settings.body.radius_m, settings.behaviors.follow_valley)
+    return bool((there.certainties == 1.0).any())
 
 
 def _pushes(percept: Percept, room_m: float | None, settings: Settings) -> Response:

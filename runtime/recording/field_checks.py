@@ -213,7 +213,7 @@ def _goal_drive(what: str, drive: GoalDrive) -> None:
     ):  # fmt: skip
         _time(f"{what}.{name}", time_s)
     nodes = [value for node in search.nodes for value in (node.x, node.y, node.direction, node.cost_m)]
-    places = [value for place in search.way for value in place]
+    places = [value for place in (*search.way, *search.closed, *search.failed) for value in place]
     for value in (
         progress.x, progress.y, progress.nearest_m, valley.direction_rad or 0.0, *(search.goal or ()), *nodes,
         *places, *(cost for cost, _ in search.waiting), *(value for square in search.passed for value in square),

@@ -15,6 +15,7 @@ from tests.behaviors.valley.windows import Wall, at
 CONFIG = FollowValleyConfig()
 RADIUS_M = 0.381
 DEAD_END: tuple[Wall, ...] = ((2.0, -1.5, 2.0, 1.5), (-1.0, 1.5, 2.0, 1.5), (-1.0, -1.5, 2.0, -1.5))
+NARROW: tuple[Wall, ...] = ((2.0, -1.0, 2.0, 1.0), (-1.0, 1.0, 2.0, 1.0), (-1.0, -1.0, 2.0, -1.0))
 CELL: tuple[Wall, ...] = (
     (1.5, -1.5, 1.5, 1.5),
     (-1.5, 1.5, 1.5, 1.5),
@@ -63,6 +64,20 @@ def test_it_leads_out_of_a_dead_end_and_round_it() -> None:
     around_m = 2.0 + 0.6 + 3.0 + 1.6 + 2.0 + 2.5
     assert length_m < 1.15 * around_m
     assert quanta < 400
+
+
+def test_a_way_that_has_failed_is_not_tried_for_ever_although_what_closed_it_is_forgotten() -> None:
+    """The grid forgets the back of a dead end each time the robot looks away: a way out is kept in the end."""
+    search, goal, turns_back = Search(), (4.0, 0.0), []
+    for walls in (NARROW[1:], NARROW) * 5:
+        percept = at(0.0, 0.0, walls=walls)
+        search = begin(search, percept, goal)
+        while not search.is_done:
+            search = expand(search, percept, RADIUS_M, CONFIG)
+        turns_back.append(min(x for x, _ in search.way) < -1.0)
+    assert turns_back[:2] == [False, True]
+    assert all(turns_back[-4:]), turns_back
+    assert all(math.dist(place, (0.0, 0.0)) < 2.5 for place in search.failed)
 
 
 def test_a_goal_that_is_walled_in_has_no_way_and_the_nearest_place_is_found() -> None:

@@ -150,3 +150,12 @@ def test_a_half_turn_on_the_spot_is_no_standing_that_begins_a_detour(monkeypatch
         script.request_drive(None)
     stood = [(run_s - begin_s, waits) for run_s, waits in waited[1:]]
     assert all(waits is (stood_s < until_s) for stood_s, waits in stood if abs(stood_s - until_s) > 0.1)
+
+
+def test_what_stands_at_the_goal_is_believed_from_near_only() -> None:
+    """From afar an echo at the goal may be of anything in its beam: the drive goes on."""
+    script = driving("behaviors.move_to_goal.stuck_after_s=2.0")
+    script.request_drive(Goal(3.5, 0.0))
+    for k in range(60):
+        script.move_to(Pose(0.35 * (k // 10 % 2), 0.0, 0.0))
+    assert goal_drive(script).progress.given_up is None
