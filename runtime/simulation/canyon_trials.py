@@ -13,6 +13,7 @@ from config.settings import GoalConfig, Settings
 from drivers.emulator.robot_device import GroundTruth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
+from runtime.simulation.canyon_hearing import IN_TIME_M, back_heard_m
 from runtime.simulation.canyon_worlds import CanyonWorld
 from runtime.simulation.closed_loop import simulate
 
@@ -63,6 +64,8 @@ class CanyonOutcome:
     shortest_m: float
     time_s: float
     reported_m: float | None = None
+    heard_m: float | None = None
+    """How far before the mouth the back is first heard on the straight way; None if it is not."""
 
 
 class CanyonRow(TypedDict):
@@ -76,6 +79,10 @@ class CanyonRow(TypedDict):
     """Canyons deeper than `DEEP_M` …"""
     turned: int
     """… and those before which the robot turned."""
+    heard: int
+    """Deep canyons whose back is heard in time to turn …"""
+    turned_heard: int
+    """… and those of them before which the robot turned."""
     entered_again: int
     contacts: int
     way: float | None
@@ -142,7 +149,7 @@ def drive(settings: Settings, place: CanyonWorld, seed: int) -> CanyonOutcome:
     return CanyonOutcome(
         place.depth_m, place.width_m, math.dist((watch.x, watch.y), place.goal) < ARRIVED_M, watch.entries,
         watch.deepest_m, watch.contacts, watch.way_m, place.shortest_m(settings.body.radius_m + ROOM_M), watch.time_s,
-        watch.reported_m,
+        watch.reported_m, back_heard_m(settings, place),
     )  # fmt: skip
 
 
@@ -150,6 +157,7 @@ def summarise(schemas: str, reflection: str, outcomes: Sequence[CanyonOutcome]) 
     """Return the row of some drives."""
     escaped = [one for one in outcomes if one.arrived]
     deep = [one for one in outcomes if one.depth_m > DEEP_M]
+    heard = [one for one in deep if one.heard_m is not None and one.heard_m >= IN_TIME_M]
     reported = [one.reported_m for one in outcomes if one.reported_m is not None]
     return {
         "schemas": schemas,
@@ -158,6 +166,8 @@ def summarise(schemas: str, reflection: str, outcomes: Sequence[CanyonOutcome]) 
         "escaped": len(escaped),
         "deep": len(deep),
         "turned": sum(one.entries == 0 for one in deep),
+        "heard": len(heard),
+        "turned_heard": sum(one.entries == 0 for one in heard),
         "entered_again": sum(one.entries > 1 for one in outcomes),
         "contacts": sum(one.contacts for one in outcomes),
         "way": mean(one.way_m / one.shortest_m for one in escaped) if escaped else None,

@@ -57,12 +57,13 @@ def run_canyons(
                 rows.append(summarise(name, reflection, outcomes))
     if json_file is not None:
         write_json(json_file, {"rows": rows})
-    table = Table("schemas", "walls", "escaped", "turned", "twice", "contacts", "way")
+    table = Table("schemas", "walls", "escaped", "turned", "if heard in time", "twice", "contacts", "way")
     for row in rows:
         way = "–" if row["way"] is None else f"{row['way']:.2f}"
         table.add_row(
             row["schemas"], row["reflection"], f"{row['escaped']} of {row['worlds']}",
-            f"{row['turned']} of {row['deep']}", str(row["entered_again"]), str(row["contacts"]), way,
+            f"{row['turned']} of {row['deep']}", f"{row['turned_heard']} of {row['heard']}",
+            str(row["entered_again"]), str(row["contacts"]), way,
         )  # fmt: skip
     EscapingConsole().print(table)
     return DONE
