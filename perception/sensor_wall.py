@@ -73,4 +73,4 @@ def beside_m(r: float, turn: float, side: float, mount: Floats, half_angle: floa
     """
     axis = side * ((turn + mount[2] + math.pi) % (2.0 * math.pi) - math.pi)
     nearest = min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
-    return side * (mount[0] * math.sin(turn) + mount[1] * math.cos(turn)) + r * math.sin(nearest)
+    return float(side * (mount[0] * math.sin(turn) + mount[1] * math.cos(turn)) + r * math.sin(nearest))

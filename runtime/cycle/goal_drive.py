@@ -18,7 +18,7 @@ from behaviors.valley.look_ahead import Search, begin, expand
 from behaviors.valley.polar_histogram import cells_near
 from config.robot import PASSAGE_M
 from config.settings import Settings
-from perception.percept import Percept
+from perception.percept import Percept, Pose, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL
 
 MOVED_M: Final = 0.1
@@ -27,6 +27,9 @@ FAINT_M: Final = 0.01
 """Least depth of the zone in which avoid-static-obstacle pushes with a bound, m."""
 STANDS_S: Final = 5.0
 """Whether there is a valley says nothing of a robot that stands for so much longer than half a turn takes, s."""
+ON_THE_SPOT_M: Final = 0.2
+TURNS_RAD: Final = math.radians(45.0)
+"""A robot so near to where its way begins, and so far off its direction, only turns: the arbiter lets it creep."""
 ROUNDS_MAX: Final = 2
 """A detour may lead away from the goal until it has led round what closes the way so often, once on either side."""
 NO_VALLEY: Final = "obstacles on all sides: no direction is free"
@@ -74,12 +77,13 @@ def drive_to_goal(
     if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:
         has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
         stands_s = STANDS_S + math.pi / min(behaviors.move_to_goal.turn_rate_max_rad_s, body.turn_max_rad_s)
+        stood_s = run_s - now.progress.moved_run_s
         around, detour = leave_canyon(
             percept, (goal.x, goal.y), now.detour, body.radius_m, behaviors.leave_canyon,
-            waits=has_valley and run_s - now.progress.moved_run_s < stands_s, last_rad=now.valley.direction_rad,
+            waits=has_valley and stood_s < stands_s, last_rad=now.valley.direction_rad,
         )  # fmt: skip
         # A detour for a robot that stands gets its own time to turn before that robot counts as stuck.
-        if now.detour.side == 0 != detour.side and run_s - now.progress.moved_run_s >= stands_s:
+        if now.detour.side == 0 != detour.side and stood_s >= stands_s:
             now = replace(now, progress=replace(now.progress, moved_run_s=run_s))
         now = replace(now, detour=detour)
     if around is not None:
@@ -178,9 +182,20 @@ def _with_search(now: GoalDrive, goal: Goal, percept: Percept, run_s: float, set
     if search.goal is not None and math.dist(search.goal, place) > MOVED_M:
         return replace(now, search=begin(search, percept, place), searched_run_s=run_s)
     age_s = math.inf if now.searched_run_s is None else run_s - now.searched_run_s
+    if run_s - now.progress.moved_run_s > STANDS_S and _turns_to_way(now, percept.pose):
+        # The turn gets its own time before the robot counts as stuck.
+        return replace(now, progress=replace(now.progress, moved_run_s=run_s - STANDS_S))
     if search.is_done and age_s >= config.look_ahead_period_s:
         return replace(now, search=begin(search, percept, place), searched_run_s=run_s)
     return now
+
+
+def _turns_to_way(now: GoalDrive, pose: Pose) -> bool:
+    """Return whether the robot turns on the spot to the way in force: another one would turn it to and fro there."""
+    direction, way = now.valley.direction_rad, now.search.way
+    if direction is None or not way or math.dist(way[0], (pose.x, pose.y)) > ON_THE_SPOT_M:
+        return False
+    return abs(wrap_angle(direction - pose.theta)) > TURNS_RAD
 
 
 def can_look_ahead(now: GoalDrive | None, percept: Percept | None) -> bool:

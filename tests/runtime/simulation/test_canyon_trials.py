@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from config.load import load_settings
-from runtime.simulation.canyon_hearing import back_heard_m
 from runtime.simulation.canyon_trials import CanyonOutcome, drive, summarise
 from runtime.simulation.canyon_worlds import canyon_world
 
@@ -28,21 +27,6 @@ def test_turns_are_counted_apart_where_the_back_is_heard_in_time() -> None:
     drives = [outcome(4.0, 0, heard_m=2.0), near, late, outcome(8.0, 1)]
     row = summarise("ours", "specular", [*drives, outcome(1.2, 0, heard_m=3.0)])
     assert (row["deep"], row["turned"], row["heard"], row["turned_heard"]) == (4, 1, 2, 1)
-
-
-@pytest.mark.compiled
-def test_the_back_between_mirrors_is_heard_from_the_ring_s_range_on() -> None:
-    settings = load_settings("hallway")
-    reach_m = settings.ring.range_max_m + settings.body.radius_m
-    places = [canyon_world(seed) for seed in range(40)]
-    assert any(place.depth_m > 7.0 for place in places)
-    for place in places:
-        heard_m = back_heard_m(settings, place)
-        along, _ = place.local(place.start.x, place.start.y)
-        if reach_m - place.depth_m > -along + 0.1:
-            assert heard_m == pytest.approx(-along), "from the start on"
-        elif heard_m is not None:
-            assert heard_m < reach_m - place.depth_m + 0.05
 
 
 @pytest.mark.soak
