@@ -13,7 +13,7 @@ from config.settings import GoalConfig, Settings
 from drivers.emulator.robot_device import GroundTruth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
-from runtime.simulation.canyon_hearing import IN_TIME_M, back_heard_m
+from runtime.simulation.canyon_reception import IN_TIME_M, back_heard_m
 from runtime.simulation.canyon_worlds import CanyonWorld
 from runtime.simulation.closed_loop import simulate
 

@@ -164,11 +164,11 @@ def test_what_stands_at_the_goal_is_believed_from_near_only() -> None:
 def test_a_robot_that_has_stood_turns_to_its_way_before_the_next_look_ahead_and_counts_as_stuck_only_then() -> None:
     script = driving("behaviors.move_to_goal.stuck_after_s=9.0")
     script.request_drive(Goal(-5.0, 0.5))
-    begun, turned = list[float | None](), [0.015 * k for k in range(200)]
+    started, turned = list[float | None](), [0.015 * k for k in range(200)]
     for theta in turned:
         script.move_to(Pose(0.0, 0.0, theta))
-        begun.append(goal_drive(script).searched_run_s)
+        started.append(goal_drive(script).searched_run_s)
         assert goal_drive(script).progress.given_up is None
-    assert len(set(begun[100:150])) == 1, "it has stood for 5 s, and turns"
-    assert len(set(begun[:100])) > 3
-    assert begun[-1] not in begun[:150], "it has turned"
+    assert len(set(started[100:150])) == 1, "it has stood for 5 s, and turns"
+    assert len(set(started[:100])) > 3
+    assert started[-1] not in started[:150], "it has turned"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from config.load import load_settings
-from runtime.simulation.canyon_hearing import back_heard_m
+from runtime.simulation.canyon_reception import back_heard_m
 from runtime.simulation.canyon_worlds import canyon_world
 
 
