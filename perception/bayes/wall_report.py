@@ -267,7 +267,8 @@ def reach_corners(
         lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
         is_proven = far >= ALONE_ECHOES and far > lead * passes and corner["is_edge"] != are_mirrors
         if is_proven or (is_met and (is_heard or is_near)):
-            found.append(_point(corner))
+            # Ranges that end at both walls speak for their corner, whether it answers or not.
+            found.append(_point(corner, max(echoes, CORNER_PASSED_SHARE * ended) if is_met and is_near else echoes))
     return found
 
 
@@ -311,13 +312,13 @@ def end_at_edges(
                 owner.ends[span, side] = along
                 is_sure = True
         if is_sure:
-            found.append(_point(edge))
+            found.append(_point(edge, float(edge["echoes"])))
     return found
 
 
-def _point(corner: NDArray[Any]) -> tuple[float, ...]:
-    """Return a corner as `CornerPoint` has it."""
-    log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (float(corner["echoes"]) - float(corner["passes"]))
+def _point(corner: NDArray[Any], signs: float) -> tuple[float, ...]:
+    """Return a corner as `CornerPoint` has it; `signs` of it, as an echo is one, against the ranges that passed."""
+    log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (signs - float(corner["passes"]))
     place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))
     clipped = min(max(log_odds, -EVIDENCE_MAX_NAT), EVIDENCE_MAX_NAT)
     return (*place, int(corner["is_edge"]), float(corner["echoes"]), clipped)

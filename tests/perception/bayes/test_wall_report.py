@@ -87,6 +87,9 @@ def test_walls_that_end_near_each_other_meet_in_a_corner_that_no_range_passed() 
     assert wall_ends(memory)[0] == pytest.approx([2, -1, 2, 1.5], abs=0.05)
     room.corners[0].ended = 10.0
     assert wall_ends(memory) == pytest.approx(np.array([[2, -1, 2, 2], [2, 2, -1, 2]]), abs=0.05)
+    room.corners[0].passes = 1.0
+    _, (corner,) = room_report(memory)
+    assert corner["log_odds"] > 0.0, "where everything echoes a corner answers no more than its walls do"
     room.corners[0].passes = 3.0
     assert wall_ends(memory)[0] == pytest.approx([2, -1, 2, 1.5], abs=0.05)
 
