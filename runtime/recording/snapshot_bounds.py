@@ -100,8 +100,8 @@ _COUNTS: Final = (
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "names_withdrawn near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total "
     "_sensors.readings "
-    "room.firings room.recent_count rejection_count run_firing run_length segments_held segments_made "
-    "segments_numbered "
+    "room.firings room.recent_count room.remembered_count rejection_count run_firing run_length segments_held "
+    "segments_made segments_numbered "
     "sensors.kept crosses_kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
     "drift._arrived drift._checked _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
     "_keyframes.count _keyframes._firings entered peak_at known_room._window_begin "
@@ -110,7 +110,7 @@ _COUNTS: Final = (
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
-    "_steady canyon_map.is_due canyon_map.is_wanted "
+    "_steady bins.is_held canyon_map.is_due canyon_map.is_wanted "
     "drift._has_started drift._stands_firm _tracker.is_synchro _map_heading._is_entering sensors.is_known "
     "_has_fired _is_started _has_stood _is_weighed _is_complete _is_confirmed"
 )
