@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, Literal
 
+from rich.box import SIMPLE
 from rich.table import Table
 
 from config.errors import DONE
@@ -57,12 +58,14 @@ def run_canyons(
                 rows.append(summarise(name, reflection, outcomes))
     if json_file is not None:
         write_json(json_file, {"rows": rows})
-    table = Table("schemas", "walls", "escaped", "turned", "if heard in time", "twice", "contacts", "way")
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))  # 80 columns wide
+    for heading in ("schemas", "walls", "escaped", "turned", "if heard", "twice", "contacts", "way"):
+        table.add_column(heading, no_wrap=heading == "schemas")
     for row in rows:
         way = "–" if row["way"] is None else f"{row['way']:.2f}"
         table.add_row(
-            row["schemas"], row["reflection"], f"{row['escaped']} of {row['worlds']}",
-            f"{row['turned']} of {row['deep']}", f"{row['turned_heard']} of {row['heard']}",
+            row["schemas"], row["reflection"], f"{row['escaped']}/{row['worlds']}",
+            f"{row['turned']}/{row['deep']}", f"{row['turned_heard']}/{row['heard']}",
             str(row["entered_again"]), str(row["contacts"]), way,
         )  # fmt: skip
     EscapingConsole().print(table)
