@@ -114,14 +114,14 @@ def wall_segments(memory: Memory) -> NDArray[Any]:
 def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
     with np.errstate(all="ignore"):  # numbers of a damaged recording
-        room, are_mirrors = memory.state["room"][0], has_mirrors(memory)
+        room, are_mirrors, are_rough = memory.state["room"][0], has_mirrors(memory), edges_answer(memory)
         walls = sure_walls(room["walls"][:MAX_WALLS], room["corners"])
-        if edges_answer(memory):
+        if are_rough:
             for of in walls.values():
                 of.hold_to_review()
             walls = {number: of for number, of in walls.items() if len(of.ends)}
         corners = straighten(walls, room["corners"], room["edges"])
-        points = reach_corners(walls, corners[:CORNERS_MAX], are_mirrors)
+        points = reach_corners(walls, corners[:CORNERS_MAX], are_mirrors=are_mirrors, are_rough=are_rough)
         points += end_at_edges(walls, corners[CORNERS_MAX:], are_mirrors)
         bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
         segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
@@ -228,7 +228,7 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
 
 
 def reach_corners(
-    walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool
+    walls: dict[int, Straight], corners: NDArray[Any], *, are_mirrors: bool, are_rough: bool
 ) -> list[tuple[float, ...]]:  # fmt: skip
     """Move the ends of walls to the corners in which they end, unless ranges passed there.
 
@@ -241,8 +241,9 @@ def reach_corners(
         The walls by their number; their ends are updated.
     corners : (n,) record of `RoomCorner`
         All corners.
-    are_mirrors : bool
-        Whether the walls are known to be mirrors.
+    are_mirrors, are_rough : bool
+        Whether the walls are known to be mirrors, and whether they are known not to be: then an inside corner is the
+        farthest of its walls from any sensor, so that what seems to come from it are echoes of a wall or a post.
 
     Returns
     -------
@@ -254,7 +255,7 @@ def reach_corners(
         x, y, echoes, passes, ended = (float(corner[name]) for name in ("x", "y", "echoes", "passes", "ended"))
         owners = [walls[number] for number in (int(corner["first"]), int(corner["second"])) if number in walls]
         places = [owner.beyond(x, y) for owner in owners]
-        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
+        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes and not (are_rough and corner["is_edge"] == 0)
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
         is_met = len(owners) == 2

@@ -60,6 +60,20 @@ def test_spans_are_segments_and_reach_a_corner_that_is_heard() -> None:
     assert wall_ends(memory)[1] == pytest.approx([2, 0, 2, 1.5], abs=0.05)
 
 
+def test_where_everything_echoes_no_wall_goes_on_to_a_far_inside_corner() -> None:
+    """It does not answer there: the echoes are a post's, and a wall closed the doorway before it."""
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -2.0, 0.8)
+    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[1], -1.5, 1.0)
+    find_corners(memory.s)
+    room.corners[0].echoes = room.corners[0].ended = 9.0
+    assert wall_ends(memory)[0] == pytest.approx([2, -2, 2, 2], abs=0.05)
+    room.edge_echoes = 100.0
+    assert wall_ends(memory)[0] == pytest.approx([2, -2, 2, 0.8], abs=0.05)
+
+
 def test_the_mouth_of_a_dead_end_in_a_long_wall_has_two_edges() -> None:
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
