@@ -33,6 +33,8 @@ LIGHT_WEIGHT: Final = 20.0
 of a barrel that was heard from a few places."""
 CORNER_NEAR_M: Final = 1.0
 """Distance from the ends of both walls within which a corner need not be heard …"""
+DOORWAY_M: Final = 1.05
+"""A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
 CORNER_PASSED_SHARE: Final = 0.2
 """… if no more than this share of the ranges towards it went on."""
 WALL_WEIGHT_MIN: Final = 12.0
@@ -303,7 +305,7 @@ def end_at_edges(
         is_sure = echoes >= ALONE_ECHOES and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
         if owner is not None:
             along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
-            reach = EDGE_SAME_M if edge["is_edge"] == 1 else CORNER_REACH_M
+            reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_M
             beyond = (along - owner.ends[:, side]) * (2 * side - 1)
             span = int(np.abs(beyond).argmin())
             is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)

@@ -197,6 +197,22 @@ def test_a_wall_ends_at_the_edge_that_is_heard_and_the_edge_is_reported() -> Non
     assert len(room_report(memory)[1]) == 0
 
 
+@pytest.mark.parametrize(("beyond_m", "reached_m"), [(0.9, 1.9), (1.2, 1.0)])
+def test_a_wall_goes_on_to_the_corner_of_which_it_is_the_only_side_unless_a_doorway_fits_between(
+    beyond_m: float, reached_m: float
+) -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.0)
+    find_corners(memory.s)
+    (corner,) = (it for it in room.edges if it.is_used == 1 and it.second == 1)
+    corner.is_edge, corner.echoes, corner.y = 0, 6.0, 1.0 + beyond_m
+    heard = corner.heard
+    heard.xx = heard.yy = 1e5
+    heard.x, heard.y = 1e5 * corner.x, 1e5 * corner.y
+    assert room_report(memory)[0]["y2"] == pytest.approx([reached_m], abs=0.05)
+
+
 def test_between_mirrors_a_corner_or_an_edge_that_is_heard_often_is_reported_whatever_is_known_of_its_walls() -> None:
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
