@@ -18,6 +18,8 @@ Snapshot: TypeAlias = dict[str, NDArray[Any]]
 
 GROWING: Final = "archived_rows"
 """An array of this name may have another length in a snapshot: what is archived grows with the map."""
+SCRATCH_FIELD: Final = "scratch"
+"""The field of an array that is overwritten before each use: zero in a snapshot, left alone when one is put back."""
 CONFIGURED: Final = "settings"
 OURS: Final = "perception."
 
@@ -54,7 +56,9 @@ def put_back(owner: object, snapshot: Snapshot) -> None:
 def _take(owner: object, path: str, taken: Snapshot) -> None:
     for name, value in _parts(owner):
         if isinstance(value, np.ndarray):
-            taken[path + name] = value.copy()
+            taken[path + name] = copied = value.copy()
+            if _has_scratch(value):
+                copied[SCRATCH_FIELD] = np.zeros((), value.dtype[SCRATCH_FIELD])
         elif isinstance(value, bool | int | float):
             taken[path + name] = np.array(value)
         else:
@@ -66,11 +70,18 @@ def _put(owner: object, path: str, snapshot: Snapshot) -> None:
         if name == GROWING:
             setattr(owner, name, snapshot[path + name].copy())
         elif isinstance(value, np.ndarray):
+            scratch = value[SCRATCH_FIELD].copy() if _has_scratch(value) else None
             value[...] = snapshot[path + name]
+            if scratch is not None:
+                value[SCRATCH_FIELD] = scratch
         elif isinstance(value, bool | int | float):
             setattr(owner, name, type(value)(snapshot[path + name].item()))
         else:
             _put(value, f"{path}{name}.", snapshot)
+
+
+def _has_scratch(array: NDArray[Any]) -> bool:
+    return SCRATCH_FIELD in (array.dtype.names or ())
 
 
 def fixed_shape(name: str, shape: Sequence[int]) -> tuple[int, ...]:

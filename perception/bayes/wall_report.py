@@ -15,7 +15,7 @@ from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, ED
 from perception.bayes.wall_crossing import CORNER_INSIDE_M, CORNER_REACH_M
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_numbers import SPAN_MIN_M
-from perception.bayes.wall_records import CORNERS_MAX, MAX_WALLS
+from perception.bayes.wall_records import MAX_WALLS
 from perception.bayes.wall_straight import Straight, straight, straighten
 from perception.kernel import Floats
 from perception.records import Record
@@ -33,7 +33,7 @@ LIGHT_WEIGHT: Final = 20.0
 of a barrel that was heard from a few places."""
 CORNER_NEAR_M: Final = 1.0
 """Distance from the ends of both walls within which a corner need not be heard …"""
-DOORWAY_M: Final = 1.05
+DOORWAY_MIN_M: Final = 1.05
 """A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
 CORNER_PASSED_SHARE: Final = 0.2
 """… if no more than this share of the ranges towards it went on."""
@@ -117,17 +117,21 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
     with np.errstate(all="ignore"):  # numbers of a damaged recording
         room, are_mirrors, are_rough = memory.state["room"][0], has_mirrors(memory), edges_answer(memory)
-        walls = sure_walls(room["walls"][:MAX_WALLS], room["corners"])
+        corners, edges = room["corners"].copy(), room["edges"].copy()
+        if are_rough:
+            # An inside corner is the farthest of its walls from any sensor: what seems to come from it is theirs.
+            for points in (corners, edges):
+                points["echoes"][points["is_edge"] == 0] = 0.0
+        walls = sure_walls(room["walls"][:MAX_WALLS], corners)
         if are_rough:
             for of in walls.values():
                 of.hold_to_review()
             walls = {number: of for number, of in walls.items() if len(of.ends)}
-        corners = straighten(walls, room["corners"], room["edges"])
-        points = reach_corners(walls, corners[:CORNERS_MAX], are_mirrors=are_mirrors, are_rough=are_rough)
-        points += end_at_edges(walls, corners[CORNERS_MAX:], are_mirrors)
+        corners, edges = straighten(walls, corners, edges)
+        found = [*reach_corners(walls, corners, are_mirrors), *end_at_edges(walls, edges, are_mirrors)]
         bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
         segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
-        return np.array(segments, WallSegment.DTYPE), np.array(points, CornerPoint.DTYPE)
+        return np.array(segments, WallSegment.DTYPE), np.array(found, CornerPoint.DTYPE)
 
 
 def has_mirrors(memory: Memory) -> bool:
@@ -230,7 +234,7 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
 
 
 def reach_corners(
-    walls: dict[int, Straight], corners: NDArray[Any], *, are_mirrors: bool, are_rough: bool
+    walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool
 ) -> list[tuple[float, ...]]:  # fmt: skip
     """Move the ends of walls to the corners in which they end, unless ranges passed there.
 
@@ -243,9 +247,8 @@ def reach_corners(
         The walls by their number; their ends are updated.
     corners : (n,) record of `RoomCorner`
         All corners.
-    are_mirrors, are_rough : bool
-        Whether the walls are known to be mirrors, and whether they are known not to be: then an inside corner is the
-        farthest of its walls from any sensor, so that what seems to come from it are echoes of a wall or a post.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors.
 
     Returns
     -------
@@ -257,7 +260,7 @@ def reach_corners(
         x, y, echoes, passes, ended = (float(corner[name]) for name in ("x", "y", "echoes", "passes", "ended"))
         owners = [walls[number] for number in (int(corner["first"]), int(corner["second"])) if number in walls]
         places = [owner.beyond(x, y) for owner in owners]
-        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes and not (are_rough and corner["is_edge"] == 0)
+        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
         is_met = len(owners) == 2
@@ -305,7 +308,7 @@ def end_at_edges(
         is_sure = echoes >= ALONE_ECHOES and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
         if owner is not None:
             along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
-            reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_M
+            reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_MIN_M
             beyond = (along - owner.ends[:, side]) * (2 * side - 1)
             span = int(np.abs(beyond).argmin())
             is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)

@@ -43,6 +43,8 @@ from perception.kernel import kernel
 
 REMEMBERED_SPACING_M: Final = 0.15
 """Least distance between the remembered readings of a sensor."""
+REMEMBERED_FIRST: Final = 1024
+"""So many are remembered, those of some 6 m, before slanting walls are known to answer: else none is reviewed."""
 REVIEWED_WEIGHT_MIN: Final = 20.0
 REVIEWED_CHI2_MIN: Final = 14.0
 """A wall of less weight or evidence is not reviewed."""
@@ -75,7 +77,9 @@ KNOWN_SHARE: Final = 0.7
 
 @kernel
 def remember(room: WallMap, sensor: int, q: Reading) -> None:
-    """Remember a reading, if its sensor has moved far enough."""
+    """Remember a reading, if its sensor has moved far enough and walls are reviewed or may be."""
+    if room.remembered_count >= REMEMBERED_FIRST and not edges_answer(room):
+        return
     is_first = room.remembered_of[sensor] == 0.0
     moved = math.hypot(q.x - room.remembered_x[sensor], q.y - room.remembered_y[sensor])
     if is_first or moved > REMEMBERED_SPACING_M:
@@ -156,7 +160,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
             x, y = wall_point(wall, along)
             if not is_hidden(tracks, q, x, y):
                 evidence[b] -= PASS_NAT if q.range_m < FAR else SILENCE_NAT
-        elif abs(e) < slack and (is_sure or not is_elsewhere(room, tracks, q, p, k, abs(e) / slack)):
+        elif abs(e) < slack and (is_sure or not is_of_another(room, tracks, q, p, k, abs(e) / slack)):
             z = EXPLAINED_SIGMAS * e / slack
             gain = min(ECHO_NAT, end_nat(room, wall, q, along, p)) - 0.5 * z * z
             evidence[b] += gain if kind == FOOT else EDGE_SHARE * gain
@@ -211,7 +215,7 @@ def end_nat(room: WallMap, wall: Wall, q: Reading, along: float, p: SettingsReco
 
 
 @kernel
-def is_elsewhere(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, own: int, error: float) -> bool:
+def is_of_another(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, own: int, error: float) -> bool:
     """Return whether another wall or a round object explains an echo as well as wall `own` does.
 
     Parameters

@@ -81,19 +81,21 @@ class Straight:
 
 def straight(wall: NDArray[Any], spans: NDArray[Any]) -> Straight:
     """Return a wall with these of its spans."""
-    frame, line = tuple(float(wall[name]) for name in FRAME), best_line(wall)
+    frame, line = tuple(float(wall[name]) for name in FRAME), reported_line(wall)
     ends = np.column_stack([spans["low"], spans["high"]])
     return Straight(wall, spans, (*frame, *line[:2]), line[2:], ends)
 
 
-def best_line(wall: NDArray[Any]) -> tuple[float, ...]:
+def reported_line(wall: NDArray[Any]) -> tuple[float, ...]:
     """Return the fields `LINE` of a wall's fit to its bins, or of its review where that had more information."""
     line, reviewed = (tuple(float(of[name]) for name in LINE) for of in (wall, wall["reviewed"]))
     information = float(wall["reviewed"]["information"])
     return reviewed if information * (line[2] * line[4] - line[3] ** 2) > 1.0 else line
 
 
-def straighten(walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray[Any]) -> NDArray[Any]:
+def straighten(
+    walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:  # fmt: skip
     """Fit the walls and the corners that are heard together.
 
     Parameters
@@ -105,8 +107,8 @@ def straighten(walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray
 
     Returns
     -------
-    (2 n,) record of `RoomCorner`
-        The corners and then the edges, with their corrected places.
+    tuple of (n,) record of `RoomCorner`
+        The corners and the edges, with their corrected places.
     """
     points = np.concatenate([corners, edges])
     ends = points[len(corners) :]["second"].copy()
@@ -116,4 +118,4 @@ def straighten(walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray
     points["second"][len(corners) :] = ends
     for of, line in zip(walls.values(), lines.tolist(), strict=True):
         of.frame, of.variances = (*of.frame[:4], *line[:2]), tuple(line[2:])
-    return points
+    return points[: len(corners)], points[len(corners) :]

@@ -42,6 +42,16 @@ def test_arrays_numbers_and_parts_are_copied_and_scratch_is_not() -> None:
     assert type(owner.done) is bool
 
 
+def test_scratch_inside_an_array_is_zero_in_a_snapshot_and_left_alone_by_it() -> None:
+    owner = Owner()
+    owner.array = np.array([(1.0, 2.0)], [("kept", float), ("scratch", float)])
+    snapshot = snapshot_of(owner)
+    assert snapshot["array"].item() == (1.0, 0.0)
+    owner.array[0] = (5.0, 6.0)
+    put_back(owner, snapshot)
+    assert owner.array.item() == (1.0, 6.0)
+
+
 def test_a_snapshot_of_something_else_is_refused() -> None:
     owner, snapshot = Owner(), snapshot_of(Owner())
     with pytest.raises(ValueError, match="another method or version: other"):

@@ -8,11 +8,22 @@ import numpy as np
 import pytest
 
 from perception.bayes.object_report import corner_object, wall_object
-from perception.bayes.state import ESTABLISHED
+from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_bins import bin_of, enter_pass, free
 from perception.bayes.wall_corners import find_corners
+from perception.bayes.wall_records import WallMap
 from perception.bayes.wall_report import room_report, wall_ends, wall_segments
 from tests.perception.bayes.rooms import fill, new_room, place_wall
+
+
+def two_walls(first: tuple[float, float], second: tuple[float, float]) -> tuple[Memory, WallMap]:
+    """Return walls that cross at (2, 2), x = 2 and y = 2, each heard between two places along it."""
+    memory, room = new_room()
+    for wall, normal, ends in ((room.walls[0], 0.0, first), (room.walls[1], math.pi / 2, second)):
+        place_wall(wall, np.zeros(2), normal, 2.0)
+        fill(memory, wall, *ends)
+    find_corners(memory.s)
+    return memory, room
 
 
 def test_the_first_wall_needs_more_evidence_than_the_others() -> None:
@@ -62,12 +73,7 @@ def test_spans_are_segments_and_reach_a_corner_that_is_heard() -> None:
 
 def test_where_everything_echoes_no_wall_goes_on_to_a_far_inside_corner() -> None:
     """It does not answer there: the echoes are a post's, and a wall closed the doorway before it."""
-    memory, room = new_room()
-    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
-    fill(memory, room.walls[0], -2.0, 0.8)
-    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
-    fill(memory, room.walls[1], -1.5, 1.0)
-    find_corners(memory.s)
+    memory, room = two_walls((-2.0, 0.8), (-1.5, 1.0))
     room.corners[0].echoes = room.corners[0].ended = 9.0
     assert wall_ends(memory)[0] == pytest.approx([2, -2, 2, 2], abs=0.05)
     room.edge_echoes = 100.0
@@ -92,12 +98,7 @@ def test_the_mouth_of_a_dead_end_in_a_long_wall_has_two_edges() -> None:
 
 
 def test_walls_that_end_near_each_other_meet_in_a_corner_that_no_range_passed() -> None:
-    memory, room = new_room()
-    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
-    fill(memory, room.walls[0], -1.0, 1.5)
-    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
-    fill(memory, room.walls[1], -1.4, 1.0)
-    find_corners(memory.s)
+    memory, room = two_walls((-1.0, 1.5), (-1.4, 1.0))
     assert wall_ends(memory)[0] == pytest.approx([2, -1, 2, 1.5], abs=0.05)
     room.corners[0].ended = 10.0
     assert wall_ends(memory) == pytest.approx(np.array([[2, -1, 2, 2], [2, 2, -1, 2]]), abs=0.05)

@@ -18,7 +18,7 @@ from perception.bayes.wall_review import (
     SWITCH_NAT,
     UNHEARD_NAT,
     find_covered,
-    is_elsewhere,
+    is_of_another,
     next_wall,
     remember,
     review,
@@ -82,9 +82,9 @@ def test_the_echoes_of_another_wall_show_nothing() -> None:
     place_wall(room.walls[1], np.zeros(2), 0.2, 2.0)
     fill(memory, room.walls[1], -1.0, 1.0)
     q = reading(0.0, 0.0, 0.2, 2.0)
-    assert is_elsewhere(room, memory.tracks, q, P, 0, 0.5)
+    assert is_of_another(room, memory.tracks, q, P, 0, 0.5)
     room.walls[1].weight = 0.0
-    assert not is_elsewhere(room, memory.tracks, q, P, 0, 0.5)
+    assert not is_of_another(room, memory.tracks, q, P, 0, 0.5)
 
 
 def test_the_line_is_fitted_again_to_the_remembered_echoes() -> None:
@@ -143,6 +143,9 @@ def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:
         remember(room, 2, reading(0.0, 0.0, 0.0, 1.0))
     assert room.remembered_count == 3, "two of sensor 1, and one of sensor 2"
     room.remembered_count = REMEMBERED_MAX
+    remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
+    assert room.remembered_count == REMEMBERED_MAX, "it is not known that slanting walls answer: none is reviewed"
+    room.edge_echoes = 100.0
     remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
     assert room.remembered[0].x == 7.0
 

@@ -9,7 +9,7 @@ import pytest
 
 from perception.bayes.state import Memory
 from perception.bayes.wall_records import WALL_BINS, WallMap
-from perception.bayes.wall_straight import Straight, best_line, straight
+from perception.bayes.wall_straight import Straight, reported_line, straight
 from tests.perception.bayes.rooms import fill, new_room, place_wall
 
 
@@ -74,7 +74,7 @@ def test_the_line_is_that_of_more_information() -> None:
     reviewed["offset"], reviewed["slope"] = 2.01, 0.02
     for information, offset in ((0.9e9, 2.0), (1.1e9, 2.01)):
         reviewed["information"] = information
-        assert best_line(wall)[0] == pytest.approx(offset)
+        assert reported_line(wall)[0] == pytest.approx(offset)
 
 
 def test_a_point_beyond_an_end() -> None:

@@ -9,7 +9,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ from perception.snapshot import Snapshot
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import KEYFRAME, decode, encode
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
-from runtime.recording.replayer import Replayer, fresh_state, replay_cycle
-from runtime.recording.schema import Keyframe, StateFields, carried_state, keyframe, perception_snapshot, state_fields
+from runtime.recording.replayer import Replayer, fresh_state
+from runtime.recording.schema import Keyframe, carried_state, keyframe, perception_snapshot, state_fields
 from runtime.recording.snapshot_bounds import (
     BOUNDS,
     CONSTANTS,
@@ -38,15 +38,17 @@ from runtime.recording.snapshot_bounds import (
 from runtime.simulation.closed_loop import simulate
 from tests.perception.halls import drive
 from tests.recorded import entries_of, rewrite
+from tests.runtime.recording.moments import (
+    OUT_OF_BOUNDS,
+    POISONED_CYCLE,
+    Moment,
+    changed,
+    ends_in_error,
+    moments_of,
+)
 
 CHECKED_EVERY = 16
 """Cycles from one check of an honest state to the next."""
-FOLLOWING = 7
-"""Cycles that are replayed from a poisoned state."""
-POISONED_CYCLE = 314
-"""Objects, pins, placements and a rejection exist by then; an edit follows 6 cycles later."""
-OUT_OF_BOUNDS = "index is out of bounds"
-"""What a compiled kernel raises where bounds are checked; numpy's own text goes on."""
 BOUNDS_CHECKED = os.environ.get("NUMBA_BOUNDSCHECK", "0") not in {"", "0"}
 JOB = "method.memory.state.job."
 ARCHIVED = tuple(
@@ -56,20 +58,6 @@ RELATED = (
     JOB + "kind", JOB + "stage", JOB + "lattices", "method.outline.pinned", "method.outline.status", *ARCHIVED,
 )  # fmt: skip
 """Fields that are compared with one another."""
-
-
-class Moment(NamedTuple):
-    """A state of a run, and the cycles that follow it."""
-
-    cycle: int
-    settings: Settings
-    fields: StateFields
-    snapshot: Snapshot
-    following: list[CycleRecord]
-
-    def perception(self) -> Perception:
-        """Return perception as a run with these settings starts."""
-        return fresh_state(self.settings).perception
 
 
 def is_honest(perception: Perception, fresh: Snapshot, settings: Settings) -> None:
@@ -187,24 +175,6 @@ def test_no_state_with_faulty_sensors_is_refused(method: str) -> None:
     assert {report.sensor for report in perception.sensor_reports()} >= {3, 5}
 
 
-def moments_of(path: Path) -> Iterator[Moment]:
-    """Yield a run's state after `POISONED_CYCLE`, and before it one for each stage of a job on polygons."""
-    with open_recording(path) as recording:
-        records = [record for record in recording.cycle_records() if record.cycle < 345]
-        replayer, stages = Replayer(recording), set[tuple[int, int]]()
-        for step in replayer:
-            state = replayer.state
-            if step.replayed is None or state is None or step.replayed.cycle > POISONED_CYCLE:
-                continue
-            at, snapshot = step.replayed.cycle, state.perception.snapshot()
-            job = snapshot["method.memory.state"]["job"][0] if "method.memory.state" in snapshot else None
-            stage = (0, 0) if job is None else (int(job["kind"]), int(job["stage"]))
-            if at == POISONED_CYCLE or (stage[0] and stage not in stages):
-                stages.add(stage)
-                settings = parse_settings(replayer.settings_data)
-                yield Moment(at, settings, carried_state(state), snapshot, records[at : at + FOLLOWING])
-
-
 def poisons(values: np.ndarray[Any, Any], name: str, settings: Settings) -> list[float]:
     """Return what to put into a field: the ends of its bound, what lies beyond, and numbers of any size."""
     bounds = {**BOUNDS, **settings_bounds(settings)}
@@ -243,36 +213,6 @@ def poison_all(moment: Moment, is_replayed: Callable[[str], bool]) -> Counter[st
                     found["ended" if ends_in_error(moment, snapshot) else "harmless"] += 1
             values[...] = before
     return found
-
-
-def ends_in_error(moment: Moment, snapshot: Snapshot) -> bool:
-    """Restore a state and replay the cycles after it; return whether that ends as the replayer refuses it."""
-    state = fresh_state(moment.settings)
-    try:
-        state.perception.restore(snapshot)
-        for name, value in moment.fields.items():
-            setattr(state, name, value)
-        state.perception.labelled_objects()
-        for record in moment.following:
-            replay_cycle(state, record, moment.settings)
-            state.perception.labelled_objects()
-            state.perception.segments()
-    except (ArithmeticError, LookupError, ValueError) as error:
-        if str(error) == OUT_OF_BOUNDS:
-            raise
-        return True
-    return False
-
-
-def changed(moment: Moment, array: str, *changes: tuple[str, float]) -> Snapshot:
-    """Return a copy of a moment's state with other values of fields; "" stands for the array itself."""
-    snapshot = {name: values.copy() for name, values in moment.snapshot.items()}
-    for fields, value in changes:
-        at: Any = snapshot[array]
-        for field in filter(None, fields.split(".")):
-            at = at[field]
-        at[...] = value
-    return snapshot
 
 
 @pytest.fixture(scope="module")
@@ -344,12 +284,7 @@ def test_random_states_within_the_bounds_are_harmless(moments: dict[int, Moment]
 @pytest.mark.parametrize("number", [2**63 - 1, -(2**63), math.nan, 1e308])
 def test_a_poisoned_scratch_is_harmless(moments: dict[int, Moment], number: float) -> None:
     for moment in moments.values():
-        snapshot = {name: array.copy() for name, array in moment.snapshot.items()}
-        for name, values in numbers_of(snapshot):
-            if name.startswith(SCRATCH) and end_of(name, CONSTANTS) is None:
-                values[...] = number if values.dtype.kind == "f" or isinstance(number, int) else -1
-        check_snapshot(snapshot, moment.perception().snapshot(), moment.settings)
-        assert not ends_in_error(moment, snapshot)
+        assert not ends_in_error(moment, moment.snapshot, number)
 
 
 @pytest.mark.boundscheck
