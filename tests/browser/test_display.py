@@ -23,6 +23,13 @@ async def still(server: FakeServer, opener: Opener, size: tuple[int, int] = SMAL
     return opened
 
 
+async def fall_silent(server: FakeServer, opened: Opened) -> None:
+    """Send one more state, the last: of data 2.5 s old the header says so, and the map gets another height."""
+    await server.advance()
+    server.silent = True
+    await opened.sync()
+
+
 async def change(opened: Opened, script: str) -> None:
     """Run a script over the page's state."""
     await opened.page.evaluate(f"async () => {{ const {{ run, scene }} = await {MODULE}; {script} }}")
@@ -42,7 +49,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     await opened.page.get_by_role("option").nth(1).click()  # the picked object's readings are a layer too
     await opened.says("#evidence", "12 readings")
     await opened.tab("Layers")
-    server.silent = True
+    await fall_silent(server, opened)
     boxes = opened.page.locator("#layers input")
     names = await opened.page.locator("#layers label").all_inner_texts()
     assert len(names) == 22
@@ -91,7 +98,7 @@ async def test_what_a_layer_draws_depends_on_the_state(server: FakeServer, opene
     server.session = greeting(truth=None)
     server.hall.moving = False
     opened = await still(server, opener)
-    server.silent = True
+    await fall_silent(server, opened)
     whole = await opened.picture()
     await opened.tab("Layers")
     await opened.page.locator("#layer-truth").uncheck()
@@ -112,8 +119,7 @@ async def test_what_a_layer_draws_depends_on_the_state(server: FakeServer, opene
 async def test_only_changes_are_drawn(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     assert await opened.world("run.segments.size") == 500
-    server.silent = True
-    await opened.sync()
+    await fall_silent(server, opened)
     await opened.run_for(20 * FRAME_MS)
     await opened.probe("count_repaints")
     await opened.run_for(10 * FRAME_MS)
