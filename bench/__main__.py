@@ -28,6 +28,7 @@ from bench.place_commands import (
     map_size,
     navigation,
     nees,
+    place_bound,
     sightings,
     slips,
     walls,
@@ -230,6 +231,7 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
 for command in (
     localization,
     known_room,
+    place_bound,
     navigation,
     beacons,
     nees,

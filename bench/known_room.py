@@ -161,7 +161,7 @@ def measure_lasers(paths: Sequence[Path], drives: int, seeds: Iterable[int], rep
             traces, costs_s = [], list[float]()
             for k in range(drives):
                 report(f"{path.name}, {reflection}: unknown start {k}")
-                drive = _carried_drive(log, room, k, drives, reflection)
+                drive = carried_drive(log, room, (k / drives, k / drives + 0.5), reflection, k)
                 traces.append(follow(KnownRoom(room, RING, seed=k), drive, costs_s))
             rows[f"{path.name.split('.')[0]}, {reflection}"] = (
                 _tracking_figures(tracked) | asdict(figures(traces)) | {"ms_mean": 1e3 * float(np.mean(costs_s))}
@@ -169,15 +169,25 @@ def measure_lasers(paths: Sequence[Path], drives: int, seeds: Iterable[int], rep
     return rows
 
 
-def _carried_drive(log: LaserLog, room: Room, k: int, drives: int, reflection: Reflection) -> KnownDrive:
-    """Return a drive of `LASER_M` from one of some evenly spaced starts, and as far again from another place."""
+def carried_drive(
+    log: LaserLog, room: Room, begin_shares: tuple[float, float], reflection: Reflection, seed: int
+) -> KnownDrive:  # fmt: skip
+    """Return a drive of `LASER_M` from one place of a recording, and as far again from another one.
+
+    Parameters
+    ----------
+    log, room, reflection, seed
+        As of `bench.laser_rooms.laser_drive`.
+    begin_shares
+        Where each part begins, as a share of the scans from which it can be driven whole; modulo 1.
+    """
     scans, way_m = len(log.poses), np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(log.poses[:, :2], axis=0).T))])
     last = max(0, int(np.searchsorted(way_m, way_m[-1] - LASER_M)) - 1)
     parts = []
-    for share in (k / drives, (k / drives + 0.5) % 1.0):
-        begin = int(share * last)
+    for share in begin_shares:
+        begin = int(share % 1.0 * last)
         parts.append(range(begin, min(scans, int(np.searchsorted(way_m, way_m[begin] + LASER_M)) + 1)))
-    return laser_drive(log, room, [*parts[0], *parts[1]], reflection, k, carried_at=len(parts[0]))
+    return laser_drive(log, room, [*parts[0], *parts[1]], reflection, seed, carried_at=len(parts[0]))
 
 
 def _tracking_figures(traces: Sequence[Trace]) -> dict[str, float]:

@@ -106,6 +106,31 @@ def known_room(
     return _try_in_rooms(rows, known_room_table, json, parts=(EMULATOR,))
 
 
+def place_bound(
+    laser: tuple[Path, ...], /, *, json: str = "place_bound.json", drives: int = 6, first: int = 100
+) -> int:
+    """Compare ours with an exact filter over all poses: unknown start and kidnapping in real buildings.
+
+    Parameters
+    ----------
+    laser
+        Recordings of a laser with corrected poses, as CARMEN logs.
+    json
+        File to write.
+    drives
+        Number of drives in each building.
+    first
+        Seed of the first drive.
+    """
+    use_kernel_cache()
+    from bench.known_room import known_room_table
+    from bench.place_bound import measure
+
+    return _try_in_rooms(
+        lambda _, tell: measure(laser, max(1, drives), first, tell), known_room_table, json, parts=(EMULATOR,)
+    )
+
+
 def navigation(
     *,
     json: str = "navigation.json",
