@@ -9,7 +9,8 @@ COMMA  := ,
 PYTEST := $(BIN)/python -m pytest -q
 PROCESSORS = $(shell nproc)
 LINES  := $(VENV)/lines
-BOUNDSCHECKED = tests/perception tests/drivers/emulator tests/runtime/recording
+KERNELS = tests/perception tests/behaviors/valley tests/drivers/emulator
+BOUNDSCHECKED = $(KERNELS) tests/runtime/recording
 
 # Python's compiled modules are kept whatever the environment says: a start without them takes twice the processor time.
 unexport PYTHONDONTWRITEBYTECODE
@@ -52,7 +53,7 @@ compiled: $(VENV)/test.stamp
 # Kernels again as plain Python: coverage cannot see into compiled code.
 interpreted: $(VENV)/test.stamp
 	@rm -f $(LINES)/interpreted-*
-	LINE_COVERAGE=$(LINES) NUMBA_DISABLE_JIT=1 $(PYTEST) --forks $(PROCESSORS) tests/perception tests/drivers/emulator \
+	LINE_COVERAGE=$(LINES) NUMBA_DISABLE_JIT=1 $(PYTEST) --forks $(PROCESSORS) $(KERNELS) \
 		-m "kernels and not compiled and not realtime and not soak"
 
 # The lines that neither of the two has executed.

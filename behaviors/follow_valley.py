@@ -19,7 +19,6 @@ from behaviors.valley.polar_histogram import (
     SECTORS,
     blocked_sectors,
     cells_near,
-    heard_at,
     masked_by_turning,
     room_m,
 )
@@ -85,9 +84,9 @@ def follow_valley(
             target_rad, target_m = bearing, math.hypot(dx, dy)
             aim_m = math.hypot(dx - goal_x, dy - goal_y)
     room_max_m, comfort_m = body_radius_m + config.safety_m, body_radius_m + config.comfort_m
-    cells = cells_near(percept, pose.x, pose.y, config.free_m + max(room_max_m, comfort_m), config)
-    if goal_m < AT_GOAL_M and aim_m < room_max_m:
-        cells = heard_at(cells, (goal_x, goal_y), room_max_m, percept)
+    reach_m = config.free_m + max(room_max_m, comfort_m)
+    heard_m = room_max_m if goal_m < AT_GOAL_M and aim_m < room_max_m else 0.0
+    cells = cells_near(percept, pose.x, pose.y, reach_m, config, only_heard=(goal_x, goal_y, heard_m))
     radius_m = room_m(cells, body_radius_m, room_max_m)
     flags = before.blocked.encode("ascii").translate(_FLAGS)
     # A gap that the robot drives through is not given up for an echo at a post that comes and goes.

@@ -25,7 +25,7 @@ QUICK = (
     "tests/test_source_rules.py",
 )
 """Files that take seconds and cover every package, for a change that maps to no test."""
-KERNELS = ("perception/", "drivers/emulator/")
+KERNELS = ("perception/", "behaviors/valley/", "drivers/emulator/")
 """After a change of these, tests run without the compiler: compiling the kernels again takes a minute."""
 
 

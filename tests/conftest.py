@@ -40,7 +40,7 @@ TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
 """Environment variables that set the width and colours of output."""
 
-KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "drivers/emulator")]
+KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "behaviors/valley", "drivers/emulator")]
 """Folders with the tests of compiled kernels."""
 
 BROWSER_TESTS = Path(__file__).parent / "browser"

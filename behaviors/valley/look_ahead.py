@@ -16,8 +16,6 @@ from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import Final, TypeAlias
 
-import numpy as np
-
 from behaviors.valley.choice import apart, candidates, gaps
 from behaviors.valley.polar_histogram import (
     SECTOR_RAD,
@@ -38,7 +36,7 @@ SAME: Final = 0.7
 """A place within this share of a step of one on the way in force is on that way."""
 TOWARDS: Final = math.radians(45.0) / SECTOR_RAD
 """A gap that is considered leads within this many sectors of the goal's direction."""
-LINE_M: Final = np.array([0.1])
+LINE_M: Final = 0.1
 """The last step to a goal is free unless something lies so near its line, m: what the grid shows beside a goal may be
 the arc of an echo, which a robot that is there does not hear."""
 AWAY_M: Final = 1.0
@@ -164,15 +162,15 @@ def _children(
     # would count twice, and a way that is in force would come and go with them.
     is_first = number == 0 and not search.way
     least_m = min(radius_m, body_radius_m + (PASSAGE_M if is_first else 0.0))
-    radii = np.array([radius_m, max(radius_m, comfort_m), least_m])
-    blocked, near, closed = map(bytes, crossed(cells, radii, np.full(3, step_m)))
+    radii_m = (radius_m, max(radius_m, comfort_m), least_m)
+    blocked, near, closed = (sectors.tobytes() for sectors in crossed(cells, radii_m, (step_m,) * 3))
     target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
     found, same, wide = [], (SAME * step_m) ** 2, math.radians(config.wide_valley_deg) / SECTOR_RAD
     free, narrow = candidates(blocked, target, wide), gaps(closed, blocked)
     if (
         step_m == distance
         and target not in free
-        and not crossed(cells, LINE_M, np.array([step_m]))[0, round(target) % SECTORS]
+        and not crossed(cells, (LINE_M,), (step_m,))[0, round(target) % SECTORS]
     ):
         free.append(target)
     for c in free + narrow:

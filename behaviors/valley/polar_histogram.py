@@ -8,6 +8,7 @@ magnitudes of a sector are not summed, as the grid spreads one echo over the man
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.behaviors import FollowValleyConfig
+from perception.kernel import Ints, kernel
 from perception.percept import Floats, Percept
 
 SECTORS: Final = 72
@@ -23,8 +25,10 @@ SECTOR_RAD: Final = math.tau / SECTORS
 FIRM_M: Final = 0.02
 """The robot asks for this much less room than it has where it stands, m: what is beside it does not hold it."""
 
-LINE: Final = 2 * SECTORS + 2
-"""Places on a line twice round, on which runs of sectors are laid out."""
+LINE: Final = 2 * SECTORS
+"""Places on a line twice round, on which runs of sectors are laid out: none is longer than half a turn."""
+NO_PART: Final = np.empty((0, 0), np.float32)
+"""What there is of an evidence grid where there is none."""
 
 Sectors: TypeAlias = NDArray[np.bool_]
 """A flag for each sector, shape (SECTORS,) or, of several discs, (n, SECTORS)."""
@@ -51,7 +55,10 @@ class Cells:
     certainties: Floats
 
 
-def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: FollowValleyConfig) -> Cells:
+def cells_near(
+    percept: Percept, x: float, y: float, reach_m: float, config: FollowValleyConfig,
+    only_heard: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Cells:  # fmt: skip
     """Return the cells and fresh echoes within a distance of a place.
 
     Parameters
@@ -64,56 +71,76 @@ def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: Fol
         The distance, m.
     config : FollowValleyConfig
         From which probability on a cell counts, and from which it is sure.
+    only_heard : tuple of float
+        dx, dy from the place to another one, and a distance, m: nearer than that to it, only echoes count.
     """
-    window = percept.occupancy
-    if window is None:
-        table = np.empty((4, len(percept.obstacles)))
-        cells = 0
-    else:
+    window, left, low, cell_m, part = percept.occupancy, 0.0, 0.0, 1.0, NO_PART
+    if window is not None:
+        cell_m = window.cell_m
         rows, columns = window.occupied.shape
-        left, low = (x - window.x_m) / window.cell_m, (y - window.y_m) / window.cell_m
-        reach = reach_m / window.cell_m
+        left, low, reach = (x - window.x_m) / cell_m, (y - window.y_m) / cell_m, reach_m / cell_m
         column, row = max(0, int(left - reach)), max(0, int(low - reach))
         part = window.occupied[
             row : max(row, min(rows, int(low + reach) + 1)), column : max(column, min(columns, int(left + reach) + 1))
         ]
-        at_row, at_column = (part > config.occupied_probability).nonzero()
-        cells = len(at_row)
-        table = np.empty((4, cells + len(percept.obstacles)))
-        np.add(at_column, column + 0.5 - left, out=table[0, :cells])
-        np.add(at_row, row + 0.5 - low, out=table[1, :cells])
-        table[:2, :cells] *= window.cell_m
-        sure = np.subtract(part[at_row, at_column], np.float64(config.occupied_probability), out=table[3, :cells])
-        sure /= config.sure_probability - config.occupied_probability
-        np.minimum(sure, 1.0, out=sure)
-    np.subtract(percept.obstacles.T, ((x,), (y,)), out=table[:2, cells:])
-    table[3, cells:] = 1.0
-    distances = np.hypot(table[0], table[1], out=table[2])
-    return Cells(*table.compress(distances < reach_m, axis=1))
+        left, low = column + 0.5 - left, row + 0.5 - low
+    # Copies, since a kernel is compiled for one layout in memory.
+    part, echoes = np.array(part, np.float32, order="C"), np.array(percept.obstacles, np.float64, order="C")
+    dx, dy, distances, certainties = np.empty((4, part.size + len(echoes)))
+    count = fill_cells(
+        part, left, low, cell_m, echoes, float(x), float(y), float(reach_m), *only_heard,
+        config.occupied_probability, config.sure_probability, dx, dy, distances, certainties,
+    )  # fmt: skip
+    return Cells(dx[:count], dy[:count], distances[:count], certainties[:count])
 
 
-def heard_at(cells: Cells, place: tuple[float, float], radius_m: float, percept: Percept) -> Cells:
-    """Return the cells and fresh echoes, near a place the fresh echoes alone.
+@kernel
+def fill_cells(
+    part: NDArray[np.float32], left: float, low: float, cell_m: float, echoes: Floats, x: float, y: float,
+    reach_m: float, heard_dx: float, heard_dy: float, heard_m: float, occupied: float, sure: float,
+    dx: Floats, dy: Floats, distances: Floats, certainties: Floats,
+) -> int:  # fmt: skip
+    """Write the cells, row by row, and the echoes within a distance of a place; return their number.
 
     Parameters
     ----------
-    cells : Cells
-        Around the robot, from `cells_near`.
-    place : tuple of float
-        Seen from the robot in odometry's directions, m.
-    radius_m : float
-        What is nearer to the place is left out, m.
-    percept : Percept
-        Its pose and its echoes.
+    part : (rows, columns) float32
+        Probabilities of the evidence grid around the place.
+    left, low : float
+        From the place to the middle of the part's first cell, in cells.
+    cell_m : float
+        Side of a cell, m.
+    echoes : (n, 2) float
+        In odometry's frame, m.
+    x, y, reach_m : float
+        The place and the distance, m.
+    heard_dx, heard_dy, heard_m : float
+        `only_heard` of `cells_near`.
+    occupied, sure : float
+        From which probability on a cell counts, and from which it is sure.
+    dx, dy, distances, certainties : (k,) float
+        Out: as of `Cells`.
     """
-    away = np.hypot(cells.dx - place[0], cells.dy - place[1]) >= radius_m
-    fresh = percept.obstacles - (percept.pose.x, percept.pose.y)
-    fresh = fresh[np.hypot(fresh[:, 0] - place[0], fresh[:, 1] - place[1]) < radius_m]
-    return Cells(
-        np.append(cells.dx[away], fresh[:, 0]), np.append(cells.dy[away], fresh[:, 1]),
-        np.append(cells.distances[away], np.hypot(fresh[:, 0], fresh[:, 1])),
-        np.append(cells.certainties[away], np.ones(len(fresh))),
-    )  # fmt: skip
+    count = 0
+    for row in range(part.shape[0]):
+        for column in range(part.shape[1]):
+            above = float(part[row, column]) - occupied
+            if not above > 0.0:
+                continue
+            dx[count] = (column + left) * cell_m
+            dy[count] = (row + low) * cell_m
+            distances[count] = math.hypot(dx[count], dy[count])
+            certainties[count] = min(1.0, above / (sure - occupied))
+            if distances[count] < reach_m and math.hypot(dx[count] - heard_dx, dy[count] - heard_dy) >= heard_m:
+                count += 1
+    for i in range(echoes.shape[0]):
+        dx[count] = echoes[i, 0] - x
+        dy[count] = echoes[i, 1] - y
+        distances[count] = math.hypot(dx[count], dy[count])
+        certainties[count] = 1.0
+        if distances[count] < reach_m:
+            count += 1
+    return count
 
 
 def room_m(cells: Cells, body_radius_m: float, room_max_m: float) -> float:
@@ -130,53 +157,75 @@ def room_m(cells: Cells, body_radius_m: float, room_max_m: float) -> float:
     return min(room_max_m, max(body_radius_m, nearest))
 
 
-def crossed(cells: Cells, radii_m: Floats, ways_m: Floats, shares: Floats | None = None) -> Sectors:
-    """Return the sectors along whose middle a disc cannot drive some way without touching a cell.
-
-    Several discs at once cost hardly more than one.
+def crossed(cells: Cells, radii_m: Sequence[float], ways_m: Sequence[float], *, in_part: bool = False) -> Sectors:
+    """Return the sectors along whose middle a disc cannot drive some way without touching a cell: (n, SECTORS).
 
     Parameters
     ----------
     cells : Cells
         The cells.
-    radii_m : (n,) float
+    radii_m : (n,) sequence of float
         Of the discs, m.
-    ways_m : (n,) float
+    ways_m : (n,) sequence of float
         Their ways, m. A cell beside a way's end blocks fewer directions than one that is passed.
-    shares : (k,) float, optional
-        What share of the ways each cell blocks; 1 if not given.
-
-    Returns
-    -------
-    Sectors
-        Shape (n, SECTORS).
+    in_part : bool
+        Whether an uncertain cell blocks only a part of the ways.
     """
-    discs = len(radii_m)
-    ends = radii_m + ways_m if shares is None else radii_m + np.multiply.outer(shares, ways_m)
-    cell, disc = (cells.distances[:, None] < ends).nonzero()
-    if len(cell) == 0:
-        return np.zeros((discs, SECTORS), dtype=np.bool_)
-    radii, ways = radii_m[disc], ways_m[disc]
-    d = np.maximum(cells.distances[cell], radii + 1e-9)
-    squares, corners = d * d, (ways_m * ways_m + radii_m * radii_m)[disc]
-    # Passed on the way: asin(R/d), the enlargement of VFH+. Beside its end: the law of cosines.
-    beside = (squares > corners).nonzero()[0]
-    half = np.arcsin(radii / d)
-    if len(beside):
-        way, radius, far = ways[beside], radii[beside], d[beside]
-        cosines = (squares[beside] + (way * way - radius * radius)) / (2.0 * way * far)
-        half[beside] = np.arccos(np.minimum(cosines, 1.0))
-    half *= 1.0 / SECTOR_RAD
-    middle = (np.arctan2(cells.dy, cells.dx) / SECTOR_RAD)[cell]
-    # Each run adds 1 where it begins and takes it away behind its end, on a line twice round for each disc; a run
-    # without a sector ends before it begins, and adds nothing.
-    middle += disc * LINE + SECTORS
-    begins = np.bincount(np.ceil(middle - half).astype(np.intp), minlength=discs * LINE)
-    ends_at = np.bincount(np.floor(middle + half).astype(np.intp) + 1, minlength=discs * LINE)
-    counts = (begins - ends_at).cumsum().reshape(discs, LINE) > 0
-    covered: Sectors = counts[:, :SECTORS] | counts[:, SECTORS : 2 * SECTORS]
-    covered[:, 0] |= counts[:, 2 * SECTORS]
+    covered = np.empty((len(radii_m), SECTORS), np.bool_)
+    cover(
+        cells.dx, cells.dy, cells.distances, cells.certainties, np.array(radii_m, np.float64),
+        np.array(ways_m, np.float64), in_part, np.empty((len(radii_m), LINE), np.int64), covered,
+    )  # fmt: skip
     return covered
+
+
+@kernel
+def cover(
+    dx: Floats, dy: Floats, distances: Floats, certainties: Floats, radii_m: Floats, ways_m: Floats, in_part: bool,
+    steps: Ints, covered: Sectors,
+) -> None:  # fmt: skip
+    """Write what `crossed` returns.
+
+    A disc that passes a cell on its way touches it within asin(R/d), the enlargement of VFH+; beside its end, within
+    the angle of the law of cosines.
+
+    Parameters
+    ----------
+    dx, dy, distances, certainties : (k,) float
+        As of `Cells`.
+    radii_m, ways_m, in_part
+        As of `crossed`.
+    steps : (n, LINE) int
+        Scratch: how many runs of sectors begin at each place of a disc's line, less those that ended before it.
+    covered : (n, SECTORS) bool
+        Out.
+    """
+    steps[:] = 0
+    covered[:] = False
+    for i in range(dx.shape[0]):
+        bearing = math.nan
+        for n in range(radii_m.shape[0]):
+            radius = radii_m[n]
+            way = ways_m[n]
+            if distances[i] >= radius + (certainties[i] * way if in_part else way):
+                continue
+            if math.isnan(bearing):
+                bearing = math.atan2(dy[i], dx[i]) / SECTOR_RAD + SECTORS
+            d = max(distances[i], radius + 1e-9)
+            if d * d > way * way + radius * radius:
+                half = math.acos(min(1.0, (d * d + (way * way - radius * radius)) / (2.0 * way * d)))
+            else:
+                half = math.asin(radius / d)
+            half *= 1.0 / SECTOR_RAD
+            # A run without a sector ends before it begins, and adds nothing.
+            steps[n, math.ceil(bearing - half)] += 1
+            steps[n, math.floor(bearing + half) + 1] -= 1
+    for n in range(radii_m.shape[0]):
+        runs = 0
+        for at in range(LINE):
+            runs += steps[n, at]
+            if runs > 0:
+                covered[n, at % SECTORS] = True
 
 
 def masked_by_turning(cells: Cells, heading_rad: float, radius_m: float, turning_radius_m: float) -> Sectors:
@@ -228,7 +277,6 @@ def blocked_sectors(
     """
     block_m = min(config.block_m, target_m)
     radius_m, comfort_m, least_m = radii_m
-    radii = np.array([radius_m, radius_m, comfort_m, least_m])
-    ways = np.array([block_m, min(config.free_m, target_m), block_m, block_m])
-    blocks, keeps, near, closed = crossed(cells, radii, ways, cells.certainties)
+    ways_m = (block_m, min(config.free_m, target_m), block_m, block_m)
+    blocks, keeps, near, closed = crossed(cells, (radius_m, radius_m, comfort_m, least_m), ways_m, in_part=True)
     return blocks | (keeps & np.frombuffer(before, dtype=np.bool_)), near, closed

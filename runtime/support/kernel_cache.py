@@ -35,6 +35,7 @@ PACKAGES: Final = (
     "perception.bayes",
     "perception.localization",
     "perception.mapping.grid",
+    "behaviors.valley",
     "drivers.emulator",
 )
 """Packages that hold kernels."""
@@ -45,11 +46,12 @@ POLYGONS: Final = "polygons"
 EMULATOR: Final = "emulator"
 LOCALIZATION: Final = "localization"
 KNOWN_ROOM: Final = "known_room"
+VALLEY: Final = "valley"
 GRIDS: Final = ("directed", "moravec_elfes", "elfes")
-PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, *GRIDS)
+PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, *GRIDS)
 """What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, the
-emulator, the correction of drift, finding the robot in a known room, and each kind of evidence grid. A file with the
-name of a part in the cache folder says that it is compiled."""
+emulator, the correction of drift, finding the robot in a known room, the choice of a valley, and each kind of
+evidence grid. A file with the name of a part in the cache folder says that it is compiled."""
 
 COMPILED_SUFFIX: Final = ".compiled"
 """Ending of empty files in the cache folder, one for each kernel that was compiled, from which progress is shown."""
@@ -126,7 +128,7 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     localization = (LOCALIZATION,) if settings.perception.localization.correct_drift else ()
     known_room = () if settings.perception.localization.known_room is None else (KNOWN_ROOM,)
     grid = () if settings.perception.grid.method == "off" else (settings.perception.grid.method,)
-    return (EMULATOR, settings.perception.method, *polygons, *localization, *known_room, *grid)
+    return (EMULATOR, settings.perception.method, *polygons, *localization, *known_room, VALLEY, *grid)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:

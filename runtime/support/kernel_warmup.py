@@ -29,6 +29,7 @@ from runtime.support.kernel_cache import (
     LOCALIZATION,
     PAPER,
     POLYGONS,
+    VALLEY,
     is_interpreted,
     needed_parts,
     uncompiled_parts,
@@ -198,9 +199,22 @@ def _known_room(settings: Settings) -> None:
     known_room.localized()
 
 
+def _valley(settings: Settings) -> None:
+    """Choose among the valleys before an echo."""
+    import numpy as np
+
+    from behaviors.valley.polar_histogram import cells_near, crossed
+    from perception.percept import FieldOfView, Percept, Pose
+
+    nothing = np.empty(0)
+    view = FieldOfView(nothing, nothing, nothing, nothing, 0.1, 1.0, 1.0)
+    percept = Percept(Pose(0.0, 0.0, 0.0), np.array([[1.0, 0.0]]), view)
+    crossed(cells_near(percept, 0.0, 0.0, 2.0, settings.behaviors.follow_valley), (0.5,), (1.0,))
+
+
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
     EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper, LOCALIZATION: _localization,
-    KNOWN_ROOM: _known_room, **{method: partial(_grid, method=method) for method in GRIDS},
+    KNOWN_ROOM: _known_room, VALLEY: _valley, **{method: partial(_grid, method=method) for method in GRIDS},
 })  # fmt: skip
 """Runs each part once."""
 

@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from behaviors.valley.polar_histogram import (
     ALL_FREE,
-    SECTOR_RAD,
-    SECTORS,
     Cells,
     Sectors,
     blocked_sectors,
     cells_near,
     crossed,
-    heard_at,
     masked_by_turning,
     room_m,
 )
 from config.behaviors import FollowValleyConfig
+from runtime.support.kernel_cache import compiled_signatures
+from tests import naive_valley
 from tests.behaviors.valley.windows import at
 
 CONFIG = FollowValleyConfig(block_m=1.0, free_m=1.3, occupied_probability=0.6, sure_probability=0.8)
 
 
-def cells(*places: tuple[float, float], certainty: float = 1.0) -> Cells:
-    x, y = np.array(places, dtype=np.float64).reshape(-1, 2).T
-    return Cells(x, y, np.hypot(x, y), np.full(len(x), certainty))
+def cells(*places: tuple[float, float], certainties: Sequence[float] = ()) -> Cells:
+    x, y = np.array(places, dtype=np.float64).reshape(-1, 2).T.copy()
+    return Cells(x, y, np.hypot(x, y), np.array([*certainties] or np.ones(len(x))))
 
 
 def one_crossed(found: Cells, radius_m: float, way_m: float) -> Sectors:
-    (sectors,) = crossed(found, np.array([radius_m]), np.array([way_m]))
+    (sectors,) = crossed(found, [radius_m], [way_m])
     return np.asarray(sectors)
 
 
@@ -40,23 +41,24 @@ def blocked_within(found: Cells, before: bytes, target_m: float = 9.0) -> bytes:
     return blocked_sectors(found, before, (0.5, 0.6, 0.45), target_m, CONFIG)[0].tobytes()
 
 
-def gap_m(x: float, y: float, sector: int, way_m: float) -> float:
-    """Return how near a point's centre comes that drives along a sector's middle."""
-    ux, uy = math.cos(sector * SECTOR_RAD), math.sin(sector * SECTOR_RAD)
-    along = min(way_m, max(0.0, x * ux + y * uy))
-    return math.hypot(x - along * ux, y - along * uy)
-
-
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.boundscheck
 def test_a_sector_is_crossed_where_the_disc_would_touch_a_cell(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    radius_m, way_m = float(rng.uniform(0.2, 0.8)), float(rng.uniform(0.3, 2.0))
-    places = [(float(x), float(y)) for x, y in rng.uniform(-2.5, 2.5, (seed + 1, 2)) if math.hypot(x, y) > radius_m]
-    found = one_crossed(cells(*places), radius_m, way_m)
-    for sector in range(SECTORS):
-        nearest = min((gap_m(x, y, sector, way_m) for x, y in places), default=math.inf)
-        if abs(nearest - radius_m) > 1e-6:
-            assert found[sector] == (nearest < radius_m), (sector, nearest)
+    places = [(float(x), float(y)) for x, y in rng.uniform(-2.5, 2.5, (seed, 2))]
+    certainties = [float(share) for share in rng.uniform(0.1, 1.0, seed)]
+    radii_m, ways_m = rng.uniform(0.2, 0.8, 3).tolist(), rng.uniform(0.3, 2.0, 3).tolist()
+    known, in_part = cells(*places, certainties=certainties), seed % 2 == 0
+    naive = [(x, y, certainty) for (x, y), certainty in zip(places, certainties, strict=True)]
+    for found, radius_m, way_m in zip(crossed(known, radii_m, ways_m, in_part=in_part), radii_m, ways_m, strict=True):
+        expected = naive_valley.touched(naive, radius_m, way_m, in_part=in_part)
+        differ = [
+            sector
+            for sector, (flag, touches) in enumerate(zip(found.tolist(), expected, strict=True))
+            if touches is not None and flag != touches
+        ]
+        assert differ == []
+        assert expected.count(None) < 3
 
 
 def test_a_cell_inside_the_disc_leaves_the_ways_away_from_it() -> None:
@@ -72,7 +74,7 @@ def test_nothing_near_blocks_nothing() -> None:
 
 def test_a_sure_cell_blocks_within_one_way_and_frees_beyond_another() -> None:
     def ahead(distance_m: float, before: bytes, certainty: float = 1.0) -> bytes:
-        return blocked_within(cells((distance_m, 0.0), certainty=certainty), before)
+        return blocked_within(cells((distance_m, 0.0), certainties=[certainty]), before)
 
     assert ahead(1.49, ALL_FREE)[0] == 1
     assert ahead(1.51, ALL_FREE)[0] == 0
@@ -96,39 +98,50 @@ def test_a_sector_with_less_room_than_is_wanted_is_blocked_and_closed_only_if_th
         assert (blocked[0], near[0], closed[0]) == (True, True, is_closed)
 
 
-def test_cells_are_those_of_the_grid_and_the_fresh_echoes() -> None:
-    percept = at(0.13, -0.21, walls=[(1.0, -1.0, 1.0, 1.0), (-5.0, 0.0, -5.0, 1.0)], echoes=[(0.5, 0.5), (3.0, 0.0)])
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.boundscheck
+def test_cells_are_those_of_the_grid_and_the_fresh_echoes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-7.5, 7.5, 2)  # some are outside the grid
+    percept = at(*place.tolist(), echoes=[(float(ex), float(ey)) for ex, ey in rng.uniform(-8.0, 8.0, (60, 2))])
     assert percept.occupancy is not None
-    grid = percept.occupancy
-    found = cells_near(percept, 0.13, -0.21, 1.5, CONFIG)
-    expected = {(0.37, 0.71)}
-    for row, column in np.argwhere(grid.occupied > 0.6).tolist():
-        dx, dy = grid.x_m + (column + 0.5) * 0.1 - 0.13, grid.y_m + (row + 0.5) * 0.1 + 0.21
-        if math.hypot(dx, dy) < 1.5:
-            expected.add((round(dx, 6), round(dy, 6)))
-    assert {(round(x, 6), round(y, 6)) for x, y in zip(found.dx, found.dy, strict=True)} == expected
-    assert len(expected) > 15
-    assert set(found.certainties.tolist()) == {1.0}
+    percept.occupancy.occupied[:] = rng.uniform(0.5, 0.9, percept.occupancy.occupied.shape)
+    heard = (0.4, -0.3, 0.5 * (seed % 3))
+    x, y = place.tolist()
+    found = cells_near(percept, x, y, 1.5, CONFIG, only_heard=heard)
+    rows = np.column_stack([found.dx, found.dy, found.certainties])
+    expected = naive_valley.cells_near(percept, x, y, 1.5, 0.6, 0.8, only_heard=heard)
+    np.testing.assert_allclose(rows, np.array(expected).reshape(-1, 3), atol=1e-6)
+    np.testing.assert_allclose(found.distances, np.hypot(found.dx, found.dy))
+
+
+def test_without_a_grid_there_are_echoes_only() -> None:
+    percept = replace(at(0.0, 0.0, echoes=[(0.5, 0.5), (3.0, 0.0)]), occupancy=None)
+    found = cells_near(percept, 0.0, 0.0, 1.5, CONFIG)
+    assert (found.dx.tolist(), found.dy.tolist(), found.certainties.tolist()) == ([0.5], [0.5], [1.0])
+
+
+def test_no_layout_of_an_array_compiles_a_kernel_again() -> None:
+    """In a cycle that would take a second."""
+    walls = [(1.0, -1.0, 1.0, 1.0)]
+    first = cells_near(at(0.0, 0.0, walls=walls), 0.0, 0.0, 1.5, CONFIG)
+    before = compiled_signatures()
+    percept = at(0.0, 0.0, walls=walls)
+    assert percept.occupancy is not None
+    grid = replace(percept.occupancy, occupied=np.asfortranarray(percept.occupancy.occupied))
+    echoes = np.zeros((4, 2, 2))[::2, :, 0]
+    for of in (grid.occupied, echoes):
+        of.flags.writeable = False
+    found = cells_near(replace(percept, occupancy=grid, obstacles=echoes), 0, 0, 1.5, CONFIG)
+    crossed(found, [1, 1], [1, 1])
+    assert compiled_signatures() == before
+    assert len(found.dx) == len(first.dx) + 2
 
 
 def test_a_place_outside_the_grid_has_echoes_only() -> None:
     percept = at(0.0, 0.0, walls=[(1.0, -1.0, 1.0, 1.0)], echoes=[(50.5, 0.0), (float("nan"), 0.0)])
     for x in (-50.0, 50.0):
         assert len(cells_near(percept, x, 0.0, 1.5, CONFIG).dx) == (x > 0.0)
-
-
-def test_near_a_place_only_what_is_heard_is_left() -> None:
-    echoes = [(1.0, 0.1), (-2.0, 0.0)]
-    percept = at(0.0, 0.0, walls=[(1.2, -1.0, 1.2, 1.0)], echoes=echoes)
-    around = cells_near(percept, 0.0, 0.0, 3.0, CONFIG)
-    found = heard_at(around, (1.0, 0.0), 0.5, percept)
-    before = list(zip(around.dx.tolist(), around.dy.tolist(), around.certainties.tolist(), strict=True))
-    kept = [cell for cell in before if math.dist(cell[:2], (1.0, 0.0)) >= 0.5]
-    assert 4 < len(kept) < len(before) - 4
-    after = list(zip(found.dx.tolist(), found.dy.tolist(), found.certainties.tolist(), strict=True))
-    assert after == [*kept, (1.0, 0.1, 1.0)], "each echo once"
-    assert (-2.0, 0.0, 1.0) in kept
-    np.testing.assert_allclose(found.distances, np.hypot(found.dx, found.dy))
 
 
 def test_an_uncertain_cell_counts_in_part() -> None:

@@ -19,7 +19,7 @@ from config.load import load_model, load_settings
 from config.settings import Settings
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_loader
-from runtime.support.kernel_cache import BAYES, COMPILED_SUFFIX, EMULATOR, POLYGONS
+from runtime.support.kernel_cache import BAYES, COMPILED_SUFFIX, EMULATOR, POLYGONS, needed_parts
 from runtime.support.kernel_loader import KernelLoader, KernelPreparation
 from tests.hil.running import ROOT
 
@@ -154,7 +154,7 @@ def test_a_preparation_is_needed_only_where_something_is_uncompiled(
 ) -> None:
     Compiler(monkeypatch, tmp_path, ())
     assert isinstance(kernel_loader.begin_preparation(ROUND), KernelPreparation)
-    for part in (EMULATOR, BAYES):
+    for part in needed_parts(ROUND):
         (tmp_path / part).touch()
     assert kernel_loader.begin_preparation(ROUND) is None
     assert isinstance(kernel_loader.begin_preparation(BOXES), KernelPreparation)

@@ -16,6 +16,7 @@ import pytest
 from numba.core import event
 from rich.console import Console
 
+from behaviors.valley import polar_histogram
 from config.load import load_settings
 from config.settings import Settings
 from perception.bayes import polygon_tracks, refine
@@ -54,6 +55,7 @@ def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) 
 DRIFT = frozenset({"add_landmark", "remove_landmark"})
 TRACKER = frozenset({"propagate", "update_with_firing"})
 GRID = frozenset({"fill_cell", "score_block", "offer_peaks"})
+HISTOGRAM = frozenset({"fill_cells", "cover"})
 TRACK = frozenset({"add_hypothesis", "move", "update_particles", "conclude"})
 
 
@@ -71,9 +73,10 @@ def test_each_compiled_kernel_leaves_a_mark(tmp_path: Path) -> None:
     [
         (kernels.LOCALIZATION, {drift_correction: DRIFT, landmark_tracker: TRACKER}),
         (kernels.KNOWN_ROOM, {pose_grid: GRID, pose_track: TRACK}),
+        (kernels.VALLEY, {polar_histogram: HISTOGRAM}),
     ],
 )
-def test_the_warm_up_of_localization_runs_every_kernel_that_it_calls(
+def test_a_warm_up_runs_every_kernel_that_its_part_calls(
     part: str, names: dict[ModuleType, frozenset[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done = set[str]()
@@ -125,13 +128,13 @@ def test_each_part_is_compiled_once_and_then_warmed_up(tmp_path: Path, monkeypat
     monkeypatch.setattr(kernel_warmup, "warm_up", lambda _settings, parts: happened.extend(parts))
     settings, console = load_settings("hallway"), Console(quiet=True)
     kernel_warmup.prepare_kernels(settings, console)
-    assert happened == ["compile emulator", "compile bayes"]
+    assert happened == ["compile emulator", "compile bayes", "compile valley"]
     happened.clear()
     kernel_warmup.prepare_kernels(settings, console)
-    assert happened == ["bayes"], "the emulator is another process"
+    assert happened == ["bayes", "valley"], "the emulator is another process"
     happened.clear()
     kernel_warmup.prepare_kernels(load_settings("hallway", models=["box"]), console)
-    assert happened == ["compile polygons", "bayes"]
+    assert happened == ["compile polygons", "bayes", "valley"]
     (tmp_path / kernels.BAYES).unlink()
     assert kernels.uncompiled_parts(tmp_path, kernels.PARTS) == [
         kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM, *kernels.GRIDS,
@@ -192,6 +195,7 @@ from config.load import load_model
 from perception.edits import (
     ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RemoveObject,
 )
+from behaviors.move_to_goal import Goal
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
@@ -205,6 +209,8 @@ encoder = FrameEncoder(settings)
 def by_hand(cycle, state):
     # every half second one action after the other, also with a model that came late
     perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
+    if cycle == 145:
+        return OperatorInput(drive_request=Goal(state.odometry.pose.x + 2.0, 0.0))
     if cycle % 10 or state.odometry is None:
         return OperatorInput(arm)
     encoder.frame(state, None, FrameContext(host_s=0.0))
@@ -227,6 +233,7 @@ with event.install_listener("numba:compile", Listener()):
         settings, settings.world, 0, 15.0, operator=by_hand, reload=lambda n: further if n == 100 else None,
     )
 assert run.state.cycle > 280 and run.state.odometry.pose.x > 1.0, run.state
+assert run.state.goal_drive.search.way
 sys.exit(" ".join(late))
 """
 
@@ -242,7 +249,7 @@ sys.exit(" ".join(late))
         ("perception.method=paper", "semicircle", "box"),
     ],
 )
-def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_edits(
+def test_no_kernel_is_compiled_while_the_robot_drives_and_a_person_edits(
     tmp_path: Path, sets: str, models: str, further: str
 ) -> None:
     """The emulator's kernels may still load: it is another process when it matters."""
@@ -254,7 +261,8 @@ def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_e
         [sys.executable, "-c", COMPILED_LATER, sets, models, further],
         cwd=ROOT, text=True, capture_output=True, check=False,
     )  # fmt: skip
-    sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
+    files = (path for package in ("perception", "behaviors") for path in (ROOT / package).rglob("*.py"))
+    sources = "".join(path.read_text("utf-8") for path in files)
     assert "Traceback" not in done.stderr, done.stderr
     late = [name for name in done.stderr.split() if f"def {name}(" in sources]
     assert late == [], done.stderr
