@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from behaviors.blocked_ahead import Ahead, Block, between, blocked_ahead, outline, pocket_ahead, presume, widen
 from behaviors.clearance import free_paths_m
-from behaviors.near_memory import NearEchoes, remember
+from behaviors.near_memory import NearEchoes, places, remember
 from behaviors.response import Response
 from behaviors.steady_heading import turned_towards
 from config.behaviors import LeaveCanyonConfig
@@ -142,16 +142,17 @@ def leave_canyon(
     virtual = [between(*canyon.mouth) for canyon in percept.canyons if is_closed(canyon, pose, goal, config)]
     if detour.block is not None:
         virtual.append(outline(detour.block))
-    near, remembered = remember(detour.near, echoes, pose, detour.driven_m, body_radius_m)
-    detour = replace(detour, near=near)
-    points = np.concatenate([echoes, remembered, *virtual])
-    free = _free_m(points, pose, bearing, body_radius_m + PASSAGE_M)
+    detour = replace(detour, near=remember(detour.near, echoes, pose, detour.driven_m, body_radius_m))
     if to_goal < detour.nearest_m - NEARER_M:
         detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
     is_held = any(holds(canyon, pose, goal, config) for canyon in percept.canyons)
+    waits = waits and detour.side == 0 and detour.driven_m - detour.nearest_driven_m < STALL_M
+    if waits and not virtual and not is_held:  # only echoes could close the way
+        return None, detour
+    points = np.concatenate([echoes, places(detour.near), *virtual])
+    counted = np.concatenate([NO_POINTS, *virtual]) if waits else points
+    free = _free_m(counted, pose, bearing, body_radius_m + PASSAGE_M)
     if detour.side == 0:
-        if waits and detour.driven_m - detour.nearest_driven_m < STALL_M:
-            free = _free_m(np.concatenate([NO_POINTS, *virtual]), pose, bearing, body_radius_m + PASSAGE_M)
         if free >= min(to_goal, config.look_m) and not is_held:
             return None, detour
         detour = _begin(points, pose, goal, percept.canyons, detour, room, config)
@@ -212,7 +213,7 @@ def _presume(
     if detour.block is not None:
         pocket = pocket_ahead(echoes, pose, detour.block.axis_rad, reach)
         return replace(detour, block=widen(detour.block, echoes, pose, pocket))
-    if detour.side != 0:
+    if detour.side != 0 or (reach <= 0.0 and detour.ahead is None):
         return detour
     pocket = pocket_ahead(echoes, pose, bearing_rad, reach)
     ahead = blocked_ahead(echoes, pose, bearing_rad, reach, detour.ahead, step, room_m, pocket)

@@ -7,6 +7,7 @@ remember where it was heard, for some metres and not for some seconds.
 
 from __future__ import annotations
 
+import math
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -25,10 +26,8 @@ SPACING_M: Final = 0.1
 KEPT_MAX: Final = 64
 
 
-def remember(
-    kept: NearEchoes, echoes: Floats, pose: Pose, driven_m: float, body_radius_m: float
-) -> tuple[NearEchoes, Floats]:
-    """Return what is remembered now, and its places, shape (n, 2), m.
+def remember(kept: NearEchoes, echoes: Floats, pose: Pose, driven_m: float, body_radius_m: float) -> NearEchoes:
+    """Return what is remembered now.
 
     Parameters
     ----------
@@ -43,17 +42,18 @@ def remember(
     body_radius_m
         What the body stands on was no obstacle.
     """
-    fresh = np.column_stack([echoes, np.full(len(echoes), driven_m)])
-    fresh = fresh[_distances(fresh, pose) < NEAR_M]
-    old = np.array(kept).reshape(-1, 3)
-    away = _distances(old, pose)
-    old = old[(away > body_radius_m) & (away < NEAR_M) & (old[:, 2] > driven_m - KEPT_M)]
-    if len(old) and len(fresh):
-        apart = np.hypot(old[:, 0, None] - fresh[:, 0], old[:, 1, None] - fresh[:, 1])
-        old = old[apart.min(axis=1) > SPACING_M]
-    rows = np.concatenate([fresh, old])[:KEPT_MAX]
-    return tuple((x, y, at) for x, y, at in rows.tolist()), rows[:, :2]
+    here = (pose.x, pose.y)  # of five and ten places: numpy's calls would take longer
+    fresh = [(x, y, driven_m) for x, y in echoes.tolist() if math.dist((x, y), here) < NEAR_M][:KEPT_MAX]
+    old = [
+        (x, y, at)
+        for x, y, at in kept
+        if at > driven_m - KEPT_M
+        and body_radius_m < math.dist((x, y), here) < NEAR_M
+        and not any(math.dist((x, y), (newer_x, newer_y)) <= SPACING_M for newer_x, newer_y, _ in fresh)
+    ]
+    return (*fresh, *old)[:KEPT_MAX]
 
 
-def _distances(rows: Floats, pose: Pose) -> Floats:
-    return np.hypot(rows[:, 0] - pose.x, rows[:, 1] - pose.y)
+def places(kept: NearEchoes) -> Floats:
+    """Return where what is remembered was heard, shape (n, 2), m."""
+    return np.array(kept).reshape(-1, 3)[:, :2]
