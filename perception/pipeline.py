@@ -369,5 +369,7 @@ class Perception:
         put_back(self, snapshot)
         self.method.drop_caches()
         self.vacant.drop_caches()
+        if self.grid is not None:
+            self.grid.drop_caches()
         if self.known_room is not None:
             self.known_room.drop_caches()

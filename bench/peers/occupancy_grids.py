@@ -84,6 +84,9 @@ class Peer(ABC):
         most: Floats = self.window.unrolled(self.log_odds).max(axis=2)
         return np.asarray(1.0 / (1.0 + np.exp(-most)), np.float32)
 
+    def drop_caches(self) -> None:  # noqa: B027 - a peer derives nothing
+        """Do nothing: nothing depends on the cells."""
+
     def clear(self) -> None:
         """Forget everything."""
         self.window.clear()

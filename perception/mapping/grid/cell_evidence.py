@@ -38,6 +38,7 @@ FADING_PLACES: Final = 50
 window; the faint evidence of one echo is gone after a few hundred metres."""
 
 Cells = NDArray[np.int16]
+Flags = NDArray[np.bool_]
 
 
 @kernel
@@ -67,15 +68,32 @@ def renew(kept: Cells, place: int) -> None:
 
 
 @kernel
-def is_sure_elsewhere(cell: Cells, own: int, place: int) -> bool:
-    """Return whether a cell is `SURE` in any looking direction but one, without this place's readings."""
+def is_sure_elsewhere(planes: Cells, maybe_sure: Flags, iy: int, ix: int, own: int, place: int) -> bool:
+    """Return whether a cell is `SURE` in any looking direction but one, without this place's readings.
+
+    Parameters
+    ----------
+    planes : (9, n, n, 4) int16
+        The evidence of all cells.
+    maybe_sure : (n, n) bool
+        False for cells whose hits are not enough for that in any direction, as almost everywhere. Updated.
+    iy, ix : int
+        The cell.
+    own : int
+        The direction that is left out.
+    place : int
+        Where the robot is now.
+    """
+    if not maybe_sure[iy, ix]:
+        return False
     most = 0
     for k in range(OCTANTS):
-        most = max(most, int(cell[k, BASE]) + int(cell[k, HIT]))
-    if most < SURE:  # as almost everywhere; what was passed and what has faded only lessens it
+        most = max(most, int(planes[k, iy, ix, BASE]) + int(planes[k, iy, ix, HIT]))
+    if most < SURE:  # what was passed and what has faded only lessens it
+        maybe_sure[iy, ix] = False
         return False
     for k in range(OCTANTS):
-        kept = cell[k]
+        kept = planes[k, iy, ix]
         if k != own and (int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)) >= SURE:
             return True
     return False

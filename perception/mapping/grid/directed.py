@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
+    BASE,
     CERTAIN,
     FREE,
     HIT,
@@ -33,8 +34,10 @@ from perception.mapping.grid.cell_evidence import (
     NOWHERE,
     PLACES,
     STAMP,
+    SURE,
     UNDIRECTED,
     Cells,
+    Flags,
     evidence_now,
     hit_nat,
     is_sure_elsewhere,
@@ -86,16 +89,18 @@ MIRROR_SHARE: Final = 0.5
 
 @kernel
 def enter_readings(
-    cells: Cells, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float, ranges: Floats,
-    mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float, mirrors: float,
-    answers: Floats, arc: Ints, shares: Floats, draws: Floats, edges: Floats,
+    planes: Cells, maybe_sure: Flags, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float,
+    ranges: Floats, mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float,
+    mirrors: float, answers: Floats, arc: Ints, shares: Floats, draws: Floats, edges: Floats,
 ) -> None:  # fmt: skip
     """Enter the readings of a firing: first what they passed, then their hits, so that their order does not matter.
 
     Parameters
     ----------
-    cells : (n, n, 9, 4) int16
-        The torus. Updated.
+    planes : (9, n, n, 4) int16
+        The torus, direction by direction. Updated.
+    maybe_sure : (n, n) bool
+        As of `is_sure_elsewhere`. Updated.
     corner : (2,) int
         Number of the window's first cell in x and y.
     cell_m : float
@@ -129,7 +134,7 @@ def enter_readings(
     edges : (4,) float
         Scratch.
     """
-    mask = cells.shape[0] - 1
+    mask = planes.shape[1] - 1
     square_sine = math.sin(half_angle) ** 2
     c = math.cos(yaw)
     s = math.sin(yaw)
@@ -149,16 +154,22 @@ def enter_readings(
         passed = r - PASSED_SIGMAS * sigma if is_echo else silence_m
         end = r + UNDIRECTED_ARC_SIGMAS * sigma if is_echo else silence_m
         is_located = is_echo and not math.isnan(bearings[i])
+        has_arc = is_echo and not is_located
         weight = PASSED * (1.0 - MIRRORS_PASSED * mirrors)
         weight_both = UNDIRECTED_PASSED
         if not is_echo:
             weight = SILENT * (1.0 - MIRRORS_SILENT * mirrors)
             weight_both = UNDIRECTED_SILENT
         nearest = math.inf
+        # Cells so near are passed, and in no arc: what is done there needs no root of the square of the distance.
+        deep = 0.999 * max(0.0, min(passed, end - 2.0 * UNDIRECTED_ARC_SIGMAS * sigma)) ** 2
+        one = octant(edges[0], edges[1])
+        other = octant(edges[2], edges[3])
         low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
         high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
         for iy in range(low_y, high_y + 1):
             dy = (iy + 0.5) * cell_m - sy
+            jy = iy & mask
             low, high = row_of_beam(dy, end, edges)
             if low > high:
                 continue
@@ -171,25 +182,27 @@ def enter_readings(
                 inside = 1.0 - across * across / (square * square_sine) if square > 0.0 else 0.0
                 if inside <= 0.0:
                     continue
-                d = math.sqrt(square)
-                k = octant(dx, dy)
-                cell = cells[iy & mask, ix & mask]
-                if is_echo and not is_located and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
-                    arc[m, 0] = iy & mask
-                    arc[m, 1] = ix & mask
-                    arc[m, 2] = k if abs(d - r) <= ARC_SIGMAS * sigma else UNDIRECTED
-                    arc[m, 3] = i
-                    shares[m, 0] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
-                    m += 1
-                if d < nearest and inside >= MIDDLE and is_sure_elsewhere(cell, k, place):
-                    nearest = d
-                if d < passed:
-                    own = cell[k]
-                    renew(own, place)
-                    own[FREE] = min(int(own[FREE]), -int(weight * inside))
-                    both = cell[UNDIRECTED]
-                    renew(both, place)
-                    both[FREE] = min(int(both[FREE]), -int(weight_both * inside))
+                k = one if one == other else octant(dx, dy)
+                jx = ix & mask
+                if square >= deep or maybe_sure[jy, jx]:
+                    d = math.sqrt(square)
+                    if has_arc and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
+                        arc[m, 0] = jy
+                        arc[m, 1] = jx
+                        arc[m, 2] = k if abs(d - r) <= ARC_SIGMAS * sigma else UNDIRECTED
+                        arc[m, 3] = i
+                        shares[m, 0] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
+                        m += 1
+                    if d < nearest and inside >= MIDDLE and is_sure_elsewhere(planes, maybe_sure, jy, jx, k, place):
+                        nearest = d
+                    if d >= passed:
+                        continue
+                own = planes[k, jy, jx]
+                renew(own, place)
+                own[FREE] = min(int(own[FREE]), -int(weight * inside))
+                both = planes[UNDIRECTED, jy, jx]
+                renew(both, place)
+                both[FREE] = min(int(both[FREE]), -int(weight_both * inside))
         if is_located and m < arc.shape[0]:
             px = r * math.cos(axis + bearings[i])
             py = r * math.sin(axis + bearings[i])
@@ -207,16 +220,18 @@ def enter_readings(
                 answers[0] += 1.0
             elif nearest < passed - BEYOND_M:
                 answers[1] += 1.0
-    enter_hits(cells, place, UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
+    enter_hits(planes, maybe_sure, place, UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
 
 
 @kernel
-def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats, draws: Floats) -> None:
+def enter_hits(
+    planes: Cells, maybe_sure: Flags, place: int, unit: float, arc: Ints, shares: Floats, draws: Floats
+) -> None:
     """Share each echo over its arc.
 
     Parameters
     ----------
-    cells, place, shares, draws
+    planes, maybe_sure, place, shares, draws
         As of `enter_readings`.
     unit : float
         The unit of evidence in a looking direction.
@@ -229,11 +244,10 @@ def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats,
         total = 0.0
         total_both = 0.0
         while last < len(arc) and arc[last, 3] == arc[first, 3]:
-            cell = cells[arc[last, 0], arc[last, 1]]
             share = shares[last, 0]
-            own = cell[arc[last, 2]]
+            own = planes[arc[last, 2], arc[last, 0], arc[last, 1]]
             renew(own, place)
-            both = cell[UNDIRECTED]
+            both = planes[UNDIRECTED, arc[last, 0], arc[last, 1]]
             renew(both, place)
             shares[last, 0] = share * draws[CERTAIN + without_hits(own)]
             shares[last, 1] = share * draws[CERTAIN + without_hits(both)]
@@ -242,25 +256,26 @@ def enter_hits(cells: Cells, place: int, unit: float, arc: Ints, shares: Floats,
             total_both += shares[last, 1]
             last += 1
         for n in range(first, last):
-            cell = cells[arc[n, 0], arc[n, 1]]
             if arc[n, 2] != UNDIRECTED:
-                own = cell[arc[n, 2]]
+                own = planes[arc[n, 2], arc[n, 0], arc[n, 1]]
                 own[HIT] = max(int(own[HIT]), hit_nat(unit * shares[n, 0] / total))
-            both = cell[UNDIRECTED]
+                if int(own[BASE]) + int(own[HIT]) >= SURE:
+                    maybe_sure[arc[n, 0], arc[n, 1]] = True
+            both = planes[UNDIRECTED, arc[n, 0], arc[n, 1]]
             both[HIT] = max(int(both[HIT]), hit_nat(UNDIRECTED_UNIT * shares[n, 1] / total_both))
         first = last
 
 
 @kernel
 def fill_probability(
-    cells: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
+    planes: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
     odds: NDArray[np.float32], out: NDArray[np.float32],
 ) -> None:  # fmt: skip
     """Write the probability of each cell.
 
     Parameters
     ----------
-    cells, corner, cell_m, place
+    planes, corner, cell_m, place
         As of `enter_readings`.
     mirrors : float
         Weight of the looking directions, 0 to 1, where they are asked together; the rest is that of the undirected.
@@ -271,28 +286,31 @@ def fill_probability(
     out : (n, n) float32
         Out: the probabilities, row by row from the smallest y.
     """
-    count = cells.shape[0]
-    for row in range(count):
+    mask = planes.shape[1] - 1
+    for row in range(mask + 1):
         iy = int(corner[1]) + row
-        for column in range(count):
+        jy = iy & mask
+        for column in range(mask + 1):
             ix = int(corner[0]) + column
-            cell = cells[iy & (count - 1), ix & (count - 1)]
-            if cell[UNDIRECTED, STAMP] == NOWHERE:
+            jx = ix & mask
+            both = planes[UNDIRECTED, jy, jx]
+            if both[STAMP] == NOWHERE:
                 out[row, column] = odds[CERTAIN]
                 continue
             if math.isnan(from_x):
                 most = 0
                 least = 0
                 for k in range(OCTANTS if mirrors > 0.0 else 0):
-                    if cell[k, STAMP] != NOWHERE:
-                        value = evidence_now(cell[k], place)
+                    kept = planes[k, jy, jx]
+                    if kept[STAMP] != NOWHERE:
+                        value = evidence_now(kept, place)
                         most = max(most, value)
                         least = min(least, value)
                 directed = max(0, most - FAINT) if most > 0 else least
-                value = int(mirrors * directed + (1.0 - mirrors) * evidence_now(cell[UNDIRECTED], place))
+                value = int(mirrors * directed + (1.0 - mirrors) * evidence_now(both, place))
             else:
                 k = octant((ix + 0.5) * cell_m - from_x, (iy + 0.5) * cell_m - from_y)
-                value = evidence_now(cell[k], place)
+                value = evidence_now(planes[k, jy, jx], place)
                 value = max(0, value - FAINT) if value > 0 else value
             out[row, column] = odds[CERTAIN + value]
 
@@ -308,14 +326,20 @@ class DirectedGrid:
         The sensors.
     """
 
-    SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds")
+    SCRATCH: Final = (
+        "window", "_ring", "_half_angle", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes",
+        "_maybe_sure",
+    )  # fmt: skip
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
         self._ring = ring
         self._half_angle = ring.half_angle
         self._rounding_m = ring.rounding_m
-        self.cells: Cells = np.zeros((window.cells, window.cells, OCTANTS + 1, 4), np.int16)
+        # A beam's cells are neighbours and share a direction, so those of one direction lie together in memory.
+        self._planes: Cells = np.zeros((OCTANTS + 1, window.cells, window.cells, 4), np.int16)
+        self.cells: Cells = np.moveaxis(self._planes, 0, 2)
+        self._maybe_sure: Flags = np.zeros((window.cells, window.cells), np.bool_)
         self._answers = np.zeros(2)
         self._place = 0
         room = len(ring.mounts) * arc_cells_max(window, ring)
@@ -335,12 +359,12 @@ class DirectedGrid:
 
     def observe(self, firing: Firing, bearings: Floats, place: int, silence_m: float) -> None:
         """Enter a firing; see `EvidenceGrid.observe`."""
-        if not self.window.follow(firing.pose, (self.cells,)):
+        if not self.window.follow(firing.pose, (self.cells, self._maybe_sure)):
             return
         self._place = 1 + place % (PLACES - 1)  # never NOWHERE
         mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_readings(
-            self.cells, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
+            self._planes, self._maybe_sure, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
             float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings, self._half_angle,
             self._rounding_m, silence_m, self.mirrors, self._answers, self._arc, self._shares, self._draws,
             self._edges,
@@ -353,9 +377,13 @@ class DirectedGrid:
         out = np.empty(self.cells.shape[:2], np.float32)
         x, y = (math.nan, math.nan) if seen_from is None else seen_from
         fill_probability(
-            self.cells, self.window.corner, self.window.cell_m, self._place, self.mirrors, x, y, self._odds, out
+            self._planes, self.window.corner, self.window.cell_m, self._place, self.mirrors, x, y, self._odds, out
         )
         return out
+
+    def drop_caches(self) -> None:
+        """Derive anew what depends on the cells, after they were overwritten."""
+        self._maybe_sure[:] = True
 
     def clear(self) -> None:
         """Forget everything."""

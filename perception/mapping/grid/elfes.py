@@ -130,6 +130,9 @@ class ElfesGrid:
         del seen_from
         return (1.0 / (1.0 + np.exp(-self.window.unrolled(self.log_odds)))).astype(np.float32)
 
+    def drop_caches(self) -> None:
+        """Do nothing: nothing depends on the cells."""
+
     def clear(self) -> None:
         """Forget everything."""
         self.window.clear()

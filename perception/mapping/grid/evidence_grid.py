@@ -53,6 +53,10 @@ class GridMethod(Protocol):
         """Return the probability of each cell, row by row from the smallest y; see `EvidenceGrid.occupancy`."""
         ...
 
+    def drop_caches(self) -> None:
+        """Derive anew what depends on the cells, after they were overwritten."""
+        ...
+
     def clear(self) -> None:
         """Forget everything."""
         ...
@@ -138,6 +142,10 @@ class EvidenceGrid:
         cell_m = self.window.cell_m
         x, y = (cell_m * float(number) for number in self.window.corner)
         return OccupancyWindow(self.method.probability(seen_from), x, y, cell_m)
+
+    def drop_caches(self) -> None:
+        """Derive anew what depends on the memory, after it was overwritten."""
+        self.method.drop_caches()
 
     def clear(self) -> None:
         """Forget everything, as after a reset of the odometry."""

@@ -138,6 +138,9 @@ class MoravecElfesGrid:
         empty, occupied = cells[..., EMPTY], cells[..., OCCUPIED]
         return (0.5 + 0.5 * np.where(occupied >= empty, occupied, -empty)).astype(np.float32)
 
+    def drop_caches(self) -> None:
+        """Do nothing: nothing depends on the cells."""
+
     def clear(self) -> None:
         """Forget everything."""
         self.window.clear()

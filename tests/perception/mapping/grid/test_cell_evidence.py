@@ -63,8 +63,11 @@ def test_a_cell_is_sure_elsewhere_by_its_other_directions_without_this_place(see
             for k in range(8)
             if k != own
         )
-        found.add(is_sure_elsewhere(cell, own, place))
-        assert is_sure_elsewhere(cell, own, place) == (most >= SURE)
+        planes, maybe_sure = cell.reshape(9, 1, 1, 4), np.ones((1, 1), np.bool_)
+        for _ in range(2):  # whether the flag was lowered or not
+            found.add(is_sure_elsewhere(planes, maybe_sure, 0, 0, own, place))
+            assert is_sure_elsewhere(planes, maybe_sure, 0, 0, own, place) == (most >= SURE)
+        assert maybe_sure[0, 0] or (cell[:8, BASE] + cell[:8, HIT]).max() < SURE
     assert found == {False, True}
 
 

@@ -9,9 +9,10 @@ import pytest
 
 from drivers.messages import Firing, Floats, Pose
 from perception.mapping.grid import directed
-from perception.mapping.grid.cell_evidence import FADING_PLACES, HIT, NAT, UNDIRECTED, evidence_now
+from perception.mapping.grid.cell_evidence import BASE, FADING_PLACES, HIT, NAT, SURE, UNDIRECTED, evidence_now
 from perception.mapping.grid.directed import DirectedGrid, arc_cells_max
 from perception.mapping.grid.window import Ring, Window, placed
+from perception.snapshot import put_back, snapshot_of
 from tests.naive_grid import NaiveGrid
 
 MOUNTS = np.array([[0.2, 0.0, 0.0], [0.1, 0.17, 0.5], [-0.1, 0.17, 1.2], [-0.2, 0.0, math.pi]])
@@ -60,6 +61,32 @@ def test_every_cell_is_as_in_the_oracle() -> None:
             ours = [evidence_now(kept, 11) for kept in cell]
             np.testing.assert_allclose(ours, [each.now(11) for each in oracle.cells[ix, iy]], atol=4)
     assert seen > 300
+
+
+def drive_among_mirrors(grid: DirectedGrid, places: range) -> None:
+    """Pass a wall that answers from the front and is passed by slanting beams, and one that answers all."""
+    for place in places:
+        x = 0.05 * place
+        front = firing([1.3, math.nan, math.nan, 1.1], x, 0.0, math.pi / 2.0)
+        slanting = firing([math.inf, 1.9, math.nan, math.nan], x - 1.6, 0.1, math.pi / 4.0)
+        for fired in (front, slanting):
+            grid.observe(fired, UNKNOWN, place, 4.0)
+
+
+def test_cells_that_may_be_sure_are_known_also_after_the_memory_was_overwritten() -> None:
+    grid, other = make_grid(), make_grid()
+    drive_among_mirrors(grid, range(1, 200))  # the window moves on, and cells leave it
+    sure = (grid.cells[:, :, :UNDIRECTED, BASE] + grid.cells[:, :, :UNDIRECTED, HIT] >= SURE).any(axis=2)
+    assert 20 < sure.sum() <= grid._maybe_sure.sum() < 400
+    assert not (sure & ~grid._maybe_sure).any()
+    put_back(other, snapshot_of(grid))
+    other.window.corner[:], other.window.placed = grid.window.corner, True
+    other.drop_caches()
+    before = grid._answers.tolist()
+    for each in (grid, other):
+        each.observe(firing([math.inf, *UNKNOWN[1:]], 7.5, 0.1, math.pi / 4.0), UNKNOWN, 200, 4.0)
+    assert before != grid._answers.tolist() == other._answers.tolist()
+    np.testing.assert_array_equal(grid.cells, other.cells)
 
 
 def test_order_of_the_sensors_in_a_firing_makes_no_difference() -> None:
