@@ -141,7 +141,10 @@ def observe_only(settings: Settings) -> None:
 
 
 def _circles(settings: Settings) -> None:
+    from perception.bayes.wall_bins import bin_of
+
     _drive_and_edit(settings, BAYES, settings.models)
+    bin_of(0.0)  # the report on walls calls it by itself
 
 
 def _polygons(settings: Settings) -> None:
