@@ -1,4 +1,4 @@
-"""The percept: the input of the behaviours, which import only this module and `config` of this program."""
+"""The percept: the input of the behaviours, which import only it, the kernel decorator and `config`."""
 
 from __future__ import annotations
 

@@ -327,14 +327,12 @@ class DirectedGrid:
     """
 
     SCRATCH: Final = (
-        "window", "_ring", "_half_angle", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes",
-        "_maybe_sure",
+        "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
     )  # fmt: skip
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
         self._ring = ring
-        self._half_angle = ring.half_angle
         self._rounding_m = ring.rounding_m
         # A beam's cells are neighbours and share a direction, so those of one direction lie together in memory.
         self._planes: Cells = np.zeros((OCTANTS + 1, window.cells, window.cells, 4), np.int16)
@@ -365,7 +363,7 @@ class DirectedGrid:
         mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_readings(
             self._planes, self._maybe_sure, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
-            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings, self._half_angle,
+            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings, self._ring.half_angle,
             self._rounding_m, silence_m, self.mirrors, self._answers, self._arc, self._shares, self._draws,
             self._edges,
         )  # fmt: skip
