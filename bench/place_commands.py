@@ -106,9 +106,7 @@ def known_room(
     return _try_in_rooms(rows, known_room_table, json, parts=(EMULATOR,))
 
 
-def place_bound(
-    laser: tuple[Path, ...], /, *, json: str = "place_bound.json", drives: int = 6, first: int = 100
-) -> int:
+def place_bound(*, laser: tuple[Path, ...], json: str = "place_bound.json", drives: int = 6, first: int = 100) -> int:
     """Compare ours with an exact filter over all poses: unknown start and kidnapping in real buildings.
 
     Parameters
