@@ -74,6 +74,21 @@ class Predictions(Record):
     """The same along the sensor's axis, m."""
 
 
+class NearReadings(Record):
+    """The recent readings that may bear on a new wall, field by field, and what each says of a line."""
+
+    x: Annotated[Floats, RECENT_MAX]
+    """As in `Reading`."""
+    y: Annotated[Floats, RECENT_MAX]
+    axis_x: Annotated[Floats, RECENT_MAX]
+    axis_y: Annotated[Floats, RECENT_MAX]
+    range_m: Annotated[Floats, RECENT_MAX]
+    is_free: Annotated[Floats, RECENT_MAX]
+    """1 for an echo that nothing explains, 0 for others."""
+    weight: Annotated[Floats, RECENT_MAX]
+    """For a line, or against it."""
+
+
 class Score(Record):
     """The evidence of readings for a circle or a polygon."""
 
@@ -172,7 +187,9 @@ class Scratch(Record):
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""
     near_recent: Annotated[Ints, RECENT_MAX]
-    """Places of the recent readings that may bear on a new wall."""
+    """Places of the recent readings that may bear on a new wall, …"""
+    near_readings: NearReadings
+    """… and those readings."""
     wall_evidence: Annotated[Floats, WALL_BINS]
     """Evidence that a wall covers each of its bins, nat."""
     wall_covered: Annotated[Ints, WALL_BINS]

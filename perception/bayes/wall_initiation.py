@@ -18,12 +18,11 @@ from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import Memory, StateRecord
 from perception.bayes.wall_bins import SILENT_PASS, bin_of, clear_wall, enter_reading
 from perception.bayes.wall_contact import (
-    BEAM_EDGE,
     FOOT,
     NOWHERE,
+    SLANTING_MIN_COS,
     contact,
     edges_answer,
-    range_sigma,
     tolerance,
     wall_normal,
 )
@@ -39,8 +38,8 @@ from perception.bayes.wall_records import (
     MAX_WALLS,
     RECENT_MAX,
     WALL_BINS,
-    Wall,
 )
+from perception.bayes.wall_support import copy_near, support
 from perception.kernel import kernel
 
 CANDIDATES_MAX: Final = 8
@@ -54,18 +53,6 @@ TANGENT_MAX_COS: Final = 0.9
 """Greatest difference of two ranges, as a share of the sensors' distance: beyond, a wall is seen end-on."""
 EDGE_NORMAL_MIN_COS: Final = 0.8
 """Least cosine between the axis and the normal of a wall from two beam edges."""
-REACH_M: Final = 3.0
-"""Readings that touch a candidate farther away than this do not count."""
-SCORE_SIGMAS: Final = 2.5
-SCORE_LEVER: Final = 0.03
-SCORE_LEVER_MAX_M: Final = 1.5
-"""Errors that support a candidate: in σ, and growing with the distance along it as its direction is uncertain."""
-SCORE_EDGE: Final = 0.6
-SCORE_PASS: Final = 0.7
-"""Weights of an echo from the beam's edge, and of a range that passed through."""
-PASS_M: Final = 0.3
-PASS_WITHIN_M: Final = 0.5
-"""A range this much longer passed through a candidate, where it touches it this near the echo."""
 SCORE_MIN: Final = 6.0
 NEW_WALL_ECHOES_MIN: Final = 6
 NEW_WALL_WEIGHT_MIN: Final = 6.0
@@ -126,7 +113,7 @@ def candidate(
 
 @kernel
 def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
-    """Write the places of the recent readings that may bear on a line through one of them, and return their number.
+    """Copy the recent readings that may bear on a line through one of them to the scratch, and return their number.
 
     It is 0 if too few of them are echoes that nothing explains.
 
@@ -147,44 +134,10 @@ def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
         other = room.recent[j].reading
         if j != newest and other.axis_x * q.axis_x + other.axis_y * q.axis_y >= least:
             s[0].scratch.near_recent[n] = j
+            copy_near(room.recent[j], s[0].scratch.near_readings, n)
             n += 1
             free += room.recent[j].is_free
     return n if free > SCORE_MIN else 0
-
-
-@kernel
-def support(s: StateRecord, wall: Wall, near: int, base: float, p: SettingsRecord) -> float:
-    """Return how many recent echoes a line explains, less those that passed through it near its origin.
-
-    Parameters
-    ----------
-    s, p
-        Memory and settings.
-    wall : Wall
-        The line; its origin is the place of an echo's sensor.
-    near : int
-        Number of the recent readings that may bear on it.
-    base : float
-        Distance of the sensor of the other echo through which it goes, m.
-    """
-    room = s[0].room
-    edges = edges_answer(room)
-    score = 1.0
-    for j in range(near):
-        recent = room.recent[s[0].scratch.near_recent[j]]
-        q = recent.reading
-        kind, expected, along, dot = contact(wall, q, p)
-        away = abs(along)
-        if kind == NOWHERE or away > REACH_M or (kind == BEAM_EDGE and not edges):
-            continue
-        e = q.range_m - expected
-        lever = SCORE_LEVER * min(away, SCORE_LEVER_MAX_M) / base
-        if abs(e) < SCORE_SIGMAS * range_sigma(room, expected) + lever:
-            if recent.is_free == IS_FREE:
-                score += 1.0 if kind == FOOT else SCORE_EDGE
-        elif e > PASS_M and away < PASS_WITHIN_M and kind == FOOT and dot >= p[0].cos_must_answer:
-            score -= SCORE_PASS
-    return score
 
 
 @kernel
@@ -225,7 +178,7 @@ def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
                 wall.normal_x = nx
                 wall.normal_y = ny
                 wall.offset = c - nx * q.x - ny * q.y
-                score = support(s, wall, near, base, p)
+                score = support(room, s[0].scratch.near_readings, near, wall, base, p)
                 if score > best:
                     best = score
                     best_x = nx
@@ -259,6 +212,8 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
     wall.normal_y = ny / length
     wall.slope = 0.0
     edges = edges_answer(room)
+    nx, ny = wall.normal_x, wall.normal_y
+    least = SLANTING_MIN_COS if edges else p[0].cos_half_angle
     echoes = 0
     clear_wall(wall)
     for j in range(min(room.recent_count, RECENT_MAX)):
@@ -266,8 +221,10 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
         if recent.is_free == IS_TAKEN:
             recent.is_free = IS_FREE
         q = recent.reading
+        if nx * q.axis_x + ny * q.axis_y < least:  # most of them: they face elsewhere
+            continue
         kind, expected, along, dot = contact(wall, q, p)
-        if kind == NOWHERE or (kind == BEAM_EDGE and not edges):
+        if kind == NOWHERE:
             continue
         e = q.range_m - expected
         slack = tolerance(room, wall, along, expected, dot)
@@ -281,6 +238,24 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
             if 0 <= b < WALL_BINS:
                 wall.bins[b].passes += 1.0 if q.range_m < FAR else SILENT_PASS
     return echoes
+
+
+@kernel
+def end_candidate(s: StateRecord, is_new: bool) -> None:
+    """Free the candidate's place, and mark the echoes that it took: as known if it has become a wall.
+
+    Parameters
+    ----------
+    s
+        Memory, updated.
+    is_new : bool
+        Whether it has.
+    """
+    room = s[0].room
+    room.walls[CANDIDATE].weight = 0.0
+    for j in range(RECENT_MAX):
+        if room.recent[j].is_free == IS_TAKEN:
+            room.recent[j].is_free = IS_KNOWN if is_new else IS_FREE
 
 
 @kernel
@@ -326,14 +301,12 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
     if not best_line(memory.s, p, newest):
         return False
     is_new = fit_candidate(memory, p)
-    walls: NDArray[Any] = memory.state["room"]["walls"][0]
     if is_new:
+        walls: NDArray[Any] = memory.state["room"]["walls"][0]
         weight = walls["weight"][:MAX_WALLS]
         slot = int(np.argmin(weight))
         if weight[slot] < min(walls["weight"][CANDIDATE], REPLACED_WEIGHT_MAX):
             walls[slot] = walls[CANDIDATE]
             number_spans(memory.s, slot)
-    walls["weight"][CANDIDATE] = 0.0
-    marks: NDArray[Any] = memory.state["room"]["recent"]["is_free"][0]
-    marks[marks == IS_TAKEN] = IS_KNOWN if is_new else IS_FREE
+    end_candidate(memory.s, is_new)
     return is_new
