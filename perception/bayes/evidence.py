@@ -17,18 +17,18 @@ from perception.bayes.occlusion import find_others, is_relevant
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.range_fit import FAR, score_circle
 from perception.bayes.reservoir import add_crosses, copy_reservoir
-from perception.bayes.scratch import Predictions, Score
+from perception.bayes.scratch import OtherCircle, Predictions, Score
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTracks, Memory, StateRecord
 from perception.edits import Arc, Evidence
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
 from perception.records import Records, records, zeros
 
 
 @kernel
 def circle_evidence(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, readings: Records[Reading],
-    score: Records[Score], predicted: Records[Predictions], others: Ints, nats: Floats,
+    score: Records[Score], predicted: Records[Predictions], others: Records[OtherCircle], nats: Floats,
 ) -> int:  # fmt: skip
     """Write the evidence of each reading for circle `t`, 0 where it does not bear on it; return how many there are.
 
@@ -44,7 +44,7 @@ def circle_evidence(
         Scratch.
     predicted : (1,) Predictions
         Scratch.
-    others : (≥ number of tracks,) int
+    others : (≥ number of tracks,) OtherCircle
         Scratch.
     nats : (READINGS_MAX,) float
         Out: the evidence of each, nat.
@@ -53,13 +53,13 @@ def circle_evidence(
     var0, rel2 = noise_variance(s, p)
     n = copy_reservoir(track, readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, readings, n)
-    known = others[: find_others(tracks, t, others)]
+    known = others[: find_others(tracks, t, p, track.x, track.y, track.radius, others)]
     for j in range(n):
         nats[j] = 0.0
         q = readings[j]
         d = math.hypot(track.x - q.x, track.y - q.y)
         e = circle_error(q, track.x - q.x, track.y - q.y, d, track.radius)
-        if is_relevant(tracks, known, p, q, track.x, track.y, track.radius, d, e, var0, rel2):
+        if is_relevant(known, p, q, track.x, track.y, track.radius, d, e, var0, rel2):
             score_circle(
                 readings[j : j + 1], track.x, track.y, track.radius, p, s[0].noise_level, predicted[0], score[0]
             )
@@ -110,7 +110,8 @@ def evidence_of(
     readings, score = records(Reading, heard), records(Score, zeros(Score, 1))
     t, rivals = row - len(memory.circles), tuple[tuple[str, float], ...]()
     if t < 0:
-        predicted, others = records(Predictions, zeros(Predictions, 1)), np.zeros(len(memory.circles), np.int64)
+        predicted = records(Predictions, zeros(Predictions, 1))
+        others = records(OtherCircle, zeros(OtherCircle, len(memory.circles)))
         n = circle_evidence(memory.s, memory.tracks, p, row, readings, score, predicted, others, nats)
         own = int(memory.circles["kind"][row])
         leads = memory.circles["leads"][row, : len(labels)].tolist()

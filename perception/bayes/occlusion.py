@@ -15,61 +15,11 @@ from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.prediction import predict_circle
 from perception.bayes.reservoir import copy_reading
+from perception.bayes.scratch import OtherCircle
 from perception.bayes.settings_record import Settings
 from perception.bayes.state import ESTABLISHED, CircleTrack, State
-from perception.kernel import Ints, kernel
+from perception.kernel import kernel
 from perception.records import Records
-
-
-@kernel
-def find_others(tracks: Records[CircleTrack], own: int, others: Ints) -> int:
-    """Write the places of the established circles other than `own`; return their number.
-
-    Few of the tracks are in use, and to ask all of them for each reading took half of the time.
-
-    Parameters
-    ----------
-    tracks : (n,) CircleTrack
-        The circles.
-    own : int
-        The circle whose readings are asked for; −1 where it has no track yet.
-    others : (≥ n,) int
-        Out.
-    """
-    count = 0
-    for t in range(len(tracks)):
-        if t != own and tracks[t].status == ESTABLISHED:
-            others[count] = t
-            count += 1
-    return count
-
-
-@kernel
-def is_hidden(
-    tracks: Records[CircleTrack], others: Ints, x: float, y: float, cx: float, cy: float, d: float, radius: float
-) -> bool:
-    """Return whether another circle lies between (x, y) and a circle about (cx, cy).
-
-    Parameters
-    ----------
-    tracks : (n,) CircleTrack
-        The circles.
-    others : (k,) int
-        Places of the established ones but for this one.
-    x, y : float
-        The sensor's position, m.
-    cx, cy, d, radius : float
-        The circle, and the distance of its centre, m.
-    """
-    ux = (cx - x) / d
-    uy = (cy - y) / d
-    for i in range(len(others)):
-        track = tracks[others[i]]
-        dx = track.x - x
-        dy = track.y - y
-        if 0.0 < dx * ux + dy * uy < d - radius and abs(dx * uy - dy * ux) < track.radius:
-            return True
-    return False
 
 
 @kernel
@@ -93,44 +43,106 @@ def is_elsewhere(track: CircleTrack, p: Records[Settings], cx: float, cy: float,
 
 
 @kernel
-def is_explained_elsewhere(
-    tracks: Records[CircleTrack], others: Ints, p: Records[Settings], q: Reading, cx: float, cy: float, radius: float,
-    off: float, var0: float, rel2: float,
-) -> bool:  # fmt: skip
-    """Return whether another established circle explains a reading, with an error smaller than `off`.
+def find_others(
+    tracks: Records[CircleTrack], own: int, p: Records[Settings], cx: float, cy: float, radius: float,
+    others: Records[OtherCircle],
+) -> int:  # fmt: skip
+    """Write the established circles other than `own`, and return their number.
+
+    Few of the tracks are in use, and to ask all of them for each reading took half of the time.
 
     Parameters
     ----------
-    tracks, others
-        As for `is_hidden`.
-    p : (1,) Settings
-        Beam and gate.
-    q : Reading
-        The reading.
-    cx, cy, radius, off : float
-        The circle, and its error for the reading, m.
-    var0, rel2 : float
-        From `noise_variance`.
+    tracks, p
+        The circles and the settings.
+    own : int
+        The circle whose readings are asked for; −1 where it has no track yet.
+    cx, cy, radius : float
+        That circle, m.
+    others : (≥ n,) OtherCircle
+        Out.
     """
+    count = 0
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if t == own or track.status != ESTABLISHED:
+            continue
+        other = others[count]
+        other.x = track.x
+        other.y = track.y
+        other.radius = track.radius
+        other.root_xx = track.root_xx
+        other.is_named = track.is_named
+        is_of_polygon = p[0].polygon_count > 0 and track.kind >= p[0].model_count
+        other.takes_readings = 1 if not is_of_polygon and is_elsewhere(track, p, cx, cy, radius) else 0
+        count += 1
+    return count
+
+
+@kernel
+def is_hidden(
+    others: Records[OtherCircle], x: float, y: float, cx: float, cy: float, d: float, radius: float
+) -> bool:  # fmt: skip
+    """Return whether another circle lies between (x, y) and a circle about (cx, cy).
+
+    Parameters
+    ----------
+    others : (k,) OtherCircle
+        The established circles but for this one.
+    x, y : float
+        The sensor's position, m.
+    cx, cy, d, radius : float
+        The circle, and the distance of its centre, m.
+    """
+    ux = (cx - x) / d
+    uy = (cy - y) / d
     for i in range(len(others)):
-        track = tracks[others[i]]
-        if p[0].polygon_count > 0 and track.kind >= p[0].model_count:
-            continue
-        if not is_elsewhere(track, p, cx, cy, radius):
-            continue
-        dx = track.x - q.x
-        dy = track.y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx
-        if dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d or not is_near_circle(q, d, track.radius, tight):
-            continue
-        if abs(circle_error(q, dx, dy, d, track.radius)) < min(off, tight):
+        other = others[i]
+        dx = other.x - x
+        dy = other.y - y
+        if 0.0 < dx * ux + dy * uy < d - radius and abs(dx * uy - dy * ux) < other.radius:
             return True
     return False
 
 
 @kernel
-def answers_before(tracks: Records[CircleTrack], others: Ints, p: Records[Settings], q: Reading) -> bool:
+def is_explained_elsewhere(
+    others: Records[OtherCircle], p: Records[Settings], q: Reading, off: float, var0: float, rel2: float
+) -> bool:  # fmt: skip
+    """Return whether another established circle explains a reading, with an error smaller than `off`.
+
+    Parameters
+    ----------
+    others
+        As for `is_hidden`.
+    p : (1,) Settings
+        Beam and gate.
+    q : Reading
+        The reading.
+    off : float
+        The circle's error for the reading, m.
+    var0, rel2 : float
+        From `noise_variance`.
+    """
+    for i in range(len(others)):
+        other = others[i]
+        if other.takes_readings == 0:
+            continue
+        dx = other.x - q.x
+        dy = other.y - q.y
+        d = math.sqrt(dx * dx + dy * dy)
+        if dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d:
+            continue
+        tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * other.root_xx
+        if is_near_circle(q, d, other.radius, tight) and abs(circle_error(q, dx, dy, d, other.radius)) < min(
+            off, tight
+        ):
+            return True
+    return False
+
+
+@kernel
+def answers_before(others: Records[OtherCircle], p: Records[Settings], q: Reading) -> bool:
     """Return whether another circle that is named must have answered a cross path sooner: so it comes from none.
 
     A listener reports the first pulse to arrive. Beams that are wide enough for listening look past bodies at places
@@ -138,19 +150,19 @@ def answers_before(tracks: Records[CircleTrack], others: Ints, p: Records[Settin
 
     Parameters
     ----------
-    tracks, others, p, q
+    others, p, q
         As for `is_explained_elsewhere`.
     """
     apart = math.sqrt(q.listener_x * q.listener_x + q.listener_y * q.listener_y)
     for i in range(len(others)):
-        track = tracks[others[i]]
-        if track.is_named == 0:
+        other = others[i]
+        if other.is_named == 0:
             continue
-        dx = track.x - q.x
-        dy = track.y - q.y
+        dx = other.x - q.x
+        dy = other.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
         # Half the way over it is longer than the way back by half the listener's distance at most.
-        is_before = d - track.radius + 0.5 * apart < q.range_m - p[0].gate_m
+        is_before = d - other.radius + 0.5 * apart < q.range_m - p[0].gate_m
         if is_before and dx * q.axis_x + dy * q.axis_y >= p[0].cos_must_answer * d:
             return True
     return False
@@ -158,23 +170,25 @@ def answers_before(tracks: Records[CircleTrack], others: Ints, p: Records[Settin
 
 @kernel
 def is_relevant(
-    tracks: Records[CircleTrack], others: Ints, p: Records[Settings], q: Reading, cx: float, cy: float, radius: float,
-    d: float, e: float, var0: float, rel2: float,
+    others: Records[OtherCircle], p: Records[Settings], q: Reading, cx: float, cy: float, radius: float, d: float,
+    e: float, var0: float, rel2: float,
 ) -> bool:  # fmt: skip
     """Return whether a reading bears on a circle: it is not hidden, and no other circle explains it better.
 
     Parameters
     ----------
-    tracks, others, p, q, cx, cy, radius, var0, rel2
+    others, p, q, var0, rel2
         As for `is_explained_elsewhere`.
+    cx, cy, radius : float
+        The circle, m.
     d, e : float
         Distance of the centre from the sensor, and the reading's error, m.
     """
-    if is_crossed(q) and (abs(e) > p[0].gate_m or answers_before(tracks, others, p, q)):
+    if is_crossed(q) and (abs(e) > p[0].gate_m or answers_before(others, p, q)):
         return False
     if e > p[0].gate_m:
-        return not (d > radius and is_hidden(tracks, others, q.x, q.y, cx, cy, d, radius))
-    return not is_explained_elsewhere(tracks, others, p, q, cx, cy, radius, abs(e), var0, rel2)
+        return not (d > radius and is_hidden(others, q.x, q.y, cx, cy, d, radius))
+    return not is_explained_elsewhere(others, p, q, abs(e), var0, rel2)
 
 
 @kernel
@@ -198,12 +212,12 @@ def keep_relevant(
     var0, rel2 = noise_variance(s, p)
     scratch = s[0].scratch
     readings, predicted = scratch.readings, scratch.predicted
-    others = scratch.others[: find_others(tracks, own, scratch.others)]
+    others = scratch.others[: find_others(tracks, own, p, cx, cy, radius, scratch.others)]
     predict_circle(readings[:n], cx, cy, radius, predicted)
     kept = 0
     for j in range(n):
         d, e = predicted.distance[j], predicted.error[j]
-        if is_relevant(tracks, others, p, readings[j], cx, cy, radius, d, e, var0, rel2):
+        if is_relevant(others, p, readings[j], cx, cy, radius, d, e, var0, rel2):
             if kept != j:
                 copy_reading(readings[j], readings[kept])
             kept += 1

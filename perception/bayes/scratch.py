@@ -89,6 +89,19 @@ class NearReadings(Record):
     """For a line, or against it."""
 
 
+class OtherCircle(Record):
+    """An established circle other than the one whose readings are asked for."""
+
+    x: float
+    y: float
+    radius: float
+    root_xx: float
+    """As in `CircleTrack`, m."""
+    is_named: int
+    takes_readings: int
+    """1 where it is another body, which may explain a reading in place of that circle."""
+
+
 class Score(Record):
     """The evidence of readings for a circle or a polygon."""
 
@@ -201,8 +214,8 @@ class Scratch(Record):
     face_readings: Annotated[Records[Reading], READINGS_MAX]
     facing: Annotated[Ints, READINGS_MAX]
     """Places of those readings that end near the circle with which a corner is compared."""
-    others: Annotated[Ints, TRACKS_MAX]
-    """Places of the established circles other than one."""
+    others: Annotated[Records[OtherCircle], TRACKS_MAX]
+    """The established circles other than one."""
     predicted: Predictions
     """Of the circle that was last asked for."""
     own: Predictions

@@ -261,10 +261,10 @@ def test_a_cross_path_that_a_named_drum_must_have_answered_sooner_is_no_other_bo
     q = crosses(np.array([[0.0, 0.0, 1.0, 0.0, half, across.real, across.imag]]))[0]
 
     def counts(own: int) -> bool:
-        others = np.zeros(len(memory.tracks), np.int64)
-        others = others[: occlusion.find_others(memory.tracks, own, others)]
+        others = memory.s[0].scratch.others
+        others = others[: occlusion.find_others(memory.tracks, own, P, to.real, to.imag, 0.3, others)]
         e = cross_path.circle_error(q, to.real, to.imag, abs(to), 0.3)
-        return bool(occlusion.is_relevant(memory.tracks, others, P, q, to.real, to.imag, 0.3, abs(to), e, 1e-6, 0.0))
+        return bool(occlusion.is_relevant(others, P, q, to.real, to.imag, 0.3, abs(to), e, 1e-6, 0.0))
 
     assert not counts(1)
     near.is_named = 0
