@@ -26,6 +26,25 @@ STEADY_S: Final = 1.5
 
 
 @kernel
+def is_steady(points: Floats, times: Floats, heard: NDArray[np.bool_], px: float, py: float, t: float) -> bool:
+    """Return whether a look not long before put an echo near a place.
+
+    Parameters
+    ----------
+    points, times, heard, t
+        As in `record_echoes`.
+    px, py : float
+        The place, m.
+    """
+    for j in range(times.shape[0]):
+        for k in range(times.shape[1]):
+            is_young = heard[j, k] and t - times[j, k] <= STEADY_S
+            if is_young and math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < STEADY_M:
+                return True
+    return False
+
+
+@kernel
 def record_echoes(
     ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, points: Floats,
     bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
@@ -64,16 +83,7 @@ def record_echoes(
         reach = r if is_echo else 0.0
         px = x + c * mounts[i, 0] - s * mounts[i, 1] + reach * math.cos(bearing)
         py = y + s * mounts[i, 0] + c * mounts[i, 1] + reach * math.sin(bearing)
-        agrees = False
-        if is_echo:
-            for j in range(times.shape[0]):
-                for k in range(times.shape[1]):
-                    if (
-                        heard[j, k]
-                        and t - times[j, k] <= STEADY_S
-                        and (math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < STEADY_M)
-                    ):
-                        agrees = True
+        agrees = is_echo and is_steady(points, times, heard, px, py, t)
         oldest = 0
         for k in range(times.shape[1]):
             turned = bearing - bearings[i, k]

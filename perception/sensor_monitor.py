@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import CrossPaths, Firing
-from perception.kernel import Floats, Ints
-from perception.records import records, zeros
+from perception.kernel import Floats, Ints, kernel
+from perception.records import Records, records, zeros
 from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
 from perception.sensor_mounts import mounts_array
 from perception.sensor_report import SILENT, SensorReport, describe_fault
@@ -93,6 +93,15 @@ def fires(ring: RingConfig) -> NDArray[np.bool_]:
     return named
 
 
+@kernel
+def are_sound(sensors: Records[SensorMemory]) -> bool:
+    """Return whether no sensor has a fault other than that it is silent, which does not touch what it hears."""
+    faults = 0
+    for i in range(len(sensors)):
+        faults |= sensors[i].faults
+    return faults & ~SILENT == 0
+
+
 class SensorMonitor:
     """Removes untrustworthy readings from firings.
 
@@ -145,7 +154,7 @@ class SensorMonitor:
             self._ring_records, self._sets, trusted, possible,
         )  # fmt: skip
         self.changes += changed & FAULTS_CHANGED
-        if firing.cross_paths is not None:
+        if firing.cross_paths is not None and not are_sound(self._sensor_records):
             firing = replace(firing, cross_paths=self._between_sound(firing.cross_paths))
         return (
             _with_ranges(firing, trusted) if changed & LESS_TRUSTED else firing,
@@ -156,8 +165,6 @@ class SensorMonitor:
         """Return the cross paths without those of sensors that have a fault; what a silent one hears is real."""
         faulty = (self._sensors["faults"] & ~SILENT) != 0
         sound = ~(faulty[heard.transmitters] | faulty[heard.listeners])
-        if sound.all():
-            return heard
         return CrossPaths(heard.transmitters[sound], heard.listeners[sound], heard.half_paths_m[sound])
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
