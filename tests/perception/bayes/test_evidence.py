@@ -10,7 +10,7 @@ import pytest
 from perception.bayes.elements import READINGS_MAX
 from perception.bayes.evidence import circle_evidence, evidence_of, polygon_evidence
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.scratch import Predictions, Score
+from perception.bayes.scratch import OtherCircle, Predictions, Score
 from perception.bayes.state import ESTABLISHED
 from perception.records import array_of, records, zeros
 from tests import naive_bayes, naive_polygon
@@ -41,7 +41,7 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
         place, rho = place_of(memory, 0), float(memory.circles["radius"][0])
         keep(memory, 0, around(rng, 40, place, rho))
         readings, nats = readings_of(np.zeros((READINGS_MAX, 5))), np.zeros(READINGS_MAX)
-        scratch = records(Score, zeros(Score, 1)), records(Predictions, zeros(Predictions, 1)), np.zeros(TRACKS, int)
+        scratch = tuple(records(one, zeros(one, n)) for one, n in ((Score, 1), (Predictions, 1), (OtherCircle, TRACKS)))
         assert circle_evidence(memory.s, memory.tracks, P, 0, readings, *scratch, nats) == 40
         w = numbers(array_of(readings))[:40, :5]
         noise = noises()[int(memory.s[0].noise_level)]
