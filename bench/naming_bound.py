@@ -2,25 +2,27 @@
 
 The rule of greatest power names a body once the likelihood ratio of drum to rival exceeds a threshold (Neyman and
 Pearson). For ranges with normal noise its logarithm is normal with mean ± d² / 2 and variance d², with d as in
-`bench.stand_bound`: from every range heard up to 4 ft ahead of the drum, the rival at its best place. Association is
-perfect there, and the noise known; strays and drop-outs are readings that are missing.
+`bench.stand_bound`: from every range heard over the drum up to 4 ft ahead, the rival at its best place. A sensor
+hears what is nearest in its beam, so that nearer drums keep a farther one from being heard. Association is perfect
+here, and the noise known; strays and drop-outs are readings that are missing.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from statistics import NormalDist
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from bench.ear_halls import poses, rings
-from bench.stand_bound import SIGMA_M, apart, audible_pairs
+from bench.ear_halls import firings, rings
+from bench.stand_bound import SIGMA_M, apart
 from config.robot import RingConfig
 from config.units import FOOT_M
 from config.world import DrumConfig
-from drivers.firing_pattern import cross_pairs, firing_pattern, sensors
+from perception.bayes.echo_kind import half_paths_over_circle
 from runtime.simulation.first_fix import EARLY_FIX_M
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls
@@ -33,27 +35,49 @@ _NATS: Final = 60.0
 _HALVINGS: Final = 60
 
 
-def heard(ring: RingConfig, hall: Hall, drum: DrumConfig) -> tuple[np.ndarray, np.ndarray]:
-    """Return places of transmitter and listener, complex, m, of all paths over a drum up to 4 ft ahead of it.
+class Heard(NamedTuple):
+    """Paths of a drive: where the ring's centre was along the hall, transmitter and listener, half the way; m."""
+
+    x: np.ndarray
+    sending: np.ndarray
+    """Places as complex numbers."""
+    receiving: np.ndarray
+    half: np.ndarray
+
+
+def drive(ring: RingConfig, hall: Hall) -> Heard:
+    """Return all paths that a ring hears on its way through a hall, firing by its pattern, without noise."""
+    sound = hall.world.acoustics.model_copy(update={"noise_m": 0.0, "dropout": 0.0, "outliers": 0.0})
+    quiet = replace(hall, world=hall.world.model_copy(update={"acoustics": sound}))
+    mounts = np.array([complex(mount.x_m, mount.y_m) for mount in ring.mounts])
+    parts = []
+    for firing in firings(ring, quiet, 0):
+        own, paths = np.arange(len(mounts)), firing.cross_paths
+        t, l, half = own, own, firing.ranges_m  # noqa: E741
+        if paths is not None:
+            t, l = np.append(t, paths.transmitters), np.append(l, paths.listeners)  # noqa: E741
+            half = np.append(half, paths.half_paths_m)
+        at = complex(firing.pose.x, firing.pose.y) + mounts * np.exp(1j * firing.ring_yaw)
+        is_heard = np.isfinite(half)
+        x = np.full(is_heard.sum(), firing.pose.x)
+        parts.append((x, at[t[is_heard]], at[l[is_heard]], half[is_heard]))
+    return Heard(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def heard_of(all_paths: Heard, drum: DrumConfig, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return places of transmitter and listener, complex, m, of the paths over a drum up to 4 ft ahead of it.
 
     Parameters
     ----------
-    ring, hall, drum
-        The ring, firing by its pattern on its way through the hall, and the drum, which nothing hides.
+    all_paths, drum
+        What was heard, and the drum.
+    step_m
+        The ranges' resolution, m.
     """
-    pattern, axes = firing_pattern(ring), tuple(mount.angle_rad for mount in ring.mounts)
-    listening = pattern.listeners or (0,) * len(pattern.masks)
-    transmitters, listeners_at = [], []
-    for k, (_, pose, yaw) in enumerate(poses(hall, pattern.step_period_s)):
-        if pose.x > drum.x_m - EARLY_FIX_M:
-            break
-        fired, listeners = pattern.masks[k % len(pattern.masks)], listening[k % len(pattern.masks)]
-        pairs = [(i, i) for i in sensors(fired)] + list(cross_pairs(axes, fired, listeners))
-        place, turn = complex(pose.x, pose.y), np.exp(1j * yaw)
-        sending, receiving = audible_pairs(ring, pairs, (complex(drum.x_m, drum.y_m) - place) / turn)
-        transmitters.append(place + turn * sending)
-        listeners_at.append(place + turn * receiving)
-    return np.concatenate(transmitters), np.concatenate(listeners_at)
+    _, sending, receiving, half = (column[all_paths.x <= drum.x_m - EARLY_FIX_M] for column in all_paths)
+    over = half_paths_over_circle(sending, receiving, complex(drum.x_m, drum.y_m), drum.radius_m)
+    is_of_drum = abs(half - over) <= step_m
+    return sending[is_of_drum], receiving[is_of_drum]
 
 
 def named_too(apart_by: Sequence[float]) -> float:
@@ -90,7 +114,8 @@ def bounds(name: SceneName, seed: int) -> dict[str, float]:
     ring, hall = rings()["ears"], halls(name, seed)[0]
     sound = hall.world.acoustics
     kept = (1.0 - sound.dropout) * (1.0 - sound.outliers) * SIGMA_M**2 / (SIGMA_M**2 + sound.noise_m**2)
-    ways = [heard(ring, hall, drum) for drum in hall.world.drum]
+    paths = drive(ring, hall)
+    ways = [heard_of(paths, drum, ring.resolution_m) for drum in hall.world.drum]
     row = {"paths of a drum": float(np.mean([len(sending) for sending, _ in ways]))}
     for rival, radius in RIVALS.items():
         d = []
