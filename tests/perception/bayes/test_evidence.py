@@ -41,7 +41,8 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
         place, rho = place_of(memory, 0), float(memory.circles["radius"][0])
         keep(memory, 0, around(rng, 40, place, rho))
         readings, nats = readings_of(np.zeros((READINGS_MAX, 5))), np.zeros(READINGS_MAX)
-        scratch = tuple(records(one, zeros(one, n)) for one, n in ((Score, 1), (Predictions, 1), (OtherCircle, TRACKS)))
+        scores, predicted = records(Score, zeros(Score, 1)), records(Predictions, zeros(Predictions, 1))
+        scratch = scores, predicted, records(OtherCircle, zeros(OtherCircle, TRACKS))
         assert circle_evidence(memory.s, memory.tracks, P, 0, readings, *scratch, nats) == 40
         w = numbers(array_of(readings))[:40, :5]
         noise = noises()[int(memory.s[0].noise_level)]

@@ -35,7 +35,7 @@ def one_at_a_time(room: WallMap, wall: Wall, recent: Records[RecentReading], bas
 
 @examples(40, 400)
 def test_many_readings_support_a_line_as_each_does_alone(examples: int) -> None:
-    """Echoes of its foot and of the beam's edge, known ones, passes and silences: any number, as a processor takes 8."""
+    """Echoes of its foot and of the beam's edge, known ones, passes, silences: any number, as a processor takes 8."""
     rng, (_, room) = np.random.default_rng(83), new_room()
     near = records(NearReadings, zeros(NearReadings, 1))[0]
     wall, seen = room.walls[0], set()
