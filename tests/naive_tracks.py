@@ -307,21 +307,24 @@ def is_elsewhere(apart: float, rho: float, other: float, is_model: bool, merge: 
 
 
 def is_explained_elsewhere(
-    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float, bool]], gate: float,
-    merge: float, opt: float, half_box: float, variance: tuple[float, float],
+    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float, bool]], surer: Iterable[bool],
+    gate: float, merge: float, opt: float, half_box: float, variance: tuple[float, float],
 ) -> bool:  # fmt: skip
-    """Return whether another body explains a reading with a smaller error; each has a place, radius, σ and kind."""
+    """Return whether another body explains a reading with a smaller error, or a surer one at all.
+
+    Each has a place, radius, σ and kind.
+    """
     own = q[4] - (math.dist(centre, q[:2]) - rho)
     if own > gate:
         return False
-    for place, radius, sigma, is_model in others:
+    for (place, radius, sigma, is_model), is_surer in zip(others, surer, strict=True):
         d, ahead = off_axis(q, place)
         error = abs(q[4] - (d - radius))
         tight = half_box + 3.0 * math.sqrt(variance[0] + variance[1] * d**2) + 2.0 * sigma
         if (
             is_elsewhere(math.dist(place, centre), rho, radius, is_model, merge, gate)
             and ahead >= opt * d
-            and error < min(abs(own), tight)
+            and error < (tight if is_surer else min(abs(own), tight))
         ):
             return True
     return False

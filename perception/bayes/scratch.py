@@ -28,6 +28,9 @@ PROPOSED: Final = -100
 POLYGON: Final = 1000
 """Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
 Other values are circle tracks."""
+TAKES_NOTHING, TAKES_BETTER, TAKES_ALL = range(3)
+"""Values of `OtherCircle.takes`: none, as a part of the same body; the readings that it explains better; all that it
+explains, as it has a name and that circle has none."""
 
 
 class PairSegment(Record):
@@ -98,8 +101,8 @@ class OtherCircle(Record):
     root_xx: float
     """As in `CircleTrack`, m."""
     is_named: int
-    takes_readings: int
-    """1 where it is another body, which may explain a reading in place of that circle."""
+    takes: int
+    """Which readings it takes from that circle; see `TAKES_NOTHING`."""
 
 
 class Score(Record):
