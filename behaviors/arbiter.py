@@ -59,7 +59,7 @@ def arbitrate(
     body: BodyConfig,
     config: ArbiterConfig,
     expected: Sequence[str],
-    turn_max_rad_s: float = math.inf,
+    turn_rad_s: tuple[float, float] = (-math.inf, math.inf),
 ) -> Decision:
     """Return the velocity for the sum of all responses, or a reason to stop.
 
@@ -80,13 +80,13 @@ def arbitrate(
         Velocities and turning gain.
     expected
         Names of the schemas that must have responded.
-    turn_max_rad_s
-        The robot turns no faster than this either.
+    turn_rad_s
+        The least and the greatest turning rate, rad/s; the base's limits hold as well.
 
     Returns
     -------
     Decision
-        `Drive` with 0 ≤ v ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
+        `Drive` with 0 ≤ v ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s` of the body, both finite; or `Stop`.
     """
     error = _input_error(responses, percept, expected)
     if error is not None:
@@ -98,8 +98,8 @@ def arbitrate(
     course = math.atan2(y, x)
     angle = wrap_angle(course - percept.pose.theta)
     speed = magnitude * _course_speed_m_s(abs(angle), config)
-    w_max = min(body.turn_max_rad_s, turn_max_rad_s)
-    w = max(-w_max, min(w_max, config.turn_gain_per_s * angle))
+    w = max(turn_rad_s[0], min(turn_rad_s[1], config.turn_gain_per_s * angle))
+    w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
     seen = seen_speed_m_s(percept, body, config.clearance_m, w)
     if seen == 0.0 and (unseen := _unseen_ways(percept, course, body, config)) is not None:
         return Unseen(f"{unseen.reason}; check the ring's cables and what covers it, then re-arm", unseen.age_s)

@@ -54,6 +54,7 @@ WITHOUT: Final = (
     "behaviors.move_to_goal.stuck_after_s=3600.0",
     "behaviors.move_to_goal.unreachable_after_s=3600.0",
     "behaviors.move_to_goal.turn_rate_max_rad_s=20.0",
+    "behaviors.move_to_goal.turn_acceleration_max_rad_s2=100.0",
 )
 """Settings of the schemas before; their drives are not given up."""
 GRID: Final = ("perception.grid.method=directed",)

@@ -64,6 +64,9 @@ class MoveToGoalConfig(Strict):
     """The goal is given up after the robot has not come nearer to it than ever before for so long, s."""
     turn_rate_max_rad_s: float = Field(default=0.3, gt=0.0, le=20.0)
     """On its way to a goal the robot turns no faster than this, rad/s."""
+    turn_acceleration_max_rad_s2: float = Field(default=0.4, gt=0.0, le=100.0)
+    """Its turning rate changes no faster than this there, rad/s²: an echo that comes and goes does not turn it to and
+    fro. Choose it above half of the turning gain times the highest rate, so that the turn ends at the direction."""
 
     @model_validator(mode="after")
     def _ordered(self) -> MoveToGoalConfig:
@@ -100,7 +103,7 @@ class FollowValleyConfig(Strict):
     """μ₃: the same from the direction chosen before."""
     near_cost: float = Field(default=20.0, ge=0.0, le=1e6)
     """Cost of a direction that passes an obstacle nearer than `comfort_m`."""
-    turn_share: float = Field(default=0.07, gt=0.0, le=1.0)
+    turn_share: float = Field(default=0.05, gt=0.0, le=1.0)
     """The direction turns by this share of the angle to the chosen one in each cycle; 1 turns at once."""
     turning_radius_m: float = Field(default=0.0, ge=0.0, le=100.0)
     """Least radius that the robot drives, m; 0 if it can turn on the spot."""

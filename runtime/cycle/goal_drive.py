@@ -44,6 +44,8 @@ class GoalDrive:
     search: Search = field(default_factory=Search)
     searched_run_s: float | None = None
     """When the look-ahead began, by the run's clock."""
+    turn_rad_s: float = 0.0
+    """The turning rate that was decided on in the last cycle, rad/s."""
     detour: Detour = NO_DETOUR
     """How leave-canyon has come."""
 
@@ -103,7 +105,8 @@ def drive_to_goal(
         hold_reason = NO_VALLEY if valley.direction_rad is None else None
         room_m = behaviors.follow_valley.safety_m
     responses = (response, _pushes(percept, room_m, settings), *beside)
-    decision = _arbitrate(responses, percept, settings)
+    decision = _arbitrate(responses, percept, now.turn_rad_s, settings)
+    now = replace(now, turn_rad_s=decision.twist.w if isinstance(decision, Drive) else 0.0)
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
             now.progress, percept.pose, distance_m, run_s, hold_reason, behaviors.move_to_goal,
@@ -142,11 +145,15 @@ def drive_through_valley(
     return replace(now, valley=valley), responses, decision, NO_VALLEY if is_closed else None
 
 
-def _arbitrate(responses: tuple[Response, ...], percept: Percept, settings: Settings) -> Decision:
-    """Return the arbiter's decision for a robot that turns no faster than it should on its way."""
-    behaviors, expected = settings.behaviors, tuple(r.schema for r in responses)
-    rate_rad_s = behaviors.move_to_goal.turn_rate_max_rad_s
-    return arbitrate(responses, percept, settings.body, behaviors.arbiter, expected, rate_rad_s)
+def _arbitrate(
+    responses: tuple[Response, ...], percept: Percept, last_rad_s: float, settings: Settings
+) -> Decision:  # fmt: skip
+    """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily."""
+    config, expected = settings.behaviors.move_to_goal, tuple(r.schema for r in responses)
+    rate_rad_s = config.turn_rate_max_rad_s
+    change_rad_s = config.turn_acceleration_max_rad_s2 / settings.cycle.rate_hz
+    limits = max(-rate_rad_s, last_rad_s - change_rad_s), min(rate_rad_s, last_rad_s + change_rad_s)
+    return arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected, limits)
 
 
 def _is_occupied(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> bool:

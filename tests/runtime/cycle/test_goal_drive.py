@@ -130,10 +130,26 @@ def test_a_goal_that_is_corrected_gets_another_way() -> None:
 
 def test_on_its_way_the_robot_turns_no_faster_than_it_should() -> None:
     for rate, expected in (("0.5", 0.5), ("0.2", 0.2), ("20.0", 1.0)):
-        script = driving(f"behaviors.move_to_goal.turn_rate_max_rad_s={rate}")
+        at_once = "behaviors.move_to_goal.turn_acceleration_max_rad_s2=100"
+        script = driving(f"behaviors.move_to_goal.turn_rate_max_rad_s={rate}", at_once)
         command = script.request_drive(Goal(-5.0, 0.5)).command
         assert isinstance(command, Twist)
         assert abs(command.w) == expected
+
+
+def test_on_its_way_its_turning_rate_changes_no_faster_than_it_should() -> None:
+    """An echo that comes and goes turned the robot to and fro."""
+    script, rates = driving(), [0.0]
+    script.request_drive(Goal(5.0, 2.0))
+    for k in range(60):
+        theta = 0.5 + 0.4 * (-1) ** (k // 2)
+        command = script.move_to(Pose(0.0, 0.0, theta)).command
+        assert isinstance(command, Twist)
+        rates.append(command.w)
+    config, step_s = script.settings.behaviors.move_to_goal, 1.0 / script.settings.cycle.rate_hz
+    changes = [abs(b - a) for a, b in pairwise(rates[1:])]
+    assert max(changes) == pytest.approx(config.turn_acceleration_max_rad_s2 * step_s)
+    assert max(map(abs, rates)) < 0.5 * config.turn_rate_max_rad_s
 
 
 def test_a_half_turn_on_the_spot_is_no_standing_that_begins_a_detour(monkeypatch: pytest.MonkeyPatch) -> None:
