@@ -9,7 +9,9 @@ the goal's direction is free. What closes the way is
 - the mouth of a known canyon (`perception.percept.Canyon`): a virtual wall for a goal that does not lie behind it;
 - what may be a canyon's back, far ahead (`behaviors.blocked_ahead`).
 
-A robot inside a known canyon leaves it, however free its goal's direction is there.
+A robot inside a known canyon leaves it, however free its goal's direction is there. One so narrow that both sides
+are within the room that is kept is left by its middle line: what is heard at the ends of its walls is placed on the
+axes of the sensors, so that the exit may seem too narrow for a robot that has come in through it.
 
 Progress is state, and behaviours hold none: the detour is passed in and returned with each call. Ways are measured in
 metres, never in cycles, so that a robot that stands gives up nothing.
@@ -64,6 +66,8 @@ FAR_M: Final = 1e6
 NO_POINTS: Final = np.empty((0, 2))
 TURN_SHARE: Final = 0.15
 """The direction turns by this share of the angle to the chosen one in each cycle."""
+OUTWARDS_M: Final = 0.5
+"""A robot that leaves a canyon aims at a point of its middle line so far ahead, m."""
 THROUGH_M: Final = 1.5
 """A gap is passed if the robot sees so far through it, m."""
 TURNS: Final = np.arange(0.0, 2.0 * math.pi, math.radians(5.0))
@@ -97,6 +101,8 @@ class Detour:
     x: float | None = None
     y: float | None = None
     """The robot's place in the last cycle."""
+    leaving: Canyon | None = None
+    """The narrow canyon that the robot is in and must leave."""
     ahead: Ahead | None = None
     """What stays far ahead, …"""
     block: Block | None = None
@@ -145,7 +151,9 @@ def leave_canyon(
     detour = replace(detour, near=remember(detour.near, echoes, pose, detour.driven_m, body_radius_m))
     if to_goal < detour.nearest_m - NEARER_M:
         detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
-    is_held = any(holds(canyon, pose, goal, config) for canyon in percept.canyons)
+    leaving = _leaving(percept.canyons, detour.leaving, pose, goal, room, config)
+    detour = replace(detour, leaving=leaving)
+    is_held = leaving is not None or any(holds(canyon, pose, goal, config) for canyon in percept.canyons)
     waits = waits and detour.side == 0 and detour.driven_m - detour.nearest_driven_m < STALL_M
     if waits and not virtual and not is_held:  # only echoes could close the way
         return None, detour
@@ -159,11 +167,13 @@ def leave_canyon(
     elif not is_held and to_goal < detour.began_m - PROGRESS_M and free >= _needed_m(detour, to_goal):
         return None, replace(detour, side=0, ahead=None, block=None)
     elif _is_round(detour, pose):
-        side: Side = -1 if detour.side == 1 else 1
         detour = replace(
-            detour, side=side, began_driven_m=detour.driven_m, wall_rad=bearing, rounds=detour.rounds + 1
-        )
+            detour, side=_other(detour.side), began_driven_m=detour.driven_m, wall_rad=bearing,
+            rounds=detour.rounds + 1,
+        )  # fmt: skip
     wall, heading = _along(points, pose, detour.side, detour.wall_rad, room, config)
+    if leaving is not None:
+        heading = _outwards(leaving, pose)
     if detour.block is not None and (
         abs(wrap_angle(heading - detour.block.axis_rad)) > TURNED_BACK_RAD or to_goal > detour.began_m + FARTHER_M
     ):
@@ -194,12 +204,39 @@ def holds(canyon: Canyon, pose: Pose, goal: tuple[float, float], config: LeaveCa
     return is_sure and _is_inside(canyon, pose.x, pose.y) and not _is_inside(canyon, *goal)
 
 
-def _is_inside(canyon: Canyon, x: float, y: float) -> bool:
+def _half_width_m(canyon: Canyon) -> float:
+    x1, y1, x2, y2 = canyon.mouth
+    return 0.5 * abs(math.cos(canyon.axis_rad) * (y2 - y1) - math.sin(canyon.axis_rad) * (x2 - x1))
+
+
+def _is_inside(canyon: Canyon, x: float, y: float, before_m: float = 0.0) -> bool:
+    """Return whether a place is inside a canyon, or before its mouth by no more than `before_m`."""
     x1, y1, x2, y2 = canyon.mouth
     c, s = math.cos(canyon.axis_rad), math.sin(canyon.axis_rad)
     dx, dy = x - 0.5 * (x1 + x2), y - 0.5 * (y1 + y2)
-    half = 0.5 * abs(c * (y2 - y1) - s * (x2 - x1))
-    return 0.0 < c * dx + s * dy < canyon.depth_m and abs(c * dy - s * dx) < half
+    return -before_m < c * dx + s * dy < canyon.depth_m and abs(c * dy - s * dx) < _half_width_m(canyon)
+
+
+def _leaving(
+    canyons: tuple[Canyon, ...], before: Canyon | None, pose: Pose, goal: tuple[float, float], room_m: float,
+    config: LeaveCanyonConfig,
+) -> Canyon | None:  # fmt: skip
+    """Return the narrow canyon that the robot leaves by its middle line, until its body is outside; None without one.
+
+    Of several the deepest: the ends of walls are found from the inside outwards.
+    """
+    held = [canyon for canyon in canyons if holds(canyon, pose, goal, config) and _half_width_m(canyon) < room_m]
+    if before is not None and _is_inside(before, pose.x, pose.y, room_m):
+        held.append(before)
+    return max(held, key=lambda canyon: canyon.depth_m) if held else None
+
+
+def _outwards(canyon: Canyon, pose: Pose) -> float:
+    """Return the heading to the middle line of a canyon a little further out, rad."""
+    x1, y1, x2, y2 = canyon.mouth
+    c, s = math.cos(canyon.axis_rad), math.sin(canyon.axis_rad)
+    across = c * (pose.y - 0.5 * (y1 + y2)) - s * (pose.x - 0.5 * (x1 + x2))
+    return wrap_angle(canyon.axis_rad + math.pi + math.atan2(across, OUTWARDS_M))
 
 
 def _presume(
@@ -237,6 +274,10 @@ def _is_round(detour: Detour, pose: Pose) -> bool:
     """Return whether the robot is back where the detour began, after a long way."""
     way = detour.driven_m - detour.began_driven_m
     return way > LOOP_M and math.hypot(pose.x - detour.began_x, pose.y - detour.began_y) < SAME_PLACE_M
+
+
+def _other(side: int) -> Side:
+    return -1 if side == 1 else 1
 
 
 def _needed_m(detour: Detour, to_goal_m: float) -> float:

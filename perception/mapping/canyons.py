@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.messages import Pose
+from drivers.messages import Pose, wrap_angle
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.percept import Canyon
@@ -189,10 +189,17 @@ def _measured(x: float, y: float, chain: Floats, weights: Floats, half: int, sea
     if (x - x1) * ux + (y - y1) * uy <= 0.0 or depth < max(DEPTH_MIN_M, DEPTH_SHARE * width):
         return None
     across = (chain[first : last + 1, 0] - x1) * uy - (chain[first : last + 1, 1] - y1) * ux
-    if np.ptp(across[depths >= 0.5 * depth]) < BACK_SHARE * width:
+    deep = across[depths >= 0.5 * depth]
+    if np.ptp(deep) < BACK_SHARE * width:
         return None
+    # One side may be known farther out than the other: the axis leads to the middle of the inner half.
+    slant = math.atan2(0.5 * (float(deep.min()) + float(deep.max())) + 0.5 * width, 0.75 * depth)
+    axis = math.atan2(uy, ux) - slant
+    c, s = math.cos(axis), math.sin(axis)
+    inner = chain[first : last + 1] - (0.5 * (x1 + x2), 0.5 * (y1 + y2))
+    depth = float((c * inner[:, 0] + s * inner[:, 1]).max())
     mouth = (float(x1), float(y1), float(x2), float(y2))
-    return Canyon(0, mouth, math.atan2(uy, ux), depth, float(weights[first : last + 1].mean()))
+    return Canyon(0, mouth, wrap_angle(axis), depth, float(weights[first : last + 1].mean()))
 
 
 def _seen_from(x: float, y: float, surfaces: Surfaces) -> tuple[Floats, Floats, NDArray[np.int64], Floats]:

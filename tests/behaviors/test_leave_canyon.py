@@ -13,7 +13,7 @@ from behaviors.arbiter import Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.blocked_ahead import Block
-from behaviors.leave_canyon import NO_DETOUR, SCHEMA, is_closed, leave_canyon
+from behaviors.leave_canyon import NO_DETOUR, SCHEMA, Detour, is_closed, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
 from config.behaviors import BehaviorsConfig, LeaveCanyonConfig
 from perception.percept import Canyon, Floats, OccupancyWindow, Percept, Pose
@@ -144,6 +144,41 @@ def test_inside_a_known_canyon_a_detour_begins_and_does_not_end() -> None:
     going, _ = leave_canyon(seen(3.0, 0.0, canyons=(CANYON,)), (6.0, 0.0), detour, 0.381, BLIND)
     assert going is not None
     assert leave_canyon(seen(2.0, 0.0, canyons=(CANYON,)), (3.5, 0.0), NO_DETOUR, 0.381, BLIND)[0] is None
+
+
+NARROW = Canyon(4, (1.0, 0.5, 1.0, -0.5), 0.0, 6.0, 0.97)
+
+
+def leaving(
+    x: float, y: float, obstacles: Floats, canyons: tuple[Canyon, ...], detour: Detour
+) -> tuple[float, Detour]:  # fmt: skip
+    percept = seen(x, y, obstacles, canyons)
+    response, after = leave_canyon(percept, (9.0, 0.0), detour, 0.381, BLIND)
+    assert response is not None
+    return math.atan2(response.y, response.x), after
+
+
+def test_a_narrow_canyon_is_left_by_its_middle_line_although_its_exit_is_heard_as_too_narrow() -> None:
+    ends = np.array([[1.0, 0.45], [1.0, -0.45], [2.2, 0.5], [2.2, -0.5]])
+    heading, detour = leaving(2.2, 0.1, ends, (NARROW,), NO_DETOUR)
+    assert abs(heading) > math.radians(150.0)
+    assert math.sin(heading) < 0.0, "back to the middle line"
+    heading, detour = leaving(1.4, 0.0, ends, (), detour)
+    assert abs(heading) == pytest.approx(math.pi), "it has forgotten the canyon"
+    heading, detour = leaving(0.8, 0.0, ends, (), detour)
+    assert abs(heading) == pytest.approx(math.pi), "its body is still inside"
+    assert leaving(0.3, 0.0, ends, (), detour)[1].leaving is None
+
+
+def test_a_wide_canyon_is_left_along_its_side() -> None:
+    assert leaving(3.0, 0.0, np.array([[3.0, 1.0], [3.0, -1.0]]), (CANYON,), NO_DETOUR)[1].leaving is None
+
+
+def test_of_the_mouths_of_a_narrow_canyon_the_outer_one_counts() -> None:
+    inner = replace(NARROW, mouth=(3.0, 0.5, 3.0, -0.5), depth_m=4.0)
+    ends = np.array([[2.8, 0.45], [2.8, -0.45]])
+    _, detour = leaving(4.0, 0.0, ends, (inner, NARROW), NO_DETOUR)
+    assert detour.leaving == NARROW
 
 
 def along_a_wall_with_a_doorway(width_m: float, last_rad: float | None = None, away_m: float = 1.0) -> float:

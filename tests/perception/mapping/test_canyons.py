@@ -57,6 +57,13 @@ def test_three_walls_are_a_canyon_at_any_angle(turn: float) -> None:
     assert found(seen, 1.0 * c, 1.0 * s) is None
 
 
+def test_where_one_side_is_known_farther_out_the_axis_still_leads_along_the_sides() -> None:
+    canyon = found([wall(1.6, 0.5, 9, 0.5), wall(9, 0.5, 9, -0.5), wall(9, -0.5, 2, -0.5)], 6.0, 0.0)
+    assert canyon is not None
+    assert canyon.axis_rad == pytest.approx(0.0, abs=0.05)
+    assert canyon.depth_m == pytest.approx(7.2, abs=0.1)
+
+
 def test_a_gap_that_is_too_narrow_is_closed_and_one_of_a_doorway_is_open() -> None:
     for gap, closed in ((0.85, True), (1.1, False)):
         seen = [wall(2, 1, 3.5, 1), wall(3.5 + gap, 1, 7, 1), wall(7, 1, 7, -1), wall(7, -1, 2, -1)]
