@@ -53,6 +53,9 @@ PRESUMED_SHARE: Final = 0.7
 NEARER_M: Final = 0.1
 STALL_M: Final = 2.0
 """A robot that comes no nearer than this in so much driving is held."""
+LED_AWAY_M: Final = 3.0
+"""With an evidence grid a detour that leads so much farther from the goal than where it began tries its other side,
+m: the grid's way may have been on the other one."""
 LOOP_M: Final = 4.0
 SAME_PLACE_M: Final = 0.4
 """A robot that is back where the detour began after this way has gone all round, and tries the other side."""
@@ -166,6 +169,10 @@ def leave_canyon(
         detour = _begin(points, pose, goal, percept.canyons, detour, room, config)
     elif not is_held and to_goal < detour.began_m - PROGRESS_M and free >= _needed_m(detour, to_goal):
         return None, replace(detour, side=0, ahead=None, block=None)
+    elif percept.occupancy is not None and to_goal > _began_m(detour, goal) + LED_AWAY_M:
+        detour = replace(
+            detour, side=_other(detour.side), began_x=pose.x, began_y=pose.y, began_driven_m=detour.driven_m
+        )
     elif _is_round(detour, pose):
         detour = replace(
             detour, side=_other(detour.side), began_driven_m=detour.driven_m, wall_rad=bearing,
@@ -278,6 +285,11 @@ def _is_round(detour: Detour, pose: Pose) -> bool:
 
 def _other(side: int) -> Side:
     return -1 if side == 1 else 1
+
+
+def _began_m(detour: Detour, goal: tuple[float, float]) -> float:
+    """Return the distance of the goal from where the detour began, m."""
+    return math.dist((detour.began_x, detour.began_y), goal)
 
 
 def _needed_m(detour: Detour, to_goal_m: float) -> float:

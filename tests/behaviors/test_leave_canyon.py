@@ -181,6 +181,18 @@ def test_of_the_mouths_of_a_narrow_canyon_the_outer_one_counts() -> None:
     assert detour.leaving == NARROW
 
 
+@pytest.mark.parametrize(("x", "turns"), [(-2.8, False), (-3.6, True)])
+def test_with_a_grid_a_detour_that_leads_away_tries_the_other_side_along_the_same_wall(x: float, turns: bool) -> None:
+    wall = np.column_stack([np.arange(-6.0, 1.0, 0.1), np.full(70, -0.6)])
+    window = OccupancyWindow(np.full((8, 8), 0.5, np.float32), 0.0, 0.0, 0.1)
+    began = replace(NO_DETOUR, side=1, began_m=5.0, nearest_m=5.0, driven_m=9.0, wall_rad=-0.5 * math.pi)
+    percept = replace(seen(x, 0.0, wall), occupancy=window)
+    response, after = leave_canyon(percept, (5.0, -3.0), began, 0.381, BLIND)
+    assert response is not None
+    assert (after.side, response.x > 0.0) == ((-1, True) if turns else (1, False))
+    assert leave_canyon(replace(percept, occupancy=None), (5.0, -3.0), began, 0.381, BLIND)[1].side == 1
+
+
 def along_a_wall_with_a_doorway(width_m: float, last_rad: float | None = None, away_m: float = 1.0) -> float:
     """Return the heading of a robot that follows a wall on its left, before the middle of a doorway in it, rad."""
     x = np.concatenate([np.arange(-4.0, -0.5 * width_m, 0.05), [-0.5 * width_m]])
