@@ -64,7 +64,7 @@ class MoveToGoalConfig(Strict):
     """The goal is given up after the robot has not come nearer to it than ever before for so long, s."""
     turn_rate_max_rad_s: float = Field(default=0.3, gt=0.0, le=20.0)
     """On its way to a goal the robot turns no faster than this, rad/s."""
-    turn_acceleration_max_rad_s2: float = Field(default=0.4, gt=0.0, le=100.0)
+    turn_acceleration_max_rad_s2: float = Field(default=0.6, gt=0.0, le=100.0)
     """Its turning rate changes no faster than this there, rad/s²: an echo that comes and goes does not turn it to and
     fro. Choose it above half of the turning gain times the highest rate, so that the turn ends at the direction."""
 
