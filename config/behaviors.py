@@ -66,7 +66,8 @@ class MoveToGoalConfig(Strict):
     """On its way to a goal the robot turns no faster than this, rad/s."""
     turn_acceleration_max_rad_s2: float = Field(default=0.6, gt=0.0, le=100.0)
     """Its turning rate changes no faster than this there, rad/s²: an echo that comes and goes does not turn it to and
-    fro. Choose it above half of the turning gain times the highest rate, so that the turn ends at the direction."""
+    fro. Near an obstacle that pushes it the base turns as fast as it can. Choose it above half of the turning gain
+    times the highest rate, so that the turn ends at the direction."""
 
     @model_validator(mode="after")
     def _ordered(self) -> MoveToGoalConfig:
@@ -103,7 +104,7 @@ class FollowValleyConfig(Strict):
     """μ₃: the same from the direction chosen before."""
     near_cost: float = Field(default=20.0, ge=0.0, le=1e6)
     """Cost of a direction that passes an obstacle nearer than `comfort_m`."""
-    turn_share: float = Field(default=0.05, gt=0.0, le=1.0)
+    turn_share: float = Field(default=0.07, gt=0.0, le=1.0)
     """The direction turns by this share of the angle to the chosen one in each cycle; 1 turns at once."""
     turning_radius_m: float = Field(default=0.0, ge=0.0, le=100.0)
     """Least radius that the robot drives, m; 0 if it can turn on the spot."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate
+from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import Zone, avoid_static_obstacle
 from behaviors.follow_valley import AT_GOAL_M, Valley, follow_valley
 from behaviors.goal_progress import Progress, observe_progress
@@ -148,10 +149,15 @@ def drive_through_valley(
 def _arbitrate(
     responses: tuple[Response, ...], percept: Percept, last_rad_s: float, settings: Settings
 ) -> Decision:  # fmt: skip
-    """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily."""
+    """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily.
+
+    One that is pushed turns away as fast as its base can.
+    """
     config, expected = settings.behaviors.move_to_goal, tuple(r.schema for r in responses)
     rate_rad_s = config.turn_rate_max_rad_s
     change_rad_s = config.turn_acceleration_max_rad_s2 / settings.cycle.rate_hz
+    if any(r.schema == AVOID and (r.x, r.y) != (0.0, 0.0) for r in responses):
+        change_rad_s = math.inf
     limits = max(-rate_rad_s, last_rad_s - change_rad_s), min(rate_rad_s, last_rad_s + change_rad_s)
     return arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected, limits)
 

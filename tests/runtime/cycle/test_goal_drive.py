@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from behaviors.leave_canyon import leave_canyon
 from behaviors.move_to_goal import Goal
+from behaviors.response import Response
 from drivers.messages import Pose, Twist
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.goal_drive import GoalDrive
@@ -150,6 +151,17 @@ def test_on_its_way_its_turning_rate_changes_no_faster_than_it_should() -> None:
     changes = [abs(b - a) for a, b in pairwise(rates[1:])]
     assert max(changes) == pytest.approx(config.turn_acceleration_max_rad_s2 * step_s)
     assert max(map(abs, rates)) < 0.5 * config.turn_rate_max_rad_s
+
+
+@pytest.mark.parametrize("push", [0.0, 0.01])
+def test_pushed_by_an_obstacle_the_robot_turns_at_once(push: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Turning little by little it touched the ends of walls that leave it .12 m."""
+    monkeypatch.setattr("runtime.cycle.goal_drive._pushes", lambda *_: Response("avoid_static_obstacle", -push, 0.0))
+    script = driving()
+    command = script.request_drive(Goal(-5.0, 0.5)).command
+    assert isinstance(command, Twist)
+    rate = script.settings.behaviors.move_to_goal.turn_rate_max_rad_s
+    assert command.w == rate if push else command.w < 0.2 * rate
 
 
 def test_a_half_turn_on_the_spot_is_no_standing_that_begins_a_detour(monkeypatch: pytest.MonkeyPatch) -> None:
