@@ -13,6 +13,7 @@ from bench.batch_commands import replay, scheduler, sweep, tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
+from bench.corner_bound import corner_bound
 from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
 from bench.estimator import Peer
 from bench.measure import Plan, measure
@@ -254,6 +255,7 @@ app.command(replay)
 app.command(one_stand)
 app.command(stand_bound)
 app.command(naming_bound)
+app.command(corner_bound)
 app.command(ear_cost)
 
 
