@@ -28,7 +28,7 @@ from runtime.simulation.wall_trials import (
     listen,
 )
 
-TOLD_NAT: Final = 4.0
+DISTINGUISHED_NAT: Final = 4.0
 """Evidence that tells one thing from another."""
 POST_M: Final = 0.35 * FOOT_M
 STEPS: Final = 30
@@ -122,13 +122,13 @@ def judge(corner: Corner, places: Floats, ranges: Floats, acoustics: AcousticsCo
     lines = [np.array([math.atan2(way[1], way[0]), float(way @ true)]) for way in ways]
     _, of_line = best(to_line, lines, places, ranges, sigma)
     is_placed = bool(np.hypot(*(at - true)) < CORNER_WITHIN_M)
-    return is_placed, 0.5 * (of_line - chi2) >= TOLD_NAT, 0.5 * (of_post - chi2) >= TOLD_NAT
+    return is_placed, 0.5 * (of_line - chi2) >= DISTINGUISHED_NAT, 0.5 * (of_post - chi2) >= DISTINGUISHED_NAT
 
 
 def measure(
     ring: RingConfig, seeds: Sequence[int], steps_ft: Iterable[float], report: Callable[[str], None]
 ) -> dict[str, dict[str, float]]:
-    """Return for corners and edges between mirrors the shares that are placed and told apart, by step.
+    """Return for corners and edges between mirrors the shares that are placed and distinguished, by step.
 
     Parameters
     ----------
@@ -149,7 +149,11 @@ def measure(
                     judged[corner.is_edge].append(judge(corner, places, ranges, ACOUSTICS))
         for is_edge, name in ((False, "inside corners"), (True, "edges")):
             of = np.array(judged[is_edge]).reshape(-1, 3)
-            figures = {"placed": of[:, 0], "told from a wall": of[:, 1], "from a post, too": of[:, 1] & of[:, 2]}
+            figures = {
+                "placed": of[:, 0],
+                "distinguished from a wall": of[:, 1],
+                "from a post, too": of[:, 1] & of[:, 2],
+            }
             rows[f"{name}, {step_ft:g} ft"] = {
                 "heard": len(of), **{what: float(share.mean()) for what, share in figures.items()}
             }  # fmt: skip

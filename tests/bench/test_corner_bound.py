@@ -24,9 +24,7 @@ def around(half_rad: float, reach_m: float = 0.8) -> tuple[Floats, Floats]:
     return places, np.full(len(bearings), reach_m)
 
 
-def test_a_point_heard_from_around_is_told_from_a_wall_and_from_a_post_and_one_heard_from_one_side_is_neither() -> (
-    None
-):
+def test_a_point_heard_from_around_is_distinguished_from_wall_and_post_and_one_heard_from_one_side_is_not() -> None:
     assert judge(CORNER, *around(1.0), ACOUSTICS) == (True, True, True)
     assert judge(CORNER, *around(0.05), ACOUSTICS)[1:] == (False, False)
 
