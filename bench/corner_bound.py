@@ -29,7 +29,7 @@ from runtime.simulation.wall_trials import (
 )
 
 DISTINGUISHED_NAT: Final = 4.0
-"""Evidence that tells one thing from another."""
+"""Evidence by which one kind is distinguished from another, nat."""
 POST_M: Final = 0.35 * FOOT_M
 STEPS: Final = 30
 NUDGE: Final = 1e-6
