@@ -3,7 +3,7 @@
 Two mirrors that meet answer from their corner at any bearing, often long before the second one is heard at the foot
 of a perpendicular. The post of a doorway is heard from near, often before its wall is known, and from where the wall
 beyond the doorway is not. Each echo puts the point on a circle, which cuts the line of the known wall in two places;
-the point is where many cuts meet. What lies on no wall's line is not looked for: any thin thing answers like an edge.
+the point is where many cuts meet. What lies on no wall's line is not looked for: any thin object answers like an edge.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ LEAD_MIN: Final = 2.0
 SPREAD_MIN_RAD: Final = 0.25
 """… and come from bearings so far apart: those of another wall lie within half a beam of its normal."""
 SIGMAS: Final = 2.5
-TOLD_SIGMAS: Final = 2.0
+LONGER_SIGMAS: Final = 2.0
 """An edge's echo is longer than its wall's own by more than this."""
 CELL_M: Final = 0.05
 EDGE_CUTS_MIN: Final = 3
@@ -226,7 +226,7 @@ def hear(
         error = q.range_m - d
         is_from_near = d <= EDGE_REACH_M
         if abs(error) < SIGMAS * sigma + slack:
-            if is_near and is_from_near and d - abs(distance_and_foot(wall, q.x, q.y)[0]) <= TOLD_SIGMAS * sigma:
+            if is_near and is_from_near and d - abs(distance_and_foot(wall, q.x, q.y)[0]) <= LONGER_SIGMAS * sigma:
                 continue
             if is_from_near:
                 found.echoes += 1.0
