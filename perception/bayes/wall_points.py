@@ -3,7 +3,7 @@
 Two mirrors that meet answer from their corner at any bearing, often long before the second one is heard at the foot
 of a perpendicular. The post of a doorway is heard from near, often before its wall is known, and from where the wall
 beyond the doorway is not. Each echo puts the point on a circle, which cuts the line of the known wall in two places;
-the point is where many cuts meet. What lies on no wall's line is not looked for: any thin object answers like an edge.
+the point is where many cuts meet. What lies on no wall's line is not looked for: any thin body answers like an edge.
 """
 
 from __future__ import annotations
