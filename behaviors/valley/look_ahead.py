@@ -80,6 +80,8 @@ class Search:
     """Whether that way leads to the goal; otherwise to the place nearest to it that can be reached."""
     closed: tuple[Place, ...] = ()
     """The places on that way to which this search has found no step."""
+    is_doubted: bool = False
+    """Whether the last search has found a way that turns back from the one in force."""
     failed: tuple[Place, ...] = ()
     """Such places of former ways, which were given up for them: as the grid forgets, they would be tried again."""
 
@@ -104,7 +106,7 @@ def begin(search: Search, percept: Percept, goal: Place) -> Search:
     pose = percept.pose
     root = Node(pose.x, pose.y, pose.theta / SECTOR_RAD, 0.0, -1)
     waiting = ((math.dist((pose.x, pose.y), goal), 0),)
-    return Search(goal, (root,), waiting, (), search.way, search.reaches, failed=search.failed)
+    return replace(search, goal=goal, nodes=(root,), waiting=waiting, passed=(), closed=())
 
 
 def expand(search: Search, percept: Percept, body_radius_m: float, config: FollowValleyConfig) -> Search:
@@ -130,7 +132,7 @@ def expand(search: Search, percept: Percept, body_radius_m: float, config: Follo
             continue
         distance = math.dist((node.x, node.y), goal)
         if distance < 1e-9 or _is_beyond(percept.occupancy, node, search.nodes[0]):
-            return _ended(search, number, reaches=True)
+            return _ended(search, number, config.carrot_m, reaches=True)
         nodes = [*search.nodes]
         children = _children(node, number, distance, search, percept, body_radius_m, config)
         for child in children:
@@ -141,7 +143,7 @@ def expand(search: Search, percept: Percept, body_radius_m: float, config: Follo
             break
         return replace(search, nodes=tuple(nodes), waiting=tuple(heap), passed=(*search.passed, square))
     nearest = min(range(len(search.nodes)), key=lambda k: math.dist((search.nodes[k].x, search.nodes[k].y), goal))
-    return _ended(search, nearest, reaches=False)
+    return _ended(search, nearest, config.carrot_m, reaches=False)
 
 
 def _children(
@@ -213,14 +215,20 @@ def _closed(search: Search, node: Node, children: list[Node], same_m: float) -> 
     return (*search.closed, there)
 
 
-def _ended(search: Search, number: int, *, reaches: bool) -> Search:
-    """Return the search with the way to a node in force; closed places that it keeps away from have failed."""
+def _ended(search: Search, number: int, carrot_m: float, *, reaches: bool) -> Search:
+    """Return the search with the way to a node in force; closed places that it keeps away from have failed.
+
+    A way that turns back from the one in force has to be found twice in turn: a gap ahead closes for an echo or two.
+    """
     way: list[Place] = []
     while number >= 0:
         node = search.nodes[number]
         way.append((node.x, node.y))
         number = node.parent
+    way.reverse()
     root = search.nodes[0]
+    if not search.is_doubted and _turns_back(search, way, carrot_m):
+        return Search(search.goal, way=search.way, reaches=search.reaches, is_doubted=True, failed=search.failed)
     given_up = [
         place
         for place in search.closed
@@ -228,7 +236,17 @@ def _ended(search: Search, number: int, *, reaches: bool) -> Search:
         and min(math.dist(place, other) for other in way) > FAILED_NEAR_M
     ]
     failed = (*search.failed, *given_up)[-FAILED_MAX:]
-    return Search(search.goal, way=tuple(reversed(way)), reaches=reaches, failed=failed)
+    return Search(search.goal, way=tuple(way), reaches=reaches, failed=failed)
+
+
+def _turns_back(search: Search, way: list[Place], carrot_m: float) -> bool:
+    """Return whether a way leads away from where the one in force does."""
+    root = search.nodes[0]
+    before = carrot(search, root.x, root.y, carrot_m)
+    after = carrot(Search(way=tuple(way)), root.x, root.y, carrot_m)
+    if before is None or after is None:
+        return False
+    return (before[0] - root.x) * (after[0] - root.x) + (before[1] - root.y) * (after[1] - root.y) < 0.0
 
 
 def carrot(search: Search, x: float, y: float, ahead_m: float) -> Place | None:

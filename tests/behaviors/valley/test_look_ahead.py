@@ -69,15 +69,34 @@ def test_it_leads_out_of_a_dead_end_and_round_it() -> None:
 def test_a_way_that_has_failed_is_not_tried_for_ever_although_what_closed_it_is_forgotten() -> None:
     """The grid forgets the back of a dead end each time the robot looks away: a way out is kept in the end."""
     search, goal, turns_back = Search(), (4.0, 0.0), []
-    for walls in (NARROW[1:], NARROW) * 5:
+    for walls in (NARROW[1:], NARROW, NARROW) * 5:
         percept = at(0.0, 0.0, walls=walls)
         search = begin(search, percept, goal)
         while not search.is_done:
             search = expand(search, percept, RADIUS_M, CONFIG)
         turns_back.append(min(x for x, _ in search.way) < -1.0)
-    assert turns_back[:2] == [False, True]
+    assert turns_back[:3] == [False, False, True]
     assert all(turns_back[-4:]), turns_back
     assert all(math.dist(place, (0.0, 0.0)) < 2.5 for place in search.failed)
+
+
+def test_a_way_that_turns_back_is_taken_once_it_is_found_twice() -> None:
+    """An echo or two close a gap ahead now and then, and the robot turned back for a second each time."""
+    goal, open_ = (4.0, 0.0), at(0.0, 0.0, walls=NARROW[1:])
+    before, _ = searched(open_, goal)
+    closed = at(0.0, 0.0, walls=NARROW)
+
+    def again(search: Search, percept: Percept) -> Search:
+        search = begin(search, percept, goal)
+        while not search.is_done:
+            search = expand(search, percept, RADIUS_M, CONFIG)
+        return search
+
+    once = again(before, closed)
+    assert (once.way, once.reaches) == (before.way, True)
+    assert min(x for x, _ in again(once, closed).way) < -1.0
+    assert again(again(once, open_), closed).way[-1] == goal, "the doubt is over once the way ahead is found again"
+    assert min(x for x, _ in again(again(once, open_), closed).way) >= 0.0
 
 
 def test_a_goal_that_is_walled_in_has_no_way_and_the_nearest_place_is_found() -> None:
