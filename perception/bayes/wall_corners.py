@@ -62,9 +62,6 @@ POINT_SLACK_M: Final = 0.03
 """Greatest uncertainty of a point that its echoes may show."""
 PASS_SLACK_M: Final = 0.1
 """A range this much longer than to a point passed it."""
-ALONE_EDGE_ECHOES: Final = 6.0
-ALONE_EDGE_LEAD: Final = 2.0
-"""Echoes from near, and so many times the passes, of an edge between mirrors that is sure whatever its walls are."""
 KEPT: Final = 1
 PENDING: Final = 2
 """Values of `RoomCorner.is_used` while points are found again: found, and not yet found."""
@@ -255,25 +252,17 @@ def find_edges(room: WallMap) -> None:
 
 @kernel
 def keep_heard(room: WallMap, edge: RoomCorner) -> None:
-    """Keep a point between mirrors at which no wall ends, or none any more, if it is heard on the line of one."""
-    near = edge.echoes - edge.far_echoes
-    is_corner = edge.is_edge == 0 and edge.far_echoes >= max(EDGE_ECHOES_MIN, edge.far_passes)
-    is_heard = is_corner or (edge.is_edge == 1 and near >= ALONE_EDGE_ECHOES and near > ALONE_EDGE_LEAD * edge.passes)
+    """Keep a corner between mirrors at which no wall ends any more, if it is heard on the line of one."""
+    is_heard = edge.is_edge == 0 and edge.far_echoes >= max(EDGE_ECHOES_MIN, edge.far_passes)
     if edge.is_used != PENDING or not is_heard or edges_answer(room):
         return
-    for c in range(EDGES_MAX):
-        other = room.edges[c]
-        if other.is_used == KEPT and math.hypot(other.x - edge.x, other.y - edge.y) < SAME_CORNER_M:
-            return
     for k in range(MAX_WALLS):
         wall = room.walls[k]
         distance, along = distance_and_foot(wall, edge.x, edge.y)
         is_beyond = is_on_span(wall, along, HEARD_REACH_M) and not is_on_span(wall, along, 0.0)
         if wall.weight >= EDGE_WALL_WEIGHT_MIN and abs(distance) < EDGE_OFF_M and is_beyond:
             edge.is_used = KEPT
-            edge.first = k
-            if is_corner:
-                edge.second = int(along > wall.spans[wall.span_count - 1].high)
+            edge.first, edge.second = k, int(along > wall.spans[wall.span_count - 1].high)
             add_line(wall, edge.x, edge.y, room.lines)
             locate(edge, room.lines)
             break

@@ -26,7 +26,6 @@ from perception.bayes.wall_contact import (
     FOOT,
     NOWHERE,
     ONLY_NAMED,
-    are_mirrors,
     contact,
     distance_and_foot,
     explaining_wall,
@@ -43,7 +42,7 @@ from perception.bayes.wall_fit import fit_walls
 from perception.bayes.wall_initiation import try_wall
 from perception.bayes.wall_merging import drop_explained, merge_walls
 from perception.bayes.wall_noise import add_residual, estimate_noise
-from perception.bayes.wall_points import find_heard_points
+from perception.bayes.wall_points import find_heard_corner
 from perception.bayes.wall_records import (
     CORNERS_MAX,
     EDGES_MAX,
@@ -66,7 +65,9 @@ KNOWN_SPACING_M: Final = 0.24
 FIT_FIRINGS: Final = 2
 """Each wall is fitted again at every second firing."""
 TIDY_FIRINGS: Final = 8
-"""Firings between two passes over pairs of walls, and between two looks for what is heard on a wall's line."""
+"""Firings between two passes over pairs of walls."""
+HEARD_TURNS: Final = 2
+"""So many of them for each look for corners that are heard: a third of a millisecond, where walls are mirrors."""
 REVIEW_FIRINGS: Final = 4
 """Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
@@ -147,7 +148,7 @@ def is_from_any_end(room: WallMap, q: Reading, p: SettingsRecord) -> bool:
 
 
 @kernel
-def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int, spacing: float) -> int:
+def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
     """Remember a reading if its sensor has moved far enough; return its place, or −1.
 
     Parameters
@@ -156,10 +157,9 @@ def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int, spacing: f
         The memory, updated, the sensor and its reading.
     is_free : int
         As in `RecentReading`.
-    spacing : float
-        How far, m.
     """
     is_first = room.kept[sensor] == 0.0
+    spacing = RECENT_SPACING_M if is_free == IS_FREE else KNOWN_SPACING_M
     if not is_first and math.hypot(q.x - room.kept_x[sensor], q.y - room.kept_y[sensor]) <= spacing:
         return -1
     room.kept[sensor] = 1.0
@@ -223,12 +223,9 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
         enter_looks(room, tracks, room.corners, CORNERS_MAX, q, p)
         enter_looks(room, tracks, room.edges, EDGES_MAX, q, p)
         is_known = is_known or own >= 0 or is_point or is_from_any_end(room, q, p)
-        # The echoes of a wall that may be another one may also start that, and so may those of a point between
-        # mirrors: near their feet they are those of a wall that ends there.
+        # The echoes of a wall that may be another one may also start that.
         is_open = own >= 0 and not is_on_straight_span(room.walls[own], contact(room.walls[own], q, p)[2])
-        spacing = RECENT_SPACING_M if is_open or not is_known else KNOWN_SPACING_M
-        is_free = is_open or not is_known or (is_point and are_mirrors(room))
-        slot = keep_recent(room, scratch.fired_sensors[i], q, IS_FREE if is_free else IS_KNOWN, spacing)
+        slot = keep_recent(room, scratch.fired_sensors[i], q, IS_KNOWN if is_known and not is_open else IS_FREE)
         if slot >= 0 and not is_known:
             unexplained += 1
             # Any of them with equal chance: else the echoes of one corner keep the others waiting.
@@ -251,7 +248,7 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
         drop_explained(memory.s, memory.tracks, p, turn)
     elif phase == TIDY_FIRINGS * 2 // 3:
         find_corners(memory.s)
-    elif phase == TIDY_FIRINGS - 1:
-        find_heard_points(memory, p, turn)
+    elif phase == TIDY_FIRINGS - 1 and turn % HEARD_TURNS == 0:
+        find_heard_corner(memory, p, turn // HEARD_TURNS)
     if phase % REVIEW_FIRINGS == 1:
         review(memory.s, memory.tracks, p, firings // REVIEW_FIRINGS)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
-from perception.bayes.wall_corners import ALONE_EDGE_ECHOES, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
+from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
 from perception.bayes.wall_crossing import CORNER_INSIDE_M, CORNER_REACH_M
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_numbers import SPAN_MIN_M
@@ -305,8 +305,7 @@ def end_at_edges(
         variance = float(edge["covariance_xx"] + edge["covariance_yy"])
         if echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2:
             continue
-        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ALONE_ECHOES
-        is_sure = echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
+        is_sure = echoes >= ALONE_ECHOES and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
         if owner is not None:
             along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
             reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_MIN_M
