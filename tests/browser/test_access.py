@@ -59,6 +59,14 @@ async def test_all_text_has_contrast_in_every_panel_and_mode(
     assert len(shapes) == 5, "two modes look alike but for their colour"
 
 
+async def test_a_plot_has_a_name_before_it_is_drawn(server: FakeServer, opener: Opener) -> None:
+    opened = await scene(server, opener, DESKTOP)
+    await opened.page.evaluate("() => { window.requestAnimationFrame = () => 0; }")
+    await opened.tab("Plot")
+    assert await opened.page.locator("#plot-lanes canvas").count() > 0
+    assert await opened.page.locator("#plot-lanes canvas:not([aria-label])").count() == 0
+
+
 DESKTOPS = {"desktop": DESKTOP, "projector": PROJECTOR, "laptop": (1024, 768), "tablet": (820, 1180)}
 HANDHELDS = {"phone": PHONE, "side": (740, 360)}
 

@@ -92,7 +92,7 @@ export class Plots {
   #addLane(path) {
     if (this.#lanes.has(path)) return;
     if (this.#lanes.size >= LANES_MAX) this.#removeLane(this.#lanes.keys().next().value);
-    const value = el("b"), canvas = el("canvas", { role: "img" });
+    const value = el("b"), canvas = el("canvas", { role: "img", "aria-label": fieldName(path) });
     const remove = el("button", { type: "button", class: "small", "aria-label": `Remove ${fieldName(path)}`, onclick: () => this.#choose(path, false) }, "✕");
     const element = el("figure", { class: "lane", "data-path": path }, el("figcaption", {}, el("span", {}, fieldName(path)), value, remove), canvas);
     canvas.addEventListener("pointermove", (event) => this.#readAt((event.offsetX - LEFT) / (canvas.clientWidth - LEFT)));
