@@ -154,9 +154,10 @@ def leave_canyon(
     detour = replace(detour, near=remember(detour.near, echoes, pose, detour.driven_m, body_radius_m))
     if to_goal < detour.nearest_m - NEARER_M:
         detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
-    leaving = _leaving(percept.canyons, detour.leaving, pose, goal, room, config)
+    held = [canyon for canyon in percept.canyons if holds(canyon, pose, goal, config)]
+    leaving = _leaving(held, detour.leaving, pose, room)
     detour = replace(detour, leaving=leaving)
-    is_held = leaving is not None or any(holds(canyon, pose, goal, config) for canyon in percept.canyons)
+    is_held = leaving is not None or len(held) > 0
     waits = waits and detour.side == 0 and detour.driven_m - detour.nearest_driven_m < STALL_M
     if waits and not virtual and not is_held:  # only echoes could close the way
         return None, detour
@@ -224,18 +225,15 @@ def _is_inside(canyon: Canyon, x: float, y: float, before_m: float = 0.0) -> boo
     return -before_m < c * dx + s * dy < canyon.depth_m and abs(c * dy - s * dx) < _half_width_m(canyon)
 
 
-def _leaving(
-    canyons: tuple[Canyon, ...], before: Canyon | None, pose: Pose, goal: tuple[float, float], room_m: float,
-    config: LeaveCanyonConfig,
-) -> Canyon | None:  # fmt: skip
+def _leaving(held: list[Canyon], before: Canyon | None, pose: Pose, room_m: float) -> Canyon | None:
     """Return the narrow canyon that the robot leaves by its middle line, until its body is outside; None without one.
 
-    Of several the deepest: the ends of walls are found from the inside outwards.
+    Of several that hold it the deepest: the ends of walls are found from the inside outwards.
     """
-    held = [canyon for canyon in canyons if holds(canyon, pose, goal, config) and _half_width_m(canyon) < room_m]
+    narrow = [canyon for canyon in held if _half_width_m(canyon) < room_m]
     if before is not None and _is_inside(before, pose.x, pose.y, room_m):
-        held.append(before)
-    return max(held, key=lambda canyon: canyon.depth_m) if held else None
+        narrow.append(before)
+    return max(narrow, key=lambda canyon: canyon.depth_m) if narrow else None
 
 
 def _outwards(canyon: Canyon, pose: Pose) -> float:

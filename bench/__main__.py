@@ -13,26 +13,20 @@ from bench.batch_commands import replay, scheduler, sweep, tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
-from bench.corner_bound import corner_bound
 from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
 from bench.estimator import Peer
+from bench.map_commands import corner_bound, false_canyons, false_drums, false_walls, grid, map_size, walls
 from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
-    false_canyons,
-    false_drums,
-    false_walls,
-    grid,
     known_room,
     localization,
-    map_size,
     navigation,
     nees,
     place_bound,
     sightings,
     slips,
-    walls,
 )  # fmt: skip
 from bench.recording import measure_recording
 from bench.runners import Method, candidates
@@ -239,6 +233,7 @@ for command in (
     slips,
     sightings,
     walls,
+    corner_bound,
     false_drums,
     false_walls,
     false_canyons,
@@ -255,7 +250,6 @@ app.command(replay)
 app.command(one_stand)
 app.command(stand_bound)
 app.command(naming_bound)
-app.command(corner_bound)
 app.command(ear_cost)
 
 

@@ -158,26 +158,3 @@ def measure(
                 "heard": len(of), **{what: float(share.mean()) for what, share in figures.items()}
             }  # fmt: skip
     return rows
-
-
-def corner_bound(
-    *, json: str = "corner_bound.json", seeds: int = 30, first: int = 0, steps: tuple[float, ...] = (1.0, 0.2)
-) -> int:
-    """Print how many corners and edges between mirrors their echoes place, and tell from a wall and from a post.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    seeds, first
-        Number of rooms, and the seed of the first one.
-    steps
-        Distances between two firings of one sensor, ft.
-    """
-    from bench.table import report, rows_table
-    from config.load import load_settings
-    from runtime.support.kernel_cache import use_kernel_cache
-
-    use_kernel_cache()
-    rows = measure(load_settings("hallway").ring, range(first, first + max(1, seeds)), steps, lambda _: None)
-    return report(json, rows, rows_table("corners and edges between mirrors, association perfect", rows))

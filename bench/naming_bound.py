@@ -53,14 +53,14 @@ def drive(ring: RingConfig, hall: Hall) -> Heard:
     parts = []
     for firing in firings(ring, quiet, 0):
         own, paths = np.arange(len(mounts)), firing.cross_paths
-        t, l, half = own, own, firing.ranges_m  # noqa: E741
+        sender, listener, half = own, own, firing.ranges_m
         if paths is not None:
-            t, l = np.append(t, paths.transmitters), np.append(l, paths.listeners)  # noqa: E741
+            sender, listener = np.append(own, paths.transmitters), np.append(own, paths.listeners)
             half = np.append(half, paths.half_paths_m)
         at = complex(firing.pose.x, firing.pose.y) + mounts * np.exp(1j * firing.ring_yaw)
         is_heard = np.isfinite(half)
         x = np.full(is_heard.sum(), firing.pose.x)
-        parts.append((x, at[t[is_heard]], at[l[is_heard]], half[is_heard]))
+        parts.append((x, at[sender[is_heard]], at[listener[is_heard]], half[is_heard]))
     return Heard(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

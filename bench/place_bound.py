@@ -23,20 +23,16 @@ from perception.localization.drift_correction import Status
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges, surfaces_near
 from perception.localization.known_room import KnownRoom
 from perception.localization.mixed_reflection import LATE_M, WILD_HEARD
+from perception.localization.particle_update import TEMPER
+from perception.localization.pose_grid import CELL_M, DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.room import Room
 from runtime.simulation.known_room_trials import KnownDrive, Trace, figures, follow
 
-CELL_M: Final = 0.2
 HEADINGS: Final = 72
 STEP_RAD: Final = math.tau / HEADINGS
 CLEAR_M: Final = 0.2
 """The ring's centre is nowhere nearer to a wall."""
-SIGMA_M: Final = 0.12
-SIGMA_SHARE: Final = 0.03
-"""Standard deviation of a range: of half a cell, and of the map and the noise as a share."""
-DROPOUT: Final = 0.2
-WILD: Final = 0.2
 SPECULAR: Final = {"cone": 0.1, "specular": 0.8}
 LATE: Final = 0.2
 """Shares of the readings by their causes, as the program has learned them where it knows its place."""
@@ -50,8 +46,6 @@ TURN_SHARE: Final = 0.03
 NEAR_M: Final = 0.5
 NEAR_RAD: Final = math.radians(12.0)
 """A place's probability is that of all poses so near to it."""
-TEMPER: Final = 0.5
-"""Weight of a reading, as in the program: errors of the map are common to readings of one wall."""
 CODES: Final = 64
 """A range is so many parts of the window; the next code is silence."""
 
@@ -226,7 +220,7 @@ def _ratios(range_m: float, window_m: float, specular: float) -> Floats:
         echo = np.where(answers, DROPOUT, 1.0)
         away = np.full((CODES + 1, 1), 1.0 - LATE)
     mirror = np.where(answers, echo, away)
-    mixed: Floats = (1.0 - WILD) * ((1.0 - specular) * echo[:, None] + specular * mirror) + WILD * anything
+    mixed: Floats = (1.0 - WILD_MIN) * ((1.0 - specular) * echo[:, None] + specular * mirror) + WILD_MIN * anything
     return mixed / anywhere
 
 

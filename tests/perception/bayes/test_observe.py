@@ -11,7 +11,7 @@ from perception.bayes import observe
 from perception.bayes.elements import BEARING_BINS, BIN_CAPACITY, HISTORY
 from perception.bayes.scratch import ON_LINE, UNEXPLAINED
 from perception.bayes.state import ESTABLISHED, FREE
-from tests import naive_tracks
+from tests import naive_occlusion, naive_tracks
 from tests.naive_tracks import rows
 from tests.perception.bayes.tracks import (
     MOUNTS,
@@ -95,7 +95,7 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
             status, centre, radius = circles["status"][k], place_of(memory, k), float(circles["radius"][k])
             same = {
                 o for o in range(TRACKS)
-                if not naive_tracks.is_elsewhere(
+                if not naive_occlusion.is_elsewhere(
                     math.dist(centre, place_of(memory, o)), radius, circles["radius"][o],
                     circles["kind"][o] < S.model_count, S.merge_m, S.gate_m,
                 )

@@ -8,7 +8,7 @@ import numpy as np
 
 from perception.bayes import noise_estimation, occlusion
 from perception.bayes.state import ESTABLISHED
-from tests import naive_tracks
+from tests import naive_occlusion
 from tests.naive_tracks import rows
 from tests.perception.bayes.tracks import (
     NOISES,
@@ -50,8 +50,8 @@ def test_the_relevant_readings_equal_their_oracle_and_keep_their_order(examples:
         variance = noise_estimation.noise_variance(memory.s, P)
         want = []
         for q in w:
-            is_hidden = naive_tracks.is_hidden(q, place, radius, others, S.gate_m)
-            taken = naive_tracks.is_explained_elsewhere(
+            is_hidden = naive_occlusion.is_hidden(q, place, radius, others, S.gate_m)
+            taken = naive_occlusion.is_explained_elsewhere(
                 q, place, radius, others, surer, S.gate_m, S.merge_m, S.cos_may_answer, S.half_resolution_m, variance
             )
             if not is_hidden and not taken:

@@ -1,0 +1,200 @@
+"""Measurements of maps: what stands around the ring, what is reported where nothing does, how large a map may be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, Literal, TypeAlias, get_args
+
+from rich.console import Console
+
+from bench.in_rooms import BY_BAYES, try_in_rooms
+from bench.table import report, rows_table, wide
+from config.load import load_settings
+from runtime.support.kernel_cache import EMULATOR, GRIDS, use_kernel_cache
+from runtime.support.kernel_warmup import prepare_kernels
+
+STEPS_FT: Final = (0.05, 0.2, 0.5, 1.0)
+"""Distances between two firings of one sensor in the rooms with walls, ft."""
+
+Furniture: TypeAlias = Literal["boxes", "clutter"]
+
+
+def grid(
+    *, json: str = "grid.json", laser: tuple[Path, ...] = (), corridor: Path | None = None, seed: int = 0
+) -> int:
+    """Measure evidence grids: ours and those of others in rooms and in a corridor, and the time that ours take.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    laser
+        Recordings of a laser with corrected poses, as CARMEN logs.
+    corridor
+        Folder with poses.txt and measurement.txt of the corridor that eight sonars recorded (tests/data/README.md).
+    seed
+        Of the readings that are too long in the rooms of mirrors.
+    """
+    use_kernel_cache()
+    from bench.grid import measure_corridor, measure_cost, measure_rooms
+
+    console, settings = Console(stderr=True), load_settings("hallway")
+    prepare_kernels(settings, console, GRIDS)
+    with console.status("bench") as status:
+        rows = {"time": measure_cost(settings.ring)}
+        if laser:
+            rows["rooms"] = measure_rooms(laser, seed, status.update)
+        if corridor is not None:
+            rows["corridor"] = measure_corridor(corridor, status.update)
+    tables = [rows_table(f"evidence grids: {title}", part) for title, part in rows.items()]
+    for table in tables[1:]:
+        wide().print(table)
+    return report(json, rows, tables[0])
+
+
+def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
+    """Measure what a firing costs in halls of more and more drums, driven through once and back.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    drums
+        Number of drums of each hall.
+    seed
+        Of their places and of the noise.
+    """
+    use_kernel_cache()
+    from bench.map_size import map_table, measure
+
+    return try_in_rooms(lambda settings, tell: measure(settings, drums, seed, tell), map_table, json)
+
+
+def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: tuple[float, ...] = STEPS_FT) -> int:
+    """Measure the walls found in random rooms with doorways and drums, at several distances between firings.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    seeds
+        Number of rooms.
+    first
+        Seed of the first room.
+    steps
+        Distances between two firings of one sensor, ft.
+    """
+    use_kernel_cache()
+    from bench.walls import measure, walls_table
+
+    rooms = range(first, first + max(1, seeds))
+    return try_in_rooms(lambda settings, tell: measure(settings, rooms, steps, tell), walls_table, json, BY_BAYES)
+
+
+def corner_bound(
+    *, json: str = "corner_bound.json", seeds: int = 30, first: int = 0, steps: tuple[float, ...] = (1.0, 0.2)
+) -> int:
+    """Measure which corners and edges between mirrors their echoes place, and distinguish from walls and posts.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    seeds
+        Number of rooms.
+    first
+        Seed of the first room.
+    steps
+        Distances between two firings of one sensor, ft.
+    """
+    use_kernel_cache()
+    from bench.corner_bound import measure
+
+    rooms = range(first, first + max(1, seeds))
+    return try_in_rooms(
+        lambda settings, tell: measure(settings.ring, rooms, steps, tell),
+        lambda rows: rows_table("corners and edges between mirrors, association perfect", rows), json,
+        parts=(EMULATOR,),
+    )  # fmt: skip
+
+
+def false_walls(*, json: str = "false_walls.json", halls: int = 100, hours: float = 10.0, first: int = 0) -> int:
+    """Measure whether walls are reported where nothing but drums stands.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    halls
+        Number of random halls of drums, posts and barrels, at steps of .05 to 1 ft in turn; 0: none.
+    hours
+        Virtual time in the hall of `make run`, by each model of reflection; 0: none.
+    first
+        Seed of the first hall.
+    """
+    use_kernel_cache()
+    from bench.false_walls import measure
+
+    seeds = range(first, first + max(0, halls))
+    return try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, max(0.0, hours), tell),
+        lambda rows: rows_table("walls reported where nothing but drums stands", rows), json, BY_BAYES,
+    )  # fmt: skip
+
+
+def false_canyons(*, json: str = "false_canyons.json", halls: int = 100, corridors: int = 100, first: int = 0) -> int:
+    """Measure whether canyons are reported where no dead end is: among drums, and in corridors with doorways.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    halls
+        Number of random halls of drums, posts and barrels, at steps of .05 to 1 ft in turn; 0: none.
+    corridors
+        Number of random corridors with doorways of 1.1 m and more; 0: none.
+    first
+        Seed of the first hall and corridor.
+    """
+    use_kernel_cache()
+    from bench.false_canyons import measure
+
+    seeds, ways = (range(first, first + max(0, count)) for count in (halls, corridors))
+    return try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, ways, tell),
+        lambda rows: rows_table("canyons reported where no dead end is", rows), json, BY_BAYES,
+    )  # fmt: skip
+
+
+def false_drums(
+    *,
+    json: str = "false_drums.json",
+    rooms: int = 10,
+    minutes: float = 30.0,
+    first: int = 100,
+    furniture: tuple[Furniture, ...] = get_args(Furniture),
+) -> int:  # fmt: skip
+    """Measure how often a drum is reported in rooms without one: walls and two boxes, and these among clutter.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms.
+    minutes
+        Duration of the drive through each, by each model of reflection, in virtual time.
+    first
+        Seed of the first room.
+    furniture
+        Two boxes, or these among clutter.
+    """
+    use_kernel_cache()
+    from bench.false_drums import measure
+
+    seeds = range(first, first + max(1, rooms))
+    title = f"false drums in rooms without a drum, {minutes:g} min each"
+    return try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, max(0.01, minutes), furniture, tell),
+        lambda rows: rows_table(title, rows), json, BY_BAYES,
+    )  # fmt: skip
