@@ -23,7 +23,7 @@ from drivers.messages import Firing, Pose
 from perception.kernel import Floats
 from perception.localization.landmark_filter import add_landmark, remove_landmark
 from perception.localization.landmark_state import FIRST, HEADING, OFFSET, EstimateRecord, X, Y
-from perception.localization.landmark_tracker import HEADING_WALK, POSE, LandmarkTracker
+from perception.localization.landmark_tracker import POSE, LandmarkTracker
 from perception.localization.map_heading import MapHeading
 from perception.localization.slip import echoes_of_cycle, find_slip
 from perception.sensor_mounts import mounts_array
@@ -171,8 +171,8 @@ class DriftCorrection:
         if self._tracker.entered == 0:
             self._enter_next()
         numbers, failures, xs, ys = self._tracker.landmarks("number", "failures", "x", "y")
-        e, range_max = self.e[0], self._tracker.range_max_m
-        is_near = [math.hypot(x - e.x, y - e.y) < range_max for x, y in zip(xs, ys, strict=True)]
+        here_x, here_y, range_max = self.e[0].x, self.e[0].y, self._tracker.range_max_m
+        is_near = [math.hypot(x - here_x, y - here_y) < range_max for x, y in zip(xs, ys, strict=True)]
         moved = {number for number, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX}
         if moved and self._tracker.is_doubtful and not self._stands_firm:
             moved = set()  # rather the robot slipped
@@ -183,7 +183,7 @@ class DriftCorrection:
             sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
             self._add(objects[number], sigma)
         if not self._has_started:
-            self._turn_landmarks(HEADING_WALK * self._way_m)
+            self._turn_landmarks(self.heading_walk**2 * self._way_m)
         self._has_started = True
 
     def corrected(self, firing: Firing) -> Firing:

@@ -35,14 +35,15 @@ NOISE_MAX: Final = 25.0
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
 NONE: Final = -1
-EDGE_RAD: Final = math.radians(0.4)
+UNHEARD: Final = -1.0
+EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
 EDGE_SIGMAS: Final = 3.0
 """A landmark farther from the beam's edge than this says nothing about its bearing."""
-DROP_OUT: Final = 0.1
+DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
-STRAY: Final = 0.02
-"""Share of the echoes that are heard from outside the beam."""
+WILD_PER_M: Final = 0.01
+"""Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 HIDING_RADII: Final = 1.1
 """A line of sight this near to a landmark's centre is hidden by it."""
 BEHIND_M: Final = 0.3
@@ -105,13 +106,16 @@ def update_with_edge(
     my: float,
     axis: float,
     half_angle: float,
-    is_heard: bool,
+    stray: float,
 ) -> None:
     """Enter that a sensor heard a landmark, which is inside the beam, or did not, so that it is rather outside.
 
     With t the angle from the landmark to the nearer edge of the beam, positive inside, and q² the sum of its variance
     and the edge's, an echo has the probability Φ(t/q); the posterior's moments are those of the probit model. Ranges
     hardly depend on the heading, but what is heard by which sensor does.
+
+    A wild reading that only seems to be of the landmark is as probable wherever the landmark is. The worse the range
+    fits, the more it may be one.
 
     Parameters
     ----------
@@ -125,8 +129,9 @@ def update_with_edge(
         The sensor's mount in the ring's frame, m and rad.
     half_angle : float
         Half the beam's width, rad.
-    is_heard : bool
-        Whether the sensor heard it.
+    stray : float
+        Probability of the reading as a wild one over that as an echo of the landmark inside the beam; negative: the
+        sensor did not hear the landmark.
     """
     est = e[0]
     c, s = math.cos(est.heading), math.sin(est.heading)
@@ -148,8 +153,8 @@ def update_with_edge(
         return
     inside = 0.5 * math.erfc(-z / math.sqrt(2.0))
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-    share = 1.0 - STRAY if is_heard else DROP_OUT - 1.0
-    total = STRAY + share * inside if is_heard else 1.0 + share * inside
+    share = DROP_OUT - 1.0 if stray < 0.0 else 1.0
+    total = 1.0 + share * inside if stray < 0.0 else stray + inside
     slope = share * density / (total * q)
     curvature = -slope * z / q - slope * slope
     if curvature < 0.0:
@@ -219,7 +224,7 @@ def update_with_range(
         est.fit_share += FIT_MEMORY * ((1.0 if best != NONE else 0.0) - est.fit_share)
     is_missed = first != NONE and first != best and r > nearest + BEHIND_M and nearest < range_max
     if is_missed and not is_hidden(e, first, x, y):
-        update_with_edge(e, covariance, first, mx, my, axis, half_angle, is_heard=False)
+        update_with_edge(e, covariance, first, mx, my, axis, half_angle, UNHEARD)
     elif best == NONE and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1
     if best == NONE or second != NONE:
@@ -231,9 +236,12 @@ def update_with_range(
     dx, dy = landmark.x - x, landmark.y - y
     d = math.sqrt(dx * dx + dy * dy)
     u, v = est.range_scale * dx / d, est.range_scale * dy / d
-    innovation = r - est.range_scale * (d - landmark.radius)
+    # The mean distance is longer than that of the means, by what lies across the line of sight.
+    longer = 0.5 * d * bearing_variance(covariance, best, dx, dy)
+    predicted = est.range_scale * (d + longer - landmark.radius)
+    innovation = r - predicted
     variance = innovation_variance(covariance, n, FIRST + 2 * best, u, v, d - landmark.radius, est.gain)
-    nominal = var0 + rel2 * r * r
+    nominal = var0 + rel2 * predicted * predicted  # by its own range, one that is short by chance would count more
     noise = est.noise * nominal
     if best_nis > SOFT:
         noise *= math.sqrt(best_nis / SOFT)
@@ -244,7 +252,9 @@ def update_with_range(
     est.noise = min(NOISE_MAX, max(NOISE_MIN, est.noise + NOISE_MEMORY * weight * (seen - est.noise)))
     landmark.failures = 0
     landmark.hits += 1
-    update_with_edge(e, covariance, best, mx, my, axis, half_angle, is_heard=True)
+    total = variance + noise
+    fits = math.exp(-0.5 * innovation * innovation / total) / math.sqrt(2.0 * math.pi * total)
+    update_with_edge(e, covariance, best, mx, my, axis, half_angle, WILD_PER_M / fits)
     return best
 
 

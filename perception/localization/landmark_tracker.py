@@ -13,7 +13,7 @@ from perception.kernel import Floats
 from perception.localization.landmark_filter import propagate, rows_used, write_lever
 from perception.localization.landmark_ranges import update_with_firing
 from perception.localization.landmark_state import (
-    HEADING,
+    FIRST,
     ODOMETER,
     OFFSET,
     RANGE,
@@ -23,6 +23,7 @@ from perception.localization.landmark_state import (
     X,
     Y,
 )
+from perception.localization.walk_rates import WalkRates
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array, turned_mounts
 
@@ -31,14 +32,12 @@ ODOMETER_SIGMA: Final = 0.03
 TURN_SIGMA: Final = 0.01
 RANGE_SIGMA: Final = 0.01
 """Standard deviations of the slow states at the start."""
-HEADING_WALK: Final = math.radians(1.0) ** 2
-"""Variance of the heading by odometry, rad²/m: the value at the start, …"""
-HEADING_WALK_MIN: Final = math.radians(0.1) ** 2
-WALK_WINDOW_M: Final = 0.5
-WALK_PRIOR: Final = 4
-WALK_MEMORY: Final = 0.06
-"""… its least value, the way after which it is renewed, how many renewals the first value is worth, and the least
-share of one renewal."""
+HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2
+HEADING_PRIOR: Final = HEADING_RATES**-0.25
+"""Variances of the heading by odometry, rad²/m, from .1 to 4.5 °/√m, and their weights before a drive, which let the
+filter begin with about 1 °/√m."""
+WALK_WINDOW_M: Final = 0.25
+"""The way after which the rates are weighed again."""
 PLACE_WALK: Final = 0.002**2
 """Variance of a displacement by odometry on each axis, m²/m."""
 SLIP_SHARE: Final = 0.4
@@ -99,6 +98,7 @@ class LandmarkTracker:
         self.e = records(Estimate, self.estimate)
         self.covariance = np.zeros((ROWS_MAX, ROWS_MAX))
         self.entered_at = np.zeros(POSE)
+        self._rates = WalkRates(HEADING_RATES, HEADING_PRIOR)
         self.reset()
 
     def reset(self) -> None:
@@ -112,15 +112,15 @@ class LandmarkTracker:
         e.odometer_scale = e.range_scale = e.noise = e.fit_share = 1.0
         self.entered = 0
         self.is_synchro = False
-        self._walk = HEADING_WALK
-        self._windows = 0
+        self._rates.reset()
         self._window_m = 0.0
         self._window_variance = -1.0
+        self._window_count = 0
 
     @property
     def heading_walk(self) -> float:
         """The estimated random walk of the heading by odometry, rad per √m."""
-        return math.sqrt(self._walk)
+        return math.sqrt(self._rates.rate)
 
     @property
     def range_max_m(self) -> float:
@@ -129,7 +129,7 @@ class LandmarkTracker:
 
     def assume_walk_of(self, other: LandmarkTracker) -> None:
         """Begin with the random walk of the heading that another filter of the same drive found."""
-        self._walk, self._windows = other._walk, other._windows
+        self._rates.assume(other._rates)
 
     def landmarks(self, *names: str) -> list[list[Any]]:
         """Return fields of all landmarks as lists of numbers."""
@@ -189,7 +189,7 @@ class LandmarkTracker:
         self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > TURNED_RAD
         way = math.hypot(dx, dy)
         self._renew_walk(way)
-        turn_variance, place_variance = self._walk * way, PLACE_WALK * way
+        turn_variance, place_variance = self._rates.rate * way, PLACE_WALK * way
         slip_m2 = slip_rad2 = 0.0
         if self.e[0].fit_share < SLIP_SHARE:
             slip_m2, slip_rad2 = SLIP_M**2, SLIP_RAD**2
@@ -200,22 +200,46 @@ class LandmarkTracker:
         )  # fmt: skip
 
     def _renew_walk(self, way: float) -> None:
-        """Estimate the random walk of the heading from the filter's corrections.
-
-        Corrections of a consistent filter are uncorrelated: over a way w their sum has the variance
-        P(start) + q w − P(end) (after K. Myers and B. Tapley, "Adaptive sequential estimation with unknown noise
-        statistics", 1976).
-        """
+        """Weigh the rates of the heading's random walk by what the filter made of the last way."""
         self._window_m += way
         if self._window_m < WALK_WINDOW_M:
             return
-        e, row = self.e[0], OFFSET if self.is_synchro else HEADING
-        seen = e.offset_correction if self.is_synchro else e.heading_correction
-        variance = float(self.covariance[row, row])
-        if self._window_variance >= 0.0 and e.count >= 2:
-            found = (seen * seen + variance - self._window_variance) / self._window_m
-            self._windows += 1
-            share = max(WALK_MEMORY, 1.0 / (self._windows + WALK_PRIOR))
-            self._walk = max(HEADING_WALK_MIN, self._walk + share * (found - self._walk))
-        self._window_m, self._window_variance = 0.0, variance
+        e = self.e[0]
+        variance = self._heading_variance()
+        if variance >= 0.0 and self._window_variance >= 0.0 and e.count == self._window_count:
+            seen = e.offset_correction if self.is_synchro else e.heading_correction
+            self._rates.enter(float(seen), self._window_variance, variance, self._window_m)
+        else:
+            self._rates.restart(max(variance, 0.0))
+        self._window_m, self._window_variance, self._window_count = 0.0, variance, int(e.count)
         e.offset_correction = e.heading_correction = 0.0
+
+    def _heading_variance(self) -> float:
+        """Return the variance of the heading that wanders, rad²; −1 where the map cannot show it.
+
+        It is the ring's against the map, of a synchro drive the wheels' against the ring.
+        """
+        if self.is_synchro:
+            return float(self.covariance[OFFSET, OFFSET])
+        if self.e[0].count < 2:
+            return -1.0
+        fit = fit_of_turn(np.column_stack(self.landmarks("x", "y")))
+        end = FIRST + len(fit)
+        return float(fit @ self.covariance[FIRST:end, FIRST:end] @ fit)
+
+
+def fit_of_turn(landmarks: Floats) -> Floats:
+    """Return the weights of the landmarks' errors in the best turn of them all against the ring.
+
+    Parameters
+    ----------
+    landmarks : (count, 2) float
+        Their places, m.
+
+    Returns
+    -------
+    (2 count,) float
+    """
+    x, y = (landmarks - landmarks.mean(axis=0)).T
+    fit: Floats = (np.column_stack([-y, x]) / np.sum(x * x + y * y)).ravel()
+    return fit

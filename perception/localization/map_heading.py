@@ -18,7 +18,7 @@ from config.robot import RingConfig
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
 from perception.localization.landmark_state import FIRST, HEADING, OFFSET, X, Y
-from perception.localization.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker
+from perception.localization.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker, fit_of_turn
 
 FIRST_FIRINGS: Final = 160
 """So many are kept, …"""
@@ -177,10 +177,9 @@ def fit_of_heading(landmarks: Floats) -> Floats:
     -------
     (rows,) float
     """
-    x, y = (landmarks - landmarks.mean(axis=0)).T
     fit = np.zeros(FIRST + landmarks.size)
     fit[HEADING] = 1.0
-    fit[FIRST:] = (np.column_stack([-y, x]) / np.sum(x * x + y * y)).ravel()
+    fit[FIRST:] = fit_of_turn(landmarks)
     return fit
 
 

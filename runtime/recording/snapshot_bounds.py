@@ -103,7 +103,7 @@ _COUNTS: Final = (
     "room.firings room.recent_count room.remembered_count rejection_count run_firing run_length segments_held "
     "segments_made segments_numbered "
     "sensors.kept crosses_kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
-    "drift._arrived drift._checked _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
+    "drift._arrived drift._checked _tracker.entered _tracker._window_count landmarks.failures landmarks.hits "
     "_keyframes.count _keyframes._firings entered peak_at known_room._window_begin "
     "known_room._search_begin _grid._due _grid._searches"
 )
@@ -135,6 +135,8 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "known_room._status": Bound(0, len(STATUSES) - 1),
         "_map_heading._kept": Bound(0, FIRST_FIRINGS),
         "_map_heading._tracker.entered": Bound(0, FIRST_FIRINGS),
+        "_rates._variances": Bound(0.0, 1e12),
+        "_rates.rate": Bound(0.0, 1e12),
         "_tracker.estimate.count": Bound(0, LANDMARKS_MAX),
         "_tracker.estimate.noise": Bound(0.0, 1e3),
         "_tracker.estimate.odometer_scale": SCALE,

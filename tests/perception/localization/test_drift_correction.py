@@ -84,7 +84,7 @@ def test_the_first_landmarks_share_an_error_of_the_heading() -> None:
     way = firing(39).pose.x
     for seen in SEEN:
         xx, _, yy = drift.places()[seen.number].covariance
-        shared = landmark_tracker.HEADING_WALK * way * ((seen.x - way) ** 2 + seen.y**2)
+        shared = drift.heading_walk**2 * way * ((seen.x - way) ** 2 + seen.y**2)
         assert xx + yy == pytest.approx(2.0 * drift_correction.FIRST_SIGMA_M**2 + shared)
 
 

@@ -92,6 +92,49 @@ def test_an_echo_at_the_edge_of_the_beam_moves_the_landmark_in_and_silence_out(i
     assert abs(abs(bearing) - HALF_ANGLE) < math.radians(1.5)
 
 
+def test_a_reading_that_may_be_a_wild_one_says_less_of_the_bearing() -> None:
+    off, bearings = HALF_ANGLE + math.radians(1.5), []
+    for stray in (0.0, 0.02, 30.0):
+        e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma=0.04)
+        kernels.update_with_edge(e, covariance, 0, *AHEAD, HALF_ANGLE, stray)
+        at = e[0].landmarks[0]
+        bearings.append(math.atan2(at.y - e[0].y, at.x - e[0].x - 0.4))
+    assert bearings[0] < bearings[1] < bearings[2]
+    assert bearings[2] == pytest.approx(off)
+
+
+def test_the_worse_a_range_fits_the_more_it_may_be_a_wild_one() -> None:
+    off, shrunk = HALF_ANGLE + math.radians(1.5), []
+    across = np.array([-math.sin(off), math.cos(off)])
+    for wrong in (0.0, 3.0):
+        e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma=0.04)
+        enter(e, covariance, 2.0 - RADIUS_M + wrong * math.hypot(SIGMA_M, 0.04))
+        shrunk.append(float(across @ covariance[FIRST : FIRST + 2, FIRST : FIRST + 2] @ across))
+    assert shrunk[0] < shrunk[1] < 0.04**2
+
+
+def test_a_landmark_that_is_uncertain_across_the_line_of_sight_is_farther_than_its_mean() -> None:
+    e, covariance = new_filter([(2.4, 0.0)], sigma=0.1)
+    covariance[FIRST, FIRST] = 1e-8
+    sideways = 0.1 * np.random.default_rng(1).standard_normal(200_000)
+    mean = float(np.mean(np.hypot(2.0, sideways))) - RADIUS_M
+    before = e[0].range_scale
+    covariance[RANGE, RANGE] = 1e-4
+    enter(e, covariance, mean)
+    assert e[0].range_scale == pytest.approx(before, abs=2e-5)
+
+
+def test_a_range_that_is_short_by_chance_counts_no_more_than_a_long_one() -> None:
+    found = []
+    for sign in (1.0, -1.0):
+        e, covariance = new_filter([(2.4, 0.0)], sigma=1e-5)
+        covariance[RANGE, RANGE] = 1e-4
+        kernels.update_with_range(e, covariance, *AHEAD, (2.0 - RADIUS_M) * (1.0 + 0.05 * sign), 1e-6, 0.05**2,
+                                  HALF_ANGLE, RANGE_MAX_M)  # fmt: skip
+        found.append(e[0].range_scale - 1.0)
+    assert found[0] == pytest.approx(-found[1], rel=1e-3)
+
+
 def test_a_range_of_a_farther_landmark_says_that_the_nearer_one_is_outside_the_beam() -> None:
     off = HALF_ANGLE - math.radians(1.0)
     near = (0.4 + 1.5 * math.cos(off), 1.5 * math.sin(off))

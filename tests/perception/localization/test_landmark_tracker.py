@@ -13,7 +13,7 @@ from perception.kernel import Floats
 from perception.localization import landmark_tracker
 from perception.localization.landmark_filter import add_landmark
 from perception.localization.landmark_state import FIRST, HEADING, X, Y
-from perception.localization.landmark_tracker import HEADING_WALK, POSE, LandmarkTracker
+from perception.localization.landmark_tracker import POSE, LandmarkTracker, fit_of_turn
 
 RING = load_settings(None).ring
 
@@ -32,7 +32,8 @@ def test_the_first_firing_gives_the_pose_and_the_next_ones_move_it() -> None:
     e = tracker.e[0]
     assert (tracker.entered, e.heading, tracker.range_max_m) == (2, 0.1, RING.range_max_m)
     assert (e.x, e.y) == pytest.approx((2.5, 0.0))
-    assert tracker.covariance[HEADING, HEADING] == pytest.approx(0.5 * HEADING_WALK)
+    assert tracker.covariance[HEADING, HEADING] == pytest.approx(0.5 * tracker.heading_walk**2)
+    assert math.radians(0.8) < tracker.heading_walk < math.radians(1.3)
 
 
 @pytest.mark.parametrize("is_synchro", [True, False])
@@ -86,19 +87,27 @@ def test_several_landmarks_that_fail_at_once_let_the_pose_be_doubted() -> None:
 
 @pytest.mark.parametrize("degrees", [0.3, 3.0])
 def test_the_random_walk_of_the_heading_is_found_from_the_corrections(degrees: float) -> None:
-    """Each window's corrections are as large as the walk of that way, which is what a filter would correct in it."""
+    """The landmarks turn against the ring by the walk of each way, and are seen again to a fifth of a degree."""
     walk, rng = math.radians(degrees) ** 2, np.random.default_rng(4)
     tracker = LandmarkTracker(RING)
-    for _ in range(2):
-        add_landmark(tracker.e, tracker.covariance, 3.0, 1.0, 1e-4, 0.0, 1e-4)
+    for side in (1.0, -1.0):
+        add_landmark(tracker.e, tracker.covariance, 3.0, side, 1e-4, 0.0, 1e-4)
+    seen, off = math.radians(0.2) ** 2, 0.0
     for k in range(400):
-        tracker.covariance[HEADING, HEADING] = 1e-4
-        tracker.e[0].heading_correction += math.sqrt(walk * 0.25) * rng.standard_normal()
+        off += math.sqrt(walk * 0.25) * rng.standard_normal()
         tracker.enter(silent(0.25 * k, 0.0, 0.0))
-        tracker.covariance[HEADING, HEADING] = 1e-4
-    assert tracker.heading_walk == pytest.approx(math.sqrt(walk), rel=0.35)
+        fit = fit_of_turn(np.column_stack(tracker.landmarks("x", "y")))
+        across = tracker.covariance[FIRST : FIRST + 4, FIRST : FIRST + 4]
+        carried = across @ fit
+        variance = float(fit @ carried)
+        gain = variance / (variance + seen)
+        across -= gain * np.outer(carried, carried) / variance
+        correction = gain * (off + math.sqrt(seen) * rng.standard_normal())
+        tracker.e[0].heading_correction += correction
+        off -= correction
+    assert tracker.heading_walk == pytest.approx(math.sqrt(walk), rel=0.25)
     other = LandmarkTracker(RING)
     other.assume_walk_of(tracker)
     assert other.heading_walk == tracker.heading_walk
     tracker.reset()
-    assert tracker.heading_walk == pytest.approx(math.sqrt(HEADING_WALK))
+    assert tracker.heading_walk == LandmarkTracker(RING).heading_walk
