@@ -39,11 +39,13 @@ UNHEARD: Final = -1.0
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
 EDGE_SIGMAS: Final = 3.0
-"""A landmark farther from the beam's edge than this says nothing about its bearing."""
+"""That a landmark so far inside was heard, or one so far outside was not, says nothing about its bearing."""
 DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
+CURVATURE_MIN: Final = 1e-6
+"""With less, as a share of the squared slope, nothing would change."""
 HIDING_RADII: Final = 1.1
 """A line of sight this near to a landmark's centre is hidden by it."""
 BEHIND_M: Final = 0.3
@@ -149,7 +151,7 @@ def update_with_edge(
     variance = innovation_variance(covariance, rows_used(e), FIRST + 2 * i, u, v, 0.0, est.gain)
     q = math.sqrt(variance + EDGE_RAD * EDGE_RAD)
     z = t / q
-    if abs(z) > EDGE_SIGMAS:
+    if (z < -EDGE_SIGMAS) if stray < 0.0 else (z > EDGE_SIGMAS):
         return
     inside = 0.5 * math.erfc(-z / math.sqrt(2.0))
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
@@ -157,8 +159,8 @@ def update_with_edge(
     total = 1.0 + share * inside if stray < 0.0 else stray + inside
     slope = share * density / (total * q)
     curvature = -slope * z / q - slope * slope
-    if curvature < 0.0:
-        # The posterior's mean is t + σ² slope, its variance σ² + σ⁴ curvature.
+    if abs(curvature) > CURVATURE_MIN * slope * slope:
+        # The posterior's mean is t + σ² slope, its variance σ² + σ⁴ curvature: more where both causes are as likely.
         correct(e, covariance, -slope / curvature, -1.0 / curvature)
 
 
