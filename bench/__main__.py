@@ -20,6 +20,7 @@ from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
+    drift_bound,
     known_room,
     localization,
     navigation,
@@ -230,6 +231,7 @@ for command in (
     navigation,
     beacons,
     nees,
+    drift_bound,
     slips,
     sightings,
     walls,

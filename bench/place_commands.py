@@ -181,6 +181,28 @@ def nees(*, json: str = "nees.json", drives: int = 100, first: int = 200) -> int
     )  # fmt: skip
 
 
+def drift_bound(*, json: str = "drift-bound.json", drives: int = 100, first: int = 200) -> int:
+    """Measure what any filter could know of the drums in the drives of `nees`: one that knows the rest, beside ours.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    drives
+        Number of drives at each level of odometry's errors, at least two.
+    first
+        Seed of the first drive.
+    """
+    use_kernel_cache()
+    from bench.drift_bound import measure
+
+    seeds = range(first, first + max(2, drives))
+    return try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, tell),
+        lambda rows: rows_table("mean error of a drum as seen from the robot, ft", rows), json,
+    )  # fmt: skip
+
+
 def slips(*, json: str = "slips.json", drives: int = 4, first: int = 300) -> int:
     """Measure what remains of slips that the wheels do not report: three rounds among eight drums.
 
