@@ -25,7 +25,7 @@ from perception.sensor_mounts import mounts_array
 from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, oval
 from runtime.simulation.random_halls import ACOUSTICS
 
-PARTICLES: Final = 2000
+PARTICLES: Final = 1000
 RADIUS_M: Final = RADIUS_FT * FOOT_M
 FOUND_START: Final = (0.03, 0.03, 0.03)
 """Standard deviations of the start (m, m, rad) in a map that was found."""
@@ -46,11 +46,11 @@ class Known(NamedTuple):
 @kernel
 def first_range(x: float, y: float, axis: float, drums: Floats, radius: float, half_angle: float) -> float:
     """Return the distance (m) of the first drum that answers a sensor at (x, y), axis in rad; inf for none."""
-    ax, ay, best = math.cos(axis), math.sin(axis), math.inf
+    ax, ay, best, inside = math.cos(axis), math.sin(axis), math.inf, math.cos(half_angle)
     for k in range(len(drums)):
         cx, cy = drums[k, 0] - x, drums[k, 1] - y
         d = math.sqrt(cx * cx + cy * cy)
-        if d - radius >= best or cx * ax + cy * ay < d * math.cos(half_angle):
+        if d - radius >= best or cx * ax + cy * ay < d * inside:
             continue
         is_hidden = False
         for j in range(len(drums)):
