@@ -42,6 +42,12 @@ EDGE_SIGMAS: Final = 3.0
 """That a landmark so far inside was heard, or one so far outside was not, says nothing about its bearing."""
 DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
+STRAY: Final = 0.02
+STRAY_MIN: Final = 5e-4
+STRAY_MAX: Final = 0.9
+STRAY_MEMORY: Final = 0.03
+"""Share of the landmarks outside a beam that are heard, at first: of mirrors none, many where a drum answers with any
+part that is in the beam; its bounds, and the weight of one look in it."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
@@ -100,6 +106,29 @@ def is_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
 
 
 @kernel
+def learn_stray(e: EstimateRecord, inside: float, chance: float) -> None:
+    """Renew the share of landmarks outside a beam that are heard, by one look, as far as that landmark was outside.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    inside : float
+        Probability that the landmark is inside the beam, before the look.
+    chance : float
+        As for `update_with_edge`.
+    """
+    est = e[0]
+    outside = 1.0 - inside
+    if chance < 0.0:
+        heard, as_outside, as_inside = 0.0, (1.0 - est.stray) * outside, DROP_OUT * inside
+    else:
+        heard, as_outside, as_inside = 1.0, est.stray * outside, inside + chance
+    weight = STRAY_MEMORY * as_outside / (as_outside + as_inside)
+    est.stray = min(STRAY_MAX, max(STRAY_MIN, est.stray + weight * (heard - est.stray)))
+
+
+@kernel
 def update_with_edge(
     e: EstimateRecord,
     covariance: Floats,
@@ -108,7 +137,7 @@ def update_with_edge(
     my: float,
     axis: float,
     half_angle: float,
-    stray: float,
+    chance: float,
 ) -> None:
     """Enter that a sensor heard a landmark, which is inside the beam, or did not, so that it is rather outside.
 
@@ -117,7 +146,7 @@ def update_with_edge(
     hardly depend on the heading, but what is heard by which sensor does.
 
     A wild reading that only seems to be of the landmark is as probable wherever the landmark is. The worse the range
-    fits, the more it may be one.
+    fits, the more it may be one. Nor does an echo say much where landmarks are heard from outside.
 
     Parameters
     ----------
@@ -131,7 +160,7 @@ def update_with_edge(
         The sensor's mount in the ring's frame, m and rad.
     half_angle : float
         Half the beam's width, rad.
-    stray : float
+    chance : float
         Probability of the reading as a wild one over that as an echo of the landmark inside the beam; negative: the
         sensor did not hear the landmark.
     """
@@ -151,12 +180,14 @@ def update_with_edge(
     variance = innovation_variance(covariance, rows_used(e), FIRST + 2 * i, u, v, 0.0, est.gain)
     q = math.sqrt(variance + EDGE_RAD * EDGE_RAD)
     z = t / q
-    if (z < -EDGE_SIGMAS) if stray < 0.0 else (z > EDGE_SIGMAS):
-        return
     inside = 0.5 * math.erfc(-z / math.sqrt(2.0))
+    stray = chance + est.stray
+    learn_stray(e, inside, chance)
+    if (z < -EDGE_SIGMAS) if chance < 0.0 else (z > EDGE_SIGMAS):
+        return
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-    share = DROP_OUT - 1.0 if stray < 0.0 else 1.0
-    total = 1.0 + share * inside if stray < 0.0 else stray + inside
+    share = DROP_OUT - 1.0 if chance < 0.0 else 1.0
+    total = 1.0 + share * inside if chance < 0.0 else stray + inside
     slope = share * density / (total * q)
     curvature = -slope * z / q - slope * slope
     if abs(curvature) > CURVATURE_MIN * slope * slope:

@@ -72,6 +72,8 @@ class Estimate(Record):
     heading_correction: float
     offset_correction: float
     """Sums of the corrections of heading and offset since the estimate of their random walk was last renewed."""
+    stray: float
+    """Share of the landmarks just outside a beam that its sensor hears all the same."""
     fit_share: float
     """Share of the expected echoes that came, over the last few dozen."""
     landmarks: Annotated[Records[Landmark], LANDMARKS_MAX]

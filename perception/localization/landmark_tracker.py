@@ -11,7 +11,7 @@ from config.robot import RingConfig
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.landmark_filter import propagate, rows_used, write_lever
-from perception.localization.landmark_ranges import update_with_firing
+from perception.localization.landmark_ranges import STRAY, update_with_firing
 from perception.localization.landmark_state import (
     FIRST,
     ODOMETER,
@@ -110,6 +110,7 @@ class LandmarkTracker:
             self.covariance[row, row] = sigma**2
         e = self.e[0]
         e.odometer_scale = e.range_scale = e.noise = e.fit_share = 1.0
+        e.stray = STRAY
         self.entered = 0
         self.is_synchro = False
         self._rates.reset()

@@ -36,6 +36,7 @@ from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED
 from perception.bayes.wall_records import IS_KNOWN, IS_TAKEN, MAX_WALLS, SPANS_MAX, WALL_BIN_M, WALL_BINS
 from perception.localization.background import HEARD_MIN
 from perception.localization.known_room import IDLE, STATUSES, WEIGHING
+from perception.localization.landmark_ranges import STRAY_MAX, STRAY_MIN
 from perception.localization.landmark_state import LANDMARKS_MAX
 from perception.localization.map_heading import FIRST_FIRINGS
 from perception.localization.pose_grid import NONE as NO_QUANTUM
@@ -141,6 +142,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "_tracker.estimate.noise": Bound(0.0, 1e3),
         "_tracker.estimate.odometer_scale": SCALE,
         "_tracker.estimate.range_scale": SCALE,
+        "_tracker.estimate.stray": Bound(STRAY_MIN, STRAY_MAX),
         "_extractor._sensors.count": Bound(0, READINGS_KEPT),
         "_extractor._sensors.newest": Bound(0, READINGS_KEPT - 1),
         "_left": QUANTA,

@@ -144,6 +144,37 @@ def test_a_range_that_is_short_by_chance_counts_no_more_than_a_long_one() -> Non
     assert found[0] == pytest.approx(-found[1], rel=1e-3)
 
 
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_how_often_landmarks_outside_the_beam_are_heard_is_found(is_heard: bool) -> None:
+    off = HALF_ANGLE + math.radians(0.8)
+    e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma=0.002)
+    e[0].stray = kernels.STRAY
+    before = covariance.copy()
+    for _ in range(120):
+        covariance[:] = before
+        enter(e, covariance, 2.0 - RADIUS_M if is_heard else math.inf)
+    assert (e[0].stray > 0.5) if is_heard else (e[0].stray < 0.2 * kernels.STRAY)
+
+
+def test_a_landmark_inside_the_beam_says_nothing_of_those_outside() -> None:
+    e, covariance = new_filter([(2.4, 0.05)], sigma=0.002)
+    e[0].stray = kernels.STRAY
+    for r in (1.7, math.inf, 1.7, math.inf):
+        enter(e, covariance, r)
+    assert e[0].stray == pytest.approx(kernels.STRAY)
+
+
+def test_where_landmarks_outside_are_heard_an_echo_does_not_turn_the_ring() -> None:
+    off, turned = HALF_ANGLE + math.radians(1.5), []
+    for stray in (0.001, 0.8):
+        e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma=0.04)
+        e[0].stray = stray
+        enter(e, covariance, 2.0 - RADIUS_M)
+        at = e[0].landmarks[0]
+        turned.append(off - math.atan2(at.y - e[0].y, at.x - e[0].x - 0.4))
+    assert turned[0] > math.radians(1.0) > 3.0 * turned[1]
+
+
 def test_a_range_of_a_farther_landmark_says_that_the_nearer_one_is_outside_the_beam() -> None:
     off = HALF_ANGLE - math.radians(1.0)
     near = (0.4 + 1.5 * math.cos(off), 1.5 * math.sin(off))
