@@ -6,6 +6,7 @@ import math
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Pose, wrap_angle
@@ -38,8 +39,9 @@ HEADING_PRIOR: Final = HEADING_RATES**-0.25
 filter begin with about 1 °/√m."""
 WALK_WINDOW_M: Final = 0.25
 """The way after which the rates are weighed again."""
-PLACE_WALK: Final = 0.002**2
-"""Variance of a displacement by odometry on each axis, m²/m."""
+PLACE_WALK: Final = 0.0005**2
+"""Variance of a displacement by odometry on each axis, m²/m. A base's distance errs by its scale, which the filter
+finds, and where wheels slip; what is left is below what the echoes show."""
 SLIP_SHARE: Final = 0.4
 """With fewer of the expected echoes than this, the wheels may have slipped: odometry is then trusted less."""
 FAILURES_DOUBTED: Final = 2
@@ -47,6 +49,8 @@ LANDMARKS_DOUBTED: Final = 2
 """So many failures in succession of so many landmarks at once let the pose be doubted."""
 RENEWED_SHARE: Final = 0.7
 """Share of the expected echoes that is assumed after a displacement was found."""
+FAILING_M: Final = 0.01
+"""Standard deviation that each firing adds to the place while a landmark fails so often: a slip, if a small one."""
 SLIP_M: Final = 0.02
 SLIP_RAD: Final = math.radians(1.0)
 """Standard deviations that each firing adds then."""
@@ -153,8 +157,12 @@ class LandmarkTracker:
     @property
     def is_doubtful(self) -> bool:
         """Whether several landmarks fail at once, or hardly any echo comes: rather a robot that slipped."""
-        failing = self.estimate["landmarks"]["failures"][0, : int(self.estimate["count"][0])] >= FAILURES_DOUBTED
-        return bool(np.count_nonzero(failing) >= LANDMARKS_DOUBTED or self.e[0].fit_share < SLIP_SHARE)
+        return bool(np.count_nonzero(self._failing()) >= LANDMARKS_DOUBTED or self.e[0].fit_share < SLIP_SHARE)
+
+    def _failing(self) -> NDArray[np.bool_]:
+        """Return which landmarks have failed so often that they, or the pose, are doubted."""
+        failures: NDArray[np.int64] = self.estimate["landmarks"]["failures"][0, : int(self.estimate["count"][0])]
+        return failures >= FAILURES_DOUBTED
 
     def displace(self, by: Pose, covariance: Floats) -> None:
         """Move the ring without odometry.
@@ -191,7 +199,7 @@ class LandmarkTracker:
         way = math.hypot(dx, dy)
         self._renew_walk(way)
         turn_variance, place_variance = self._rates.rate * way, PLACE_WALK * way
-        slip_m2 = slip_rad2 = 0.0
+        slip_m2, slip_rad2 = FAILING_M**2 if np.any(self._failing()) else 0.0, 0.0
         if self.e[0].fit_share < SLIP_SHARE:
             slip_m2, slip_rad2 = SLIP_M**2, SLIP_RAD**2
         propagate(

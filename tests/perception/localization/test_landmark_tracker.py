@@ -52,6 +52,16 @@ def test_while_no_echo_fits_odometry_is_trusted_less() -> None:
     assert tracker.covariance[X, X] > 0.9 * landmark_tracker.SLIP_M**2
 
 
+@pytest.mark.parametrize("failures", [1, 2])
+def test_while_a_landmark_fails_again_and_again_the_place_by_odometry_is_trusted_less(failures: int) -> None:
+    tracker = LandmarkTracker(RING)
+    tracker.enter(silent(0.0, 0.0, 0.0))
+    add_landmark(tracker.e, tracker.covariance, 3.0, 1.0, 1e-4, 0.0, 1e-4)
+    tracker.e[0].landmarks[0].failures = failures
+    tracker.enter(silent(0.01, 0.0, 0.0))
+    assert (tracker.covariance[X, X] > 0.9 * landmark_tracker.FAILING_M**2) == (failures == 2)
+
+
 def test_a_displacement_moves_the_ring_alone_and_makes_it_uncertain_alone() -> None:
     tracker = LandmarkTracker(RING)
     tracker.enter(silent(1.0, 0.5, 0.5))
