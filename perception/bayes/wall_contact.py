@@ -47,7 +47,8 @@ HEARD_REACH_M: Final = 3.0
 EDGES_LEAD: Final = 4.0
 EDGES_SHARE: Final = 0.25
 """Edges count if their echoes exceed this share of their silences by this lead. Mirrors leave 1 %; of surfaces that
-answer at any angle, half: drop-outs, and walls that are not yet known well."""
+answer at any angle, half: drop-outs, and walls that are not yet known well. Where hardly a beam is silent they count
+until their silences lead as far."""
 
 
 @kernel
@@ -59,7 +60,8 @@ def range_sigma(room: WallMap, range_m: float) -> float:
 @kernel
 def edges_answer(room: WallMap) -> bool:
     """Return whether slanting walls answer from the beam's edge here."""
-    return bool(room.edge_echoes > EDGES_SHARE * room.edge_silences + EDGES_LEAD)
+    lead = -EDGES_LEAD if room.is_loud == 1 else EDGES_LEAD
+    return bool(room.edge_echoes > EDGES_SHARE * room.edge_silences + lead)
 
 
 @kernel

@@ -15,6 +15,7 @@ import math
 from typing import Final
 
 from perception.bayes.elements import Reading
+from perception.bayes.model_check import is_loud
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.settings_record import SettingsRecord
@@ -76,6 +77,8 @@ EDGE_WITHIN_M: Final = 0.15
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 EDGE_SLACK_M: Final = 0.05
+LOUD_MIN: Final = 100.0
+"""Echoes among the last thousand readings, at least, before the share of silent ones says how surfaces answer."""
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
 
@@ -186,6 +189,7 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
     room = s[0].room
     scratch = s[0].scratch
     estimate_noise(s, p)
+    room.is_loud = 1 if is_loud(s, p) and s[0].heard >= LOUD_MIN else 0
     newest = -1
     unexplained = 0
     for i in range(m):

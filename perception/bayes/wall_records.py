@@ -191,6 +191,8 @@ class WallMap(Record):
     """Slanting walls that answered from the beam's edge …"""
     edge_silences: float
     """… and those that did not."""
+    is_loud: int
+    """1 where so few beams are silent that surfaces must answer at any angle."""
     variance_m2: float
     """Variance of a range r, as assumed now: `variance_m2` + `relative_variance` · r²."""
     relative_variance: float

@@ -141,8 +141,10 @@ def has_mirrors(memory: Memory) -> bool:
 
 def edges_answer(memory: Memory) -> bool:
     """Return whether slanting walls answer from the beam's edge, as `wall_contact.edges_answer` does."""
-    echoes, silences = (float(memory.state["room"][name][0]) for name in ("edge_echoes", "edge_silences"))
-    return echoes > EDGES_SHARE * silences + EDGES_LEAD
+    echoes, silences, is_loud = (
+        float(memory.state["room"][name][0]) for name in ("edge_echoes", "edge_silences", "is_loud")
+    )
+    return echoes > EDGES_SHARE * silences + (-EDGES_LEAD if is_loud == 1.0 else EDGES_LEAD)
 
 
 def is_of_body(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
