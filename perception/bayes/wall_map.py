@@ -77,6 +77,8 @@ EDGE_WITHIN_M: Final = 0.15
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 EDGE_SLACK_M: Final = 0.05
+LOUD_SHARE: Final = 1.4
+"""Beams may be silent more often by this factor than where names are given with care: silences contradict soon."""
 LOUD_MIN: Final = 100.0
 """Echoes among the last thousand readings, at least, before the share of silent ones says how surfaces answer."""
 EDGES_COUNTED_MAX: Final = 400.0
@@ -189,7 +191,7 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
     room = s[0].room
     scratch = s[0].scratch
     estimate_noise(s, p)
-    room.is_loud = 1 if is_loud(s, p) and s[0].heard >= LOUD_MIN else 0
+    room.is_loud = 1 if is_loud(s, p, LOUD_SHARE) and s[0].heard >= LOUD_MIN else 0
     newest = -1
     unexplained = 0
     for i in range(m):

@@ -227,9 +227,10 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     """
     length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
     least = PROVEN_WEIGHT_MIN if is_proven else SPAN_WEIGHT_MIN
-    sure = (length >= SPAN_MIN_M) & (weight >= np.maximum(least, SPAN_DENSITY * length)) & (straight > SPAN_CHI2_MIN)
+    dense = (weight >= np.maximum(least, SPAN_DENSITY * length)) & (straight > SPAN_CHI2_MIN)
+    sure = dense & (length >= SPAN_MIN_M)
     if sure.any() and not is_proven:
-        together = chi2 if np.count_nonzero(sure & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
+        together = chi2 if np.count_nonzero(dense & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
         is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
     return np.asarray(sure)
