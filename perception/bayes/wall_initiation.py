@@ -70,6 +70,9 @@ NEW_WALL_PASSES_MAX: Final = 0.35
 NEW_WALL_VARIANCE_M2: Final = 0.03**2
 NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
 """Uncertainty of a candidate before the first fit."""
+KNOWN_SIGMA_M: Final = 0.06
+"""Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
+turn it, by a long lever."""
 ROUNDS: Final = 3
 CONTINUED_WEIGHT_MIN: Final = 20.0
 CONTINUED_CHI2_MIN: Final = 14.0
@@ -234,7 +237,7 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
         if nx * q.axis_x + ny * q.axis_y < least:  # most of them: they face elsewhere
             continue
         kind, expected, along, dot = contact(wall, q, p)
-        if kind == NOWHERE:
+        if kind == NOWHERE or line_variance(wall, along) > KNOWN_SIGMA_M**2:
             continue
         e = q.range_m - expected
         slack = tolerance(room, wall, along, expected, dot)
