@@ -75,6 +75,7 @@ def clear_bins(wall: Wall) -> None:
         of.passes = 0.0
         of.number = 0
         of.is_held = 0
+        of.is_open = 0
 
 
 def free(wall: Wall) -> None:

@@ -126,6 +126,7 @@ def move_bins(main: Wall, part: Wall) -> None:
         np.add.at(target[name], at, source[name])
     np.maximum.at(target["passes"], at, source["passes"])
     np.maximum.at(target["is_held"], at, source["is_held"])
+    np.maximum.at(target["is_open"], at, source["is_open"])
     target["newest"][at] = source["newest"]
     target["number"][at] = source["number"]
     main.is_changed = 1

@@ -53,6 +53,8 @@ class WallBin(Record):
     """That of the numbered span that held it last, 0 before."""
     is_held: int
     """1 where the last review found that the wall covers it by echoes, or one was entered since."""
+    is_open: int
+    """1 where the last review found it open."""
     newest: Reading
 
 

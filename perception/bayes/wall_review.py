@@ -264,4 +264,5 @@ def find_covered(s: StateRecord, k: int) -> None:
         b = WALL_BINS - 1 - i
         before = covered[b]
         bins[b].is_held = 1 if is_on and evidence[b] > 0.0 else 0
+        bins[b].is_open = 0 if is_on else 1
         is_on = before >= 2 if is_on else before % 2 == 1

@@ -68,8 +68,11 @@ class Straight:
         """Let the spans go as far as the last review found, if there was one; it may leave none."""
         if not self.wall["reviewed"]["information"] > 0.0:
             return
-        on = np.flatnonzero(self.wall["bins"]["is_held"] == 1)
-        parts = np.split(on, np.flatnonzero((np.diff(on) - 1) * WALL_BIN_M > ROUGH_GAP_MAX_M + TINY_M) + 1)
+        bins = self.wall["bins"]
+        on = np.flatnonzero(bins["is_held"] == 1)
+        is_far = (np.diff(on) - 1) * WALL_BIN_M > ROUGH_GAP_MAX_M + TINY_M
+        opened = np.cumsum((bins["is_open"] == 1) & (bins["is_held"] == 0))[on]
+        parts = np.split(on, np.flatnonzero(is_far | (np.diff(opened) > 0)) + 1)
         ends, kept = [], []
         for low, high in ((int(part[0]), int(part[-1]) + 1) for part in parts if len(part)):
             own = self.spans[(self.spans["first_bin"] < high) & (low < self.spans["end_bin"])]
