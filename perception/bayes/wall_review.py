@@ -156,7 +156,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
         slack = tolerance(room, wall, along, expected, cosine)
         of = wall.bins[b]
         is_sure = of.weight >= SURE_WEIGHT and of.passes < SURE_PASSES * of.weight and is_on_span(wall, along, 0.0)
-        if e > slack and not is_sure:
+        if e > slack:
             x, y = wall_point(wall, along)
             if not is_hidden(tracks, q, x, y):
                 evidence[b] -= PASS_NAT if q.range_m < FAR else SILENCE_NAT
