@@ -27,7 +27,7 @@ CORNERS_MAX: Final = 24
 EDGES_MAX: Final = 24
 RECENT_MAX: Final = 768
 """Spaced readings of all sensors that are remembered for new walls."""
-REMEMBERED_MAX: Final = 4096
+REMEMBERED_MAX: Final = 8192
 """Spaced readings of all sensors by which walls are reviewed: those of some 25 m."""
 IS_KNOWN: Final = 0
 IS_FREE: Final = 1

@@ -41,9 +41,9 @@ from perception.bayes.wall_fit import OFFSET_INFORMATION, SLOPE_SIGMA
 from perception.bayes.wall_records import MAX_WALLS, REMEMBERED_MAX, WALL_BINS, Wall, WallMap
 from perception.kernel import kernel
 
-REMEMBERED_SPACING_M: Final = 0.15
+REMEMBERED_SPACING_M: Final = 0.08
 """Least distance between the remembered readings of a sensor."""
-REMEMBERED_FIRST: Final = 1024
+REMEMBERED_FIRST: Final = 2048
 """So many are remembered, those of some 6 m, before slanting walls are known to answer: else none is reviewed."""
 REVIEWED_WEIGHT_MIN: Final = 20.0
 REVIEWED_CHI2_MIN: Final = 14.0
