@@ -39,6 +39,8 @@ STRAY_BINS: Final = 2
 STRAY_SIGMAS: Final = 3.0
 STRAY_SLACK_M: Final = 0.012
 """Echoes whose mean lies this far behind the line come from something else: from the ends of an opening, mostly."""
+STRAY_BEFORE_M: Final = 0.03
+"""… and so do those that lie this far before it: from another wall at its corner, before that was known."""
 PASSED_MIN: Final = 1.5
 PASSED_SHARE: Final = 0.4
 """Passes there that make it open: so many, and of so great a share of the weight."""
@@ -146,7 +148,8 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
             error += of.precision * mean_error(wall, k)
     if edges_answer(room) and passes >= PASSED_MIN and passes > PASSED_SHARE * total:
         return True
-    return error / precision > STRAY_SIGMAS / math.sqrt(precision) + STRAY_SLACK_M
+    slack = STRAY_SIGMAS / math.sqrt(precision)
+    return error / precision > slack + STRAY_SLACK_M or error / precision < -slack - STRAY_BEFORE_M
 
 
 @kernel
