@@ -54,7 +54,7 @@ def everything_echoes(s: StateRecord, p: SettingsRecord) -> bool:
 
 @kernel
 def is_loud(s: StateRecord, p: SettingsRecord, factor: float) -> bool:
-    """Return whether the beams hear more than mirrors would let them; `factor` of the silences that prove it may be."""
+    """Return whether the beams hear more than mirrors would let them; `factor` times more silences are allowed."""
     return bool(s[0].silent < factor * p[0].silent_share_min * (s[0].heard + s[0].silent))
 
 

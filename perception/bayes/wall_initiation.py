@@ -18,23 +18,17 @@ from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import Memory, StateRecord
 from perception.bayes.wall_bins import SILENT_PASS, bin_of, clear_wall, enter_reading
 from perception.bayes.wall_contact import (
-    BEAM_EDGE,
     FOOT,
     NOWHERE,
     SLANTING_MIN_COS,
-    SPAN_MARGIN_M,
     contact,
-    distance_and_foot,
     edges_answer,
-    is_on_span,
     line_variance,
     tolerance,
     wall_normal,
-    wall_point,
 )
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_fit import fit_walls
-from perception.bayes.wall_merging import SAME_SIGMAS, SAME_SLACK_M, move_bins
 from perception.bayes.wall_numbers import number_spans
 from perception.bayes.wall_records import (
     CANDIDATE,
@@ -74,9 +68,6 @@ KNOWN_SIGMA_M: Final = 0.06
 """Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
 turn it, by a long lever."""
 ROUNDS: Final = 3
-CONTINUED_WEIGHT_MIN: Final = 20.0
-CONTINUED_CHI2_MIN: Final = 14.0
-"""A wall of so much weight and evidence may continue beyond an opening."""
 REPLACED_WEIGHT_MAX: Final = 12.0
 """A wall of less weight gives way to a new one where there are too many."""
 
@@ -301,77 +292,6 @@ def fit_candidate(memory: Memory, p: SettingsRecord, chi2_min: float = NEW_WALL_
     return is_wall(memory.s, chi2_min)
 
 
-@kernel
-def continued_wall(s: StateRecord, p: SettingsRecord, newest: int) -> int:
-    """Return the known wall whose line a recent echo touches beyond its ends, −1 if there is none.
-
-    Parameters
-    ----------
-    s, p
-        Memory and settings; the candidate becomes that line.
-    newest : int
-        The echo's place among the recent readings.
-    """
-    room = s[0].room
-    q = room.recent[newest].reading
-    edges = edges_answer(room)
-    for k in range(MAX_WALLS):
-        wall = room.walls[k]
-        if wall.weight < CONTINUED_WEIGHT_MIN or wall.chi2 < CONTINUED_CHI2_MIN:
-            continue
-        kind, expected, along, dot = contact(wall, q, p)
-        is_touched = kind == FOOT or (kind == BEAM_EDGE and edges)
-        if not is_touched or is_on_span(wall, along, SPAN_MARGIN_M):
-            continue
-        if abs(q.range_m - expected) < tolerance(room, wall, along, expected, dot):
-            own = room.walls[CANDIDATE]
-            own.normal_x, own.normal_y = wall_normal(wall)
-            own.origin_x, own.origin_y = wall_point(wall, along)
-            own.offset = own.slope = own.covariance = 0.0
-            own.variance_offset = line_variance(wall, along)
-            own.variance_slope = wall.variance_slope
-            return k
-    return -1
-
-
-@kernel
-def is_in_line(s: StateRecord, k: int) -> bool:
-    """Return whether the spans of the candidate lie on the line of wall `k`."""
-    wall = s[0].room.walls[k]
-    own = s[0].room.walls[CANDIDATE]
-    for i in range(2 * own.span_count):
-        span = own.spans[i // 2]
-        u = span.low if i % 2 == 0 else span.high
-        x, y = wall_point(own, u)
-        away, along = distance_and_foot(wall, x, y)
-        if abs(away) > SAME_SIGMAS * math.sqrt(line_variance(wall, along) + line_variance(own, u)) + SAME_SLACK_M:
-            return False
-    return True
-
-
-def continue_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
-    """Look for a known wall's part beyond an opening, through a recent echo, and add it; return whether there is one.
-
-    Its line is known, so that its echoes need not prove that it is straight: a round object would touch that line
-    by chance.
-
-    Parameters
-    ----------
-    memory, p
-        Updated, and the settings.
-    newest : int
-        The echo's place among the recent readings.
-    """
-    k = continued_wall(memory.s, p, newest)
-    is_new = k >= 0 and fit_candidate(memory, p, SPAN_CHI2_MIN) and is_in_line(memory.s, k)
-    if is_new:
-        walls: NDArray[Any] = memory.state["room"]["walls"][0]
-        move_bins(walls[k], walls[CANDIDATE])
-        fit_walls(memory.s, p, k, k + 1, 1)
-    end_candidate(memory.s, is_new)
-    return is_new
-
-
 def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
     """Look for a wall through a recent echo, and add it; return whether there is one.
 
@@ -384,8 +304,6 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
     newest : int
         The echo's place among the recent readings.
     """
-    if continue_wall(memory, p, newest):
-        return True
     if not best_line(memory.s, p, newest):
         return False
     is_new = fit_candidate(memory, p)
