@@ -11,7 +11,7 @@ from perception.bayes.reservoir import copy_reading
 from perception.bayes.state import CircleTrack, Memory
 from perception.bayes.wall_bins import HALF
 from perception.bayes.wall_fit import fit_walls
-from perception.bayes.wall_records import MAX_WALLS, Wall, WallMap
+from perception.bayes.wall_records import IS_FREE, MAX_WALLS, Wall, WallMap
 from perception.records import records, zeros
 from tests.naive_walls import Array
 from tests.perception.bayes.tracks import P, S, new_memory
@@ -82,3 +82,12 @@ def spans(wall: Wall) -> Array:
 def facing(normal: float, rng: np.random.Generator) -> float:
     """Return the axis of a sensor whose beam contains a normal well inside."""
     return normal + float(rng.uniform(-0.8, 0.8)) * S.half_angle_rad
+
+
+def remember_free(room: WallMap, rows: Array) -> None:
+    """Make rows of x, y, axis (rad) and range (m) the recent readings, echoes that nothing explains."""
+    for k, (x, y, axis, range_m) in enumerate(rows.tolist()):
+        q = room.recent[k].reading
+        q.x, q.y, q.axis_x, q.axis_y, q.range_m = x, y, math.cos(axis), math.sin(axis), range_m
+        room.recent[k].is_free = IS_FREE
+    room.recent_count = len(rows)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes import wall_contact
+from perception.bayes import wall_contact, wall_report
 from perception.bayes.state import ESTABLISHED, TENTATIVE
 from perception.bayes.wall_contact import BEAM_EDGE, FOOT, NOWHERE
 from tests import naive_walls
@@ -62,6 +62,14 @@ def test_echoes_from_a_beams_edge_count_where_slanting_walls_answer() -> None:
     assert wall_contact.explaining_wall(room, q, P, 0.0) == (-1, NOWHERE, 1.0)
     room.edge_echoes, room.edge_silences = 9.0, 2.0
     assert wall_contact.explaining_wall(room, q, P, 0.0)[:2] == (0, BEAM_EDGE)
+
+
+def test_where_hardly_a_beam_is_silent_echoes_of_edges_count_until_silences_lead() -> None:
+    memory, room = new_room()
+    for is_loud, silences, expected in ((0, 0.0, False), (1, 0.0, True), (1, 15.0, True), (1, 17.0, False)):
+        room.is_loud, room.edge_silences = is_loud, silences
+        assert wall_contact.edges_answer(room) is expected
+        assert wall_report.edges_answer(memory) is expected
 
 
 def test_ends_and_corners_explain_echoes() -> None:

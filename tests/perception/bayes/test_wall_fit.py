@@ -64,6 +64,20 @@ def test_a_single_echo_far_beyond_either_end_is_no_part_of_a_wall() -> None:
         assert longest == pytest.approx(ends, abs=0.061)
 
 
+def test_echoes_far_before_the_line_at_one_end_do_not_turn_it() -> None:
+    memory, room = new_room()
+    wall = room.walls[0]
+    place_wall(wall, np.zeros(2), 0.0, 2.0)
+    fill(memory, wall, -0.9, 0.9)
+    for b in (109, 110):
+        of = wall.bins[b]
+        of.offset_sum = of.precision * 1.9
+    for _ in range(3):
+        refit(memory, wall)
+    assert (wall.offset, wall.slope) == pytest.approx((2.0, 0.0), abs=2e-3)
+    assert spans(wall) == pytest.approx(np.array([[-0.9, 0.8]]), abs=0.1), "those beside them are left out, too"
+
+
 def test_echoes_of_an_end_do_not_lengthen_a_wall() -> None:
     rng = np.random.default_rng(44)
     memory, room = new_room()

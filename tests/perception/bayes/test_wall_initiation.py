@@ -9,20 +9,10 @@ import pytest
 
 from perception.bayes import wall_initiation
 from perception.bayes.wall_contact import wall_normal, wall_point
-from perception.bayes.wall_records import IS_FREE, IS_KNOWN, WallMap
+from perception.bayes.wall_records import CANDIDATE, IS_FREE, IS_KNOWN
 from tests import naive_walls
-from tests.naive_walls import Array
-from tests.perception.bayes.rooms import SIGMA, facing, new_room, reading, spans
+from tests.perception.bayes.rooms import SIGMA, facing, new_room, place_wall, reading, remember_free, spans
 from tests.perception.bayes.tracks import P, S, examples, pair
-
-
-def remember(room: WallMap, rows: Array) -> None:
-    """Make rows of x, y, axis (rad) and range (m) the recent readings."""
-    for k, (x, y, axis, range_m) in enumerate(rows.tolist()):
-        q = room.recent[k].reading
-        q.x, q.y, q.axis_x, q.axis_y, q.range_m = x, y, math.cos(axis), math.sin(axis), range_m
-        room.recent[k].is_free = IS_FREE
-    room.recent_count = len(rows)
 
 
 @examples(100, 1000)
@@ -60,7 +50,7 @@ def test_a_wall_among_outliers_is_found_and_its_echoes_are_known(examples: int) 
             axis = facing(normal, rng)
             exact, _ = naive_walls.touch(place, axis, S.half_angle_rad, normal, 0.0)
             rows.append((*place, axis, exact + rng.normal(0, SIGMA) if k % 8 else rng.uniform(0.2, 4.0)))
-        remember(room, np.array(rows))
+        remember_free(room, np.array(rows))
         wall_initiation.try_wall(memory, P, 39)
         wall = room.walls[0]
         assert wall.weight > 20.0
@@ -69,6 +59,19 @@ def test_a_wall_among_outliers_is_found_and_its_echoes_are_known(examples: int) 
         assert abs(np.array(wall_point(wall, float(spans(wall).mean()))) @ n) < 0.01
         known = sum(room.recent[k].is_free == IS_KNOWN for k in range(40))
         assert 30 <= known <= 37
+
+
+def test_what_lies_where_a_candidate_is_not_known_does_not_turn_it() -> None:
+    memory, room = new_room()
+    near = [(1.0, y, 0.0, 1.0) for y in np.linspace(-0.3, 0.3, 12)]
+    far = [(1.0, y, 0.0, 1.25) for y in np.linspace(2.8, 3.0, 8)]
+    remember_free(room, np.array(near + far))
+    candidate = room.walls[CANDIDATE]
+    place_wall(candidate, np.array([1.0, 0.0]), 0.0, 1.0)
+    candidate.variance_offset, candidate.variance_slope = 0.03**2, 0.04**2
+    assert wall_initiation.enter_recent(memory.s, P) == 12
+    wall_initiation.fit_candidate(memory, P)
+    assert abs(candidate.slope) < 0.01
 
 
 def test_a_drum_and_random_ranges_are_no_walls() -> None:
@@ -80,7 +83,7 @@ def test_a_drum_and_random_ranges_are_no_walls() -> None:
     noise = np.column_stack([rng.uniform(-1, 1, (60, 2)), rng.uniform(-3, 3, 60), rng.uniform(0.3, 5.0, 60)])
     for rows in (drum, noise):
         memory, room = new_room()
-        remember(room, rows)
+        remember_free(room, rows)
         for newest in range(0, len(rows), 6):
             wall_initiation.try_wall(memory, P, newest)
         assert all(room.walls[k].weight == 0.0 for k in range(4))

@@ -38,6 +38,21 @@ def test_the_first_wall_needs_more_evidence_than_the_others() -> None:
         assert len(wall_segments(memory)) == reported
 
 
+def test_a_short_span_in_line_with_a_long_one_is_evidence_with_it() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.0)
+    place_wall(room.walls[1], np.zeros(2), math.pi, 2.0)
+    fill(memory, room.walls[1], -0.9, 0.0)
+    fill(memory, room.walls[1], 1.2, 1.44)
+    wall = room.walls[1]
+    wall.spans[0].chi2, wall.chi2 = 3.0, 50.0
+    assert wall.span_count == 2
+    for weight, reported in ((4.0, 1), (6.0, 2)):
+        wall.spans[1].weight = weight
+        assert len(wall_segments(memory)) == reported
+
+
 def test_a_short_wall_that_touches_a_named_drum_is_its_side() -> None:
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)

@@ -77,6 +77,16 @@ def test_what_was_thought_to_be_wall_is_open_where_ranges_went_on() -> None:
     assert wall_ends(memory)[0] == pytest.approx([2, -1.98, 2, -0.3], abs=0.08)
 
 
+def test_ranges_that_went_on_count_where_a_wall_was_sure_before() -> None:
+    memory, room = rough_wall()
+    for b in range(WALL_BINS):
+        room.walls[0].bins[b].weight *= 2.0
+    look(room, np.arange(-1.9, -0.3, 0.05))
+    look(room, np.arange(-0.28, 0.0, 0.02), 1.0)
+    review(memory.s, memory.tracks, P, 0)
+    assert wall_ends(memory)[0] == pytest.approx([2, -1.98, 2, -0.3], abs=0.08)
+
+
 def test_the_echoes_of_another_wall_show_nothing() -> None:
     memory, room = rough_wall()
     place_wall(room.walls[1], np.zeros(2), 0.2, 2.0)
@@ -134,6 +144,7 @@ def test_covered_places_are_the_likeliest_sequence() -> None:
         places = naive_walls.likeliest_cover(evidence, SWITCH_NAT, UNHEARD_NAT, PLACE_NAT)
         marked = [room.walls[0].bins[b].is_held == 1 for b in range(WALL_BINS)]
         assert marked == [is_on and value > 0.0 for is_on, value in zip(places, evidence.tolist(), strict=True)]
+        assert [room.walls[0].bins[b].is_open == 0 for b in range(WALL_BINS)] == [bool(is_on) for is_on in places]
 
 
 def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:

@@ -50,6 +50,16 @@ def test_spans_go_as_far_as_the_review_found_and_are_one_where_it_found_no_gap()
     assert wall_of(memory).ends == pytest.approx(np.array([[-2.4, -1.2], [0.0, 1.2]])), "not reviewed"
 
 
+def test_echoes_of_its_posts_do_not_close_an_opening() -> None:
+    memory, room = reviewed_wall((-1.2, 1.2))
+    for low, high in ((-1.2, -0.36), (-0.18, -0.06), (0.12, 0.18), (0.36, 1.2)):
+        hold(room, low, high)
+    assert wall_of(memory).ends == pytest.approx(np.array([[-1.2, 1.2]])), "nothing was seen between"
+    for b in range(96 - 6, 96 + 6):
+        room.walls[0].bins[b].is_open = 1 - room.walls[0].bins[b].is_held
+    assert wall_of(memory).ends == pytest.approx(np.array([[-1.2, -0.36], [0.36, 1.2]]))
+
+
 def test_a_span_of_which_little_is_left_is_none() -> None:
     memory, room = reviewed_wall((-1.2, 1.2))
     assert len(wall_of(memory).ends) == 0
