@@ -49,13 +49,7 @@ def count_surroundings(s: StateRecord, m: int, moved_m: float) -> None:
 @kernel
 def everything_echoes(s: StateRecord, p: SettingsRecord) -> bool:
     """Return whether surfaces answer at any angle here: the beams hear more than mirrors would let them."""
-    return is_loud(s, p, 1.0) or edges_answer(s[0].room)
-
-
-@kernel
-def is_loud(s: StateRecord, p: SettingsRecord, factor: float) -> bool:
-    """Return whether the beams hear more than mirrors would let them; `factor` times more silences are allowed."""
-    return bool(s[0].silent < factor * p[0].silent_share_min * (s[0].heard + s[0].silent))
+    return s[0].silent < p[0].silent_share_min * (s[0].heard + s[0].silent) or edges_answer(s[0].room)
 
 
 @kernel

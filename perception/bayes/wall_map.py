@@ -15,7 +15,6 @@ import math
 from typing import Final
 
 from perception.bayes.elements import Reading
-from perception.bayes.model_check import is_loud
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.settings_record import SettingsRecord
@@ -79,9 +78,9 @@ THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 EDGE_SLACK_M: Final = 0.05
 LOUD_SHARE: Final = 1.4
-"""Beams may be silent more often by this factor than where names are given with care: silences contradict soon."""
-LOUD_MIN: Final = 100.0
-"""Echoes among the last thousand readings, at least, before the share of silent ones says how surfaces answer."""
+LOUD_SILENCES_MIN: Final = 16.0
+"""Slanting walls are taken to answer where the beams are silent less often than this many times the share that asks for
+care with names, until walls are known that show it; so many silences must be expected, as wide beams hear mirrors, too."""
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
 
@@ -192,7 +191,8 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
     room = s[0].room
     scratch = s[0].scratch
     estimate_noise(s, p)
-    room.is_loud = 1 if is_loud(s, p, LOUD_SHARE) and s[0].heard >= LOUD_MIN else 0
+    allowed = p[0].silent_share_min * (s[0].heard + s[0].silent)
+    room.is_loud = 1 if allowed >= LOUD_SILENCES_MIN and s[0].silent < LOUD_SHARE * allowed else 0
     newest = -1
     unexplained = 0
     for i in range(m):
