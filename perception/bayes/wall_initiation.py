@@ -228,7 +228,7 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
         if nx * q.axis_x + ny * q.axis_y < least:  # most of them: they face elsewhere
             continue
         kind, expected, along, dot = contact(wall, q, p)
-        if kind == NOWHERE or line_variance(wall, along) > KNOWN_SIGMA_M**2:
+        if kind == NOWHERE or (edges and line_variance(wall, along) > KNOWN_SIGMA_M**2):
             continue
         e = q.range_m - expected
         slack = tolerance(room, wall, along, expected, dot)
