@@ -254,8 +254,11 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
             continue
         count += 1
         # A barrel's side is a wall's until it is heard from farther round.
-        least = ONLY_NAMED if is_on_straight_span(room.walls[own], middle_of(b)) else BARREL_PROBABILITY
-        is_taken = is_from_circle(room, tracks, of.newest, p, least) or corner_of(room, of.newest, p) >= 0
+        is_straight = is_on_straight_span(room.walls[own], middle_of(b))
+        least = ONLY_NAMED if is_straight else BARREL_PROBABILITY
+        is_taken = is_from_circle(room, tracks, of.newest, p, least)
+        # From afar a wall's echoes are as long as those of the corner in which it ends.
+        is_taken = is_taken or (not is_straight and corner_of(room, of.newest, p) >= 0)
         for k in range(MAX_WALLS):
             is_heavier = room.walls[k].weight > room.walls[own].weight
             is_taken = is_taken or (is_heavier and is_from_wall(room, room.walls[k], of.newest, p))

@@ -66,6 +66,20 @@ def test_a_line_behind_a_wall_and_one_on_a_drum_end() -> None:
     assert alone.weight > 0.0
 
 
+def test_a_straight_wall_that_is_heard_from_afar_is_not_its_corners() -> None:
+    for chi2, is_kept in ((50.0, False), (70.0, True)):
+        memory, room = new_room()
+        wall, corner = room.walls[0], room.corners[2]
+        place_wall(wall, np.zeros(2), 0.0, 4.0)
+        fill(memory, wall, -0.6, 0.6, 5.0, 4.0)
+        corner.is_used, corner.x, corner.y = 1, 4.0, 0.66
+        for k in range(wall.span_count):
+            wall.spans[k].chi2 = chi2
+        room.variance_m2 = 0.06**2
+        wall_merging.drop_explained(memory.s, memory.tracks, P, 0)
+        assert (wall.weight > 0.0) == is_kept
+
+
 def test_a_line_that_does_not_fit_its_readings_ends_and_its_echoes_may_start_new_walls() -> None:
     memory, room = new_room()
     wall = room.walls[0]
