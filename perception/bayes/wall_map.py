@@ -79,8 +79,9 @@ THIN_M: Final = 0.2
 EDGE_SLACK_M: Final = 0.05
 LOUD_SHARE: Final = 1.4
 LOUD_SILENCES_MIN: Final = 16.0
-"""Slanting walls are taken to answer where the beams are silent less often than this many times the share that asks for
-care with names, until walls are known that show it; so many silences must be expected, as wide beams hear mirrors, too."""
+"""Slanting walls are taken to answer where beams are silent less often than so many times the share that asks for
+care with names, until walls are known that show it; and only where so many silences are expected: wide beams hear
+mirrors, too."""
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
 

@@ -69,6 +69,8 @@ def test_what_lies_where_a_candidate_is_not_known_does_not_turn_it() -> None:
     candidate = room.walls[CANDIDATE]
     place_wall(candidate, np.array([1.0, 0.0]), 0.0, 1.0)
     candidate.variance_offset, candidate.variance_slope = 0.03**2, 0.04**2
+    assert wall_initiation.enter_recent(memory.s, P) == 20, "between mirrors little lies on a line by chance"
+    room.edge_echoes = 100.0
     assert wall_initiation.enter_recent(memory.s, P) == 12
     wall_initiation.fit_candidate(memory, P)
     assert abs(candidate.slope) < 0.01
