@@ -42,7 +42,9 @@ ENDS_M: Final = 0.1
 """Posts of a gap are known within half of this each: a gap is closed if it is narrower than what the robot passes by
 this. Otherwise two drums reported at the corners of an open end are a back."""
 POST_RADIUS_M: Final = 0.1
-"""Radius of what has a place but no known shape."""
+"""Radius of what has a place but no known shape …"""
+POINTS: Final = ("edge", "inside corner")
+"""… but for these, which are points of walls: both posts of a doorway leave all its width."""
 STEP_RAD: Final = math.radians(5.0)
 NUDGE_RAD: Final = 1e-4
 """Directions just beside the end of a surface, so that no opening is missed between two directions."""
@@ -81,7 +83,7 @@ def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], se
     seen
         What perception reports, the nearest first: the others are left out where there are too many.
     radii_m
-        Radius by label; what has another label and is no wall is a post.
+        Radius by label; what has another label is a wall, a point, or else a post.
     sealed_m
         Gaps narrower than this are closed for the robot, m.
     """
@@ -94,7 +96,8 @@ def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], se
         if one.ends is not None:
             walls.append((*one.ends, weight))
         elif len(rounds) < SURFACES_MAX:
-            rounds.append((one.x, one.y, radii_m.get(one.model, POST_RADIUS_M), weight))
+            radius = 0.0 if one.model in POINTS else radii_m.get(one.model, POST_RADIUS_M)
+            rounds.append((one.x, one.y, radius, weight))
     pieces = np.array(walls[:SURFACES_MAX]).reshape(-1, 5)
     circles = np.array(rounds).reshape(-1, 4)
     bridges = _bridges(pieces[:, :4], circles[:, :3], sealed_m)
@@ -121,7 +124,8 @@ def _bridges(pieces: Floats, circles: Floats, sealed_m: float) -> Floats:
         feet = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
         gaps = np.hypot(*np.moveaxis(feet - ends[:, None], 2, 0)) - radii[:, None]
         gaps[owner[:, None] == np.arange(len(pieces))] = math.inf
-        near = np.argwhere((gaps > 0.0) & (gaps < sealed_m))
+        touching = np.where((owner < 0) & (radii == 0.0), POST_RADIUS_M, 0.0)  # the end of a wall is a point of it
+        near = np.argwhere((gaps > touching[:, None]) & (gaps < sealed_m))
         found += [(gaps[i, k], *ends[i], *feet[i, k]) for i, k in near]
     apart = np.hypot(*np.moveaxis(circles[:, None, :2] - circles[:, :2], 2, 0)) - circles[:, None, 2] - circles[:, 2]
     near = np.argwhere(np.triu((apart > 0.0) & (apart < sealed_m), 1))

@@ -74,6 +74,17 @@ def test_a_gap_that_is_too_narrow_is_closed_and_one_of_a_doorway_is_open() -> No
     assert behind.depth_m == pytest.approx(2.4, abs=0.3)
 
 
+def test_edges_and_corners_of_walls_have_no_width() -> None:
+    seen = [wall(2, 1, 3.5, 1), wall(4.6, 1, 7, 1), wall(7, 1, 7, -1), wall(7, -1, 2, -1)]
+    points = [DetectedObject("edge", x, 1.005, 0.0, 0.01, 9, 1.0) for x in (3.5, 4.6)]
+    points.append(DetectedObject("inside corner", 7.005, 1.0, 0.0, 0.01, 9, 1.0))
+    assert found([*seen, *points], 3.0, 0.0) is None, "the robot passes a doorway of 1.1 m"
+    closed = len(surfaces_of(seen, RADII, SEALED_M).pieces)
+    assert len(surfaces_of([*seen, *points], RADII, SEALED_M).pieces) == closed, "no gap at the end of a wall"
+    midway = DetectedObject("edge", 4.05, 1.0, 0.0, 0.01, 9, 1.0)
+    assert found([*seen, midway], 3.0, 0.0) is not None, "beside it the robot passes on neither side"
+
+
 def test_columns_of_drums_are_a_corridor_and_with_a_back_a_canyon() -> None:
     columns = [drum(0.3 + 0.914 * k, y) for k in range(3) for y in (1.2, -1.2)]
     assert found(columns, 1.2, 0.0) is None
