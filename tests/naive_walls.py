@@ -155,3 +155,31 @@ def likeliest_cover(evidence: Array, switch: float, unheard: float, most: float)
         }
     closed = {state: score - (switch if state else 0.0) for state, (score, _) in best.items()}
     return best[max(closed, key=lambda state: closed[state])][1]
+
+
+def line_cuts(
+    readings: Array, origin: Array, normal: float, offset: float, half_angle: float, slant: float
+) -> tuple[Array, Array]:
+    """Return where echoes' circles cut a line inside their beams, as positions along it, and their ranges.
+
+    Parameters
+    ----------
+    readings : (n, 4) float
+        Sensors' places and axes (rad), and ranges.
+    origin, normal, offset
+        The line: its frame's origin, its normal (rad), and its distance from the origin.
+    half_angle, slant
+        Of the beam (rad), and the least share of a range that runs along the line.
+    """
+    n, t = (np.array([math.cos(a), math.sin(a)]) for a in (normal, normal + math.pi / 2))
+    cuts, ranges = [], []
+    for x, y, axis, r in readings.tolist():
+        off = offset + n @ origin - n @ np.array([x, y])
+        for sign in (-1.0, 1.0):
+            along = sign * math.sqrt(max(0.0, r * r - off * off))
+            bearing = math.atan2(*(off * n + along * t)[::-1])
+            is_ahead = abs((bearing - axis + math.pi) % (2.0 * math.pi) - math.pi) <= half_angle
+            if math.isfinite(r) and abs(along) > slant * r and is_ahead:
+                cuts.append(t @ (np.array([x, y]) - origin) + along)
+                ranges.append(r)
+    return np.array(cuts), np.array(ranges)

@@ -19,6 +19,7 @@ from perception.bayes.wall_contact import (
     EDGE_REACH_M,
     EXPLAINED_SIGMAS,
     HEARD_REACH_M,
+    are_mirrors,
     distance_and_foot,
     edges_answer,
     is_hidden,
@@ -62,6 +63,8 @@ POINT_SLACK_M: Final = 0.03
 """Greatest uncertainty of a point that its echoes may show."""
 PASS_SLACK_M: Final = 0.1
 """A range this much longer than to a point passed it."""
+ALONE_LEAD: Final = 2.0
+"""So many times its passes have the echoes of a point between mirrors that is sure whatever its walls are."""
 KEPT: Final = 1
 PENDING: Final = 2
 """Values of `RoomCorner.is_used` while points are found again: found, and not yet found."""
@@ -122,6 +125,21 @@ def clear_corner(corner: RoomCorner) -> None:
     corner.far_echoes = 0.0
     corner.far_passes = 0.0
     clear_information(corner.heard)
+
+
+@kernel
+def copy_heard(a: RoomCorner, b: RoomCorner) -> None:
+    """Write what was heard of one corner to another."""
+    b.echoes = a.echoes
+    b.passes = a.passes
+    b.ended = a.ended
+    b.far_echoes = a.far_echoes
+    b.far_passes = a.far_passes
+    b.heard.xx = a.heard.xx
+    b.heard.xy = a.heard.xy
+    b.heard.yy = a.heard.yy
+    b.heard.x = a.heard.x
+    b.heard.y = a.heard.y
 
 
 @kernel
@@ -252,17 +270,25 @@ def find_edges(room: WallMap) -> None:
 
 @kernel
 def keep_heard(room: WallMap, edge: RoomCorner) -> None:
-    """Keep a corner between mirrors at which no wall ends any more, if it is heard on the line of one."""
-    is_heard = edge.is_edge == 0 and edge.far_echoes >= max(EDGE_ECHOES_MIN, edge.far_passes)
+    """Keep a point between mirrors at which no wall ends, or none any more, if it is heard on the line of one."""
+    near = edge.echoes - edge.far_echoes
+    is_corner = edge.is_edge == 0 and edge.far_echoes >= max(EDGE_ECHOES_MIN, edge.far_passes)
+    is_heard = is_corner or (edge.is_edge == 1 and near >= EDGE_ECHOES_MIN and near > ALONE_LEAD * edge.passes)
     if edge.is_used != PENDING or not is_heard or edges_answer(room):
         return
+    for c in range(EDGES_MAX):
+        other = room.edges[c]
+        if other.is_used == KEPT and math.hypot(other.x - edge.x, other.y - edge.y) < SAME_CORNER_M:
+            return
     for k in range(MAX_WALLS):
         wall = room.walls[k]
         distance, along = distance_and_foot(wall, edge.x, edge.y)
         is_beyond = is_on_span(wall, along, HEARD_REACH_M) and not is_on_span(wall, along, 0.0)
         if wall.weight >= EDGE_WALL_WEIGHT_MIN and abs(distance) < EDGE_OFF_M and is_beyond:
             edge.is_used = KEPT
-            edge.first, edge.second = k, int(along > wall.spans[wall.span_count - 1].high)
+            edge.first = k
+            if is_corner:
+                edge.second = int(along > wall.spans[wall.span_count - 1].high)
             add_line(wall, edge.x, edge.y, room.lines)
             locate(edge, room.lines)
             break
@@ -294,6 +320,7 @@ def point_of(
     """
     best = -1
     least = 1.0
+    are_smooth = are_mirrors(room)
     for c in range(count):
         corner = corners[c]
         if corner.is_used != KEPT:
@@ -302,6 +329,10 @@ def point_of(
         dy = corner.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
         if dx * q.axis_x + dy * q.axis_y < p[0].cos_half_angle * d or d == 0.0:
+            continue
+        # Between mirrors an edge is not heard from afar: such echoes are its wall's, which would lack them.
+        is_passed = corner.is_edge == 1 and corner.far_passes > max(EDGE_ECHOES_MIN, corner.far_echoes)
+        if is_passed and d > EDGE_REACH_M and are_smooth:
             continue
         across = (
             dx * dx * corner.covariance_xx + 2.0 * dx * dy * corner.covariance_xy + dy * dy * corner.covariance_yy
@@ -349,7 +380,10 @@ def enter_looks(
         d = math.sqrt(dx * dx + dy * dy)
         if dx * q.axis_x + dy * q.axis_y < p[0].cos_must_answer * d:
             continue
-        is_passed = q.range_m > d + EXPLAINED_SIGMAS * range_sigma(room, d) + PASS_SLACK_M + POINT_SLACK_M
+        # No echo says nothing of what is farther than a sensor hears.
+        is_passed = min(q.range_m, p[0].range_max_m) > (
+            d + EXPLAINED_SIGMAS * range_sigma(room, d) + PASS_SLACK_M + POINT_SLACK_M
+        )
         if is_passed and is_hidden(tracks, q, corner.x, corner.y):
             continue
         if is_passed and d > EDGE_REACH_M:

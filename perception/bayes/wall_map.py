@@ -43,7 +43,7 @@ from perception.bayes.wall_fit import fit_walls
 from perception.bayes.wall_initiation import try_wall
 from perception.bayes.wall_merging import drop_explained, merge_walls
 from perception.bayes.wall_noise import add_residual, estimate_noise
-from perception.bayes.wall_points import find_heard_corner
+from perception.bayes.wall_points import find_heard_points
 from perception.bayes.wall_records import (
     CORNERS_MAX,
     EDGES_MAX,
@@ -66,9 +66,7 @@ KNOWN_SPACING_M: Final = 0.24
 FIT_FIRINGS: Final = 2
 """Each wall is fitted again at every second firing."""
 TIDY_FIRINGS: Final = 8
-"""Firings between two passes over pairs of walls."""
-HEARD_TURNS: Final = 2
-"""So many of them for each look for corners that are heard: a third of a millisecond, where walls are mirrors."""
+"""Firings between two passes over pairs of walls, and between two looks for what is heard on a wall's line."""
 REVIEW_FIRINGS: Final = 4
 """Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
@@ -256,7 +254,7 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
         drop_explained(memory.s, memory.tracks, p, turn)
     elif phase == TIDY_FIRINGS * 2 // 3:
         find_corners(memory.s)
-    elif phase == TIDY_FIRINGS - 1 and turn % HEARD_TURNS == 0:
-        find_heard_corner(memory, p, turn // HEARD_TURNS)
+    elif phase == TIDY_FIRINGS - 1:
+        find_heard_points(memory, p, turn)
     if phase % REVIEW_FIRINGS == 1:
         review(memory.s, memory.tracks, p, firings // REVIEW_FIRINGS)

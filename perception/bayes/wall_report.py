@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
-from perception.bayes.wall_corners import CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
+from perception.bayes.wall_corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
 from perception.bayes.wall_crossing import CORNER_INSIDE_M, CORNER_REACH_M
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_numbers import SPAN_MIN_M
@@ -61,10 +61,11 @@ EDGE_NEAR_M: Final = 0.18
 CORNER_MET_M: Final = 0.3
 """A corner is reported if both walls come so near it, …"""
 ALONE_ECHOES: Final = 8.0
-ALONE_LEAD: Final = 2.0
+ALONE_EDGE_ECHOES: Final = 5.0
 ROUGH_LEAD: Final = 5.0
 """… or if so many echoes come from it, and so many times its passes, whatever is known of its walls: from an inside
-corner between mirrors, from afar, or from an edge. Where slanting walls answer, some of them may be a wall's."""
+corner between mirrors, from afar, or from an edge, of which between mirrors fewer are enough: it is heard from near
+alone. Where slanting walls answer, some of them may be a wall's."""
 POINT_PRIOR_NAT: Final = 0.0
 POINT_ECHO_NAT: Final = 1.0
 """Log prior odds of a corner where walls end, and evidence of each echo."""
@@ -308,7 +309,8 @@ def end_at_edges(
         variance = float(edge["covariance_xx"] + edge["covariance_yy"])
         if echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2:
             continue
-        is_sure = echoes >= ALONE_ECHOES and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
+        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ALONE_ECHOES
+        is_sure = echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
         if owner is not None:
             along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
             reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_MIN_M

@@ -25,6 +25,7 @@ from perception.bayes.wall_contact import (
     HIDING_PROBABILITY,
     NOWHERE,
     SPAN_MARGIN_M,
+    are_mirrors,
     contact,
     edge_direction,
     edges_answer,
@@ -44,7 +45,8 @@ from perception.kernel import kernel
 REMEMBERED_SPACING_M: Final = 0.08
 """Least distance between the remembered readings of a sensor."""
 REMEMBERED_FIRST: Final = 2048
-"""So many are remembered, those of some 6 m, before slanting walls are known to answer: else none is reviewed."""
+"""So many are remembered, those of some 6 m, before it is known whether slanting walls answer, or are mirrors: then
+readings show corners and edges."""
 REVIEWED_WEIGHT_MIN: Final = 20.0
 REVIEWED_CHI2_MIN: Final = 14.0
 """A wall of less weight or evidence is not reviewed."""
@@ -77,8 +79,8 @@ KNOWN_SHARE: Final = 0.7
 
 @kernel
 def remember(room: WallMap, sensor: int, q: Reading) -> None:
-    """Remember a reading, if its sensor has moved far enough and walls are reviewed or may be."""
-    if room.remembered_count >= REMEMBERED_FIRST and not edges_answer(room):
+    """Remember a reading, if its sensor has moved far enough and it is of use, or may be."""
+    if room.remembered_count >= REMEMBERED_FIRST and not edges_answer(room) and not are_mirrors(room):
         return
     is_first = room.remembered_of[sensor] == 0.0
     moved = math.hypot(q.x - room.remembered_x[sensor], q.y - room.remembered_y[sensor])

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
     from config.model import ModelConfig
     from config.settings import Settings
+    from perception.bayes.settings_record import SettingsRecord
+    from perception.bayes.state import Memory
     from perception.pipeline import Perception
 
 FIRINGS: Final = 24
@@ -141,10 +143,25 @@ def observe_only(settings: Settings) -> None:
 
 
 def _circles(settings: Settings) -> None:
+    from perception.bayes.kernel_settings import make_settings
+    from perception.bayes.state import Memory
     from perception.bayes.wall_bins import bin_of
 
     _drive_and_edit(settings, BAYES, settings.models)
     bin_of(0.0)  # the report on walls calls it by itself
+    bayes = settings.perception.bayes
+    memory = Memory(len(settings.ring.mounts), bayes.tracks_max)
+    _look_for_points(memory, make_settings(settings.ring, settings.models, bayes))
+
+
+def _look_for_points(memory: Memory, constants: SettingsRecord) -> None:
+    """Look for corners and edges on the line of a wall, as where mirrors are known."""
+    import numpy as np
+
+    from perception.bayes.wall_points import CELLS, count_cuts, enter_point_of_line
+
+    count_cuts(memory.s, constants, 0, np.zeros((2, CELLS)))
+    enter_point_of_line(memory.s, constants, 0, 0.0, False)  # noqa: FBT003 - a kernel takes no keywords
 
 
 def _polygons(settings: Settings) -> None:
@@ -282,6 +299,7 @@ def compile_refinement(part: str) -> None:
         drop_explained(memory.s, memory.tracks, constants, 0)
         find_corners(memory.s)
         review(memory.s, memory.tracks, constants, 0)
+        _look_for_points(memory, constants)
 
 
 def warm_up(settings: Settings, parts: Iterable[str]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes import wall_corners
+from perception.bayes.range_fit import FAR
 from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_crossing import position_along
 from perception.bayes.wall_records import CORNERS_MAX, EDGES_MAX, WallMap
@@ -132,6 +133,29 @@ def test_a_point_that_mirrors_answer_from_afar_is_an_inside_corner() -> None:
         edge.far_echoes, edge.far_passes = 20.0, far_passes
         wall_corners.find_corners(memory.s)
         assert edge.is_edge == is_edge
+
+
+def test_an_edge_between_mirrors_explains_no_echo_from_afar_once_it_was_passed_from_there() -> None:
+    _, room = corner_room()
+    corner = room.corners[0]
+    near, far = (reading(2.0 - a, 2.0 - a, math.pi / 4, math.hypot(a, a)) for a in (0.4, 1.5))
+    corner.is_edge, room.edge_silences = 1, 50.0
+    for passes, echoes, expected in ((0.0, 0.0, 0), (9.0, 0.0, -1), (9.0, 10.0, 0)):
+        corner.far_passes, corner.far_echoes = passes, echoes
+        assert wall_corners.point_of(room, room.corners, CORNERS_MAX, far, P)[0] == expected
+        assert wall_corners.point_of(room, room.corners, CORNERS_MAX, near, P)[0] == 0
+    corner.far_echoes, room.edge_echoes = 0.0, 100.0
+    assert wall_corners.point_of(room, room.corners, CORNERS_MAX, far, P)[0] == 0, "rough edges answer from afar"
+
+
+def test_no_echo_says_nothing_of_a_point_that_is_too_far_away_to_answer() -> None:
+    memory, room = corner_room()
+    corner = room.corners[0]
+    for beyond, expected in ((0.0, 0.0), (-0.5, 1.0)):
+        away = (P[0].range_max_m + beyond) / math.sqrt(2.0)
+        q = reading(corner.x - away, corner.y - away, math.pi / 4, 2.0 * FAR)
+        wall_corners.enter_looks(room, memory.tracks, room.corners, CORNERS_MAX, q, P)
+        assert corner.passes == corner.far_passes == expected
 
 
 def test_a_point_explains_only_echoes_of_beams_that_hold_it() -> None:

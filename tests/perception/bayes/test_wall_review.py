@@ -155,10 +155,13 @@ def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:
     assert room.remembered_count == 3, "two of sensor 1, and one of sensor 2"
     room.remembered_count = REMEMBERED_MAX
     remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
-    assert room.remembered_count == REMEMBERED_MAX, "it is not known that slanting walls answer: none is reviewed"
+    assert room.remembered_count == REMEMBERED_MAX, "it is not known what slanting walls do"
     room.edge_echoes = 100.0
     remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
     assert room.remembered[0].x == 7.0
+    room.edge_echoes, room.edge_silences = 0.0, 100.0
+    remember(room, 4, reading(8.0, 0.0, 0.0, 1.0))
+    assert room.remembered[1].x == 8.0, "between mirrors they show corners and edges"
 
 
 def test_a_wall_of_which_a_review_leaves_nothing_is_none() -> None:

@@ -19,7 +19,7 @@ from rich.console import Console
 from behaviors.valley import polar_histogram
 from config.load import load_settings
 from config.settings import Settings
-from perception.bayes import polygon_tracks, refine
+from perception.bayes import polygon_tracks, refine, wall_points
 from perception.localization import drift_correction, landmark_tracker, pose_grid, pose_track
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
@@ -52,6 +52,7 @@ def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) 
     assert started[0].returncode is not None
 
 
+LOOK = frozenset({"count_cuts", "enter_point_of_line"})
 DRIFT = frozenset({"add_landmark", "remove_landmark"})
 TRACKER = frozenset({"propagate", "update_with_firing"})
 GRID = frozenset({"fill_cell", "score_block", "offer_peaks"})
@@ -71,6 +72,7 @@ def test_each_compiled_kernel_leaves_a_mark(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("part", "names"),
     [
+        (kernels.BAYES, {wall_points: LOOK}),
         (kernels.LOCALIZATION, {drift_correction: DRIFT, landmark_tracker: TRACKER}),
         (kernels.KNOWN_ROOM, {pose_grid: GRID, pose_track: TRACK}),
         (kernels.VALLEY, {polar_histogram: HISTOGRAM}),
