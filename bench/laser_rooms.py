@@ -57,7 +57,7 @@ SAME_RAD: Final = math.radians(6.0)
 """… and one wall's lines of two scans are nearer to each other than this."""
 OPENING_M: Final = 0.4
 """A greater gap between hits of one line is an opening."""
-WALL_M: Final = 0.4
+WALL_M: Final = 0.2
 """Shorter walls are left out of the map: they are clutter."""
 
 

@@ -33,6 +33,9 @@ OUTLIERS: Final = 0.1
 """Errors of a range compared with the map, whose own errors they contain."""
 WINDOW_M: Final = 9.0
 """Way over which odometry compounds keyframes for a search."""
+WINDOW_LEAST: Final = 9
+WINDOW_FAR_M: Final = 16.0
+"""Where so many keyframes are a longer way, that is taken, up to this."""
 WINDOW_MAX: Final = 96
 """Most keyframes of it."""
 SEARCH_M: Final = (1.0, 3.0)
@@ -117,7 +120,7 @@ class KnownRoom:
         """Number of the first keyframe that a search uses."""
         self._stage = IDLE
         self._search_begin = 0
-        """The same of the search whose hypotheses are weighed."""
+        """The same of the search that goes on."""
         self._is_complete = self._is_confirmed = False
         """Whether the last search left out no place that may be the robot's; whether two have the same answer."""
         self._searched_at_m = -STAND_SEARCH_M
@@ -140,14 +143,15 @@ class KnownRoom:
         self._background.observe(keyframes.latest_ranges())
         if self._stage in {IDLE, DUE}:
             self._window_begin = max(self._window_begin, keyframes.count - WINDOW_MAX)
-            while keyframes.way_since(self._window_begin) > WINDOW_M:
+            while self._is_window_long(keyframes):
                 self._window_begin += 1
         if self._stage != IDLE:
             return
         if self._status == TRACKING:
-            if self._tracked.evidence > SUSPECT_LOG:
+            if self._tracked.evidence <= SUSPECT_LOG:
+                self._window_begin = max(self._window_begin, min(self._tracked.peak_at + 1, keyframes.count - 1))
+            elif self.probability > SURE:
                 return
-            self._window_begin = max(self._window_begin, min(self._tracked.peak_at + 1, keyframes.count - 1))
         way_m = keyframes.driven_m - self._searched_at_m
         if way_m >= self._pause_m or (keyframes.is_stand and way_m >= STAND_SEARCH_M):
             self._searched_at_m = keyframes.driven_m
@@ -181,12 +185,15 @@ class KnownRoom:
                 self._judge()
         elif self._stage == DUE:
             readings = self._keyframes.compounded(self._window_begin, READINGS_MAX)
-            self._grid.begin(readings, self.shares.records[0])
+            self._grid.begin(readings, self.shares.profiles())
+            self._search_begin = self._window_begin
             self._stage = COMPARING if len(readings) else IDLE
         elif self._stage == COMPARING:
             self._grid.refine()
             if not self._grid.is_searching:
-                begin = self._search_begin = self._window_begin
+                begin = self._search_begin
+                if len(self._grid):
+                    self.shares.guess(self._grid.best_profile)
                 starts, self._is_complete = self._grid.best_starts(HYPOTHESES_MAX), self._grid.is_complete
                 self._candidates.start(
                     starts, CELL_M, STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
@@ -218,6 +225,11 @@ class KnownRoom:
         """Discard cached results, after the memory was restored from a snapshot."""
         self._grid.drop_caches()
 
+    def _is_window_long(self, keyframes: Keyframes) -> bool:
+        """Return whether the window may begin with a later keyframe."""
+        most_m = WINDOW_M if keyframes.count - self._window_begin > WINDOW_LEAST else WINDOW_FAR_M
+        return keyframes.way_since(self._window_begin) > most_m
+
     def _at_last_firing(self) -> Pose:
         """Return the ring's pose by odometry at the last firing."""
         x, y, yaw = self._odometry.tolist()
@@ -228,7 +240,8 @@ class KnownRoom:
         before = track.entered
         least_log = LEAST_LOG if track is self._tracked else SEARCH_LEAST_LOG
         readings = track.enter(self._keyframes, self.shares, least_log)
-        if readings and min(track.explains, track.fits) > SURE:
+        is_place = track is self._tracked and float(track.best.share) > SURE
+        if readings and is_place and min(track.explains, track.fits) > SURE:
             self.shares.learn(track.best, readings)
         return track.entered > before
 
@@ -256,6 +269,9 @@ class KnownRoom:
             self._is_confirmed = self._is_complete
         elif is_same or self._is_complete:
             self._is_confirmed = True
+        if is_same:
+            # From the whole window, with what is known of the causes now.
+            tracked.likeness = max(tracked.likeness, found.likeness)
 
     def _judge(self) -> None:
         """Set status and probability after a keyframe."""

@@ -12,7 +12,9 @@ from __future__ import annotations
 import math
 from typing import Final, Protocol
 
-from perception.kernel import kernel
+import numpy as np
+
+from perception.kernel import Floats, kernel
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.surroundings import SensorModel
 from perception.records import Record, Records, records, zeros
@@ -25,6 +27,9 @@ SHARES: Final = (0.5, 0.1, 0.1, 0.2)
 SHARES_MIN: Final = (0.03, 0.02, 0.05, 0.02)
 SHARES_MAX: Final = (0.97, 0.5, 0.4, 0.9)
 """Shares at the start, and their bounds, in the order of `Shares`."""
+ROOMS: Final = (SHARES, (0.8, 0.25, 0.1, 0.4))
+"""What a search tries while nothing was learned: those, and the shares of a real building of smooth surfaces. Between
+mirrors the right place is with the former hardly better than others."""
 
 
 class Shares(Record):
@@ -69,6 +74,8 @@ class LearnedShares:
     ----------
     records : (1,) Shares
         As kernels take them.
+    is_learned : bool
+        Whether a known place has shown any.
     """
 
     SCRATCH: Final = ("records",)
@@ -82,9 +89,23 @@ class LearnedShares:
     def reset(self) -> None:
         """Forget what was learned."""
         self._memory[0] = SHARES
+        self.is_learned = False
+
+    def profiles(self) -> Floats:
+        """Return what a search is to try, shape (1 or 2, 3), as of `perception.localization.pose_grid`."""
+        share = self.records[0]
+        if self.is_learned:
+            return np.array([(share.specular, share.late, share.wild)])
+        return np.array([room[:3] for room in ROOMS])
+
+    def guess(self, profile: int) -> None:
+        """Take what fits best of what a search has tried, as long as nothing was learned."""
+        if not self.is_learned:
+            self._memory[0] = ROOMS[profile]
 
     def learn(self, causes: Counted, readings: int) -> None:
         """Take the causes of some readings."""
+        self.is_learned = True
         share, least, most = self.records[0], SHARES_MIN, SHARES_MAX
         specular = share.specular + (causes.specular - share.specular * readings) / MEMORY
         late = share.late + (causes.late - share.late * causes.turned_away) / MEMORY

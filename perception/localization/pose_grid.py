@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats, kernel
 from perception.localization.expected_ranges import Reflection
-from perception.localization.mixed_reflection import LATE_M, SHARES, WILD_HEARD, Shares
+from perception.localization.mixed_reflection import LATE_M, WILD_HEARD
 from perception.localization.pose_starts import STARTS_MAX, Starts, offer
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.room import Room
@@ -34,6 +34,8 @@ BLOCK: Final = 16
 """Cells of a block's side: a quantum of a search compares one block at one heading."""
 READINGS_MAX: Final = 108
 """Readings that are compared."""
+PROFILES_MAX: Final = 2
+"""Guesses of the causes of readings."""
 SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
@@ -73,7 +75,8 @@ def fill_cell(
     s : Surroundings
         `near` is overwritten.
     table : (2, DIRECTIONS, n, m) uint8
-        Codes of the ranges by `cone` and by `specular`.
+        Codes of the ranges by `cone` and by `specular`, with mirrors that are a little beside the beam: the headings
+        are coarse, and such mirrors often answer.
     free : (n, m) uint8
         1 where the ring's centre may be.
     i, j : int
@@ -90,7 +93,8 @@ def fill_cell(
     for d in range(DIRECTIONS):
         cos, sin = math.cos(STEP_RAD * d), math.sin(STEP_RAD * d)
         cone_m, _, _ = expect_cone(s, x, y, cos, sin)
-        (specular_m, _, _), _ = expect_specular(s, x, y, cos, sin, s.sensor[0].cos_half)
+        inside, beside = expect_specular(s, x, y, cos, sin, s.sensor[0].cos_fringe)
+        specular_m = min(inside[0], beside[0])
         table[0, d, i, j] = int(cone_m * (254.0 / window_m) + 0.5) if cone_m <= window_m else SILENT
         table[1, d, i, j] = int(specular_m * (254.0 / window_m) + 0.5) if specular_m <= window_m else SILENT
 
@@ -153,7 +157,7 @@ def score_block(
 
 @kernel
 def offer_peaks(
-    to: Records[Starts], scratch: Records[ScoreScratch], x: float, y: float, heading: float
+    to: Records[Starts], scratch: Records[ScoreScratch], x: float, y: float, heading: float, profile: int
 ) -> None:  # fmt: skip
     """Offer the cells of a block that fit at least as well as all their neighbours in it.
 
@@ -167,6 +171,8 @@ def offer_peaks(
         Middle of the block's first cell, m.
     heading : float
         rad
+    profile : int
+        By which guess of the causes.
     """
     score = scratch[0].score
     for a in range(BLOCK):
@@ -177,7 +183,7 @@ def offer_peaks(
                 for j in range(max(0, b - 1), min(BLOCK, b + 2)):
                     is_peak = is_peak and here >= score[BLOCK * i + j]
             if is_peak:
-                offer(to, x + CELL_M * a, y + CELL_M * b, heading, here)
+                offer(to, x + CELL_M * a, y + CELL_M * b, heading, here, profile)
 
 
 class PoseGrid:
@@ -221,10 +227,11 @@ class PoseGrid:
         self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
         self._readings = np.zeros((READINGS_MAX, 5))
         self._count = self._searches = 0
-        self._shares = np.array(SHARES[:3])
+        self._profiles = 1
+        self._shares = np.zeros((PROFILES_MAX, 3))
         self._quantum = NONE
         """Of the search; `NONE` without one."""
-        self._likely = np.zeros((READINGS_MAX, 3, SILENT + 1))
+        self._likely = np.zeros((PROFILES_MAX, READINGS_MAX, 3, SILENT + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""
 
@@ -233,19 +240,20 @@ class PoseGrid:
         """Whether a search has work left."""
         return self._quantum != NONE
 
-    def begin(self, readings: Floats, shares: Shares) -> None:
+    def begin(self, readings: Floats, profiles: Floats) -> None:
         """Begin a search.
 
         Parameters
         ----------
         readings : (n, 5) float
             Of a short drive, in one frame, as of `perception.localization.particle_update`; at most `READINGS_MAX`.
-        shares : Shares
-            How often a reading has which cause.
+        profiles : (n, 3) float
+            How often a reading is from a smooth surface, over a second one, and anything, as in `Shares`; where that
+            is not known, several guesses, at most `PROFILES_MAX`: each is tried.
         """
-        self._count = len(readings)
+        self._count, self._profiles = len(readings), len(profiles)
         self._readings[: self._count] = readings
-        self._shares[:] = shares.specular, shares.late, shares.wild
+        self._shares[: self._profiles] = profiles
         self._searches += 1
         self._quantum = 0
         self._found["count"], self._found["least"] = 0, -math.inf
@@ -263,18 +271,21 @@ class PoseGrid:
             return
         if self._likely_search != self._searches:
             self._fill()
-            self._likely[: self._count] = self._likelihoods()
+            for profile in range(self._profiles):
+                self._likely[profile, : self._count] = self._likelihoods(profile)
             self._likely_search = self._searches
         blocks_i, blocks_j = (math.ceil(side / BLOCK) for side in self.shape)
-        direction, block = divmod(self._quantum, blocks_i * blocks_j)
+        profile, part = divmod(self._quantum, DIRECTIONS * blocks_i * blocks_j)
+        direction, block = divmod(part, blocks_i * blocks_j)
         i, j = BLOCK * (block // blocks_j), BLOCK * (block % blocks_j)
         score_block(
-            self._table, self._free, self._likely, self._readings, self._count, direction, i, j, self._scratch
-        )
+            self._table, self._free, self._likely[profile], self._readings, self._count, direction, i, j,
+            self._scratch,
+        )  # fmt: skip
         x, y = (self._origin + CELL_M * np.array([i, j])).tolist()
-        offer_peaks(self.starts, self._scratch, x, y, direction * STEP_RAD)
+        offer_peaks(self.starts, self._scratch, x, y, direction * STEP_RAD, profile)
         self._quantum += 1
-        if self._quantum >= DIRECTIONS * blocks_i * blocks_j:
+        if self._quantum >= self._profiles * DIRECTIONS * blocks_i * blocks_j:
             self._quantum = NONE
 
     def best_starts(self, most: int) -> Floats:
@@ -294,6 +305,16 @@ class PoseGrid:
         order = np.argsort(-found["score"], kind="stable")[:most]
         order = order[found["score"][order] >= found["score"][order[:1]] - START_LOG]
         return np.column_stack([found[name][order] for name in ("x", "y", "heading")])
+
+    def __len__(self) -> int:
+        """Return how many starts the last search has found."""
+        return int(self._found["count"][0])
+
+    @property
+    def best_profile(self) -> int:
+        """By which guess of the causes the readings fit best; there must be a start."""
+        found = self._found["starts"][0, : int(self._found["count"][0])]
+        return int(found["profile"][found["score"].argmax()])
 
     @property
     def is_complete(self) -> bool:
@@ -330,7 +351,7 @@ class PoseGrid:
             fill_cell(self._surroundings, self._table, self._free, i, j, x, y, self._clear_m)
             self._filled += 1
 
-    def _likelihoods(self) -> Floats:
+    def _likelihoods(self, profile: int) -> Floats:
         """Return each reading's likelihood ratio by cause at each code of the table, shape (n, 3, 256).
 
         That of `perception.localization.mixed_reflection`, as coarse as the table: a rough surface, or anything, at
@@ -340,7 +361,7 @@ class PoseGrid:
         measured = self._readings[: self._count, 4:5]
         expected = np.append(np.arange(SILENT) * (self._window_m / 254.0), np.inf)
         answers, heard = np.isfinite(expected), np.isfinite(measured)
-        specular, late, wild = self._shares.tolist()
+        specular, late, wild = self._shares[profile].tolist()
         wild = max(WILD_MIN, wild)
         sigma = np.hypot(SIGMA_M, SIGMA_SHARE * np.minimum(expected, self._window_m))
         with np.errstate(invalid="ignore"):

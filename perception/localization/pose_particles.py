@@ -40,6 +40,9 @@ RESAMPLE_SHARE: Final = 0.5
 MERGE_M: Final = 0.3
 MERGE_RAD: Final = math.radians(10.0)
 """Hypotheses nearer to each other than this are one."""
+SAME_M: Final = 0.5
+SAME_RAD: Final = math.radians(15.0)
+"""Hypotheses as near to the best one as this are of the same place."""
 
 
 class Particle(Record):
@@ -332,12 +335,17 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
         best.could_beside += weight * p.could_beside
     prune(of, least_log, most, scratch)
     resample(of, scratch)
-    h, total = summarise(of, scratch), 0.0
+    h, near, total = summarise(of, scratch), 0.0, 0.0
     middle = of[0].hypotheses[h]
     for k in range(of[0].count):
-        total += math.exp(SHARE_TEMPER * (of[0].hypotheses[k].log_evidence - middle.log_evidence))
+        other = of[0].hypotheses[k]
+        odds = math.exp(SHARE_TEMPER * (other.log_evidence - middle.log_evidence))
+        turn = (other.heading - middle.heading + math.pi) % (2.0 * math.pi) - math.pi
+        total += odds
+        if math.hypot(other.x - middle.x, other.y - middle.y) <= SAME_M and abs(turn) <= SAME_RAD:
+            near += odds
     normalise(of, h, scratch)
-    best.share, best.x, best.y, best.heading = 1.0 / total, middle.x, middle.y, middle.heading
+    best.share, best.x, best.y, best.heading = near / total, middle.x, middle.y, middle.heading
     best.xx = best.xy = best.xh = best.yy = best.yh = best.hh = 0.0
     for i in range(HEADINGS):
         p, weight = middle.particles[i], scratch[0].weights[i]

@@ -21,6 +21,8 @@ class Start(Record):
     y: float
     heading: float
     score: float
+    profile: int
+    """By which of the search's guesses of the causes of readings."""
 
 
 class Starts(Record):
@@ -33,14 +35,14 @@ class Starts(Record):
 
 
 @kernel
-def offer(to: Records[Starts], x: float, y: float, heading: float, score: float) -> None:
+def offer(to: Records[Starts], x: float, y: float, heading: float, score: float, profile: int) -> None:
     """Add a start, unless a better one is near it or all are better; it replaces a worse one near it.
 
     Parameters
     ----------
     to : (1,) Starts
         Updated.
-    x, y, heading, score : float
+    x, y, heading, score, profile : float, int
         As of `Start`.
     """
     if score <= to[0].least:
@@ -51,7 +53,7 @@ def offer(to: Records[Starts], x: float, y: float, heading: float, score: float)
         turn = abs((heading - other.heading + math.pi) % (2.0 * math.pi) - math.pi)
         if abs(x - other.x) < APART_M and abs(y - other.y) < APART_M and turn < APART_RAD:
             if score > other.score:
-                other.x, other.y, other.heading, other.score = x, y, heading, score
+                other.x, other.y, other.heading, other.score, other.profile = x, y, heading, score, profile
             return
         if other.score < starts[worst].score:
             worst = k
@@ -59,7 +61,7 @@ def offer(to: Records[Starts], x: float, y: float, heading: float, score: float)
         worst = to[0].count
         to[0].count += 1
     at = starts[worst]
-    at.x, at.y, at.heading, at.score = x, y, heading, score
+    at.x, at.y, at.heading, at.score, at.profile = x, y, heading, score, profile
     if to[0].count == STARTS_MAX:
         to[0].least = score
         for k in range(STARTS_MAX):

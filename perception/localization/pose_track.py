@@ -45,6 +45,8 @@ another room it is 1.1 at most, but 1.7 in one of twenty rooms where nothing is 
 MIRRORS: Final = 0.4
 ALIKE_WEIGHT: Final = 0.15
 """Weight of what an echo gains beyond that: such gains scatter by more than the two differ."""
+LIKENESS_MAX: Final = 4.5
+"""The same of `PoseTrack.likeness`: a robot that is carried must notice within a few keyframes."""
 INDEPENDENT_M: Final = 0.5
 """Readings on a way as short as this have errors in common, those of the map and of what it lacks."""
 NOISES: Final = 512
@@ -227,7 +229,7 @@ class PoseTrack:
         gain = self.best.log_ratio - self._background.log_ratio(ranges_m, shares)
         line = float(np.interp(shares.records[0].specular, (0.0, MIRRORS), ALIKE_GAIN))
         alike = ALIKE_WEIGHT * (gain - line * heard)
-        self.likeness = max(-EVIDENCE_MAX, min(EVIDENCE_MAX, self.likeness + share * alike))
+        self.likeness = max(-EVIDENCE_MAX, min(LIKENESS_MAX, self.likeness + share * alike))
         self._gains[self.entered % KEYFRAMES_MAX] = weight * gain
         self.evidence = max(-EVIDENCE_MIN, min(EVIDENCE_MAX, self.evidence + weight * gain))
         self._is_weighed = True

@@ -40,7 +40,7 @@ from perception.localization.landmark_ranges import STRAY_MAX, STRAY_MIN
 from perception.localization.landmark_state import LANDMARKS_MAX
 from perception.localization.map_heading import FIRST_FIRINGS
 from perception.localization.pose_grid import NONE as NO_QUANTUM
-from perception.localization.pose_grid import READINGS_MAX
+from perception.localization.pose_grid import PROFILES_MAX, READINGS_MAX
 from perception.localization.pose_particles import HYPOTHESES_MAX
 from perception.localization.pose_starts import STARTS_MAX
 from perception.localization.pose_track import QUANTA as QUANTA_OF_HYPOTHESIS
@@ -113,7 +113,7 @@ _FLAGS: Final = (
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
     "_steady bins.is_held bins.is_open room.is_loud canyon_map.is_due canyon_map.is_wanted "
     "drift._has_started drift._stands_firm _tracker.is_synchro _map_heading._is_entering sensors.is_known "
-    "_has_fired _is_started _has_stood _is_weighed _is_complete _is_confirmed"
+    "_has_fired _is_started _has_stood _is_weighed _is_complete _is_confirmed shares.is_learned"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
@@ -122,6 +122,8 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
     | {
         "_grid._count": Bound(0, READINGS_MAX),
         "_grid._found.count": Bound(0, STARTS_MAX),
+        "_grid._found.starts.profile": Bound(0, PROFILES_MAX - 1),
+        "_grid._profiles": Bound(1, PROFILES_MAX),
         "_grid._quantum": Bound(NO_QUANTUM, COUNT.high),
         "_grid._shares": SHARE,
         "_memory.count": Bound(0, HYPOTHESES_MAX),

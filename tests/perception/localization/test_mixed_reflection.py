@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from perception.localization.mixed_reflection import (
+    ROOMS,
     SHARES,
     SHARES_MAX,
     SHARES_MIN,
@@ -60,6 +61,9 @@ def test_the_variance_is_the_range_models() -> None:
 def test_shares_are_learned_within_bounds() -> None:
     learned = LearnedShares()
     share = learned.records[0]
+    assert learned.profiles().tolist() == [list(room[:3]) for room in ROOMS]
+    learned.guess(1)
+    assert (share.specular, share.late, share.wild, share.beside) == ROOMS[1]
     for _ in range(300):
         learned.learn(
             SimpleNamespace(specular=8.0, turned_away=4.0, late=1.0, wild=2.0, beside=1.5, could_beside=3.0), 10
@@ -74,5 +78,9 @@ def test_shares_are_learned_within_bounds() -> None:
                 10,
             )
         assert (share.specular, share.late, share.wild, share.beside) == pytest.approx(bounds)
+    assert learned.profiles().tolist() == [[share.specular, share.late, share.wild]]
+    learned.guess(0)
+    assert share.specular == SHARES_MAX[0], "what was learned is not guessed"
     learned.reset()
+    assert len(learned.profiles()) == len(ROOMS)
     assert (share.specular, share.late, share.wild, share.beside) == SHARES

@@ -10,11 +10,11 @@ import pytest
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.mixed_reflection import LearnedShares
+from perception.localization.mixed_reflection import ROOMS, LearnedShares
 from perception.localization.pose_grid import CELL_M, STEP_RAD, PoseGrid
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room, room_of
-from perception.localization.surroundings import make_surroundings
+from perception.localization.surroundings import FRINGE_RAD, make_surroundings
 from perception.snapshot import put_back, snapshot_of
 from runtime.simulation.furnished_rooms import furnished_room
 from runtime.simulation.random_rooms import ACOUSTICS
@@ -29,9 +29,9 @@ def grid_of(room: Room) -> PoseGrid:
     return PoseGrid(room, make_surroundings(room, RangeModel.of_ring(RING), HALF_ANGLE), 0.2)
 
 
-def crooked() -> tuple[PoseGrid, Floats]:
+def crooked(reflection: Reflection = "cone") -> tuple[PoseGrid, Floats]:
     """The grid of a small room, and the readings of a stand in it."""
-    room, firing = stand(world_of(CROOKED, ACOUSTICS), TRUTH)
+    room, firing = stand(world_of(CROOKED, ACOUSTICS.model_copy(update={"model": reflection})), TRUTH)
     found = panorama_of(firing)
     return grid_of(room), np.column_stack([found.x, found.y, np.cos(found.axis), np.sin(found.axis), found.range_m])
 
@@ -46,7 +46,8 @@ def test_the_table_holds_the_expected_ranges(reflection: Reflection) -> None:
     table = grid.expected(reflection)[direction, x, y]
     place_x, place_y = grid.places(x, y).T
     beams = Beams(place_x, place_y, direction.astype(np.float64) * STEP_RAD)
-    exact = expected_ranges(room, beams, HALF_ANGLE, reflection).range_m
+    half = HALF_ANGLE + (FRINGE_RAD if reflection == "specular" else 0.0)
+    exact = expected_ranges(room, beams, half, reflection).range_m
     silent = exact > RING.window_m
     assert (np.isinf(table) == silent).all()
     assert table[~silent] == pytest.approx(exact[~silent], abs=0.02)
@@ -56,7 +57,7 @@ def test_a_search_offers_the_pose_and_another_one_needs_no_table() -> None:
     grid, readings = crooked()
     quanta = []
     for _ in range(2):
-        grid.begin(readings, LearnedShares().records[0])
+        grid.begin(readings, LearnedShares().profiles())
         quanta.append(0)
         while grid.is_searching:
             grid.refine()
@@ -72,7 +73,7 @@ def test_a_search_offers_the_pose_and_another_one_needs_no_table() -> None:
 @pytest.mark.parametrize("quanta", [10, 200])
 def test_a_search_goes_on_from_a_snapshot_with_the_same_result(quanta: int) -> None:
     grid, readings = crooked()
-    grid.begin(readings, LearnedShares().records[0])
+    grid.begin(readings, LearnedShares().profiles())
     for _ in range(quanta):
         grid.refine()
     other = crooked()[0]
@@ -84,8 +85,20 @@ def test_a_search_goes_on_from_a_snapshot_with_the_same_result(quanta: int) -> N
     assert np.array_equal(grid.best_starts(50), other.best_starts(50))
 
 
+@pytest.mark.parametrize(("reflection", "profile"), [("cone", 0), ("specular", 1)])
+def test_a_search_tries_rough_and_smooth_surfaces_and_says_which_fit(reflection: Reflection, profile: int) -> None:
+    grid, readings = crooked(reflection)
+    best = []
+    for profiles in (LearnedShares().profiles(), np.array([ROOMS[profile][:3]])):
+        grid.begin(readings, profiles)
+        while grid.is_searching:
+            grid.refine()
+        best.append((grid.best_profile, grid.best_starts(100)[0].tolist()))
+    assert best == [(profile, best[0][1]), (0, best[0][1])]
+
+
 def test_a_cancelled_search_is_over() -> None:
     grid, readings = crooked()
-    grid.begin(readings, LearnedShares().records[0])
+    grid.begin(readings, LearnedShares().profiles())
     grid.cancel()
     assert not grid.is_searching

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
+from perception.localization import pose_track
 from perception.localization.background import Background
 from perception.localization.keyframes import KEYFRAMES_MAX, Keyframes
 from perception.localization.mixed_reflection import LearnedShares
@@ -73,8 +74,9 @@ def test_a_keyframe_takes_quanta_for_each_hypothesis_and_the_right_one_is_left()
     assert not track.is_behind(keyframes)
 
 
-def test_where_nothing_is_a_mirror_a_place_must_explain_more() -> None:
+def test_where_nothing_is_a_mirror_a_place_must_explain_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """A right place explains rough surfaces wherever they are, and mirrors only where they answer."""
+    monkeypatch.setattr(pose_track, "LIKENESS_MAX", 100.0)
     found = []
     for specular in (0.0, 0.5 * MIRRORS, MIRRORS):
         keyframes, shares = keyframes_of(1), LearnedShares()
