@@ -57,8 +57,9 @@ SAME_RAD: Final = math.radians(6.0)
 """… and one wall's lines of two scans are nearer to each other than this."""
 OPENING_M: Final = 0.4
 """A greater gap between hits of one line is an opening."""
-WALL_M: Final = 0.2
-"""Shorter walls are left out of the map: they are clutter."""
+PIECE_M: Final = 0.2
+WALL_M: Final = 0.4
+"""Shorter walls are left out of a known room's map, and of a world to drive in: they are clutter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +171,7 @@ def _mirrors(log: LaserLog, k: int) -> NDArray[np.bool_]:
     return answers
 
 
-def wall_map(log: LaserLog, scans: Sequence[int]) -> Room:
+def wall_map(log: LaserLog, scans: Sequence[int], least_m: float = PIECE_M) -> Room:
     """Return the straight walls that some scans hit.
 
     Parameters
@@ -179,6 +180,8 @@ def wall_map(log: LaserLog, scans: Sequence[int]) -> Room:
         The scans.
     scans : sequence of int
         Which.
+    least_m : float
+        Shorter walls are left out, m.
     """
     pieces = [piece for k in scans for piece in _pieces(log, k)]
     pieces.sort(key=lambda piece: -float(np.hypot(*(piece[-1] - piece[0]))))
@@ -199,7 +202,7 @@ def wall_map(log: LaserLog, scans: Sequence[int]) -> Room:
             walls += [
                 (*(middle + low * along), *(middle + high * along))
                 for low, high in _intervals((ends[members].reshape(-1, 2, 2) - middle) @ along)
-                if high - low >= WALL_M
+                if high - low >= least_m
             ]
     return make_room(np.array(walls))
 

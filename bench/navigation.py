@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from bench.laser_rooms import LaserLog, read_carmen, wall_map
+from bench.laser_rooms import WALL_M, LaserLog, read_carmen, wall_map
 from bench.peers.nav2_recovery import Nav2Recovery
 from bench.peers.playerproject_vfh import PlayerprojectVfh
 from bench.peers.vff import Vff
@@ -85,7 +85,7 @@ def laser_trials(path: Path, count: int, settings: Settings, seed: int = 0) -> l
         Of the choice.
     """
     log = read_carmen(path)
-    walls = wall_map(log, range(0, len(log.poses), max(1, len(log.poses) // SCANS_MAX))).walls
+    walls = wall_map(log, range(0, len(log.poses), max(1, len(log.poses) // SCANS_MAX)), WALL_M).walls
     rng = np.random.default_rng(np.random.SeedSequence([seed, 57]))
     found: list[Trial] = []
     for _ in range(400 * count):
