@@ -116,6 +116,19 @@ def test_no_wrong_place_is_sure(
         assert [trace.probability[-1] for trace in traces] == pytest.approx([0.5] * len(seeds), abs=0.2)
 
 
+def test_a_place_that_may_be_another_one_teaches_nothing() -> None:
+    """Of two places that are alike, either explains all that is heard."""
+    drive = driven(RECTANGLE)
+    localizer = KnownRoom(drive.room, RING)
+    follow(localizer, drive)
+    assert localizer.localized().probability > 0.3
+    assert not localizer.shares.is_learned
+    drive = driven(CROOKED)
+    localizer = KnownRoom(drive.room, RING)
+    follow(localizer, drive)
+    assert localizer.shares.is_learned
+
+
 def test_the_same_firings_give_the_same_answers_and_odometry_never_jumps() -> None:
     drive = driven(CROOKED, 1.4)
     one, other = (follow(KnownRoom(drive.room, RING, seed=4), drive) for _ in range(2))
