@@ -142,8 +142,9 @@ def update_with_edge(
     """Enter that a sensor heard a landmark, which is inside the beam, or did not, so that it is rather outside.
 
     With t the angle from the landmark to the nearer edge of the beam, positive inside, and q² the sum of its variance
-    and the edge's, an echo has the probability Φ(t/q); the posterior's moments are those of the probit model. Ranges
-    hardly depend on the heading, but what is heard by which sensor does.
+    and the edge's, an echo has the probability Φ(t/q); the posterior's moments are those of the probit model (C. E.
+    Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning", 2006, 3.9). Ranges hardly depend on
+    the heading, but what is heard by which sensor does.
 
     A wild reading that only seems to be of the landmark is as probable wherever the landmark is. The worse the range
     fits, the more it may be one. Nor does an echo say much where landmarks are heard from outside.
@@ -181,14 +182,17 @@ def update_with_edge(
     q = math.sqrt(variance + EDGE_RAD * EDGE_RAD)
     z = t / q
     inside = 0.5 * math.erfc(-z / math.sqrt(2.0))
-    stray = chance + est.stray
+    # The reading has the probability `rest` + `share` Φ, but for a constant factor.
+    if chance < 0.0:
+        share = (DROP_OUT - 1.0) * (1.0 - est.stray)
+        rest = 1.0 + (DROP_OUT - 1.0) * est.stray
+    else:
+        share, rest = 1.0 - est.stray, est.stray + chance
     learn_stray(e, inside, chance)
     if (z < -EDGE_SIGMAS) if chance < 0.0 else (z > EDGE_SIGMAS):
         return
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-    share = DROP_OUT - 1.0 if chance < 0.0 else 1.0
-    total = 1.0 + share * inside if chance < 0.0 else stray + inside
-    slope = share * density / (total * q)
+    slope = share * density / ((rest + share * inside) * q)
     curvature = -slope * z / q - slope * slope
     if abs(curvature) > CURVATURE_MIN * slope * slope:
         # The posterior's mean is t + σ² slope, its variance σ² + σ⁴ curvature: more where both causes are as likely.

@@ -175,6 +175,28 @@ def test_where_landmarks_outside_are_heard_an_echo_does_not_turn_the_ring() -> N
     assert turned[0] > math.radians(1.0) > 3.0 * turned[1]
 
 
+@pytest.mark.parametrize("stray", [0.0005, 0.3, 0.8])
+@pytest.mark.parametrize("is_heard", [True, False])
+@pytest.mark.parametrize("outside_deg", [-0.5, 0.3, 0.8])
+def test_the_bearing_has_the_moments_of_the_exact_posterior(is_heard: bool, stray: float, outside_deg: float) -> None:
+    d, sigma = 2.0, math.radians(0.6)
+    off = HALF_ANGLE + math.radians(outside_deg)
+    e, covariance = new_filter([(0.4 + d * math.cos(off), d * math.sin(off))], sigma=d * sigma)
+    e[0].stray = stray
+    kernels.update_with_edge(e, covariance, 0, *AHEAD, HALF_ANGLE, 0.0 if is_heard else kernels.UNHEARD)
+    at, across = e[0].landmarks[0], np.array([-math.sin(off), math.cos(off)])
+    found = across @ (at.x - 0.4 - d * math.cos(off), at.y - d * math.sin(off)) / d
+    variance = across @ covariance[FIRST : FIRST + 2, FIRST : FIRST + 2] @ across / d**2
+    bearings = off + sigma * np.linspace(-6.0, 6.0, 4001)
+    inside = [0.5 * math.erfc((b - HALF_ANGLE) / (math.sqrt(2.0) * kernels.EDGE_RAD)) for b in bearings.tolist()]
+    heard = stray + (1.0 - stray) * np.array(inside)
+    weights = np.exp(-0.5 * ((bearings - off) / sigma) ** 2)
+    weights *= heard if is_heard else 1.0 - (1.0 - kernels.DROP_OUT) * heard
+    mean = np.average(bearings, weights=weights)
+    assert found == pytest.approx(mean - off, abs=0.01 * sigma)
+    assert variance == pytest.approx(np.average((bearings - mean) ** 2, weights=weights), rel=0.02)
+
+
 def test_a_range_of_a_farther_landmark_says_that_the_nearer_one_is_outside_the_beam() -> None:
     off = HALF_ANGLE - math.radians(1.0)
     near = (0.4 + 1.5 * math.cos(off), 1.5 * math.sin(off))
