@@ -5,8 +5,8 @@ From then on each raw range of theirs corrects pose, landmarks and scales (`perc
 The first objects are recognised after a metre or two. Until then firings wait in a buffer, so that the filter can
 begin at the first one: otherwise the drift of that way would turn the map for good.
 
-What perception holds stays in the frame in which the filter began. The map frame is the filter's frame, turned about
-the start by what `perception.localization.map_heading` finds once the map is known.
+What perception holds stays in the frame in which the filter began. The map frame is the filter's frame after
+the motion that `perception.localization.map_heading` finds once the map is known.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ CYCLE_FIRINGS: Final = 3
 CYCLE_FIRINGS_MAX: Final = 24
 """Firings from one check for a slip to the next one, and the most firings of which one looks at the echoes."""
 TURN_PER_M: Final = math.radians(1.0)
-"""The map frame turns no faster as the robot drives, rad/m: the map frame does not jump."""
+SHIFT_PER_M: Final = 0.02
+"""The map frame turns (rad/m) and shifts (m/m) no faster as the robot drives: it does not jump."""
 
 
 class LocalizedPose(NamedTuple):
@@ -113,7 +114,7 @@ class DriftCorrection:
         self._arrived = 0
         self._has_started = False
         self._way_m = 0.0
-        self._turned = 0.0
+        self._motion = np.zeros(3)
         self._checked = 0
         self._stands_firm = False
 
@@ -143,8 +144,8 @@ class DriftCorrection:
             before = self._waiting[(self._arrived - 1) % WAITING_MAX]
             way = math.hypot(row[0] - before[0], row[1] - before[1])
             self._way_m += way
-            left = self._map_heading.turn - self._turned
-            self._turned += math.copysign(min(abs(left), TURN_PER_M * way), left)
+            limits = way * np.array([TURN_PER_M, SHIFT_PER_M, SHIFT_PER_M])
+            self._motion += np.clip(self._map_heading.motion - self._motion, -limits, limits)
         self._arrived += 1
         self._has_started = self._has_started or self._way_m > LONGEST_WAY_M
         self._map_heading.keep(row)
@@ -196,16 +197,10 @@ class DriftCorrection:
         return self.odometry_from_filter().compose(self.map_from_filter().inverse())
 
     def map_from_filter(self) -> Pose:
-        """Return the pose of the filter's frame in the map frame: a turn about the place of the first firing."""
-        if self._turned == 0.0:
-            return Pose(0.0, 0.0, 0.0)
-        start = self._map_heading
-        c, s = math.cos(self._turned), math.sin(self._turned)
-        return Pose(
-            start.start_x - c * start.start_x + s * start.start_y,
-            start.start_y - s * start.start_x - c * start.start_y,
-            self._turned,
-        )
+        """Return the pose of the filter's frame in the map frame: a turn about the first firing, and a shift."""
+        turn, x, y = self._motion.tolist()
+        start = Pose(self._map_heading.start_x, self._map_heading.start_y, 0.0)
+        return Pose(start.x + x, start.y + y, turn).compose(start.inverse())
 
     def odometry_from_filter(self) -> Pose:
         """Return the pose of the filter's frame in odometry's frame, at the last firing."""
@@ -225,13 +220,13 @@ class DriftCorrection:
         to = np.zeros((3, FIRST))
         to[0, X] = to[1, Y] = to[2, HEADING] = to[2, OFFSET] = 1.0
         to[0, HEADING], to[1, HEADING] = -e.y, e.x
-        c, s = math.cos(self._turned), math.sin(self._turned)
+        to_map = self.map_from_filter()
+        c, s = math.cos(to_map.theta), math.sin(to_map.theta)
         to = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ to
         covariance = to @ self.covariance[:FIRST, :FIRST] @ to.T
         share = float(e.fit_share)
         is_caught_up = e.count > 0 and self._arrived == self._tracker.entered
         status: Status = "lost" if share < LOST_SHARE else "tracking" if is_caught_up else "localizing"
-        to_map = self.map_from_filter()
         return LocalizedPose(to_map.compose(pose), ring_yaw + to_map.theta, covariance, status, share)
 
     def places(self) -> dict[int, LandmarkPlace]:

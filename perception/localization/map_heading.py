@@ -1,10 +1,11 @@
-"""The heading of the map, found again from the first firings once the map is known.
+"""Where the map lies relative to the first firing, found again from the first firings once the map is known.
 
-The heading of the map is that of odometry at the first firing. The filter enters the first firings among landmarks
-that it hardly knows. Which sensors hear them shows the heading then much worse than later, and an extended filter
-cannot take back how little it made of that. So a second filter enters the first firings once more, with any heading
-and with the landmarks' places relative to each other as they are known by now. What the first filter believes of the
-heading of its map is replaced by what the second one finds, so that no firing counts twice for it.
+The map frame is odometry's at the first firing. The filter enters the first firings among landmarks that it hardly
+knows, with a random walk of the heading that it only guesses. Which sensors hear the landmarks shows the heading then
+much worse than later, and an extended filter cannot take back how little, or how much, it made of that. So a second
+filter enters the first firings once more, with any heading, with the walk found by now, and with the landmarks'
+places relative to each other as they are known by now. What the first filter believes of the heading and the place of
+its map is replaced by what the second one finds, so that no firing counts twice for it.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
-from perception.localization.landmark_state import FIRST, HEADING, OFFSET, X, Y
-from perception.localization.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker, fit_of_turn
+from perception.localization.landmark_state import FIRST, HEADING, ODOMETER, OFFSET, RANGE, TURN, X, Y
+from perception.localization.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker
 
 FIRST_FIRINGS: Final = 160
 """So many are kept, …"""
@@ -32,9 +33,10 @@ random walk."""
 LANDMARKS_MIN: Final = 2
 ENTERED_AT_ONCE: Final = 8
 """Kept firings that are entered with each new one: bounds the work."""
-HEADING_SIGMA: Final = math.radians(3.0)
-PLACE_SIGMA_M: Final = 0.05
-"""Standard deviations of the map's turn about the start, and of its shift, before the second filter."""
+MOTION_SIGMAS: Final = (math.radians(3.0), 0.05, 0.05)
+"""Standard deviations of the map's turn about the start (rad), and of its shift (m), before the second filter."""
+FITTED_TIMES: Final = 3
+"""The motion between two maps is fitted so often: each time, what is left of the turn is squared."""
 
 
 class MapHeading:
@@ -47,8 +49,9 @@ class MapHeading:
 
     Attributes
     ----------
-    turn : float
-        By this the first filter's map is to be turned about the start, rad; 0 until the second one has finished.
+    motion : (3,) float
+        The first filter's map is to be turned by this about the start (rad), and shifted along x and y (m); 0 until
+        the second one has finished.
     start_x, start_y : float
         The place of the first firing, m.
     """
@@ -56,6 +59,7 @@ class MapHeading:
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)
         self._rows = np.zeros((FIRST_FIRINGS, POSE + len(ring.mounts)))
+        self.motion = np.zeros(3)
         self.reset()
 
     def reset(self) -> None:
@@ -63,7 +67,7 @@ class MapHeading:
         self._kept = 0
         self._is_entering = False
         self._due_m = BEGIN_M
-        self.turn = self.start_x = self.start_y = 0.0
+        self.motion[:] = self.start_x = self.start_y = 0.0
 
     def keep(self, row: Floats) -> None:
         """Keep a firing, as `LandmarkTracker` takes it, if it is one of the first."""
@@ -79,12 +83,12 @@ class MapHeading:
         self._kept += 1
 
     def renew(self, known: LandmarkTracker, way_m: float) -> None:
-        """Do a part of the work after a firing; at its end, set `turn` and the covariance of the first filter.
+        """Do a part of the work after a firing; at its end, set `motion` and the covariance of the first filter.
 
         Parameters
         ----------
         known : LandmarkTracker
-            The first filter; its covariance becomes one about the map turned by `turn`.
+            The first filter; its covariance becomes one about the map after `motion`.
         way_m : float
             Way driven, m.
         """
@@ -102,7 +106,7 @@ class MapHeading:
             self._finish(known)
 
     def _begin(self, known: LandmarkTracker) -> None:
-        """Give the second filter the first one's map, turned by an unknown angle about the start."""
+        """Give the second filter the first one's map, after an unknown motion; its ring has the known start."""
         mine = self._tracker
         mine.reset()
         mine.assume_walk_of(known)
@@ -113,49 +117,59 @@ class MapHeading:
         e.offset = e.offset_correction = e.heading_correction = 0.0
         e.fit_share = 1.0
         landmarks = points_of(known)
-        fit = fit_of_heading(landmarks)
-        n = len(fit)
-        relative = without_heading(known.covariance[:n, :n], fit, self._turning(landmarks))
-        for row in (HEADING, X, Y, OFFSET):
-            relative[row, :] = relative[:, row] = 0.0
-        relative[OFFSET, OFFSET] = OFFSET_SIGMA_RAD**2
-        shifts = np.zeros((2, n))
-        shifts[0, FIRST::2] = shifts[1, FIRST + 1 :: 2] = PLACE_SIGMA_M
-        turn = np.zeros(n)
-        turn[FIRST:] = (
-            HEADING_SIGMA * np.column_stack([self.start_y - landmarks[:, 1], landmarks[:, 0] - self.start_x]).ravel()
-        )
-        for error in (turn, *shifts):
-            relative += np.outer(error, error)
-        mine.covariance[:n, :n] = relative
+        moving, of_places = self._moving(landmarks), place_errors(landmarks)
+        n = len(moving)
+        covariance = known.covariance[:n, :n]
+        weights, _ = fit_of_motion(of_places @ covariance @ of_places.T, of_places @ moving)
+        kept = np.zeros((n, n))
+        for row in (ODOMETER, TURN, RANGE):
+            kept[row, row] = 1.0
+        kept[FIRST:] = of_places  # of a ring whose heading is right
+        mine.covariance[:n, :n] = kept @ without_motion(covariance, of_places.T @ weights, moving) @ kept.T
+        mine.covariance[OFFSET, OFFSET] = OFFSET_SIGMA_RAD**2
+        spread = of_places @ moving * MOTION_SIGMAS
+        mine.covariance[FIRST:n, FIRST:n] += spread @ spread.T
 
     def _finish(self, known: LandmarkTracker) -> None:
-        """Compare the maps of both filters, and replace what the first believes of the heading of its own."""
-        numbers, xs, ys = known.landmarks("number", "x", "y")
-        mine = dict(zip(*self._tracker.landmarks("number"), points_of(self._tracker), strict=True))
-        common = [k for k, number in enumerate(numbers) if number in mine]
+        """Compare the maps of both filters, and replace what the first believes of where its own lies."""
         self._is_entering = False
+        (numbers,), (mine,) = known.landmarks("number"), self._tracker.landmarks("number")
+        common = [number for number in numbers if number in mine]
         if len(common) < LANDMARKS_MIN:
             return
-        before = np.column_stack([xs, ys])[common]
-        after = np.array([mine[numbers[k]] for k in common])
-        fit = fit_of_heading(points_of(self._tracker))
-        n = len(fit)
-        variance = float(fit @ self._tracker.covariance[:n, :n] @ fit)
-        self.turn = turn_between(before, after)
-        landmarks = points_of(known)
-        turning, fit = self._turning(landmarks), fit_of_heading(landmarks)
-        n = len(fit)
-        relative = without_heading(known.covariance[:n, :n], fit, turning)
-        known.covariance[:n, :n] = relative + variance * np.outer(turning, turning)
+        places, own_places = points_of(known), points_of(self._tracker)
+        at, own_at = [numbers.index(number) for number in common], [mine.index(number) for number in common]
+        moving, of_common = self._moving(places), rows_of(place_errors(places), at)
+        own_common = rows_of(place_errors(own_places), own_at)
+        n, m = len(moving), own_common.shape[1]
+        weights, variance = fit_of_motion(
+            own_common @ self._tracker.covariance[:m, :m] @ own_common.T, of_common @ moving
+        )
+        start = np.array([self.start_x, self.start_y])
+        self.motion[:] = motion_between(places[at] - start, own_places[own_at] - start, weights)
+        relative = without_motion(known.covariance[:n, :n], of_common.T @ weights, moving)
+        known.covariance[:n, :n] = relative + moving @ variance @ moving.T
 
-    def _turning(self, landmarks: Floats) -> Floats:
-        """Return how the errors of all rows change as map and ring turn about the start: (rows,)."""
-        turning = np.zeros(FIRST + landmarks.size)
-        turning[HEADING] = 1.0
-        turning[X], turning[Y] = self.start_y, -self.start_x
-        turning[FIRST::2], turning[FIRST + 1 :: 2] = self.start_y, -self.start_x
-        return turning
+    def _moving(self, landmarks: Floats) -> Floats:
+        """Return how the errors of all rows change with a turn of map and ring about the start, and with a shift.
+
+        Parameters
+        ----------
+        landmarks : (count, 2) float
+            Their places, m.
+
+        Returns
+        -------
+        (rows, 3) float
+        """
+        moving = np.zeros((FIRST + landmarks.size, 3))
+        moving[HEADING, 0] = 1.0
+        for rows, column, lever in (
+            ([X, *range(FIRST, len(moving), 2)], 1, self.start_y),
+            ([Y, *range(FIRST + 1, len(moving), 2)], 2, -self.start_x),
+        ):
+            moving[rows, 0], moving[rows, column] = lever, 1.0
+        return moving
 
 
 def points_of(tracker: LandmarkTracker) -> Floats:
@@ -163,10 +177,10 @@ def points_of(tracker: LandmarkTracker) -> Floats:
     return np.column_stack(tracker.landmarks("x", "y"))
 
 
-def fit_of_heading(landmarks: Floats) -> Floats:
-    """Return the weights of all rows' errors in that of the map's heading: the best turn of the landmarks.
+def place_errors(landmarks: Floats) -> Floats:
+    """Return how the landmarks' places err with the errors of all rows.
 
-    A landmark's error is relative to the ring's heading, which is why that counts in full.
+    A landmark's row is relative to the ring's heading: a true place is p = R(δθ) p̂ + δp, to first order.
 
     Parameters
     ----------
@@ -175,31 +189,73 @@ def fit_of_heading(landmarks: Floats) -> Floats:
 
     Returns
     -------
-    (rows,) float
+    (2 count, rows) float
     """
-    fit = np.zeros(FIRST + landmarks.size)
-    fit[HEADING] = 1.0
-    fit[FIRST:] = fit_of_turn(landmarks)
-    return fit
+    errors = np.zeros((landmarks.size, FIRST + landmarks.size))
+    errors[:, HEADING] = np.column_stack([-landmarks[:, 1], landmarks[:, 0]]).ravel()
+    errors[:, FIRST:] = np.eye(landmarks.size)
+    return errors
 
 
-def without_heading(covariance: Floats, fit: Floats, turning: Floats) -> Floats:
-    """Return the covariance of what is left when the fitted heading's error is taken out of all rows.
+def rows_of(errors: Floats, landmarks: list[int]) -> Floats:
+    """Return the rows of some landmarks from what `place_errors` returns: shape (2 n, rows)."""
+    chosen: Floats = errors.reshape(-1, 2, errors.shape[1])[landmarks].reshape(-1, errors.shape[1])
+    return chosen
+
+
+def fit_of_motion(covariance: Floats, moving: Floats) -> tuple[Floats, Floats]:
+    """Return the weights of places' errors in the most likely common motion, and that motion's covariance.
+
+    It is the generalised least squares of A. C. Aitken (1935): what it leaves of the errors is independent of it.
+
+    Parameters
+    ----------
+    covariance : (2 n, 2 n) float
+        W, of the errors, m².
+    moving : (2 n, 3) float
+        M, how a turn about the start and a shift change the places.
+
+    Returns
+    -------
+    weights : (2 n, 3) float
+        W⁻¹ M V.
+    variance : (3, 3) float
+        V = (Mᵀ W⁻¹ M)⁻¹.
+    """
+    solved = np.linalg.solve(covariance, moving)
+    variance = np.linalg.inv(moving.T @ solved)
+    return solved @ variance, variance
+
+
+def without_motion(covariance: Floats, weights: Floats, moving: Floats) -> Floats:
+    """Return the covariance of what is left when the fitted motion is taken out of all rows.
 
     Parameters
     ----------
     covariance : (rows, rows) float
         P.
-    fit, turning : (rows,) float
-        c and g, of which cᵀg = 1: the result is (I − g cᵀ) P (I − g cᵀ)ᵀ.
+    weights, moving : (rows, 3) float
+        C and G, of which CᵀG = I: the result is (I − G Cᵀ) P (I − G Cᵀ)ᵀ.
     """
-    carried = covariance @ fit
-    across = np.outer(turning, carried)
-    left: Floats = covariance - across - across.T + float(fit @ carried) * np.outer(turning, turning)
+    carried = covariance @ weights
+    across = moving @ carried.T
+    left: Floats = covariance - across - across.T + moving @ (weights.T @ carried) @ moving.T
     return left
 
 
-def turn_between(before: Floats, after: Floats) -> float:
-    """Return the angle of the best rigid motion from points to points, both of shape (n, 2), rad."""
-    a, b = before - before.mean(axis=0), after - after.mean(axis=0)
-    return math.atan2(float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])), float(np.sum(a * b)))
+def motion_between(before: Floats, after: Floats, weights: Floats) -> Floats:
+    """Return the motion from places to places, relative to the start: turn (rad) and shift (m).
+
+    Parameters
+    ----------
+    before, after : (n, 2) float
+        m.
+    weights : (2 n, 3) float
+        As from `fit_of_motion`.
+    """
+    motion = np.zeros(3)
+    for _ in range(FITTED_TIMES):
+        c, s = math.cos(motion[0]), math.sin(motion[0])
+        moved = before @ np.array([[c, s], [-s, c]]) + motion[1:]
+        motion += weights.T @ (after - moved).ravel()
+    return motion

@@ -87,4 +87,4 @@ class WalkRates:
             weights = np.exp(self._logs)
             self._logs -= np.log(np.sum(weights))
             self.rate = float(weights @ self._rates / np.sum(weights))
-        self._means -= correction
+        self._means -= correction  # the main filter has corrected the value: what is left of it
