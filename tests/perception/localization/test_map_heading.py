@@ -48,10 +48,11 @@ def move_filter(drift: DriftCorrection, turn: float, dx: float, dy: float) -> No
     """Turn the filter's map and pose about the start, and shift them."""
     e = drift.e[0]
     to = Pose(START[0] + dx, START[1] + dy, turn).compose(Pose(-START[0], -START[1], 0.0))
-    for one in (e, *(e.landmarks[i] for i in range(e.count))):
-        place = to.compose(Pose(one.x, one.y, 0.0))
-        one.x, one.y = place.x, place.y
-    e.heading += turn
+    ring = to.compose(Pose(e.x, e.y, e.heading))
+    e.x, e.y, e.heading = ring.x, ring.y, ring.theta
+    for i in range(e.count):
+        place = to.compose(Pose(e.landmarks[i].x, e.landmarks[i].y, 0.0))
+        e.landmarks[i].x, e.landmarks[i].y = place.x, place.y
 
 
 def test_a_landmark_that_errs_as_the_ring_does_turns_about_the_origin() -> None:
