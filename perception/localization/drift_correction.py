@@ -56,6 +56,7 @@ CYCLE_FIRINGS_MAX: Final = 24
 TURN_PER_M: Final = math.radians(1.0)
 SHIFT_PER_M: Final = 0.02
 """The map frame turns (rad/m) and shifts (m/m) no faster as the robot drives: it does not jump."""
+MOTION_PER_M: Final = np.array([TURN_PER_M, SHIFT_PER_M, SHIFT_PER_M])
 
 
 class LocalizedPose(NamedTuple):
@@ -144,8 +145,8 @@ class DriftCorrection:
             before = self._waiting[(self._arrived - 1) % WAITING_MAX]
             way = math.hypot(row[0] - before[0], row[1] - before[1])
             self._way_m += way
-            limits = way * np.array([TURN_PER_M, SHIFT_PER_M, SHIFT_PER_M])
-            self._motion += np.clip(self._map_heading.motion - self._motion, -limits, limits)
+            most = way * MOTION_PER_M
+            self._motion += np.maximum(np.minimum(self._map_heading.motion - self._motion, most), -most)
         self._arrived += 1
         self._has_started = self._has_started or self._way_m > LONGEST_WAY_M
         self._map_heading.keep(row)
