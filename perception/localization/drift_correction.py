@@ -178,6 +178,7 @@ class DriftCorrection:
         moved = {number for number, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX}
         if moved and self._tracker.is_doubtful and not self._stands_firm:
             moved = set()  # rather the robot slipped
+        self._map_heading.leave_out(moved)
         for i in range(len(numbers) - 1, -1, -1):
             if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
                 remove_landmark(self.e, self.covariance, i)

@@ -11,6 +11,7 @@ its map is replaced by what the second one finds, so that no firing counts twice
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
+from perception.localization.landmark_filter import remove_landmark
 from perception.localization.landmark_state import FIRST, HEADING, ODOMETER, OFFSET, RANGE, TURN, X, Y
 from perception.localization.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker
 
@@ -60,6 +62,7 @@ class MapHeading:
         self._tracker = LandmarkTracker(ring)
         self._rows = np.zeros((FIRST_FIRINGS, POSE + len(ring.mounts)))
         self.motion = np.zeros(3)
+        self._moved: set[int] = set()
         self.reset()
 
     def reset(self) -> None:
@@ -67,6 +70,7 @@ class MapHeading:
         self._kept = 0
         self._is_entering = False
         self._due_m = BEGIN_M
+        self._moved.clear()
         self.motion[:] = self.start_x = self.start_y = 0.0
 
     def keep(self, row: Floats) -> None:
@@ -81,6 +85,10 @@ class MapHeading:
                 return
         self._rows[self._kept] = row
         self._kept += 1
+
+    def leave_out(self, moved: Iterable[int]) -> None:
+        """Use no more landmarks of these numbers: they stood elsewhere at the first firings."""
+        self._moved.update(moved)
 
     def renew(self, known: LandmarkTracker, way_m: float) -> None:
         """Do a part of the work after a firing; at its end, set `motion` and the covariance of the first filter.
@@ -129,6 +137,10 @@ class MapHeading:
         mine.covariance[OFFSET, OFFSET] = OFFSET_SIGMA_RAD**2
         spread = of_places @ moving * MOTION_SIGMAS
         mine.covariance[FIRST:n, FIRST:n] += spread @ spread.T
+        (numbers,) = mine.landmarks("number")
+        for i in range(len(numbers) - 1, -1, -1):
+            if numbers[i] in self._moved:
+                remove_landmark(mine.e, mine.covariance, i)
 
     def _finish(self, known: LandmarkTracker) -> None:
         """Compare the maps of both filters, and replace what the first believes of where its own lies."""

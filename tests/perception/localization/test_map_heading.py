@@ -9,7 +9,13 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Firing, Pose
-from perception.localization.drift_correction import SHIFT_PER_M, TURN_PER_M, DriftCorrection, SeenObject
+from perception.localization.drift_correction import (
+    FAILURES_MAX,
+    SHIFT_PER_M,
+    TURN_PER_M,
+    DriftCorrection,
+    SeenObject,
+)
 from perception.localization.landmark_state import FIRST, HEADING, X, Y
 from perception.localization.map_heading import (
     BEGIN_M,
@@ -140,6 +146,22 @@ def test_a_map_that_was_moved_is_moved_back_without_a_jump(turn: float, dx: floa
     to = drift.odometry_from_map()
     assert {type(v) for v in (here.pose.x, here.pose.theta, here.ring_yaw, to.x, to.theta)} == {float}
     assert drift.odometry_from_map().theta == pytest.approx(0.0, abs=math.radians(0.3))
+
+
+@pytest.mark.compiled
+def test_a_landmark_that_moved_says_nothing_of_where_the_map_lies() -> None:
+    drift = DriftCorrection(RING)
+    drift.observe(firing(0))
+    drift.learn(SEEN)
+    landmark = drift.e[0].landmarks[2]
+    landmark.failures = FAILURES_MAX
+    drift.learn(SEEN)
+    for k in range(1, round((BEGIN_M + 1.0) / STEP_M)):
+        drift.observe(firing(k))
+    (numbers,), (entered,) = drift._tracker.landmarks("number"), drift._map_heading._tracker.landmarks("number")
+    assert set(numbers) - set(entered) == {3}
+    drift.reset()
+    assert not drift._map_heading._moved
 
 
 def test_only_firings_that_are_apart_are_kept_and_no_more_than_there_is_room_for() -> None:
