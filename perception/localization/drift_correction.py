@@ -178,13 +178,12 @@ class DriftCorrection:
         moved = {number for number, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX}
         if moved and self._tracker.is_doubtful and not self._stands_firm:
             moved = set()  # rather the robot slipped
-        self._map_heading.leave_out(moved)
         for i in range(len(numbers) - 1, -1, -1):
             if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
                 remove_landmark(self.e, self.covariance, i)
         for number in sorted(objects.keys() - (set(numbers) - moved)):
             sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
-            self._add(objects[number], sigma)
+            self._add(objects[number], sigma, moved=int(number in moved))
         if not self._has_started:
             self._turn_landmarks(self.heading_walk**2 * self._way_m)
         self._has_started = True
@@ -312,7 +311,7 @@ class DriftCorrection:
         end = FIRST + len(lever)
         self.covariance[FIRST:end, FIRST:end] += variance * np.outer(lever, lever)
 
-    def _add(self, seen: SeenObject, sigma_m: float) -> None:
+    def _add(self, seen: SeenObject, sigma_m: float, moved: int) -> None:
         """Add a landmark that stands where perception sees it, relative to the ring, with this standard deviation."""
         e = self.e[0]
         c, s = math.cos(e.heading), math.sin(e.heading)
@@ -321,5 +320,5 @@ class DriftCorrection:
         if i < 0:
             return
         landmark = e.landmarks[i]
-        landmark.radius, landmark.number = seen.radius, seen.number
+        landmark.radius, landmark.number, landmark.moved = seen.radius, seen.number, moved
         landmark.anchor_x, landmark.anchor_y = seen.x, seen.y

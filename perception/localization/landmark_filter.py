@@ -252,6 +252,7 @@ def add_landmark(
     landmark.y = est.y + s * ahead + c * left
     landmark.failures = 0
     landmark.hits = 0
+    landmark.moved = 0
     est.count += 1
     return i
 
@@ -275,6 +276,7 @@ def remove_landmark(e: EstimateRecord, covariance: Floats, i: int) -> None:
         source, target = est.landmarks[last], est.landmarks[i]
         target.x, target.y, target.radius = source.x, source.y, source.radius
         target.number, target.failures, target.hits = source.number, source.failures, source.hits
+        target.moved = source.moved
         target.anchor_x, target.anchor_y = source.anchor_x, source.anchor_y
         for axis in range(2):
             to, of = FIRST + 2 * i + axis, FIRST + 2 * last + axis

@@ -36,6 +36,8 @@ class Landmark(Record):
     failures: int
     """Readings in succession that should have hit it and missed, while other landmarks were hit."""
     hits: int
+    moved: int
+    """Whether it stood elsewhere before."""
     anchor_x: float
     anchor_y: float
     """Its place when perception's track was last moved with it."""

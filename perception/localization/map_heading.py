@@ -11,7 +11,6 @@ its map is replaced by what the second one finds, so that no firing counts twice
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -62,7 +61,6 @@ class MapHeading:
         self._tracker = LandmarkTracker(ring)
         self._rows = np.zeros((FIRST_FIRINGS, POSE + len(ring.mounts)))
         self.motion = np.zeros(3)
-        self._moved: set[int] = set()
         self.reset()
 
     def reset(self) -> None:
@@ -70,7 +68,6 @@ class MapHeading:
         self._kept = 0
         self._is_entering = False
         self._due_m = BEGIN_M
-        self._moved.clear()
         self.motion[:] = self.start_x = self.start_y = 0.0
 
     def keep(self, row: Floats) -> None:
@@ -85,10 +82,6 @@ class MapHeading:
                 return
         self._rows[self._kept] = row
         self._kept += 1
-
-    def leave_out(self, moved: Iterable[int]) -> None:
-        """Use no more landmarks of these numbers: they stood elsewhere at the first firings."""
-        self._moved.update(moved)
 
     def renew(self, known: LandmarkTracker, way_m: float) -> None:
         """Do a part of the work after a firing; at its end, set `motion` and the covariance of the first filter.
@@ -137,9 +130,9 @@ class MapHeading:
         mine.covariance[OFFSET, OFFSET] = OFFSET_SIGMA_RAD**2
         spread = of_places @ moving * MOTION_SIGMAS
         mine.covariance[FIRST:n, FIRST:n] += spread @ spread.T
-        (numbers,) = mine.landmarks("number")
-        for i in range(len(numbers) - 1, -1, -1):
-            if numbers[i] in self._moved:
+        (moved,) = mine.landmarks("moved")
+        for i in range(len(moved) - 1, -1, -1):
+            if moved[i] == 1:  # it stood elsewhere at the first firings
                 remove_landmark(mine.e, mine.covariance, i)
 
     def _finish(self, known: LandmarkTracker) -> None:

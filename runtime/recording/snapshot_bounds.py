@@ -113,7 +113,7 @@ _FLAGS: Final = (
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
     "_steady bins.is_held bins.is_open room.is_loud canyon_map.is_due canyon_map.is_wanted "
     "drift._has_started drift._stands_firm _tracker.is_synchro _map_heading._is_entering sensors.is_known "
-    "_has_fired _is_started _has_stood _is_weighed _is_complete _is_confirmed shares.is_learned"
+    "landmarks.moved _has_fired _is_started _has_stood _is_weighed _is_complete _is_confirmed shares.is_learned"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
