@@ -44,9 +44,9 @@ from perception.kernel import kernel
 
 REMEMBERED_SPACING_M: Final = 0.08
 """Least distance between the remembered readings of a sensor."""
-REMEMBERED_FIRST: Final = 2048
-"""So many are remembered, those of some 6 m, before it is known whether slanting walls answer, or are mirrors: then
-readings show corners and edges."""
+REMEMBERED_FIRST: Final = 1024
+"""So many are remembered, those of some 3 m, before it is known whether slanting walls answer, or are mirrors: then
+readings show corners and edges. Where no walls are they only fill recordings."""
 REVIEWED_WEIGHT_MIN: Final = 20.0
 REVIEWED_CHI2_MIN: Final = 14.0
 """A wall of less weight or evidence is not reviewed."""
