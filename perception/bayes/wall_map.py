@@ -75,10 +75,12 @@ EDGE_WITHIN_M: Final = 0.15
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 EDGE_SLACK_M: Final = 0.05
+LOUD_SHARE: Final = 1.2
 LOUD_SILENCES_MIN: Final = 16.0
-"""Slanting walls are taken to answer where beams are silent less often than the share that asks for care with names
-allows, until walls are known that show it; and only where it allows so many silences: wide beams hear mirrors, too.
-Between drums a fifth of the beams and more is silent, in rooms of walls that answer at any angle a seventh at most."""
+"""Slanting walls are taken to answer where beams are silent less often than so many times the share that asks for
+care with names, until walls are known that show it; and only where so many silences are expected: wide beams hear
+mirrors, too. Between drums a fifth of the beams is silent, or more; in rooms of walls that answer at any angle a
+seventh at most."""
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
 
@@ -190,7 +192,7 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
     scratch = s[0].scratch
     estimate_noise(s, p)
     allowed = p[0].silent_share_min * (s[0].heard + s[0].silent)
-    room.is_loud = 1 if allowed >= LOUD_SILENCES_MIN and s[0].silent < allowed else 0
+    room.is_loud = 1 if allowed >= LOUD_SILENCES_MIN and s[0].silent < LOUD_SHARE * allowed else 0
     newest = -1
     unexplained = 0
     for i in range(m):
