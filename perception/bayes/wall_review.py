@@ -45,8 +45,8 @@ from perception.kernel import kernel
 REMEMBERED_SPACING_M: Final = 0.08
 """Least distance between the remembered readings of a sensor."""
 REMEMBERED_FIRST: Final = 1024
-"""So many are remembered, those of some 3 m, before it is known whether slanting walls answer, or are mirrors: then
-readings show corners and edges. Where no walls are they only fill recordings."""
+"""So many are remembered, those of some 3 m, before a wall is known and whether slanting walls answer, or are
+mirrors: then readings show corners and edges. Where no wall stands, more of them would only fill recordings."""
 REVIEWED_WEIGHT_MIN: Final = 20.0
 REVIEWED_CHI2_MIN: Final = 14.0
 """A wall of less weight or evidence is not reviewed."""
@@ -78,18 +78,9 @@ KNOWN_SHARE: Final = 0.7
 
 
 @kernel
-def remember(room: WallMap, sensor: int, q: Reading) -> None:
-    """Remember a reading, if its sensor has moved far enough and it is of use, or may be."""
-    if room.remembered_count >= REMEMBERED_FIRST and not edges_answer(room) and not are_mirrors(room):
-        return
-    is_first = room.remembered_of[sensor] == 0.0
-    moved = math.hypot(q.x - room.remembered_x[sensor], q.y - room.remembered_y[sensor])
-    if is_first or moved > REMEMBERED_SPACING_M:
-        room.remembered_of[sensor] = 1.0
-        room.remembered_x[sensor] = q.x
-        room.remembered_y[sensor] = q.y
-        copy_reading(q, room.remembered[room.remembered_count % REMEMBERED_MAX])
-        room.remembered_count += 1
+def is_reviewed(wall: Wall) -> bool:
+    """Return whether enough is known of a wall to review it."""
+    return bool(wall.span_count > 0 and wall.weight >= REVIEWED_WEIGHT_MIN and wall.chi2 >= REVIEWED_CHI2_MIN)
 
 
 @kernel
@@ -110,9 +101,20 @@ def next_wall(room: WallMap, turn: int) -> int:
 
 
 @kernel
-def is_reviewed(wall: Wall) -> bool:
-    """Return whether enough is known of a wall to review it."""
-    return bool(wall.span_count > 0 and wall.weight >= REVIEWED_WEIGHT_MIN and wall.chi2 >= REVIEWED_CHI2_MIN)
+def remember(room: WallMap, sensor: int, q: Reading) -> None:
+    """Remember a reading, if its sensor has moved far enough and it is of use, or may be."""
+    if room.remembered_count >= REMEMBERED_FIRST and not edges_answer(room) and not are_mirrors(room):
+        return
+    is_first = room.remembered_of[sensor] == 0.0
+    moved = math.hypot(q.x - room.remembered_x[sensor], q.y - room.remembered_y[sensor])
+    if (is_first or moved > REMEMBERED_SPACING_M) and (
+        room.remembered_count < REMEMBERED_FIRST or next_wall(room, 0) >= 0
+    ):
+        room.remembered_of[sensor] = 1.0
+        room.remembered_x[sensor] = q.x
+        room.remembered_y[sensor] = q.y
+        copy_reading(q, room.remembered[room.remembered_count % REMEMBERED_MAX])
+        room.remembered_count += 1
 
 
 @kernel

@@ -148,7 +148,7 @@ def test_covered_places_are_the_likeliest_sequence() -> None:
 
 
 def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:
-    _, room = new_room()
+    memory, room = new_room()
     for k in range(5):
         remember(room, 1, reading(0.5 * REMEMBERED_SPACING_M * k, 0.0, 0.0, 1.0))
         remember(room, 2, reading(0.0, 0.0, 0.0, 1.0))
@@ -157,6 +157,10 @@ def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:
     remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
     assert room.remembered_count == REMEMBERED_MAX, "it is not known what slanting walls do"
     room.edge_echoes = 100.0
+    remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
+    assert room.remembered_count == REMEMBERED_MAX, "no wall is known that they could show"
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.5, 1.9)
     remember(room, 3, reading(7.0, 0.0, 0.0, 1.0))
     assert room.remembered[0].x == 7.0
     room.edge_echoes, room.edge_silences = 0.0, 100.0
