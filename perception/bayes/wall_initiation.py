@@ -263,33 +263,25 @@ def end_candidate(s: StateRecord, is_new: bool) -> None:
 
 
 @kernel
-def is_wall(s: StateRecord, chi2_min: float) -> bool:
-    """Return whether the fitted candidate is a wall, by at least this evidence that it is straight."""
+def is_wall(s: StateRecord) -> bool:
+    """Return whether the fitted candidate is a wall."""
     wall = s[0].room.walls[CANDIDATE]
     for k in range(wall.span_count):
         span = wall.spans[k]
         is_long = span.high - span.low >= WALL_MIN_M and span.weight >= NEW_WALL_WEIGHT_MIN
-        is_flat = max(span.chi2, wall.chi2) >= chi2_min and span.chi2 > SPAN_CHI2_MIN
+        is_flat = max(span.chi2, wall.chi2) >= NEW_WALL_CHI2_MIN and span.chi2 > SPAN_CHI2_MIN
         if is_long and is_flat and span.passes < NEW_WALL_PASSES_MAX * span.weight:
             return bool(wall.misfit < NEW_WALL_MISFIT_MAX)
     return False
 
 
-def fit_candidate(memory: Memory, p: SettingsRecord, chi2_min: float = NEW_WALL_CHI2_MIN) -> bool:
-    """Fit the candidate, whose line is known roughly, to the recent readings; return whether it is a wall.
-
-    Parameters
-    ----------
-    memory, p
-        Updated, and the settings.
-    chi2_min : float
-        Least evidence that it is straight.
-    """
+def fit_candidate(memory: Memory, p: SettingsRecord) -> bool:
+    """Fit the candidate, whose line is known roughly, to the recent readings; return whether it is a wall."""
     for _ in range(ROUNDS):
         if enter_recent(memory.s, p) < NEW_WALL_ECHOES_MIN:
             return False
         fit_walls(memory.s, p, CANDIDATE, CANDIDATE + 1, 1)
-    return is_wall(memory.s, chi2_min)
+    return is_wall(memory.s)
 
 
 def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:

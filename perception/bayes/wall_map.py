@@ -37,7 +37,6 @@ from perception.bayes.wall_contact import (
     tolerance,
     wall_point,
 )
-from perception.bayes.wall_continuation import continue_wall
 from perception.bayes.wall_corners import EDGE_WALL_WEIGHT_MIN, enter_echo, enter_looks, find_corners, point_of
 from perception.bayes.wall_fit import fit_walls
 from perception.bayes.wall_initiation import try_wall
@@ -247,7 +246,7 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
     newest = enter_firing(memory.s, memory.tracks, p, m)
     firings: int = memory.firings.item()
     fit_walls(memory.s, p, firings % FIT_FIRINGS, MAX_WALLS, FIT_FIRINGS)
-    is_new = newest >= 0 and (continue_wall(memory, p, newest) or try_wall(memory, p, newest))
+    is_new = newest >= 0 and try_wall(memory, p, newest)
     turn, phase = divmod(firings, TIDY_FIRINGS)
     if phase == 0 or is_new:
         merge_walls(memory, p)
