@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from config.settings import Settings
-from runtime.simulation.drift_trials import LEVELS, drive, summarise_drives
+from runtime.simulation.drift_trials import LEVELS, drive, level_name, summarise_drives
 
 POSE_DEGREES: Final = 3
 PLACE_DEGREES: Final = 2
@@ -50,8 +50,7 @@ def measure(
     seeds, rows = tuple(seeds), {}
     pose, place = band(POSE_DEGREES, len(seeds)), band(PLACE_DEGREES, len(seeds))
     for errors in LEVELS[1:]:
-        degrees = math.degrees(errors.heading_rad_per_sqrt_m)
-        name = f"{errors.scale - 1.0:.0%}, {degrees:g}°/√m"
+        name = level_name(errors)
         outcomes = []
         for seed in seeds:
             report(f"nees: {name}, drive {seed}")

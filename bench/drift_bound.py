@@ -22,7 +22,7 @@ from drivers.messages import Firing, Floats, Pose
 from perception.kernel import kernel
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
-from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, oval
+from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, level_name, oval
 from runtime.simulation.random_halls import ACOUSTICS
 
 PARTICLES: Final = 1000
@@ -206,7 +206,7 @@ def measure(
     """
     seeds, rows = tuple(seeds), {}
     for errors in LEVELS[1:]:
-        level = f"{errors.scale - 1.0:.0%}, {math.degrees(errors.heading_rad_per_sqrt_m):g}°/√m"
+        level = level_name(errors)
         drives = []
         for seed in seeds:
             report(f"drift-bound: {level}, drive {seed}")

@@ -143,7 +143,7 @@ class KnownRoom:
         self._background.observe(keyframes.latest_ranges())
         if self._stage in {IDLE, DUE}:
             self._window_begin = max(self._window_begin, keyframes.count - WINDOW_MAX)
-            while self._is_window_long(keyframes):
+            while self._is_window_long():
                 self._window_begin += 1
         if self._stage != IDLE:
             return
@@ -225,10 +225,10 @@ class KnownRoom:
         """Discard cached results, after the memory was restored from a snapshot."""
         self._grid.drop_caches()
 
-    def _is_window_long(self, keyframes: Keyframes) -> bool:
+    def _is_window_long(self) -> bool:
         """Return whether the window may begin with a later keyframe."""
-        most_m = WINDOW_M if keyframes.count - self._window_begin > WINDOW_LEAST else WINDOW_FAR_M
-        return keyframes.way_since(self._window_begin) > most_m
+        most_m = WINDOW_M if self._keyframes.count - self._window_begin > WINDOW_LEAST else WINDOW_FAR_M
+        return self._keyframes.way_since(self._window_begin) > most_m
 
     def _at_last_firing(self) -> Pose:
         """Return the ring's pose by odometry at the last firing."""

@@ -301,7 +301,7 @@ class PoseGrid:
         (n, 3) float
             x, y (m), heading (rad).
         """
-        found = self._found["starts"][0, : int(self._found["count"][0])]
+        found = self._found["starts"][0, : len(self)]
         order = np.argsort(-found["score"], kind="stable")[:most]
         order = order[found["score"][order] >= found["score"][order[:1]] - START_LOG]
         return np.column_stack([found[name][order] for name in ("x", "y", "heading")])
@@ -313,15 +313,14 @@ class PoseGrid:
     @property
     def best_profile(self) -> int:
         """By which guess of the causes the readings fit best; there must be a start."""
-        found = self._found["starts"][0, : int(self._found["count"][0])]
+        found = self._found["starts"][0, : len(self)]
         return int(found["profile"][found["score"].argmax()])
 
     @property
     def is_complete(self) -> bool:
         """Whether all places but the offered ones fit much worse than the best one."""
-        count = int(self._found["count"][0])
-        scores = np.sort(self._found["starts"]["score"][0, :count])
-        return count < STARTS_MAX or bool(scores[-1] - scores[0] > COMPLETE_LOG)
+        scores = np.sort(self._found["starts"]["score"][0, : len(self)])
+        return len(self) < STARTS_MAX or bool(scores[-1] - scores[0] > COMPLETE_LOG)
 
     def drop_caches(self) -> None:
         """Discard what was computed for a search, after another state was restored."""

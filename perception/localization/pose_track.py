@@ -46,7 +46,7 @@ MIRRORS: Final = 0.4
 ALIKE_WEIGHT: Final = 0.15
 """Weight of what an echo gains beyond that: such gains scatter by more than the two differ."""
 LIKENESS_MAX: Final = 4.5
-"""The same of `PoseTrack.likeness`: a robot that is carried must notice within a few keyframes."""
+"""Most likeness that is remembered, nat: a robot that is carried must notice it within a few keyframes."""
 INDEPENDENT_M: Final = 0.5
 """Readings on a way as short as this have errors in common, those of the map and of what it lacks."""
 NOISES: Final = 512
