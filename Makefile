@@ -142,7 +142,13 @@ $(VENV)/browser.stamp: | $(VENV)/bin/python
 			{ apt-get -qq install -y chromium-headless-shell || apt-get -qq install -y chromium; }"; }
 	@touch $@
 
-$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/browser.stamp
+# Recordings are tested with the reader that Foxglove and Lichtblick use; without npm that test is skipped.
+$(VENV)/npm.stamp: | $(VENV)/bin/python
+	@{ command -v npm >/dev/null && npm install --silent --no-audit --no-fund --prefix $(VENV)/npm @mcap/core@2.2.2 fzstd@0.1.1; } \
+		|| echo "npm is not installed, or reaches no registry: the test with npm's @mcap/core is skipped"
+	@touch $@
+
+$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/browser.stamp $(VENV)/npm.stamp
 	$(call install,.[dev])
 
 $(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python

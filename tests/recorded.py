@@ -20,7 +20,7 @@ from config.settings import Settings
 from drivers.messages import Pose
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
-from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
+from runtime.recording.mcap_file import CHUNK_BYTES, PROFILE
 from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import cycle_head, open_recording
 from runtime.recording.recorder import Recorder
@@ -165,7 +165,7 @@ def rewrite(
 ) -> None:
     """Write messages as a recording, a chunk every ten cycles."""
     with path.open("wb") as file:
-        writer = Writer(file, CHUNK_BYTES, CompressionType.ZSTD, INDEX, enable_data_crcs=True)
+        writer = Writer(file, CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True)
         writer.start(profile, "echolocate 9")
         numbers: dict[str, int] = {}
         for topic, form in CHANNELS.items():

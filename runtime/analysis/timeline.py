@@ -155,7 +155,7 @@ class Timeline:
     cross_paths: CrossPathRows = field(default_factory=lambda: np.empty(0, CROSS_PATH))
     """Every cross path of the run, in order of time; empty where no sensor listens to others."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)
-    """At most ten a second."""
+    """At most ten a second. A ring log has the poses of its firings, and a velocity of NaN."""
     snapshots: list[RunSnapshot] = field(default_factory=list)
     """Evenly over the run; the last one is its end."""
     segments: Floats = field(default_factory=_no_rows)

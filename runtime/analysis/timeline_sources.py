@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Final
 from config.errors import WRONG_CALL, UserError
 from config.load import load_settings, load_world
 from config.settings import Settings
-from drivers.messages import Odometry
+from drivers.messages import Flags, Odometry, Twist
 from drivers.registry import make_driver
 from runtime.analysis.timeline import BookmarkEntry, LogEntry, ModeEntry, Timeline
 from runtime.analysis.timeline_builder import FIRST_INTERVAL_S, TimelineBuilder
@@ -27,6 +28,7 @@ from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
 from runtime.recording.verification import Verifier
 
 Progress = Callable[[], None]
+UNKNOWN_TWIST: Final = Twist(math.nan, math.nan)
 LOG_LINES_MAX: Final = 1000
 """Log lines kept."""
 SKIMMED_KEYFRAMES_MIN: Final = 12
@@ -218,6 +220,9 @@ def _of_ring_log(
         if timeline.cycles:
             timeline.cycle_gaps_s.append(t_s - timeline.seconds)
         builder.add_firing(t_s, firing)
+        # The poses of a ring log are its odometry; it does not say how fast the wheels were.
+        at = Odometry(firing.robot_s, firing.pose, firing.ring_yaw, UNKNOWN_TWIST, Flags.NONE, 0)
+        builder.add_odometry(t_s, at)
         builder.end_cycle(t_s, replayer.perception)
         timeline.cycles += 1
         on_step()

@@ -1,5 +1,6 @@
 """An MCAP file while it is being written: small chunks, each readable by itself once it is flushed.
 
+After each chunk comes an index of its messages, without which npm's `@mcap/core`, and so Foxglove, reads no message.
 It is locked while it is open: other runs then leave it alone when they make room.
 """
 
@@ -11,7 +12,7 @@ import os
 from pathlib import Path
 from typing import Final
 
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, Writer
 
 from runtime import VERSION
 from runtime.recording.channels import CHANNELS, RUN_INFO, schema_of
@@ -20,9 +21,6 @@ from runtime.recording.schema import FORMAT
 PROFILE: Final = "echolocate"
 CHUNK_BYTES: Final = 256 * 1024
 """Largest chunk, bytes: a corrupt byte costs no more than one chunk."""
-
-INDEX: Final = IndexType.CHUNK | IndexType.ATTACHMENT | IndexType.METADATA
-"""No index of single messages: with chunks this small it would take a third of the file."""
 
 
 class McapFile:
@@ -51,9 +49,8 @@ class McapFile:
         ):  # a file that the user named is locked already, see `run`; or no locks exist
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._writer = Writer(
-            self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
-            enable_crcs=True, enable_data_crcs=True,
-        )  # fmt: skip
+            self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         try:

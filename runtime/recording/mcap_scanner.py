@@ -39,6 +39,10 @@ CHUNK_MAX: Final = CONTENT_MAX + (1 << 20)
 """Longest chunk record: what does not shrink by compression grows by little."""
 MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Of a message record: channel, sequence number, log time and publish time."""
+INDEX_HEAD: Final = struct.Struct("<HI")
+"""Of an index of a chunk's messages: channel and size of the list that follows."""
+INDEX_MAX: Final = INDEX_HEAD.size + 16 * RECORDS_MAX
+DATA_END_BYTES: Final = 4
 HEADER_MAX: Final = 4096
 SEARCH_BYTES: Final = 1 << 20
 """What is searched at a time for the next chunk: a file may be larger than the memory, and most of it a hole."""
@@ -156,7 +160,19 @@ class McapScanner:
         code, length = struct.unpack_from("<BQ", self._data, at)
         if code not in OPCODES or code in {Opcode.FOOTER, Opcode.MESSAGE}:
             return None
-        return None if at + RECORD_HEADER + length > len(self._data) else (code, length)
+        if at + RECORD_HEADER + length > len(self._data):
+            return None
+        # One wrong bit of these, which stand between the chunks, would skip chunks that are whole.
+        if code == Opcode.MESSAGE_INDEX and not self._is_index(at + RECORD_HEADER, length):
+            return None
+        return None if code == Opcode.DATA_END and length != DATA_END_BYTES else (code, length)
+
+    def _is_index(self, at: int, length: int) -> bool:
+        """Return whether the length of an index of messages agrees with that of the list in it."""
+        if length < INDEX_HEAD.size:
+            return False
+        _, list_bytes = INDEX_HEAD.unpack_from(self._data, at)
+        return bool(length == INDEX_HEAD.size + list_bytes)
 
     def _find_chunk(self, at: int) -> tuple[list[RawMessage] | None, int]:
         """Return the next whole chunk from `at` on and the byte after it; without one, None and the file's end."""
@@ -189,7 +205,10 @@ class McapScanner:
         if at + RECORD_HEADER > len(self._data):
             return True
         code, length = struct.unpack_from("<BQ", self._data, at)
-        longest = {Opcode.CHUNK: CONTENT_MAX, Opcode.HEADER: HEADER_MAX, Opcode.DATA_END: 4}.get(code, 0)
+        longest = {
+            Opcode.CHUNK: CONTENT_MAX, Opcode.MESSAGE_INDEX: INDEX_MAX, Opcode.HEADER: HEADER_MAX,
+            Opcode.DATA_END: DATA_END_BYTES,
+        }.get(code, 0)  # fmt: skip
         return bool(length <= longest) and at + RECORD_HEADER + length > len(self._data)
 
     def _chunk(self, at: int, length: int) -> list[RawMessage] | None:

@@ -10,7 +10,7 @@ from typing import BinaryIO, Final
 from mcap.writer import CompressionType, Writer
 
 from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
-from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
+from runtime.recording.mcap_file import CHUNK_BYTES, PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
 from runtime.recording.reader import RecordingError, check_format, check_origin, map_file
 from runtime.recording.schema import FORMAT
@@ -64,8 +64,7 @@ def recover(source: Path, target: Path) -> Recovered:
 def _copy(scanner: McapScanner, source: Path, file: BinaryIO, target: Path) -> Recovered:
     chunks = messages = cycles = 0
     first_ns = last_ns = 0
-    writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
-                    enable_data_crcs=True)  # fmt: skip
+    writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile=scanner.profile or f"{PROFILE}/{FORMAT}", library=scanner.library or PROFILE)
     channels: dict[str, int] = {}
     for chunk in scanner.chunks():

@@ -120,8 +120,8 @@ def _odometry(timeline: Timeline) -> Table:
         "y_m": [o.pose.y for _, o in path_rows],
         "heading_rad": [o.pose.theta for _, o in path_rows],
         "ring_yaw_rad": [o.ring_yaw for _, o in path_rows],
-        "v_m_s": [o.twist.v for _, o in path_rows],
-        "w_rad_s": [o.twist.w for _, o in path_rows],
+        "v_m_s": _known([o.twist.v for _, o in path_rows]),
+        "w_rad_s": _known([o.twist.w for _, o in path_rows]),
         "flags": [int(o.flags) for _, o in path_rows],
     }
 

@@ -113,9 +113,8 @@ class _RunExporter:
     def write(self) -> None:
         """Write everything, in order of time."""
         timeline = self._timeline
-        poses = [(t, o.pose) for t, o in timeline.odometry] or [(m.t_s, m.pose) for m in timeline.snapshots]
         items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._write_truth)]
-        items += [(t, partial(self._write_pose, pose)) for t, pose in poses]
+        items += [(t, partial(self._write_pose, odometry.pose)) for t, odometry in timeline.odometry]
         items += [(scan.t_s, partial(self._write_scan, scan)) for scan in firing_scans(timeline)]
         items += [(snapshot.t_s, partial(self._write_snapshot, snapshot)) for snapshot in timeline.snapshots]
         items += [(max(0.0, entry.t_s), partial(self._write_log_entry, entry)) for entry in timeline.log]

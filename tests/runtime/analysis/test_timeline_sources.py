@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,10 @@ def test_a_ring_log_has_echoes_and_objects_and_no_modes(hall_log: Path, timeline
         np.testing.assert_array_equal(loaded.echoes[name], timeline.echoes[name])
     assert len(loaded.objects) >= 3
     assert (loaded.modes, loaded.cycle_unix, loaded.summary, loaded.counts) == ([], [], None, None)
+    way, known = np.array([(o.pose.x, o.pose.y) for _, o in loaded.odometry]), timeline.odometry
+    assert np.ptp(way[:, 0]) == pytest.approx(np.ptp([o.pose.x for _, o in known]), abs=0.1), "its path is known"
+    assert np.diff([o.robot_s for _, o in loaded.odometry]).max() < 0.3
+    assert all(math.isnan(o.twist.v) for _, o in loaded.odometry), "a ring log does not say how fast the wheels were"
     assert load_timeline(TimelineSource(str(hall_log), sets), ignore).world is None
 
 

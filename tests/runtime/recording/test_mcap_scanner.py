@@ -25,9 +25,9 @@ from tests.recorded import chunks_at, entries_of, rewrite, scanned
 
 @pytest.fixture(scope="module")
 def small_file(chunked_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a recording of the first second without keyframes, so short that every byte can be damaged in turn."""
+    """Return a recording of the first 1.5 s without keyframes, so short that every byte can be damaged in turn."""
     path = tmp_path_factory.mktemp("small") / "small.mcap"
-    rewrite([e for e in entries_of(chunked_run) if e.topic == CYCLE][:20], path)
+    rewrite([e for e in entries_of(chunked_run) if e.topic == CYCLE][:30], path)
     return path
 
 
@@ -38,10 +38,10 @@ def small(small_file: Path) -> bytes:
 
 def test_the_chunks_are_those_of_the_stock_reader(small: bytes) -> None:
     found = chunks_at(small)
-    assert len(found) == 2
+    assert len(found) == 3
     assert all(small[begin] == Opcode.CHUNK for begin, _ in found)
     chunks, scanner = scanned(small)
-    assert [len(chunk) for chunk in chunks] == [10] * 2
+    assert [len(chunk) for chunk in chunks] == [10] * 3
     assert (scanner.corrupt_regions, scanner.finished) == ([], True)
 
 
