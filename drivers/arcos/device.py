@@ -40,8 +40,10 @@ from drivers.emulator.faults import (
     Reboot,
     Runaway,
     StopButton,
+    SuddenObject,
 )
 from drivers.emulator.faulty_line import FaultyLine
+from drivers.emulator.faulty_sonar import FaultySonar
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Flags, Pose, Twist
@@ -104,15 +106,16 @@ class ArcosDevice(EventDevice):
         seeds = np.random.SeedSequence(seed).spawn(5)
         sonar_rng, drift_rng, outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
         self._firmware = firmware
-        scene = compile_scene(world)
+        schedule = FaultSchedule(faults)
+        scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
         body = Body(robot.body, scene, start, world.odometry, drift_rng)
         sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._touch = Touch(firmware, scene, robot.body.radius_m)
         self._heard_us = 0
-        schedule = FaultSchedule(faults)
         super().__init__(body, schedule, FaultyLine(firmware.baud, schedule, *line_rngs))
-        self._readings = SonarReadings(firmware, sonar, robot.ring.window_m, self._faults, outlier_rng)
+        faulty = FaultySonar(sonar, len(robot.ring.mounts), schedule, outlier_rng)
+        self._readings = SonarReadings(firmware, faulty, robot.ring.window_m)
         self._watchdog_ms = firmware.watchdog_ms
         self._driven = STILL
         self._stalled_until_us = 0
@@ -311,8 +314,7 @@ class ArcosDevice(EventDevice):
         if self._faults.next_us is None:
             return
         for begins, fault in self._faults.due(self._now_us):
-            self._line.collect(self._now_us)
-            self._faults.set_active(fault, on=begins)
+            self._set_active(fault, on=begins)
             if begins:
                 self._start_fault(fault)
             elif isinstance(fault, Reboot) and not self._faults.has(Reboot):

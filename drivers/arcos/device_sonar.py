@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
 from config.robot import SOUND_SPEED_M_S
 from drivers.arcos.firmware import Firmware
 from drivers.arcos.frames import NO_ECHO_MM, SonarReading
 from drivers.emulator.body import Body
-from drivers.emulator.fault_schedule import FaultSchedule
-from drivers.emulator.faults import Outliers, StuckSensor
-from drivers.emulator.sonar import Sonar
+from drivers.emulator.faulty_sonar import FaultySonar
 
 ARRAYS, DISCS = 4, 8
 """Most arrays of a robot, and discs of an array."""
@@ -102,23 +98,15 @@ class SonarReadings:
     firmware
         Numbers and factor of the ranges.
     sonar
-        The discs.
+        The discs, with their faults.
     window_m
         How far they listen at most, m.
-    faults
-        What is wrong with the robot at present.
-    rng
-        Random numbers of outliers.
     """
 
-    def __init__(
-        self, firmware: Firmware, sonar: Sonar, window_m: float, faults: FaultSchedule, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, firmware: Firmware, sonar: FaultySonar, window_m: float) -> None:
         self._firmware = firmware
         self._sonar = sonar
         self._window_m = min(window_m, 1e-3 * NO_ECHO_MM)
-        self._faults = faults
-        self._rng = rng
         self._pending: list[tuple[int, SonarReading]] = []
 
     def fire(self, sensors: Sequence[int], now_us: int, cycle_us: int, body: Body) -> None:
@@ -126,13 +114,8 @@ class SonarReadings:
         if not sensors:
             return
         window_m = min(self._window_m, 0.5e-6 * cycle_us * SOUND_SPEED_M_S)
-        ranges = self._sonar.fire(body.pose, body.ring_yaw, sensors, window_m)
-        for outliers in self._faults.all(Outliers):
-            wild = self._rng.random(len(ranges)) < outliers.share
-            ranges[wild] = self._rng.uniform(0.0, window_m, len(ranges))[wild]
-        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
-        for sensor in sensors:
-            range_m = stuck.get(sensor, float(ranges[sensor]))
+        ranges = self._sonar.fire(now_us, body.pose, body.ring_yaw, sensors, window_m)
+        for sensor, range_m in zip(sensors, ranges, strict=True):
             if range_m is None:  # a disc that reports nothing
                 continue
             raw = round(min(1e3 * range_m, NO_ECHO_MM) / self._firmware.mm_per_range)

@@ -39,6 +39,7 @@ from drivers.emulator.faults import (
     Reboot,
     Runaway,
     StopButton,
+    SuddenObject,
 )
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.scene import compile_scene
@@ -105,12 +106,12 @@ class DenningDevice(EventDevice):
         sonar_rng, drift_rng, self._boot_rng, *noises = map(np.random.default_rng, seeds)
         *line_rngs, outlier_rng = noises
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
-        scene = compile_scene(world)
+        schedule = FaultSchedule(faults)
+        scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
         body = Body(robot.body, scene, start, world.odometry, drift_rng)
         sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._newest = emulated_version(robot)
-        schedule = FaultSchedule(faults)
         super().__init__(body, schedule, FaultyLine(robot.link.baud, schedule, *line_rngs))
         self._reporter = EchoReporter(robot.ring, sonar, self._faults, outlier_rng)
         self._deadman_ms = DEADMAN_MS
@@ -286,8 +287,7 @@ class DenningDevice(EventDevice):
         if self._faults.next_us is None:
             return
         for begins, fault in self._faults.due(self._now_us):
-            self._line.collect(self._now_us)
-            self._faults.set_active(fault, on=begins)
+            self._set_active(fault, on=begins)
             if begins:
                 self._start_fault(fault)
             elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
@@ -333,7 +333,7 @@ class DenningDevice(EventDevice):
     # The line.
 
     def _clock_us(self, at_us: int) -> int:
-        return (at_us + self._clock_offset_us) % 2**32
+        return (self._faults.clock_us(at_us) + self._clock_offset_us) % 2**32
 
     def _send(self, frame: RobotFrame) -> None:
         """Queue `frame` with the next sequence number, which counts as used even if the frame is lost."""

@@ -9,7 +9,7 @@ from drivers.denning.frames import Echo, Echo2
 from drivers.denning.pattern_rotation import Step
 from drivers.denning.wire_units import echo_byte, echo_count, range_unit_um
 from drivers.emulator.fault_schedule import FaultSchedule
-from drivers.emulator.faults import Outliers, StuckSensor
+from drivers.emulator.faulty_sonar import FaultySonar
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import sensors
 from drivers.messages import Pose
@@ -27,7 +27,7 @@ class EchoReporter:
     faults
         What is wrong with the robot at present.
     rng
-        Random numbers of outliers.
+        Random numbers of their faults.
 
     Attributes
     ----------
@@ -37,19 +37,12 @@ class EchoReporter:
 
     def __init__(self, ring: RingConfig, sonar: Sonar, faults: FaultSchedule, rng: np.random.Generator) -> None:
         self.unit_um = range_unit_um(ring)
-        self._sonar = sonar
-        self._faults = faults
-        self._rng = rng
+        self._sonar = FaultySonar(sonar, len(ring.mounts), faults, rng)
 
     def fire(self, step: Step, t_us: int, pose: Pose, ring_yaw: float, version: int) -> Echo | Echo2:
         """Return the frame of one firing at `t_us` of the robot's clock; listeners report in version 2 only."""
         fired, heard = sensors(step.mask), sensors(step.listeners) if version > 1 else ()
-        ranges = self._sonar.fire(pose, ring_yaw, fired, step.window_m, heard)
-        for outliers in self._faults.all(Outliers):
-            wild = self._rng.random(len(ranges)) < outliers.share
-            ranges[wild] = self._rng.uniform(0.0, step.window_m, len(ranges))[wild]
-        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
-        reported = [stuck[i] if i in stuck else float(ranges[i]) for i in (*fired, *heard)]
+        reported = self._sonar.fire(step.at_us, pose, ring_yaw, fired, step.window_m, heard)
         if version == 1:
             return Echo(0, t_us, step.number, step.mask, tuple(map(echo_byte, reported)))
         counts = tuple(echo_count(range_m, self.unit_um) for range_m in reported)

@@ -87,6 +87,8 @@ class Body:
         The wheels' velocity.
     contacts
         How often the rim has touched a surface.
+    contact_m_s
+        The greatest speed at which it did, m/s.
     """
 
     def __init__(
@@ -103,6 +105,7 @@ class Body:
         self.odometry_m = 0.0
         self.twist = Twist(0.0, 0.0)
         self.contacts = 0
+        self.contact_m_s = 0.0
         self._last_clearance: tuple[Pose, float] | None = None
         """The pose whose clearance was computed last, and the clearance, m; a step ends where the next one starts."""
         self._clear_m = -math.inf
@@ -113,10 +116,28 @@ class Body:
         """Distance from the rim to the nearest surface, m; below zero only if the robot starts there."""
         return self._clearance(self.pose)
 
+    @property
+    def radius_m(self) -> float:
+        """Radius of the rim, m."""
+        return self._config.radius_m
+
     def reset_odometry(self) -> None:
         """Set the odometry to zero; the ring's angle to the wheels is measured at its gear and stays."""
         self.odometry_pose = Pose(0.0, 0.0, 0.0)
         self.odometry_ring_yaw = wrap_angle(self.ring_yaw - self.pose.theta)
+
+    def set_object(self, number: int, circle: tuple[float, float, float]) -> None:
+        """Set a drum into the scene that has a place for it, or take it away.
+
+        Parameters
+        ----------
+        number
+            Which of the scene's places for later drums, counted from the last.
+        circle
+            Centre and radius in world coordinates, m; `scene.NOWHERE` takes the drum away.
+        """
+        self._scene.circles[-1 - number] = circle
+        self._last_clearance, self._clear_m = None, -math.inf
 
     def jump_odometry(self, dx_m: float, dy_m: float, dheading_rad: float) -> None:
         """Shift the odometry.
@@ -177,6 +198,7 @@ class Body:
             if share < 1.0:
                 self.twist = Twist(0.0, 0.0)
                 self.contacts += 1
+                self.contact_m_s = max(self.contact_m_s, abs(v))
                 return True
         return False
 

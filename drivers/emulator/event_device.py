@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 
 from drivers.emulator.body import Body
 from drivers.emulator.fault_schedule import FaultSchedule
-from drivers.emulator.faults import Reboot
+from drivers.emulator.faults import Fault, Reboot, SuddenObject
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.robot_device import GroundTruth
+from drivers.emulator.scene import NOWHERE
 from drivers.messages import Flags
 
 
@@ -34,7 +36,9 @@ class EventDevice(ABC):
     def truth(self) -> GroundTruth:
         """The true state at the last event."""
         body = self._body
-        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+        return GroundTruth(
+            self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts, body.contact_m_s
+        )
 
     @property
     @abstractmethod
@@ -70,6 +74,17 @@ class EventDevice(ABC):
             return b""
         self._next_event_us = None
         return data
+
+    def _set_active(self, fault: Fault, *, on: bool) -> None:
+        """Start or end a fault as far as all robots do so alike."""
+        self._line.collect(self._now_us)
+        self._faults.set_active(fault, on=on)
+        if isinstance(fault, SuddenObject):
+            pose, way = self._body.pose, self._body.pose.theta + math.radians(fault.bearing_deg)
+            away_m = self._body.radius_m + fault.distance_m + fault.radius_m
+            there = (pose.x + away_m * math.cos(way), pose.y + away_m * math.sin(way), fault.radius_m)
+            number = self._faults.planned(SuddenObject).index(fault)
+            self._body.set_object(number, there if on else NOWHERE)
 
     @abstractmethod
     def _next_us(self) -> int:

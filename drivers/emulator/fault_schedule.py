@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from drivers.emulator.faults import Fault
+from drivers.emulator.faults import ClockError, Fault
 
 F = TypeVar("F", bound=Fault)
 
@@ -17,6 +17,8 @@ class FaultSchedule:
     """Starts and ends faults in the order of their times; a fault without duration ends right after it starts."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
+        self._planned = tuple(faults)
+        self._clock_errors = self.planned(ClockError)
         edges = []
         for fault in faults:
             begin = round(fault.at_s * 1e6)
@@ -46,6 +48,20 @@ class FaultSchedule:
         """Return whether a fault of this kind is active."""
         # Called at every event; in most calls no fault is active.
         return bool(self._active) and any(isinstance(fault, kind) for fault in self._active)
+
+    def planned(self, kind: type[F]) -> list[F]:
+        """Return all faults of this kind in the script."""
+        return [fault for fault in self._planned if isinstance(fault, kind)]
+
+    def clock_us(self, at_us: int) -> int:
+        """Return what a clock with the script's errors of the robot's clock shows at a time, µs."""
+        shown_us = at_us
+        for error in self._clock_errors:
+            begin_us = round(error.at_s * 1e6)
+            if at_us >= begin_us:
+                lasted_us = min(at_us - begin_us, round(error.duration_s * 1e6))
+                shown_us += round(error.leap_s * 1e6 + (error.rate - 1.0) * lasted_us)
+        return shown_us
 
     def all(self, kind: type[F]) -> list[F]:
         """Return the active faults of this kind."""

@@ -127,6 +127,97 @@ class Outliers(_Timed):
     """Probability for each reading."""
 
 
+class _Lie(_Timed):
+    """A lie of sensors: what they report looks like a range, and is false."""
+
+    sensors: TomlList[Annotated[int, Field(ge=0)]] = ()
+    """Numbers of the sensors that lie; all if none is given."""
+
+
+class FrozenRing(_Lie):
+    """Each sensor repeats the range that it reported last, bit for bit."""
+
+    kind: Literal["frozen_ring"]
+
+
+class SilentRing(_Lie):
+    """Sensors fire and hear nothing."""
+
+    kind: Literal["silent_ring"]
+
+
+class ConstantRing(_Lie):
+    """Sensors report one range, whatever is there."""
+
+    kind: Literal["constant_ring"]
+    range_m: float = Field(default=0.9144, ge=0.0)
+
+
+class BlindNear(_Lie):
+    """Sensors hear nothing of what is nearer than this."""
+
+    kind: Literal["blind_near"]
+    range_m: float = Field(default=0.4572, gt=0.0)
+
+
+class DroppedReadings(_Lie):
+    """Readings are missing, or silent in place of the echo."""
+
+    kind: Literal["dropped_readings"]
+    share: float = Field(default=0.9, gt=0.0, le=1.0)
+    """Probability for each reading."""
+    silent: bool = False
+    """Whether a dropped reading is reported as silence; otherwise the sensor reports none."""
+
+
+class RangeOffset(_Lie):
+    """Ranges are too long by this, or too short where it is below zero."""
+
+    kind: Literal["range_offset"]
+    offset_m: float = 0.4572
+
+
+class ReplayedEchoes(_Lie):
+    """Sensors report again and again what they heard in the last `period_s` before the fault."""
+
+    kind: Literal["replayed_echoes"]
+    period_s: float = Field(default=2.0, gt=0.0, le=600.0)
+
+
+class TurnedRing(_Timed):
+    """The ring is mounted turned by this angle, counter-clockwise."""
+
+    kind: Literal["turned_ring"]
+    angle_deg: float = Field(default=90.0, ge=-360.0, le=360.0)
+
+
+class SwappedSensors(_Timed):
+    """The cables of two sensors are exchanged."""
+
+    kind: Literal["swapped_sensors"]
+    first: int = Field(ge=0)
+    second: int = Field(ge=0)
+
+
+class ClockError(_Timed):
+    """The robot's clock leaps, and then runs at another rate for `duration_s`: at 0 its stamps are latched."""
+
+    kind: Literal["clock_error"]
+    rate: float = Field(default=0.0, ge=0.0, le=100.0)
+    leap_s: float = Field(default=0.0, ge=-600.0, le=600.0)
+
+
+class SuddenObject(_Timed):
+    """A drum is set beside the robot for `duration_s`."""
+
+    kind: Literal["sudden_object"]
+    distance_m: float = Field(default=0.3, ge=0.0)
+    """From the rim to the drum's surface."""
+    bearing_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+    """Direction from the robot, counter-clockwise from straight ahead."""
+    radius_m: float = Field(default=0.15, gt=0.0)
+
+
 class OdometryJump(_Timed):
     """The odometry's pose jumps."""
 
@@ -158,6 +249,17 @@ Fault: TypeAlias = (
     | Deadman
     | StuckSensor
     | Outliers
+    | FrozenRing
+    | SilentRing
+    | ConstantRing
+    | BlindNear
+    | DroppedReadings
+    | RangeOffset
+    | ReplayedEchoes
+    | TurnedRing
+    | SwappedSensors
+    | ClockError
+    | SuddenObject
     | OdometryJump
     | Unplug
 )

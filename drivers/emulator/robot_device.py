@@ -23,8 +23,8 @@ class GroundTruth:
         The wheels' velocity.
     flags
         What the base reports.
-    contacts
-        How often the rim has touched a surface.
+    contacts, contact_m_s
+        How often the rim has touched a surface, and the greatest speed at which it did.
     """
 
     emulated_s: float
@@ -33,6 +33,7 @@ class GroundTruth:
     twist: Twist
     flags: Flags
     contacts: int
+    contact_m_s: float = 0.0
 
 
 class RobotDevice(Protocol):

@@ -22,6 +22,12 @@ _FLAT_RAD = 1e-3
 _PARALLEL = 1e-12
 """Sine of the angle below which two sides count as parallel: rounding makes any crossing of theirs meaningless."""
 
+_FAR_M = 1e6
+"""Where objects wait that are not in the scene yet: beyond the hearing of any sensor."""
+
+NOWHERE = (_FAR_M, _FAR_M, 0.0)
+"""Such an object."""
+
 _Point = tuple[float, float]
 _Side = tuple[_Point, _Point]
 
@@ -45,12 +51,17 @@ class Scene:
     corners: Records
 
 
-def compile_scene(world: WorldConfig) -> Scene:
-    """Return the surfaces of `world`; a surface shorter than `JOIN_M` is left out."""
+def compile_scene(world: WorldConfig, later: int = 0) -> Scene:
+    """Return the surfaces of `world`; a surface shorter than `JOIN_M` is left out.
+
+    The last `later` of the circles are far away: a drum that appears later takes the place of one.
+    """
     sides = [((x1, y1), (x2, y2)) for x1, y1, x2, y2 in world.sides_m()]
     sides = [(a, b) for a, b in sides if math.dist(a, b) > JOIN_M]
     return Scene(
-        circles=np.array([(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum], dtype=CIRCLE),
+        circles=np.array(
+            [(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum] + later * [NOWHERE], dtype=CIRCLE
+        ),
         segments=np.array([(*a, *b) for a, b in sides], dtype=SEGMENT),
         corners=np.array(_sectors(sides), dtype=CORNER),
     )

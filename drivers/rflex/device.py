@@ -26,13 +26,13 @@ from drivers.emulator.faults import (
     LowBattery,
     MotorFault,
     OdometryJump,
-    Outliers,
     Reboot,
     Runaway,
     StopButton,
-    StuckSensor,
+    SuddenObject,
 )
 from drivers.emulator.faulty_line import FaultyLine
+from drivers.emulator.faulty_sonar import FaultySonar
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Flags, Pose, Twist
@@ -112,14 +112,15 @@ class RflexDevice(EventDevice):
         self, robot: RobotConfig, world: WorldConfig, seed: int, faults: Sequence[Fault] = (), clock_start_us: int = 0
     ) -> None:
         seeds = np.random.SeedSequence(seed).spawn(5)
-        sonar_rng, drift_rng, self._outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
+        sonar_rng, drift_rng, outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
         self._config, self._rflex = robot, robot.rflex
         self._ids = sonar_ids(robot)
-        self._scene = scene = compile_scene(world)
+        schedule = FaultSchedule(faults)
+        self._scene = scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
         body = Body(robot.body, scene, start, world.odometry, drift_rng)
-        self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
-        schedule = FaultSchedule(faults)
+        sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
+        self._sonar = FaultySonar(sonar, len(robot.ring.mounts), schedule, outlier_rng)
         super().__init__(body, schedule, FaultyLine(robot.link.baud, schedule, *line_rngs))
         self._clock_start_us, self._booted_us = clock_start_us, 0
         self._fail_safe_us = round(1e6 * self._rflex.fail_safe_s)
@@ -127,7 +128,7 @@ class RflexDevice(EventDevice):
         self._boot()
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
-        self._sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
+        sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
 
     @property
     def flags(self) -> Flags:
@@ -274,14 +275,9 @@ class RflexDevice(EventDevice):
     def _readings(self, sensors: list[int]) -> tuple[tuple[int, int], ...]:
         body = self._body
         window_m = min(self._config.ring.window_m, 0.5e-6 * self._step_us * SOUND_SPEED_M_S)
-        ranges = self._sonar.fire(body.pose, body.ring_yaw, sensors, window_m)
-        for outliers in self._faults.all(Outliers):
-            wild = self._outlier_rng.random(len(ranges)) < outliers.share
-            ranges[wild] = self._outlier_rng.uniform(0.0, window_m, len(ranges))[wild]
-        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
+        ranges = self._sonar.fire(self._now_us, body.pose, body.ring_yaw, sensors, window_m)
         readings = []
-        for sensor in sensors:
-            range_m = stuck.get(sensor, float(ranges[sensor]))
+        for sensor, range_m in zip(sensors, ranges, strict=True):
             if range_m is not None:  # else a sonar that reports nothing
                 heard = math.isfinite(range_m)
                 raw = min(NO_ECHO, round(range_m * self._rflex.range_factor)) if heard else NO_ECHO
@@ -326,8 +322,7 @@ class RflexDevice(EventDevice):
         if self._faults.next_us is None:
             return
         for begins, fault in self._faults.due(self._now_us):
-            self._line.collect(self._now_us)
-            self._faults.set_active(fault, on=begins)
+            self._set_active(fault, on=begins)
             match fault:
                 case Reboot():
                     self._body.reset_odometry()
@@ -362,7 +357,7 @@ class RflexDevice(EventDevice):
         self._line.clear()
 
     def _clock(self) -> int:
-        return (self._clock_start_us + self._now_us - self._booted_us) % _I32
+        return (self._clock_start_us + self._faults.clock_us(self._now_us) - self._booted_us) % _I32
 
     def _send(self, report: Report) -> None:
         self._number = (self._number + 1) % 0x100

@@ -1,0 +1,146 @@
+"""The ring with the faults of its sensors: what it reports in place of what its sonars hear."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.emulator.fault_schedule import FaultSchedule
+from drivers.emulator.faults import (
+    BlindNear,
+    ConstantRing,
+    DroppedReadings,
+    Fault,
+    FrozenRing,
+    Outliers,
+    RangeOffset,
+    ReplayedEchoes,
+    SilentRing,
+    StuckSensor,
+    SwappedSensors,
+    TurnedRing,
+)
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Floats, Pose
+
+KINDS: tuple[type[Fault], ...] = (
+    BlindNear, ConstantRing, DroppedReadings, FrozenRing, Outliers, RangeOffset, ReplayedEchoes, SilentRing,
+    StuckSensor, SwappedSensors, TurnedRing,
+)  # fmt: skip
+"""The faults of sensors."""
+
+
+class FaultySonar:
+    """A ring of any family; its faults act in the order of the signal: mounts, echoes, electronics, cables.
+
+    Parameters
+    ----------
+    sonar
+        What the sensors hear.
+    sensors
+        How many there are.
+    faults
+        What is wrong with the robot at present.
+    rng
+        Random numbers of the faults.
+    """
+
+    def __init__(self, sonar: Sonar, sensors: int, faults: FaultSchedule, rng: np.random.Generator) -> None:
+        self._sonar, self._sensors, self._faults, self._rng = sonar, sensors, faults, rng
+        self._heard = [deque[tuple[int, float]]() for _ in range(sensors)]
+        self._kept_us = max((_period_us(fault) for fault in faults.planned(ReplayedEchoes)), default=0)
+
+    def fire(
+        self, at_us: int, pose: Pose, ring_yaw: float, fired: Sequence[int], window_m: float,
+        listeners: Sequence[int] = (),
+    ) -> list[float | None]:  # fmt: skip
+        """Return what the sensors that fire at a time, and then those that listen, report.
+
+        Parameters
+        ----------
+        at_us
+            Time since the emulator's start, µs.
+        pose, ring_yaw, window_m, listeners
+            As of `Sonar.fire`.
+        fired
+            Numbers of the sensors that fire.
+
+        Returns
+        -------
+        list
+            Ranges in m, +inf for silence, None for a sensor that reports a fault.
+        """
+        faults = self._faults
+        wired, active = self._wiring(), (*fired, *listeners)
+        turned = math.radians(sum(fault.angle_deg for fault in faults.all(TurnedRing)))
+        mounted = Pose(pose.x, pose.y, pose.theta + turned) if turned else pose
+        ranges = self._sonar.fire(
+            mounted, ring_yaw + turned, [wired[i] for i in fired], window_m, [wired[i] for i in listeners]
+        )[wired]
+        for offset in faults.all(RangeOffset):
+            which = self._those(offset.sensors)
+            ranges[which] = np.maximum(ranges[which] + offset.offset_m, 0.0)
+            ranges[ranges > window_m] = math.inf
+        for blind in faults.all(BlindNear):
+            ranges[self._those(blind.sensors) & (ranges < blind.range_m)] = math.inf
+        self._repeat(ranges, active, at_us)
+        for outliers in faults.all(Outliers):
+            wild = self._rng.random(len(ranges)) < outliers.share
+            ranges[wild] = self._rng.uniform(0.0, window_m, len(ranges))[wild]
+        for constant in faults.all(ConstantRing):
+            ranges[self._those(constant.sensors)] = constant.range_m
+        for silent in faults.all(SilentRing):
+            ranges[self._those(silent.sensors)] = math.inf
+        missing: set[int] = set()
+        for dropped in faults.all(DroppedReadings):
+            which = self._those(dropped.sensors) & (self._rng.random(len(ranges)) < dropped.share)
+            if dropped.silent:
+                ranges[which] = math.inf
+            else:
+                missing.update(which.nonzero()[0].tolist())
+        stuck = {fault.sensor: fault.range_m for fault in faults.all(StuckSensor)}
+        return [stuck[i] if i in stuck else None if i in missing else float(ranges[i]) for i in active]
+
+    def _wiring(self) -> NDArray[np.int64]:
+        """Return which sensor answers in each one's place."""
+        wired = np.arange(self._sensors)
+        for swap in self._faults.all(SwappedSensors):
+            if max(swap.first, swap.second) < self._sensors:
+                wired[[swap.first, swap.second]] = wired[[swap.second, swap.first]]
+        return wired
+
+    def _those(self, sensors: Iterable[int]) -> NDArray[np.bool_]:
+        """Return a mask of these sensors, of all if there is none."""
+        chosen = [i for i in sensors if i < self._sensors]
+        which = np.full(self._sensors, not tuple(sensors))
+        which[chosen] = True
+        return which
+
+    def _repeat(self, ranges: Floats, active: Sequence[int], at_us: int) -> None:
+        """Put earlier ranges in the place of the present ones where a fault says so; otherwise keep the present."""
+        faults: list[FrozenRing | ReplayedEchoes] = [*self._faults.all(FrozenRing)]
+        faults += self._faults.all(ReplayedEchoes)
+        begin_us = {i: fault for fault in faults for i in self._those(fault.sensors).nonzero()[0].tolist()}
+        for i in active:
+            heard = self._heard[i]
+            if i in begin_us and heard:
+                ranges[i] = _range_then(heard, begin_us[i], at_us)
+                continue
+            heard.append((at_us, float(ranges[i])))
+            while len(heard) > 1 and heard[1][0] <= at_us - self._kept_us:
+                heard.popleft()
+
+
+def _period_us(fault: FrozenRing | ReplayedEchoes) -> int:
+    return round(1e6 * fault.period_s) if isinstance(fault, ReplayedEchoes) else 0
+
+
+def _range_then(heard: Iterable[tuple[int, float]], fault: FrozenRing | ReplayedEchoes, at_us: int) -> float:
+    """Return the range that a sensor repeats at a time: its last one, or the last of that time of the period."""
+    begin_us, period_us = round(1e6 * fault.at_s), _period_us(fault)
+    then_us = begin_us - period_us + (at_us - begin_us) % period_us if period_us else begin_us
+    return [range_m for i, (t_us, range_m) in enumerate(heard) if i == 0 or t_us <= then_us][-1]
