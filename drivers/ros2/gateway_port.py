@@ -44,7 +44,7 @@ class GatewayPort(TcpPort):
         paths = os.pathsep.join(path for path in sys.path if path)
         with other:
             process = subprocess.Popen(  # noqa: S603 - this program
-                [sys.executable, "-m", MODULE, str(other.fileno()), text], pass_fds=[other.fileno()],
+                [sys.executable, "-P", "-m", MODULE, str(other.fileno()), text], pass_fds=[other.fileno()],
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": paths},
                 start_new_session=True,
             )  # fmt: skip

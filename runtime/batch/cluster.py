@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +14,7 @@ from runtime.batch.dispatch import Done
 from runtime.batch.local_workers import local_workers
 from runtime.batch.runs import Run
 from runtime.batch.worker import Row, run_one
+from runtime.support.child_process import INTERPRETER
 
 if TYPE_CHECKING:
     from distributed import Client, as_completed
@@ -30,7 +30,7 @@ DEATHS_MAX: Final = 10
 """Workers that may die during one attempt at a run before it is blamed."""
 LOCAL_HOST: Final = "127.0.0.1"
 WORKER_COMMAND: Final = (
-    sys.executable, "-m", "dask", "worker", "--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--no-dashboard",
+    *INTERPRETER, "-m", "dask", "worker", "--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--no-dashboard",
     "--host", LOCAL_HOST,
 )  # fmt: skip
 SETTINGS: Final = (

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Final
 
+from runtime.support.child_process import child_environment
+
 LOOK_PERIOD_S: Final = 1.0
 """Time until a dead worker is noticed and replaced."""
 END_TIMEOUT_S: Final = 10.0
@@ -73,5 +75,6 @@ def local_workers(
 def _start(command: Sequence[str], output: IO[bytes]) -> subprocess.Popen[bytes]:
     """Start a process in a session of its own: an interrupt of the terminal is for the sweep, which ends it."""
     return subprocess.Popen(  # noqa: S603 - our own command
-        command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
-    )
+        command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
+        env=child_environment(),
+    )  # fmt: skip

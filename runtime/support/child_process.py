@@ -13,6 +13,7 @@ import runpy
 import signal
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -24,9 +25,16 @@ NICENESS: Final = 10
 """About a tenth of the usual share of a busy processor."""
 
 
+INTERPRETER: Final = (sys.executable, "-P")
+"""How a child is started: without the current folder in its path, which may hold modules of the same names."""
+ROOT: Final = str(Path(__file__).resolve().parents[2])
+"""The folder of our packages."""
+
+
 def child_environment() -> dict[str, str]:
     """Return an environment in which another interpreter finds the same modules as this one."""
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    paths = [path for path in sys.path if path]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths if ROOT in paths else [*paths, ROOT])}
 
 
 async def start_child(
@@ -55,7 +63,7 @@ async def start_child(
     pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
     program = [LOW_PRIORITY, module] if low_priority else [module]
     return await asyncio.create_subprocess_exec(
-        sys.executable, "-m", *program, *arguments,
+        *INTERPRETER, "-m", *program, *arguments,
         stdin=pipe if pipes else nothing, stdout=pipe if pipes else nothing, stderr=pipe, start_new_session=True,
         env={**child_environment(), **environment},
     )  # fmt: skip

@@ -19,7 +19,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from runtime.support.child_process import child_environment
+from runtime.support.child_process import INTERPRETER, child_environment
 from runtime.support.kernel_cache import (
     BAYES,
     COMPILED_SUFFIX,
@@ -262,7 +262,7 @@ def compile_in_parallel(part: str) -> Iterator[None]:
     """Compile the refinement of `part` in another process meanwhile, and wait for it at the end."""
     null = subprocess.DEVNULL
     process = subprocess.Popen(  # noqa: S603 - this very program
-        [sys.executable, "-m", "runtime.support.kernel_warmup", part], stdin=null, stdout=null, stderr=null,
+        [*INTERPRETER, "-m", "runtime.support.kernel_warmup", part], stdin=null, stdout=null, stderr=null,
         env=child_environment(),
     )  # fmt: skip
     try:

@@ -27,7 +27,7 @@ sys.argv[1:] = ["--version"]
 __main__.main()
 """
 """Raises a signal at the first import after signals are handled."""
-ALLOWED = {"__future__", "os", "signal", "runtime", "runtime.cli", "runtime.cli.first_signals"}
+ALLOWED = {"__future__", "echolocate", "os", "signal", "runtime", "runtime.cli", "runtime.cli.first_signals"}
 
 
 @pytest.mark.promise("P19")
@@ -48,7 +48,7 @@ def test_each_signal_at_the_first_import(number: signal.Signals, code: int, meas
 def test_nothing_of_ours_is_imported_before_signals_are_handled() -> None:
     """What comes before is the interpreter's own start, which no program can shorten."""
     program = (
-        "import sys; import signal, os; before = set(sys.modules); import runtime.cli.__main__; "
+        "import sys; import signal, os; before = set(sys.modules); import echolocate, runtime.cli.__main__; "
         "print(*sorted(set(sys.modules) - before))"
     )
     done = subprocess.run(

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from runtime.support import child_process
-from runtime.support.child_process import NICENESS, child_environment, kill_child, lower_priority, start_child
+from runtime.support.child_process import NICENESS, ROOT, child_environment, kill_child, lower_priority, start_child
 
 
 async def test_a_child_finds_this_program_runs_in_its_own_session_and_is_killed() -> None:
@@ -33,9 +33,11 @@ async def test_without_pipes_only_errors_are_read() -> None:
     assert await child.wait() == 1
 
 
-def test_another_interpreter_gets_the_path_of_this_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_interpreter_gets_the_path_of_this_one_and_our_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", ["/a", "", "/b"])
-    assert child_environment()["PYTHONPATH"] == f"/a{os.pathsep}/b"
+    assert child_environment()["PYTHONPATH"] == os.pathsep.join(("/a", "/b", ROOT))
+    monkeypatch.setattr(sys, "path", [ROOT, "/a"])
+    assert child_environment()["PYTHONPATH"] == os.pathsep.join((ROOT, "/a"))
 
 
 @pytest.mark.parametrize(("pinned", "moved"), [({1}, [{0, 2, 3}]), ({0, 1, 2, 3}, []), ({1, 2}, [])])
