@@ -20,6 +20,8 @@ from config.strict import Strict, TomlList
 from config.world import WorldConfig
 
 TRACKS_MAX: Final = 1000
+ITERATIONS_MAX: Final = 1_000_000
+QUANTA_MAX: Final = 1000
 
 
 class CycleConfig(Strict):
@@ -83,7 +85,7 @@ class RelaxationConfig(Strict):
     """Relaxation ends when an iteration moves the model by less than this, m, and …"""
     negligible_rad: float = Field(default=1e-3, gt=0.0, le=1.0)
     """… turns it by less than this, rad."""
-    iterations_max: int = Field(default=500, ge=1, le=1_000_000)
+    iterations_max: int = Field(default=500, ge=1, le=ITERATIONS_MAX)
     """Most iterations for one model; after them it stays where it is until its segments change."""
     iterations_per_quantum: int = Field(default=20, ge=1, le=100_000)
     """Iterations in one quantum of refinement."""
@@ -117,9 +119,9 @@ class BayesConfig(Strict):
     """Unexplained outline segments examined for new objects after each firing."""
     fresh_share: float = Field(default=0.08, gt=0.0, le=1.0)
     """An object is refined again once this share of its readings is new, 0 to 1."""
-    quanta_per_firing: int = Field(default=2, ge=1, le=1000)
+    quanta_per_firing: int = Field(default=2, ge=1, le=QUANTA_MAX)
     """Most refinements of round objects after each firing; the others follow after the next one."""
-    polygon_quanta_per_firing: int = Field(default=12, ge=1, le=1000)
+    polygon_quanta_per_firing: int = Field(default=12, ge=1, le=QUANTA_MAX)
     """Most refinements of polygons after each firing, counted separately so that drums do not delay boxes."""
 
 

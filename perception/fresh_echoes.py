@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing
+from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
 from perception.sensor_mounts import mounts_at
 
@@ -171,6 +172,10 @@ class FreshEchoes:
     turning : tuple of int
         The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
     """
+
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT, _half_angle=CONSTANT, _points=PLACE, _bearings=PLACE, _times=PLACE._replace(infinite=True)
+    )  # fmt: skip
 
     def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
         self._mounts, self._turning = mounts, turning

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 from config.model import ModelConfig
 from config.robot import PASSAGE_M, RingConfig
 from config.settings import PerceptionConfig
 from config.world import WorldConfig
 from drivers.messages import Firing, Pose
+from perception.bounds import CONSTANT, bounds
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     COORDINATE_MAX_M,
@@ -65,6 +67,8 @@ class Perception:
     method : Method, optional
         In place of the one that `config` names; there is no evidence grid then.
     """
+
+    BOUNDS: Final = bounds(_axes=CONSTANT, _half_angle=CONSTANT, _reach_m=CONSTANT, _sensors=CONSTANT)
 
     def __init__(
         self,

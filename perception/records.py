@@ -8,7 +8,7 @@ of light objects on the same memory stands in for each array; numpy's own record
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import (
     Annotated,
     Any,
@@ -26,6 +26,8 @@ from typing import (
 import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from perception.bounds import Bound, Fields, relaxed
 
 T_co = TypeVar("T_co", covariant=True)
 R = TypeVar("R", bound="Record")
@@ -51,17 +53,24 @@ class Record:
     """Base of the declarations.
 
     A field is annotated `float`, `int`, another record's class, or `Annotated[Records[Other], n]`,
-    `Annotated[Floats, n, m]`, `Annotated[Ints, n]` for arrays of a fixed shape.
+    `Annotated[Floats, n, m]`, `Annotated[Ints, n]` for arrays of a fixed shape. A number that is remembered from one
+    cycle to the next also has a bound in its annotation: `Annotated[int, FLAG]`, `Annotated[Floats, n, FINITE]`, or
+    one of the short forms of `perception.bounds`.
     """
 
     DTYPE: ClassVar[np.dtype[Any]]
     """The fields in the order in which they are declared, those of the base class first."""
+    BOUNDS: ClassVar[Mapping[str, Bound | Fields]]
+    """The fields' bounds; fields that are overwritten before each use may be missing."""
     _VIEW: ClassVar[type]
 
     def __init_subclass__(cls) -> None:
         """Derive the dtype from the annotations."""
         hints = get_type_hints(cls, include_extras=True)
-        fields = {name: hint for name, hint in hints.items() if get_origin(hint) is not ClassVar}
+        declared = {name: hint for name, hint in hints.items() if get_origin(hint) is not ClassVar}
+        bounds = {name: _bound(hint) for name, hint in declared.items()}
+        fields = {name: _without_bound(hint) for name, hint in declared.items()}
+        cls.BOUNDS = {name: bound for name, bound in bounds.items() if bound is not None}
         cls.DTYPE = np.dtype((np.record, [(name, *_dtype(hint)) for name, hint in fields.items()]))
         cls._VIEW = _view_class(cls.__name__, fields, cls.DTYPE)
 
@@ -86,6 +95,25 @@ def array_of(of: Records[Any]) -> NDArray[Any]:
 def column(of: Records[Any], name: str) -> NDArray[Any]:
     """Return one field of all records as a view, whose first axis is the record; `of` comes from `records`."""
     return array_of(of)[name]
+
+
+def _bound(hint: Any) -> Bound | Fields | None:  # noqa: ANN401 - an annotation may be anything
+    """Return the bound of a field, or those of the fields of a record."""
+    kind, *details = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    item = get_args(kind)[0] if get_origin(kind) is Records else kind
+    bound = next((detail for detail in details if isinstance(detail, Bound)), None)
+    if isinstance(item, type) and issubclass(item, Record):
+        return item.BOUNDS if bound is None else relaxed(item.BOUNDS)
+    return bound
+
+
+def _without_bound(hint: Any) -> Any:  # noqa: ANN401 - an annotation may be anything
+    """Return an annotation with what tells of a field's shape only."""
+    if get_origin(hint) is not Annotated:
+        return hint
+    kind, *details = get_args(hint)
+    shape = tuple(detail for detail in details if not isinstance(detail, Bound))
+    return Annotated[(kind, *shape)] if shape else kind
 
 
 def _dtype(hint: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation may be anything

@@ -4,75 +4,81 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
+from perception.bounds import FINITE, FLAG, PLACE, Count, Place, Share, index_of, up_to
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
+from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
 
 SETS_MAX: Final = 32
 """Sets of sensors that fire together that are distinguished; a firing pattern has at most 24."""
 
 
+RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
+"""Of a range; infinite where nothing was heard, or nothing is known yet."""
+
+
 class NeighbourCounts(Record):
     """A sensor's running counts, against which its neighbours are compared."""
 
-    changes: int
+    changes: Count
     """Changes of the steady reading."""
-    leaps: int
+    leaps: Count
     """Those by more than `LEAP_M`."""
-    near_echoes: int
+    near_echoes: Count
     """Echoes nearer than the near limit."""
 
 
 class SensorMemory(Record):
     """What is remembered of one sensor."""
 
-    readings: int
+    readings: Count
     """Readings since the start or the last reset."""
-    last_m: float
+    last_m: Annotated[float, RANGE_OR_NONE]
     """The last reading, m."""
-    before_last_m: float
-    steady_m: float
+    before_last_m: Annotated[float, RANGE_OR_NONE]
+    steady_m: Annotated[float, RANGE_OR_NONE]
     """What it reads but for strays, m."""
-    last_set: int
+    last_set: Annotated[int, index_of(SETS_MAX)]
     """The set it fired in at the last reading."""
-    before_last_set: int
-    last_x: float
+    before_last_set: Annotated[int, index_of(SETS_MAX)]
+    last_x: Place
     """Place of the ring at the last reading, m."""
-    last_y: float
+    last_y: Place
     counts: NeighbourCounts
-    missed: int
+    missed: Count
     """Firings of the ring since the last reading."""
-    run_m: float
+    run_m: Annotated[float, RANGE_OR_NONE]
     """The run of equal readings: its value, m."""
-    run_firing: int
+    run_firing: Count
     """The firing of the ring in which it began."""
-    run_length: int
+    run_length: Count
     """Its readings."""
-    run_x: float
+    run_x: Place
     """Pose of the ring when it began, m and rad."""
-    run_y: float
-    run_yaw: float
+    run_y: Place
+    run_yaw: Place
     run_neighbours: Annotated[Records[NeighbourCounts], 2]
     """The neighbours' counts when it began."""
-    stuck_m: float
+    stuck_m: Annotated[float, RANGE_OR_NONE]
     """The value it is stuck at, m."""
-    off_stuck: int
+    off_stuck: Count
     """Consecutive readings away from that value."""
-    faults: int
+    faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK)]
     """Fault bits of `perception.sensor_report`."""
-    short_readings: Annotated[Floats, SETS_MAX]
+    short_readings: Annotated[Floats, SETS_MAX, FINITE]
     """For each set, short readings less those that were not."""
-    is_crossed: Annotated[Ints, SETS_MAX]
+    is_crossed: Annotated[Ints, SETS_MAX, FLAG]
     """For each set, 1 where the sensor is masked for crosstalk."""
 
 
 class RingMemory(Record):
     """What is remembered of the ring as a whole."""
 
-    firings: int
-    sets_seen: int
+    firings: Count
+    sets_seen: Count
     """Different sets met so far; a set that was replaced and recurs counts again."""
-    x: float
+    x: Place
     """Place of the last firing, m."""
-    y: float
-    regularity: float
+    y: Place
+    regularity: Share
     """Recent share of firings whose set was known."""

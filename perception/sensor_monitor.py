@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import CrossPaths, Firing
+from perception.bounds import CONSTANT, COUNT, FLAG, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
 from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
@@ -118,6 +119,10 @@ class SensorMonitor:
 
     SCRATCH: Final = ("_trusted", "_possible", "_turns", "_sensor_records", "_ring_records")
     """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
+    BOUNDS: Final = bounds(
+        changes=COUNT, _mounts=CONSTANT, _neighbours=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
+        _near=CONSTANT, _sensors=SensorMemory.BOUNDS, _ring=RingMemory.BOUNDS, _sets=FLAG,
+    )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
         mounts = mounts_array(ring.mounts)

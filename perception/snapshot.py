@@ -7,11 +7,13 @@ are overwritten before each use.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from perception.bounds import FLAG, Bound, Declared, Fields
 
 Snapshot: TypeAlias = dict[str, NDArray[Any]]
 """Copies of the memory's values, by dotted name; a number is an array of no dimension."""
@@ -31,13 +33,30 @@ def snapshot_of(owner: object) -> Snapshot:
     return taken
 
 
+def bounds_of(owner: object) -> dict[str, Bound]:
+    """Return the declared bounds of what `snapshot_of` takes of an object, by the dotted name of each number.
+
+    A number without a declaration is missing; see `perception.bounds`.
+    """
+    found: dict[str, Bound] = {}
+    _declared(owner, "", found)
+    return found
+
+
+def numbers_of(snapshot: Snapshot) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield name and values of every field of every array, inner records included; views of the same memory."""
+    for name, array in snapshot.items():
+        yield from _fields(name, array)
+
+
 def put_back(owner: object, snapshot: Snapshot) -> None:
     """Overwrite an object's memory with a snapshot of another object made from the same settings.
 
     Raises
     ------
     ValueError
-        The snapshot is of something else: names, shapes or fields differ.
+        The snapshot is of something else: names, shapes or fields differ. Or numbers that are each in their bounds
+        contradict each other, as a part's method `contradiction` says; the object is of no use then.
     """
     mine = snapshot_of(owner)
     if mine.keys() != snapshot.keys():
@@ -51,6 +70,49 @@ def put_back(owner: object, snapshot: Snapshot) -> None:
                 f"the snapshot is of other settings: {name} is {snapshot[name].shape}, not {array.shape}"
             )
     _put(owner, "", snapshot)
+    _refuse_contradictions(owner, "")
+
+
+def is_scratch(name: str) -> bool:
+    """Return whether a number, by its dotted name, belongs to what is overwritten before each use."""
+    return f".{SCRATCH_FIELD}." in name
+
+
+def _refuse_contradictions(owner: object, path: str) -> None:
+    contradiction: Callable[[], str | None] | None = getattr(owner, "contradiction", None)
+    if contradiction is not None and (found := contradiction()) is not None:
+        raise ValueError(f"{path}{found}")
+    for name, value in _parts(owner):
+        if _is_ours(value):
+            _refuse_contradictions(value, f"{path}{name}.")
+
+
+def _declared(owner: object, path: str, found: dict[str, Bound]) -> None:
+    declared: Mapping[str, Declared] = getattr(type(owner), "BOUNDS", {})
+    for name, value in _parts(owner):
+        if not isinstance(value, np.ndarray | bool | int | float):
+            _declared(value, f"{path}{name}.", found)
+        elif isinstance(value, bool) or (isinstance(value, np.ndarray) and value.dtype.kind == "b"):
+            found[path + name] = FLAG
+    for name, bound in declared.items():  # after the parts', of which they may replace some
+        _flatten(bound if isinstance(bound, Bound | Mapping) else bound(owner), path + name, found)
+
+
+def _flatten(bound: Bound | Fields, path: str, found: dict[str, Bound]) -> None:
+    if isinstance(bound, Bound):
+        found[path] = bound
+    else:
+        for name, inner in bound.items():
+            if name != SCRATCH_FIELD:
+                _flatten(inner, f"{path}.{name}", found)
+
+
+def _fields(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+    if array.dtype.names is None:
+        yield name, array
+    else:
+        for field in array.dtype.names:
+            yield from _fields(f"{name}.{field}", array[field])
 
 
 def _take(owner: object, path: str, taken: Snapshot) -> None:

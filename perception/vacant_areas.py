@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from perception.bounds import COUNT, PLACE, bounds, up_to
 from perception.detected_object import DetectedObject
 
 AREAS_MAX: Final = 64
@@ -49,6 +50,12 @@ class VacantAreas:
     count, last : int
         Number of areas, and the number that was given last.
     """
+
+    BOUNDS: Final = bounds(
+        rows={"x": PLACE, "y": PLACE, "radius": PLACE, "number": COUNT, "object": COUNT},
+        count=up_to(AREAS_MAX),
+        last=COUNT,
+    )
 
     def __init__(self) -> None:
         self.rows = np.zeros(AREAS_MAX, AREA)

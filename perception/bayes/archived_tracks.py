@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.state import CircleTrack, PolygonTrack
+from perception.bounds import FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
 
 READINGS_KEPT: Final = 48
@@ -29,6 +30,12 @@ def archived_dtype(track: type[CircleTrack | PolygonTrack]) -> np.dtype[Any]:
     fields = [(name, track.DTYPE[name]) for name in (track.DTYPE.names or ())[:-1]]  # the last are the readings
     readings = ("readings", np.float32, (READINGS_KEPT, 4))
     return np.dtype((np.record, [*fields, ("is_reported", np.int64), ("kept", np.int64), readings]))
+
+
+def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
+    """Return the bounds of the fields of an archived track."""
+    own = {name: bound for name, bound in track.BOUNDS.items() if name != BINS}
+    return {**own, "is_reported": FLAG, "kept": up_to(READINGS_KEPT), "readings": PLACE}
 
 
 def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDArray[Any]:

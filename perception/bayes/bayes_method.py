@@ -14,11 +14,12 @@ import numpy as np
 
 from config.model import ModelConfig
 from config.robot import RingConfig
-from config.settings import BayesConfig, PerceptionConfig
+from config.settings import QUANTA_MAX, BayesConfig, PerceptionConfig
 from drivers.messages import Firing
 from perception.bayes.echo_sources import locate_echoes
 from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.evidence import evidence_of
+from perception.bayes.job_records import NO_JOB, REFINEMENT
 from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
 from perception.bayes.map_edits import edit_memory, row_of
 from perception.bayes.naming import Reported, report_circles, sure_polygons
@@ -38,10 +39,11 @@ from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
 from perception.bayes.segment_list import count_again, count_map, drawn, mapped_segments
-from perception.bayes.state import FREE, Memory
+from perception.bayes.state import ESTABLISHED, FREE, Memory
 from perception.bayes.state_migration import migrate
 from perception.bayes.track_archive import TrackArchive
 from perception.bayes.wall_map import update_walls
+from perception.bounds import CONSTANT, Bound, bounds, index_of, up_to
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     ClearMap,
@@ -59,6 +61,11 @@ from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
 
+def _polygon_model(owner: BayesPerception) -> Bound:
+    """Return the bound of the index of a polygon model."""
+    return index_of(len(owner._outlines))
+
+
 class BayesPerception:
     """Detection of objects from echoes by comparing all explanations on the raw ranges.
 
@@ -74,6 +81,19 @@ class BayesPerception:
 
     SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_readings")
     """Attributes that are derived from the rest; they are not in a snapshot."""
+    BOUNDS: Final = bounds(
+        {
+            "memory.state.polygons.model": _polygon_model,
+            "memory.state.polygons.status": lambda self: up_to(ESTABLISHED if self._outlines else FREE),
+            "memory.state.requests.model": _polygon_model,
+            "memory.state.job.model": _polygon_model,
+            "memory.state.job.kind": lambda self: up_to(REFINEMENT if self._outlines else NO_JOB),
+            "_archive.polygons.archived_rows.model": _polygon_model,
+        },
+        _mounts=CONSTANT,
+        _left=up_to(QUANTA_MAX),
+        _polygons_left=up_to(QUANTA_MAX),
+    )
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning

@@ -5,9 +5,10 @@ Lengths are metres, angles radians.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Annotated, Final
 
 from perception.bayes.settings_record import CIRCLES_MAX
+from perception.bounds import RANGE, Bound, Count, Finite, Place
 from perception.records import Record
 
 MAX_TRACKS: Final = 48
@@ -53,49 +54,53 @@ GRID_CELLS: Final = 49
 """Cells of the grid on which a circle's posterior is summed."""
 
 
+RADIUS: Final = Bound(0.0, 1e3)
+"""Of a round object, m."""
+
+
 class Reading(Record):
     """A raw range in the odometry frame, or half a cross path; see `perception.bayes.cross_path`."""
 
-    x: float
+    x: Place
     """Position of the sensor that fired, m."""
-    y: float
-    axis_x: float
+    y: Place
+    axis_x: Place
     """Its axis, a unit vector."""
-    axis_y: float
-    range_m: float
+    axis_y: Place
+    range_m: Annotated[float, RANGE]
     """Range, m; at least `range_fit.FAR` without an echo."""
-    listener_x: float
+    listener_x: Place
     """Position of the sensor that heard it, from there, m; 0, 0 where it is the same one."""
-    listener_y: float
+    listener_y: Place
 
 
 class Pose(Record):
     """A pose: position (m) and heading (rad)."""
 
-    x: float
-    y: float
-    heading: float
+    x: Place
+    y: Place
+    heading: Place
 
 
 class LowerTriangle(Record):
     """The lower triangle of a 3 × 3 matrix over x, y and heading h."""
 
-    xx: float
-    yx: float
-    yy: float
-    hx: float
-    hy: float
-    hh: float
+    xx: Finite
+    yx: Finite
+    yy: Finite
+    hx: Finite
+    hy: Finite
+    hh: Finite
 
 
 class MappedSegment(Record):
     """An outline segment in the map."""
 
-    x: float
+    x: Place
     """Its middle, m."""
-    y: float
-    normal_x: float
+    y: Place
+    normal_x: Place
     """Unit normal, away from the sensors."""
-    normal_y: float
-    number: int
-    time_s: float
+    normal_y: Place
+    number: Count
+    time_s: Place

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.job_records import REFINEMENT
 from perception.bayes.occlusion import keep_relevant
 from perception.bayes.parameters import (
     CENTRE_VARIANCE_MAX_M2,
@@ -16,7 +17,7 @@ from perception.bayes.parameters import (
     PLACED_STRAY_MAX_RAD,
 )
 from perception.bayes.polygon_initiation import relax_polygon, restart_polygon
-from perception.bayes.polygon_job import REFINEMENT, end_job
+from perception.bayes.polygon_job import end_job
 from perception.bayes.polygon_readings import gather_polygon_history
 from perception.bayes.reservoir import copy_reservoir, gather_history
 from perception.bayes.settings_record import SettingsRecord

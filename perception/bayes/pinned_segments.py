@@ -15,10 +15,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
+from perception.bayes.elements import BUCKET_CAPACITY, BUCKETS, MappedSegment
 from perception.bayes.parameters import CELL_M
 from perception.bayes.segment_list import count_again, mapped_segments, put_segment
 from perception.bayes.state import Memory
+from perception.bounds import bounds, index_of, up_to
 from perception.kernel import Ints
 from perception.records import zeros
 
@@ -30,6 +31,8 @@ UNPINNED_MIN: Final = 2
 
 class Pins:
     """The pinned segments: a copy of each."""
+
+    BOUNDS: Final = bounds(segments=MappedSegment.BOUNDS, buckets=index_of(BUCKETS), count=up_to(PINS_MAX))
 
     def __init__(self) -> None:
         self.segments = zeros(MappedSegment, PINS_MAX)

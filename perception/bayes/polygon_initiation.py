@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from perception.bayes.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
+from perception.bayes.job_records import INITIATION
 from perception.bayes.parameters import CELL_M
 from perception.bayes.polygon_job import (
-    INITIATION,
     advance_search,
     end_job,
     is_search_over,

@@ -9,14 +9,12 @@ have in common.
 from __future__ import annotations
 
 from perception.bayes.elements import Pose
+from perception.bayes.job_records import NO_JOB
 from perception.bayes.polygon_likelihood import begin_search, continue_search, score_polygon
 from perception.bayes.polygon_parameters import READING_COST
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
-
-NO_JOB, INITIATION, REFINEMENT = range(3)
-"""Values of `PolygonJob.kind`."""
 
 
 @kernel

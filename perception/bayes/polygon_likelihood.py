@@ -10,14 +10,15 @@ dozen chance agreements.
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.cross_path import is_crossed
 from perception.bayes.elements import Reading
+from perception.bayes.job_records import PoseSearch
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import DROP_OUT_NAT, DROP_OUT_SHARE
 from perception.bayes.polygon_cross_path import NO_ANSWER_M, score_crosses
 from perception.bayes.polygon_parameters import (
+    AXES,
     DOUBTFUL_ANSWER_NAT,
     EDGE_NAT_PER_M,
     EDGE_REACH_M,
@@ -30,13 +31,11 @@ from perception.bayes.polygon_parameters import (
 )
 from perception.bayes.scratch import Score
 from perception.bayes.settings_record import PolygonSide, SettingsRecord
-from perception.bayes.state import PoseSearch
 from perception.kernel import kernel
 from perception.records import Records
 
 ALONG, ACROSS, TURN = range(3)
 """Axes of a search: along and across the body, and turn."""
-AXES: Final = 3
 
 
 @kernel

@@ -99,6 +99,9 @@ APART: Final = 0.5
 CHALLENGE_UNSEEN: Final = 8
 """Unseen readings that a challenger counts as."""
 
+AXES: Final = 3
+"""Axes of a search: along and across the body, and turn."""
+
 # --- The lattice of a polygon's posterior --------------------------------------------------------------------------
 
 LATTICE_PITCH: Final = 1.3

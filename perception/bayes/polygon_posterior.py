@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from perception.bayes.elements import LowerTriangle, Pose
+from perception.bayes.job_records import LatticeMoments
 from perception.bayes.polygon_job import cost, score_pose
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.polygon_parameters import (
@@ -31,7 +32,7 @@ from perception.bayes.polygon_parameters import (
     LATTICE_WIDE,
 )
 from perception.bayes.settings_record import SettingsRecord
-from perception.bayes.state import LatticeMoments, StateRecord
+from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 
 _CELLS: Final = np.stack(np.meshgrid(*3 * [np.arange(-3, 4)], indexing="ij"), axis=-1).reshape(-1, 3)

@@ -10,13 +10,21 @@ from __future__ import annotations
 import math
 
 from perception.bayes.elements import MAX_POLYGONS
+from perception.bayes.job_records import (
+    ASSIGN,
+    JUDGE,
+    LATTICE,
+    NO_JOB,
+    REFINEMENT,
+    RESTART,
+    SEARCH_NEAR,
+    SEARCH_WIDE,
+)
 from perception.bayes.naming import is_sure_polygon
 from perception.bayes.polygon_alternatives import compare_circles, is_part_of_wall
 from perception.bayes.polygon_association import leave_to_next_neighbour
 from perception.bayes.polygon_initiation import advance_initiation, next_request
 from perception.bayes.polygon_job import (
-    NO_JOB,
-    REFINEMENT,
     advance_search,
     copy_pose,
     cost,
@@ -44,12 +52,6 @@ from perception.bayes.polygon_parameters import (
 )
 from perception.bayes.polygon_posterior import advance_lattice, begin_lattice, copy_triangle
 from perception.bayes.pose_restarts import (
-    ASSIGN,
-    JUDGE,
-    LATTICE,
-    RESTART,
-    SEARCH_NEAR,
-    SEARCH_WIDE,
     begin_pose_search,
     keep_best,
     next_restart,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.job_records import JUDGE, SEARCH_NEAR, SEARCH_WIDE
 from perception.bayes.polygon_initiation import lay_side, ways_to_lie
 from perception.bayes.polygon_job import start_search
 from perception.bayes.polygon_likelihood import ACROSS, ALONG, moved
@@ -31,9 +32,6 @@ from perception.bayes.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 from perception.records import Records
-
-ASSIGN, SEARCH_WIDE, RESTART, SEARCH_NEAR, JUDGE, LATTICE = range(6)
-"""Stages of a refinement, values of `PolygonJob.stage`."""
 
 
 @kernel

@@ -25,6 +25,7 @@ from perception.bayes.elements import (
     MAX_TRACKS,
     POLYGON_BEARING_BINS,
     POLYGON_BIN_CAPACITY,
+    RADIUS,
     REJECTIONS_MAX,
     REQUESTS_MAX,
     LowerTriangle,
@@ -32,10 +33,28 @@ from perception.bayes.elements import (
     Pose,
     Reading,
 )
+from perception.bayes.job_records import JOB_READINGS, LATTICE, REFINEMENT, PolygonJob, PolygonRequest
 from perception.bayes.parameters import START_NOISE, START_NOISE_NAT
-from perception.bayes.scratch import Scratch
-from perception.bayes.settings_record import NOISES
+from perception.bayes.polygon_parameters import LATTICE_ATTEMPTS
+from perception.bayes.scratch import POLYGON, Scratch
+from perception.bayes.settings_record import CIRCLES_MAX, NOISES, POLYGONS_MAX
 from perception.bayes.wall_records import WallMap
+from perception.bounds import (
+    CONSTANT,
+    FINITE,
+    FLAG,
+    PLACE,
+    SIGNED,
+    UNHEARD,
+    Bound,
+    Count,
+    Finite,
+    Flag,
+    Place,
+    bounds,
+    index_of,
+    up_to,
+)
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records, records, zeros
 
@@ -51,21 +70,21 @@ class Sensor(Record):
 
     history: Annotated[Records[Reading], HISTORY]
     """A ring buffer of spaced readings, hits and silences."""
-    times_s: Annotated[Floats, HISTORY]
-    kept: int
+    times_s: Annotated[Floats, HISTORY, PLACE]
+    kept: Count
     """Readings ever put there."""
-    last: Reading
+    last: Annotated[Reading, UNHEARD]
     """The last reading that was not redundant."""
-    crossed: Reading
+    crossed: Annotated[Reading, UNHEARD]
     """Where it stood when others last listened to it; without a range."""
 
 
 class Bucket(Record):
     """The segments of one cell of the map."""
 
-    cell_x: int
-    cell_y: int
-    count: int
+    cell_x: Annotated[int, SIGNED]
+    cell_y: Annotated[int, SIGNED]
+    count: Count
     """Segments put in since the cell took the bucket."""
     segments: Annotated[Records[MappedSegment], BUCKET_CAPACITY]
 
@@ -73,31 +92,31 @@ class Bucket(Record):
 class Line(Record):
     """A wall, or a line that may become one; its normal and distance refer to a local origin."""
 
-    normal_x: float
-    normal_y: float
-    distance: float
+    normal_x: Place
+    normal_y: Place
+    distance: Place
     """From the origin along the normal, m."""
-    origin_x: float
-    origin_y: float
-    variance_angle: float
+    origin_x: Place
+    origin_y: Place
+    variance_angle: Finite
     """rad²"""
-    covariance: float
+    covariance: Finite
     """m·rad"""
-    variance_distance: float
+    variance_distance: Finite
     """m²"""
-    low: float
+    low: Place
     """Extent along the line, m."""
-    high: float
-    log_odds: float
+    high: Place
+    log_odds: Annotated[float, Bound(-700.0, 700.0)]
     """Log odds that it is still there."""
-    echoes: float
+    echoes: Finite
     """Echoes that it explained; 0 where the place is free."""
 
 
 class CircleBin(Record):
     """The readings that a circle keeps of one direction."""
 
-    count: int
+    count: Count
     """Readings ever put in."""
     readings: Annotated[Records[Reading], BIN_CAPACITY]
 
@@ -105,80 +124,80 @@ class CircleBin(Record):
 class PolygonBin(Record):
     """The readings that a polygon keeps of one direction."""
 
-    count: int
+    count: Count
     readings: Annotated[Records[Reading], POLYGON_BIN_CAPACITY]
 
 
 class Track(Record):
     """Fields that circle and polygon tracks have in common."""
 
-    status: int
+    status: Annotated[int, Bound(FREE, ESTABLISHED)]
     """`FREE`, `TENTATIVE` or `ESTABLISHED`."""
-    unseen: int
+    unseen: Count
     """Readings since the last refinement."""
-    reservoir: int
+    reservoir: Count
     """Readings that bore on it at the last refinement."""
-    refinements: int
-    idle_firings: int
+    refinements: Count
+    idle_firings: Count
     """Firings without new evidence."""
-    final_refinements: int
+    final_refinements: Annotated[int, SIGNED]
     """Refinements still due once it is idle."""
-    passed_over: int
+    passed_over: Count
     """Quanta that went to other tracks since its last one."""
-    number: int
+    number: Count
     """Number that users see."""
-    marks: int
+    marks: Annotated[int, up_to(CONFIRMED | PLACED)]
     """Sum of `CONFIRMED` and `PLACED`."""
-    x: float
-    y: float
-    log_likelihood_ratio: float
+    x: Place
+    y: Place
+    log_likelihood_ratio: Finite
     """Evidence against the background, nat."""
-    hits: float
-    near: float
+    hits: Finite
+    near: Finite
     """Readings within the gate."""
-    probability: float
+    probability: Finite
     """Existence probability: this explanation against all others."""
 
 
 class CircleTrack(Track):
     """Track of a round object."""
 
-    kind: int
+    kind: Annotated[int, index_of(CIRCLES_MAX)]
     """Index of its radius in `Settings.circles`."""
-    alternative: int
+    alternative: Annotated[int, index_of(ALTERNATIVES_MAX)]
     """Index of the alternative that was compared last."""
-    is_named: int
+    is_named: Flag
     """1 while it is reported as a model."""
-    radius: float
-    root_xx: float
+    radius: Annotated[float, RADIUS]
+    root_xx: Finite
     """Lower Cholesky root of the covariance from which the next grid starts, m."""
-    root_yx: float
-    root_yy: float
-    covariance_xx: float
+    root_yx: Finite
+    root_yy: Finite
+    covariance_xx: Finite
     """m²"""
-    covariance_xy: float
-    covariance_yy: float
-    misses: float
+    covariance_xy: Finite
+    covariance_yy: Finite
+    misses: Finite
     """Readings that should have hit and passed through."""
-    dispersion: float
+    dispersion: Finite
     """Dispersion of the axes of the sensors that heard it."""
-    unknown_nat: float
+    unknown_nat: Finite
     """Evidence of an unknown object in its place."""
-    misfit: float
+    misfit: Finite
     """Shortfall of its hits' log likelihood from what the noise lets expect, in σ."""
-    outline_lead: float
+    outline_lead: Finite
     """Lead of a body of unknown outline, nat; 0 where it was not compared."""
-    round_lead: float
+    round_lead: Finite
     """Lead of a circle of unknown radius, nat; 0 where it was not compared."""
-    room_lead: float
+    room_lead: Finite
     """Lead of the mapped walls and corners, nat."""
-    sides: int
+    sides: Annotated[int, up_to(BEARING_BINS)]
     """Bearing bins from which it was heard."""
-    is_confirmed: int
+    is_confirmed: Flag
     """1 once it was heard from many sides while it was named."""
-    leads: Annotated[Floats, ALTERNATIVES_MAX]
+    leads: Annotated[Floats, ALTERNATIVES_MAX, FINITE]
     """Lead of each alternative, nat: the radii, then a line, then a corner; 0 where it was not compared."""
-    noise_nat: Annotated[Floats, NOISES]
+    noise_nat: Annotated[Floats, NOISES, FINITE]
     """Log likelihood of its residuals under each noise, nat."""
     bins: Annotated[Records[CircleBin], BEARING_BINS]
     """The readings it keeps, by bearing."""
@@ -187,12 +206,12 @@ class CircleTrack(Track):
 class PolygonTrack(Track):
     """An object of polygonal outline."""
 
-    model: int
+    model: Annotated[int, index_of(POLYGONS_MAX)]
     """Index in `Settings.polygons`."""
-    has_challenger: int
+    has_challenger: Flag
     """1 while another pose is to be tried."""
-    heading: float
-    sure_hits: float
+    heading: Place
+    sure_hits: Finite
     """Hits where an echo was certain to be heard."""
     covariance: LowerTriangle
     """Of the pose; all zero until it is known."""
@@ -203,134 +222,51 @@ class PolygonTrack(Track):
 class Rejection(Record):
     """A place where a user rejected an object."""
 
-    x: float
-    y: float
-    radius: float
+    x: Place
+    y: Place
+    radius: Place
     """Nothing of the kind starts within this, m, …"""
-    what: int
+    what: Annotated[int, index_of(POLYGON + POLYGONS_MAX)]
     """Index of a circle, or `POLYGON` plus that of a polygon model."""
-    evidence_nat: float
+    evidence_nat: Finite
     """… until the evidence exceeds this."""
-
-
-class PolygonRequest(Record):
-    """A request for a polygon hypothesis behind a segment."""
-
-    model: int
-    x: float
-    y: float
-    normal_x: float
-    normal_y: float
-    is_done: int
-
-
-class PoseSearch(Record):
-    """A search for the pose of greatest likelihood; see `polygon_likelihood.search`."""
-
-    x: float
-    y: float
-    heading: float
-    log_likelihood_ratio: float
-    """At that pose, nat."""
-    step_m: float
-    trial: int
-    """The next trial; −1 before the first score."""
-    rounds_left: int
-    has_gained: int
-    """1 where this round gained."""
-
-
-class LatticeMoments(Record):
-    """Mass, first and second moments of a likelihood on a lattice, in pitches along the frame's axes a, b, c."""
-
-    mass: float
-    a: float
-    b: float
-    c: float
-    aa: float
-    ab: float
-    bb: float
-    ac: float
-    bc: float
-    cc: float
-
-
-class PolygonJob(Record):
-    """The current job on polygons and its progress; see `perception.bayes.polygon_job`."""
-
-    kind: int
-    stage: int
-    track: int
-    """The track that is refined, or …"""
-    model: int
-    """… the model that is tried."""
-    reading_count: int
-    reading_step: int
-    """Step between the readings that a search scores."""
-    noise_level: int
-    """Noise assumed when the job began."""
-    next_step: int
-    """Progress within the stage."""
-    lattices: int
-    """Lattices laid."""
-    refines_next: int
-    """Turn of refinements (1) and of new hypotheses (0)."""
-    requests_made: int
-    search: PoseSearch
-    best: Pose
-    """Best pose of several searches."""
-    best_nat: float
-    """Its log likelihood ratio."""
-    segment_x: float
-    """The segment behind which a hypothesis is tried."""
-    segment_y: float
-    segment_normal_x: float
-    segment_normal_y: float
-    middle: Pose
-    """Middle of the lattice, or of the restarts."""
-    middle_nat: float
-    """Log likelihood ratio there."""
-    root: LowerTriangle
-    """The lattice's frame: lower root of one pitch."""
-    covariance: LowerTriangle
-    moments: LatticeMoments
 
 
 class State(Record):
     """The memory without the circle tracks."""
 
-    sensor_count: int
-    noise_level: int
+    sensor_count: Annotated[int, CONSTANT]
+    noise_level: Annotated[int, index_of(NOISES)]
     """Index of the assumed noise in `Settings.noises`."""
-    segments_made: int
-    segments_held: int
+    segments_made: Count
+    segments_held: Count
     """Segments in the outline map: to count them anew would drive everything else out of the processor's caches."""
-    buckets_used: int
+    buckets_used: Annotated[int, up_to(BUCKETS)]
     """Buckets of the outline map that hold segments, …"""
-    used_buckets: Annotated[Ints, BUCKETS]
+    used_buckets: Annotated[Ints, BUCKETS, index_of(BUCKETS)]
     """… and which they are, in ascending order, for the same reason."""
-    refinements: int
-    ring_x: float
+    refinements: Count
+    ring_x: Place
     """Position of the ring at its last firing, m."""
-    ring_y: float
-    objects_numbered: int
+    ring_y: Place
+    objects_numbered: Count
     """Numbers assigned to objects; a number is never reused."""
-    segments_numbered: int
+    segments_numbered: Count
     """The same for segments."""
-    rejection_count: int
-    heard: float
+    rejection_count: Count
+    heard: Finite
     """Readings with an echo …"""
-    silent: float
+    silent: Finite
     """… and without; older ones count less."""
-    crosses_kept: int
+    crosses_kept: Count
     """Cross paths ever remembered."""
-    names_withdrawn: int
+    names_withdrawn: Count
     """Names withdrawn since a named circle was last heard from many sides, …"""
-    unconfirmed_m: float
+    unconfirmed_m: Place
     """… and the way driven since, m."""
-    roughness_nat: Annotated[Floats, NOISES]
+    roughness_nat: Annotated[Floats, NOISES, FINITE]
     """Evidence of the readings' roughness for each noise."""
-    residuals_nat: Annotated[Floats, NOISES]
+    residuals_nat: Annotated[Floats, NOISES, FINITE]
     """Evidence of all objects' residuals for each noise."""
     crosses: Annotated[Records[Reading], CROSS_HISTORY]
     """A ring buffer of cross paths."""
@@ -343,7 +279,7 @@ class State(Record):
     rejections: Annotated[Records[Rejection], REJECTIONS_MAX]
     requests: Annotated[Records[PolygonRequest], REQUESTS_MAX]
     job: PolygonJob
-    job_readings: Annotated[Records[Reading], POLYGON_BEARING_BINS * POLYGON_BIN_CAPACITY]
+    job_readings: Annotated[Records[Reading], JOB_READINGS]
     scratch: Scratch
 
 
@@ -358,6 +294,7 @@ class Memory:
 
     SCRATCH: Final = ("s", "tracks", "firings", "objects_numbered")
     """Views of the same memory, left out of snapshots."""
+    BOUNDS: Final = bounds({"state.room.edges.second": FLAG}, state=State.BOUNDS, circles=CircleTrack.BOUNDS)
 
     def __init__(self, sensors: int, tracks: int = MAX_TRACKS) -> None:
         self.state = zeros(State, 1)
@@ -369,6 +306,13 @@ class Memory:
         self.objects_numbered = self.state["objects_numbered"]
         self.state["sensor_count"] = sensors
         self.clear()
+
+    def contradiction(self) -> str | None:
+        """Return what would keep a job on polygons from ending, None if nothing does."""
+        job = self.s[0].job
+        if job.kind == REFINEMENT and job.stage == LATTICE and job.lattices >= LATTICE_ATTEMPTS:
+            return f"state.job.lattices is {job.lattices}, but the stage of lattices is not over"
+        return None
 
     @property
     def polygons(self) -> np.ndarray[Any, Any]:

@@ -16,11 +16,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.archived_tracks import archived_dtype, pack, unpack
+from perception.bayes.archived_tracks import archived_bounds, archived_dtype, pack, unpack
 from perception.bayes.manual_tracks import leave_job
 from perception.bayes.naming import sure_polygons
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, CircleTrack, Memory, PolygonTrack
+from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats, Ints
 from perception.mapping.archive import Archive
 
@@ -34,6 +35,10 @@ HELD_SHARE: Final = 0.8
 """Share of the tracks that objects may take; the others are for hypotheses."""
 
 
+LOOKED: Final = PLACE._replace(infinite=True)
+"""Of where the robot last looked for objects, m; infinite before the first look."""
+
+
 class TrackArchive:
     """The archived objects, circles and polygons.
 
@@ -45,9 +50,11 @@ class TrackArchive:
         Archived objects near the robot for which no track was free at the last look.
     """
 
+    BOUNDS: Final = bounds(waiting=COUNT, _numbered=COUNT, _looked_x=LOOKED, _looked_y=LOOKED)
+
     def __init__(self) -> None:
-        self.circles = Archive(archived_dtype(CircleTrack))
-        self.polygons = Archive(archived_dtype(PolygonTrack))
+        self.circles = Archive(archived_dtype(CircleTrack), archived_bounds(CircleTrack))
+        self.polygons = Archive(archived_dtype(PolygonTrack), archived_bounds(PolygonTrack))
         self.waiting = 0
         self._numbered = 0
         self._looked_x = self._looked_y = math.inf

@@ -12,6 +12,7 @@ from typing import Annotated, Final
 
 from config.robot import SENSORS_MAX
 from perception.bayes.elements import Reading
+from perception.bounds import FINITE, PLACE, Bound, Count, Finite, Flag, Place, index_of, up_to
 from perception.kernel import Floats
 from perception.records import Record, Records
 
@@ -33,6 +34,8 @@ IS_KNOWN: Final = 0
 IS_FREE: Final = 1
 IS_TAKEN: Final = 2
 """Values of `RecentReading.is_free`; the last is that of a candidate's echoes while it is fitted."""
+EXTENT: Final = Bound(-0.5 * WALL_BINS * WALL_BIN_M, 0.5 * WALL_BINS * WALL_BIN_M)
+"""Of the ends of a wall's spans, which become indices of its bins, m."""
 GOLDEN_RATIO: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 """Its multiples modulo 1 are spread evenly; they choose among readings."""
 
@@ -40,20 +43,20 @@ GOLDEN_RATIO: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 class WallBin(Record):
     """The readings of one place along a wall; a weight of 1 is an echo from the perpendicular's foot."""
 
-    weight: float
-    precision: float
+    weight: Finite
+    precision: Finite
     """Sum of the echoes' weights, each divided by the variance of its range, m⁻²."""
-    offset_sum: float
+    offset_sum: Finite
     """Sum of the distances from the origin along the frame's normal at which the echoes lie, by precision, m⁻¹."""
-    range_sum: float
+    range_sum: Finite
     """Sum of the ranges, by precision, m⁻¹."""
-    passes: float
+    passes: Finite
     """Ranges that passed through, less with each new echo."""
-    number: int
+    number: Count
     """That of the numbered span that held it last, 0 before."""
-    is_held: int
+    is_held: Flag
     """1 where the last review found that the wall covers it by echoes, or one was entered since."""
-    is_open: int
+    is_open: Flag
     """1 where the last review found it open."""
     newest: Reading
 
@@ -61,56 +64,56 @@ class WallBin(Record):
 class Span(Record):
     """A part of a wall without openings."""
 
-    low: float
+    low: Annotated[float, EXTENT]
     """Its ends along the frame's tangent, m."""
-    high: float
-    first_bin: int
-    end_bin: int
+    high: Annotated[float, EXTENT]
+    first_bin: Annotated[int, up_to(WALL_BINS)]
+    end_bin: Annotated[int, up_to(WALL_BINS)]
     """Its bins, this one excluded."""
-    weight: float
-    passes: float
+    weight: Finite
+    passes: Finite
     """Of the bins."""
-    chi2: float
+    chi2: Finite
     """Evidence that it is straight; see `wall_evidence.flatness`."""
-    number: int
+    number: Count
     """The object's number, of the same sequence as those of tracks; 0 of a span too short to be reported."""
 
 
 class ReviewedLine(Record):
     """A wall's line by the readings that are remembered, in the wall's frame."""
 
-    information: float
+    information: Finite
     """Determinant of the information on offset and slope, m⁻²; 0 before the first review."""
-    offset: float
-    slope: float
-    variance_offset: float
-    covariance: float
-    variance_slope: float
+    offset: Finite
+    slope: Finite
+    variance_offset: Finite
+    covariance: Finite
+    variance_slope: Finite
 
 
 class Wall(Record):
     """A wall; the line is `offset` + `slope` · u along its frame's normal, u along the frame's tangent."""
 
-    origin_x: float
-    origin_y: float
-    normal_x: float
+    origin_x: Place
+    origin_y: Place
+    normal_x: Place
     """The frame's normal, a unit vector away from the sensors."""
-    normal_y: float
-    offset: float
-    slope: float
-    weight: float
+    normal_y: Place
+    offset: Place
+    slope: Place
+    weight: Finite
     """Weight of the readings on its spans; 0 where the place is free."""
-    variance_offset: float
-    covariance: float
-    variance_slope: float
-    chi2: float
+    variance_offset: Finite
+    covariance: Finite
+    variance_slope: Finite
+    chi2: Finite
     """Evidence of all its spans together that it is straight."""
-    misfit: float
+    misfit: Finite
     """χ² of the line for each degree of freedom."""
     reviewed: ReviewedLine
-    is_changed: int
+    is_changed: Flag
     """1 where its bins have changed since it was fitted."""
-    span_count: int
+    span_count: Annotated[int, up_to(SPANS_MAX)]
     spans: Annotated[Records[Span], SPANS_MAX]
     bins: Annotated[Records[WallBin], WALL_BINS]
 
@@ -118,39 +121,39 @@ class Wall(Record):
 class PointInformation(Record):
     """What is known of the place of a point: the sum of information (m⁻²), and of information times place (m⁻¹)."""
 
-    xx: float
-    xy: float
-    yy: float
-    x: float
-    y: float
+    xx: Finite
+    xy: Finite
+    yy: Finite
+    x: Finite
+    y: Finite
 
 
 class RoomCorner(Record):
     """A point where two walls meet, or would meet, or where one ends."""
 
-    is_used: int
-    is_edge: int
+    is_used: Flag
+    is_edge: Flag
     """1 where it juts out, as the post of a doorway does; 0 for an inside corner."""
-    x: float
-    y: float
-    covariance_xx: float
+    x: Place
+    y: Place
+    covariance_xx: Finite
     """m²"""
-    covariance_xy: float
-    covariance_yy: float
+    covariance_xy: Finite
+    covariance_yy: Finite
     heard: PointInformation
     """From its echoes, without its walls."""
-    echoes: float
+    echoes: Finite
     """Echoes from the point itself."""
-    passes: float
+    passes: Finite
     """Ranges towards it that went on …"""
-    ended: float
+    ended: Finite
     """… and those that did not."""
-    far_echoes: float
+    far_echoes: Finite
     """The echoes and passes from where an edge between mirrors is not heard."""
-    far_passes: float
-    first: int
+    far_passes: Finite
+    first: Annotated[int, index_of(MAX_WALLS)]
     """The walls; where a wall ends alone, that wall …"""
-    second: int
+    second: Annotated[int, index_of(MAX_WALLS)]
     """… and 1 if it is its high end, 0 for its low end."""
 
 
@@ -158,7 +161,7 @@ class RecentReading(Record):
     """A reading that may support a new wall."""
 
     reading: Reading
-    is_free: int
+    is_free: Annotated[int, Bound(IS_KNOWN, IS_TAKEN)]
     """1 for an echo that nothing explains yet, 2 while a new wall is fitted to it."""
 
 
@@ -172,32 +175,32 @@ class WallMap(Record):
     lines: PointInformation
     """From a corner's walls, while it is located."""
     recent: Annotated[Records[RecentReading], RECENT_MAX]
-    recent_count: int
+    recent_count: Count
     """Readings ever put there."""
-    kept_x: Annotated[Floats, SENSORS_MAX]
+    kept_x: Annotated[Floats, SENSORS_MAX, PLACE]
     """Where each sensor was at its last recent reading, m; meaningless before the first."""
-    kept_y: Annotated[Floats, SENSORS_MAX]
-    kept: Annotated[Floats, SENSORS_MAX]
+    kept_y: Annotated[Floats, SENSORS_MAX, PLACE]
+    kept: Annotated[Floats, SENSORS_MAX, FINITE]
     """1 for each sensor that has a recent reading."""
     remembered: Annotated[Records[Reading], REMEMBERED_MAX]
     """Spaced readings of all sensors by which walls are reviewed, a ring buffer."""
-    remembered_count: int
+    remembered_count: Count
     """Readings ever put there."""
-    remembered_x: Annotated[Floats, SENSORS_MAX]
+    remembered_x: Annotated[Floats, SENSORS_MAX, PLACE]
     """Where each sensor was at its last remembered reading, m; meaningless before the first."""
-    remembered_y: Annotated[Floats, SENSORS_MAX]
-    remembered_of: Annotated[Floats, SENSORS_MAX]
+    remembered_y: Annotated[Floats, SENSORS_MAX, PLACE]
+    remembered_of: Annotated[Floats, SENSORS_MAX, FINITE]
     """1 for each sensor that has one."""
-    firings: int
-    edge_echoes: float
+    firings: Count
+    edge_echoes: Finite
     """Slanting walls that answered from the beam's edge …"""
-    edge_silences: float
+    edge_silences: Finite
     """… and those that did not."""
-    is_loud: int
+    is_loud: Flag
     """1 where so few beams are silent that surfaces must answer at any angle."""
-    variance_m2: float
+    variance_m2: Finite
     """Variance of a range r, as assumed now: `variance_m2` + `relative_variance` · r²."""
-    relative_variance: float
-    noise_sums: Annotated[Floats, 5]
+    relative_variance: Finite
+    noise_sums: Annotated[Floats, 5, FINITE]
     """Of the errors e of echoes of known walls: sums of w, w · r², w · r⁴, w · e² and w · r² · e²; w (m⁻⁴) is one
     divided by the square of the range's variance."""

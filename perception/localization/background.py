@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from perception.bounds import Bound, bounds
 from perception.kernel import Floats
 from perception.localization.mixed_reflection import LATE_M, LearnedShares
 from perception.localization.pose_grid import DIRECTIONS, SILENT, fill_cell
@@ -51,6 +52,7 @@ class Background:
 
     SCRATCH: Final = ("_densities", "_window_m")
     """What follows from the room."""
+    BOUNDS: Final = bounds(heard_share=Bound(HEARD_MIN, 1.0 - HEARD_MIN))
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
         self._window_m = float(surroundings.sensor[0].window_m)

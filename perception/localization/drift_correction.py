@@ -20,6 +20,7 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
+from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
 from perception.localization.landmark_filter import add_landmark, remove_landmark
 from perception.localization.landmark_state import FIRST, HEADING, OFFSET, EstimateRecord, X, Y
@@ -98,6 +99,11 @@ class DriftCorrection:
     ring : RingConfig
         The sensors.
     """
+
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT, _half_angle=CONSTANT, _range_min_m=CONSTANT, _waiting=PLACE, _arrived=COUNT, _way_m=FINITE,
+        _motion=PLACE, _checked=COUNT,
+    )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)

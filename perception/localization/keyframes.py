@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from drivers.messages import Firing, Pose, wrap_angle
+from perception.bounds import COUNT, FINITE, PLACE, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.particle_update import COLUMNS
 
@@ -48,6 +49,10 @@ class Keyframes:
 
     SCRATCH: Final = ("_axes",)
     """What the settings give."""
+    BOUNDS: Final = bounds(
+        _latest=PLACE._replace(infinite=True), _firings=COUNT, _begin=PLACE, count=COUNT, odometry=PLACE,
+        way_m=FINITE, readings=PLACE._replace(infinite=True), counts=lambda self: up_to(self.readings.shape[1]),
+    )  # fmt: skip
 
     def __init__(self, mounts: Floats, turning: tuple[int, ...] = ()) -> None:
         self._turning = list(turning)

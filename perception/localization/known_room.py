@@ -15,6 +15,7 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
+from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, bounds, index_of
 from perception.localization.background import Background
 from perception.localization.drift_correction import LocalizedPose, Status
 from perception.localization.keyframes import Keyframes
@@ -84,6 +85,10 @@ class KnownRoom:
 
     SCRATCH: Final = ("_search_evidence",)
     """What follows from the room."""
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT, _odometry=PLACE, _status=index_of(len(STATUSES)), probability=SHARE, _window_begin=COUNT,
+        _stage=Bound(IDLE, WEIGHING), _search_begin=COUNT, _searched_at_m=FINITE, _pause_m=FINITE, _travel=PLACE,
+    )  # fmt: skip
 
     def __init__(self, room: Room, ring: RingConfig, model: RangeModel | None = None, seed: int = 0) -> None:
         model = model or RangeModel(

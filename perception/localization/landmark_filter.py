@@ -11,7 +11,19 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
-from perception.localization.landmark_state import FIRST, HEADING, ODOMETER, OFFSET, RANGE, TURN, EstimateRecord, X, Y
+from perception.localization.landmark_state import (
+    FIRST,
+    HEADING,
+    ODOMETER,
+    OFFSET,
+    RANGE,
+    SCALE_MAX,
+    SCALE_MIN,
+    TURN,
+    EstimateRecord,
+    X,
+    Y,
+)
 
 SMALL_RAD: Final = 1e-6
 """Below this angle the series of sin a/a is used."""
@@ -210,9 +222,9 @@ def correct(e: EstimateRecord, covariance: Floats, innovation: float, variance: 
     est.offset += factor * gain[OFFSET]
     est.offset_correction += factor * gain[OFFSET]
     est.heading_correction += factor * gain[HEADING]
-    est.odometer_scale += factor * gain[ODOMETER]
+    est.odometer_scale = min(SCALE_MAX, max(SCALE_MIN, est.odometer_scale + factor * gain[ODOMETER]))
     est.turn_scale += factor * gain[TURN]
-    est.range_scale += factor * gain[RANGE]
+    est.range_scale = min(SCALE_MAX, max(SCALE_MIN, est.range_scale + factor * gain[RANGE]))
     turn = factor * gain[HEADING]
     move_points(e, turn, gain, factor)
     est.heading += turn

@@ -11,7 +11,7 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.localization.landmark_filter import correct, innovation_variance, rows_used
-from perception.localization.landmark_state import FIRST, EstimateRecord, X, Y
+from perception.localization.landmark_state import FIRST, STRAY_MAX, STRAY_MIN, EstimateRecord, X, Y
 
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
@@ -43,11 +43,9 @@ EDGE_SIGMAS: Final = 3.0
 DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
 STRAY: Final = 0.02
-STRAY_MIN: Final = 5e-4
-STRAY_MAX: Final = 0.9
 STRAY_MEMORY: Final = 0.03
 """Share of the landmarks outside a beam that are heard, at first: of mirrors none, many where a drum answers with any
-part that is in the beam; its bounds, and the weight of one look in it."""
+part that is in the beam; and the weight of one look in it."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6

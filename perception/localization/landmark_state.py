@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final, TypeAlias
 
+from perception.bounds import FINITE, Bound, Count, Finite, Flag, Place, up_to
 from perception.kernel import Floats
 from perception.records import Record, Records
 
@@ -17,6 +18,13 @@ LANDMARKS_MAX: Final = 72
 """As many as perception has tracks: 48 circles and 24 polygons."""
 SENSORS_MAX: Final = 255
 """As `config.robot.SENSORS_MAX`."""
+
+STRAY_MIN: Final = 5e-4
+STRAY_MAX: Final = 0.9
+"""Bounds of `Estimate.stray`."""
+SCALE_MIN: Final = 0.5
+SCALE_MAX: Final = 2.0
+"""Bounds of the scales of odometer and ranges, by which something is divided: those of a real robot are near 1."""
 
 HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
 """Rows of the covariance for the fields of `Estimate`, in their order; those of the landmarks follow."""
@@ -28,61 +36,61 @@ ROWS_MAX: Final = FIRST + 2 * LANDMARKS_MAX
 class Landmark(Record):
     """A round object in the map frame."""
 
-    x: float
-    y: float
-    radius: float
-    number: int
+    x: Place
+    y: Place
+    radius: Annotated[float, Bound(0.0, 1e3)]
+    number: Count
     """The number that perception gave the object."""
-    failures: int
+    failures: Count
     """Readings in succession that should have hit it and missed, while other landmarks were hit."""
-    hits: int
-    moved: int
+    hits: Count
+    moved: Flag
     """Whether it stood elsewhere before."""
-    anchor_x: float
-    anchor_y: float
+    anchor_x: Place
+    anchor_y: Place
     """Its place when perception's track was last moved with it."""
 
 
 class LastUse(Record):
     """Where a sensor was at the last of its readings that the filter used."""
 
-    x: float
-    y: float
-    axis: float
-    is_known: int
+    x: Place
+    y: Place
+    axis: Place
+    is_known: Flag
 
 
 class Estimate(Record):
     """The mean."""
 
-    heading: float
+    heading: Place
     """Direction of the ring's sensor 0."""
-    x: float
-    y: float
-    offset: float
+    x: Place
+    y: Place
+    offset: Place
     """True less reported angle from the ring's direction to the direction of travel."""
-    odometer_scale: float
+    odometer_scale: Annotated[float, Bound(SCALE_MIN, SCALE_MAX)]
     """Reported distance over true distance."""
-    turn_scale: float
+    turn_scale: Place
     """True turn over reported turn, less 1."""
-    range_scale: float
+    range_scale: Annotated[float, Bound(SCALE_MIN, SCALE_MAX)]
     """Reported range over true range."""
-    count: int
+    count: Annotated[int, up_to(LANDMARKS_MAX)]
     """Landmarks."""
-    noise: float
+    noise: Annotated[float, Bound(0.0, 1e3)]
     """Variance of the ranges over the nominal one, estimated from the innovations."""
-    heading_correction: float
-    offset_correction: float
+    heading_correction: Place
+    offset_correction: Place
     """Sums of the corrections of heading and offset since the estimate of their random walk was last renewed."""
-    stray: float
+    stray: Annotated[float, Bound(STRAY_MIN, STRAY_MAX)]
     """Share of the landmarks just outside a beam that its sensor hears all the same."""
-    fit_share: float
+    fit_share: Finite
     """Share of the expected echoes that came, over the last few dozen."""
     landmarks: Annotated[Records[Landmark], LANDMARKS_MAX]
     sensors: Annotated[Records[LastUse], SENSORS_MAX]
-    gain: Annotated[Floats, ROWS_MAX]
+    gain: Annotated[Floats, ROWS_MAX, FINITE]
     """Scratch."""
-    lever: Annotated[Floats, ROWS_MAX]
+    lever: Annotated[Floats, ROWS_MAX, FINITE]
     """Scratch: how a turn of the ring moves each row."""
 
 

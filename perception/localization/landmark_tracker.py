@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Pose, wrap_angle
+from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
 from perception.localization.landmark_filter import propagate, rows_used, write_lever
 from perception.localization.landmark_ranges import STRAY, update_with_firing
@@ -89,6 +90,10 @@ class LandmarkTracker:
 
     SCRATCH: Final = ("e",)
     """A view of the same memory, left out of snapshots."""
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT, _ring=CONSTANT, estimate=Estimate.BOUNDS, covariance=FINITE, entered_at=PLACE,
+        entered=COUNT, _window_m=FINITE, _window_variance=FINITE, _window_count=COUNT,
+    )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning

@@ -17,6 +17,7 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import wrap_angle
+from perception.bounds import FINITE, PLACE, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.landmark_filter import remove_landmark
 from perception.localization.landmark_state import FIRST, HEADING, ODOMETER, OFFSET, RANGE, TURN, X, Y
@@ -56,6 +57,11 @@ class MapHeading:
     start_x, start_y : float
         The place of the first firing, m.
     """
+
+    BOUNDS: Final = bounds(
+        {"_tracker.entered": up_to(FIRST_FIRINGS)},
+        _rows=PLACE, motion=PLACE, _kept=up_to(FIRST_FIRINGS), _due_m=FINITE, start_x=PLACE, start_y=PLACE,
+    )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)

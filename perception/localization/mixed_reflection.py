@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from perception.bounds import Share, bounds
 from perception.kernel import Floats, kernel
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.surroundings import SensorModel
@@ -35,13 +36,13 @@ mirrors the right place is with the former hardly better than others."""
 class Shares(Record):
     """How often a reading has which cause, as learned so far."""
 
-    specular: float
+    specular: Share
     """Share of the readings that are from a smooth surface."""
-    late: float
+    late: Share
     """Share of the smooth surfaces without a straight way back that answer over a second one."""
-    wild: float
+    wild: Share
     """Share of the readings that are anything."""
-    beside: float
+    beside: Share
     """Share of the smooth surfaces a little beside the beam that answer."""
 
 
@@ -80,6 +81,7 @@ class LearnedShares:
 
     SCRATCH: Final = ("records",)
     """A view of other memory."""
+    BOUNDS: Final = bounds(_memory=Shares.BOUNDS)
 
     def __init__(self) -> None:
         self._memory = zeros(Shares, 1)

@@ -14,10 +14,11 @@ from typing import Annotated, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bounds import CONSTANT, COUNT, PLACE, SHARE, Bound, bounds, up_to
 from perception.kernel import Floats, kernel
 from perception.localization.expected_ranges import Reflection
 from perception.localization.mixed_reflection import LATE_M, WILD_HEARD
-from perception.localization.pose_starts import STARTS_MAX, Starts, offer
+from perception.localization.pose_starts import PROFILES_MAX, STARTS_MAX, Starts, offer
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.room import Room
 from perception.localization.surroundings import Surroundings, expect_cone, expect_specular, look_around
@@ -34,8 +35,6 @@ BLOCK: Final = 16
 """Cells of a block's side: a quantum of a search compares one block at one heading."""
 READINGS_MAX: Final = 108
 """Readings that are compared."""
-PROFILES_MAX: Final = 2
-"""Guesses of the causes of readings."""
 SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
@@ -206,6 +205,11 @@ class PoseGrid:
 
     SCRATCH: Final = ("_origin", "_table", "_free", "_filled", "_scratch", "_likely", "_likely_search", "starts")
     """What follows from the room, what is overwritten before each use, and a view of other memory."""
+    BOUNDS: Final = bounds(
+        _clear_m=CONSTANT, _due=COUNT, _found=Starts.BOUNDS, _readings=PLACE._replace(infinite=True),
+        _count=up_to(READINGS_MAX), _searches=COUNT, _profiles=Bound(1, PROFILES_MAX), _shares=SHARE,
+        _quantum=Bound(NONE, COUNT.high),
+    )  # fmt: skip
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
         self._surroundings, self._clear_m = surroundings, clear_m

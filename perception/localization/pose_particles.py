@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Final, TypeAlias
 
+from perception.bounds import Finite, Place, Share, up_to
 from perception.kernel import Floats, Ints, kernel
 from perception.localization.surroundings import insert_nearest
 from perception.records import Record, Records
@@ -48,66 +49,66 @@ SAME_RAD: Final = math.radians(15.0)
 class Particle(Record):
     """A heading (rad), and the Gaussian of place (m) and scale of the odometer at it."""
 
-    heading: float
-    x: float
-    y: float
-    scale: float
-    xx: float
-    xy: float
-    xs: float
-    yy: float
-    ys: float
-    ss: float
-    log_weight: float
+    heading: Place
+    x: Place
+    y: Place
+    scale: Place
+    xx: Finite
+    xy: Finite
+    xs: Finite
+    yy: Finite
+    ys: Finite
+    ss: Finite
+    log_weight: Finite
     """nat; not normalised."""
-    log_ratio: float
+    log_ratio: Finite
     """Log likelihood ratio of the readings of the last update to readings from anywhere, nat."""
-    specular: float
-    turned_away: float
-    late: float
-    wild: float
-    beside: float
-    could_beside: float
+    specular: Finite
+    turned_away: Finite
+    late: Finite
+    wild: Finite
+    beside: Finite
+    could_beside: Finite
     """Causes of the readings of the last update, as in `perception.localization.mixed_reflection`, summed."""
 
 
 class Hypothesis(Record):
     """A place at which the robot may be: its log evidence (nat) and mean pose (m, rad) when last summarised."""
 
-    log_evidence: float
-    x: float
-    y: float
-    heading: float
+    log_evidence: Finite
+    x: Place
+    y: Place
+    heading: Place
     particles: Annotated[Records[Particle], HEADINGS]
 
 
 class Best(Record):
     """The most likely hypothesis after an update: its share of the probability, mean and covariance."""
 
-    share: float
-    x: float
-    y: float
-    heading: float
-    xx: float
-    xy: float
-    xh: float
-    yy: float
-    yh: float
-    hh: float
-    log_ratio: float
-    specular: float
-    turned_away: float
-    late: float
-    wild: float
-    beside: float
-    could_beside: float
+    share: Share
+    x: Place
+    y: Place
+    heading: Place
+    xx: Finite
+    xy: Finite
+    xh: Finite
+    yy: Finite
+    yh: Finite
+    hh: Finite
+    log_ratio: Finite
+    specular: Finite
+    turned_away: Finite
+    late: Finite
+    wild: Finite
+    beside: Finite
+    could_beside: Finite
     """Mean over its particles of their fields of the same name."""
 
 
 class Hypotheses(Record):
     """All hypotheses; those beyond `count` are zero."""
 
-    count: int
+    count: Annotated[int, up_to(HYPOTHESES_MAX)]
     best: Best
     hypotheses: Annotated[Records[Hypothesis], HYPOTHESES_MAX]
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Final
 
+from perception.bounds import FINITE, Finite, Place, index_of, up_to
 from perception.kernel import kernel
 from perception.records import Record, Records
 
 STARTS_MAX: Final = 200
+PROFILES_MAX: Final = 2
+"""Guesses of the causes of readings that a search tries."""
 APART_M: Final = 0.3
 APART_RAD: Final = math.radians(9.0)
 """Starts nearer to each other than this, on each axis, are one: one and a half steps of the search."""
@@ -17,19 +20,19 @@ APART_RAD: Final = math.radians(9.0)
 class Start(Record):
     """A pose (m, rad) and how well the readings fit there, nat."""
 
-    x: float
-    y: float
-    heading: float
-    score: float
-    profile: int
+    x: Place
+    y: Place
+    heading: Place
+    score: Finite
+    profile: Annotated[int, index_of(PROFILES_MAX)]
     """By which of the search's guesses of the causes of readings."""
 
 
 class Starts(Record):
     """The best poses found so far, in any order."""
 
-    count: int
-    least: float
+    count: Annotated[int, up_to(STARTS_MAX)]
+    least: Annotated[float, FINITE._replace(infinite=True)]
     """Score of the worst one if there is no room for more, otherwise -inf: a start must be better."""
     starts: Annotated[Records[Start], STARTS_MAX]
 

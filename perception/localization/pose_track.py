@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from drivers.messages import Pose, wrap_angle
+from perception.bounds import COUNT, FINITE, PLACE, bounds, index_of
 from perception.kernel import Floats
 from perception.localization.background import Background
 from perception.localization.keyframes import KEYFRAMES_MAX, Keyframes
@@ -15,6 +16,7 @@ from perception.localization.mixed_reflection import LearnedShares
 from perception.localization.particle_update import TEMPER, update_particles
 from perception.localization.pose_particles import (
     HEADINGS,
+    HYPOTHESES_MAX,
     Best,
     Hypotheses,
     ParticleScratch,
@@ -84,6 +86,10 @@ class PoseTrack:
 
     SCRATCH: Final = ("_background", "_noise", "_hypotheses", "_scratch")
     """What is given, a view of other memory, and what is overwritten before each use."""
+    BOUNDS: Final = bounds(
+        _memory=Hypotheses.BOUNDS, entered=COUNT, _step=index_of(QUANTA * HYPOTHESES_MAX), _at=PLACE, evidence=FINITE,
+        likeness=FINITE, _peak=FINITE, peak_at=COUNT, _gains=FINITE,
+    )  # fmt: skip
 
     def __init__(self, surroundings: Surroundings, background: Background, noise: Floats) -> None:
         self._surroundings, self._background, self._noise = surroundings, background, noise

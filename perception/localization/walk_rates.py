@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from perception.bounds import FINITE, POSITIVE, bounds
 from perception.kernel import Floats
 
 FORGETTING: Final = 0.01
@@ -37,6 +38,7 @@ class WalkRates:
 
     SCRATCH: Final = ("_rates", "_prior")
     """Constants, left out of snapshots."""
+    BOUNDS: Final = bounds(_logs=FINITE, _means=FINITE, _variances=POSITIVE, rate=POSITIVE)
 
     def __init__(self, rates: Floats, prior: Floats) -> None:
         self._rates, self._prior = rates, np.log(prior / np.sum(prior))

@@ -13,6 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bounds import COUNT, Fields, bounds
+
 CELL_M: Final = 4.0
 """Edge of a grid cell: a ring looks as far as two."""
 START: Final = 16
@@ -26,6 +28,8 @@ class Archive:
     ----------
     dtype : dtype
         Of a record; its fields `number` (int), `x` and `y` (m) are used here.
+    row_bounds : mapping
+        Bounds of its fields.
 
     Attributes
     ----------
@@ -37,12 +41,20 @@ class Archive:
 
     SCRATCH: Final = ("_cells", "_index")
     """Derived from the records; not in a snapshot."""
+    BOUNDS: Final = bounds(archived_rows=lambda self: self._row_bounds, count=COUNT)
 
-    def __init__(self, dtype: np.dtype[Any]) -> None:
+    def __init__(self, dtype: np.dtype[Any], row_bounds: Fields) -> None:
+        self._row_bounds = row_bounds
         self.archived_rows: NDArray[Any] = np.zeros(START, dtype)
         self.count = 0
         self._cells: dict[tuple[int, int], list[int]] = {}
         self._index: dict[int, int] = {}
+
+    def contradiction(self) -> str | None:
+        """Return why the records cannot be told apart, None if each has a number of its own."""
+        if len(np.unique(self.archived_rows["number"][: self.count])) < self.count:
+            return f"count is {self.count}, but not as many objects have a number of their own"
+        return None
 
     def add(self, row: NDArray[Any]) -> None:
         """Add a record, shape (1,), whose number is not in the archive."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Pose, wrap_angle
+from perception.bounds import CONSTANT, COUNT, PLACE, SHARE, bounds
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.percept import Canyon
@@ -258,6 +259,16 @@ class CanyonMap:
     is_due : bool
         Whether the next place is to be examined.
     """
+
+    BOUNDS: Final = bounds(
+        sealed_m=CONSTANT,
+        rows={
+            "number": COUNT, "mouth": PLACE, "axis": PLACE, "depth": PLACE, "probability": SHARE, "inside": PLACE,
+        },
+        numbered=COUNT,
+        firings=COUNT,
+        _at=PLACE,
+    )  # fmt: skip
 
     def __init__(self, sealed_m: float) -> None:
         self.sealed_m = sealed_m

@@ -11,7 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from config.settings import RelaxationConfig
+from config.settings import ITERATIONS_MAX, RelaxationConfig
+from perception.bounds import CONSTANT, COUNT, FLAG, PLACE, Bound, bounds, up_to
 from perception.kernel import Floats, Ints, owning_kernel
 from perception.object_model import ObjectModel
 from perception.paper.clusters import Clusters
@@ -84,6 +85,17 @@ class Candidates:
     rows : (clusters_max, models) CANDIDATE
         The candidates by cluster and model.
     """
+
+    BOUNDS: Final = bounds(
+        _segments_min=CONSTANT,
+        _reach_m=CONSTANT,
+        rows={"pose": PLACE, "iterations_left": up_to(ITERATIONS_MAX), "has_rested": FLAG, "number": COUNT},
+        _centres=PLACE,
+        _sizes=COUNT,
+        _predecessor=lambda self: Bound(-1, len(self._sizes) - 1),
+        _count=lambda self: up_to(len(self._sizes)),
+        _turn=COUNT,
+    )
 
     def __init__(
         self,

@@ -6,10 +6,12 @@ A cluster shows where an object may be; relaxation starts a model at its centre.
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
 from config.settings import ClustersConfig
+from perception.bounds import COUNT, PLACE, Bound, bounds, index_of, up_to
 from perception.kernel import Floats, Ints, kernel
 from perception.paper.outline_map import OutlineMap
 
@@ -135,6 +137,12 @@ class Clusters:
     count : int
         Number of clusters.
     """
+
+    BOUNDS: Final = bounds(
+        _labels=lambda self: Bound(-1, len(self.sizes) - 1), _members=lambda self: index_of(len(self._members)),
+        _offsets=lambda self: up_to(len(self._members)), centres=PLACE, sizes=COUNT,
+        count=lambda self: up_to(len(self.sizes)),
+    )  # fmt: skip
 
     def __init__(self, config: ClustersConfig, capacity: int) -> None:
         self._config = config

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from config.settings import RelaxationConfig
+from config.settings import ITERATIONS_MAX, RelaxationConfig
+from perception.bounds import COUNT, FLAG, PLACE, bounds, index_of, up_to
 from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
 from perception.paper.outline_map import OutlineMap
@@ -43,6 +44,8 @@ REJECTION: Final = np.dtype(
 class NumberSource:
     """Gives objects their numbers; none is given twice."""
 
+    BOUNDS: ClassVar = bounds(last=COUNT)
+
     last: int = 0
 
     def next(self) -> int:
@@ -68,6 +71,15 @@ class Placements:
     rows : (PLACEMENTS_MAX,) PLACEMENT
         The placements; the first `count` are valid.
     """
+
+    BOUNDS: Final = bounds(
+        rows=lambda self: {
+            "pose": PLACE, "number": COUNT, "model": index_of(len(self._models)),
+            "iterations_left": up_to(ITERATIONS_MAX), "is_confirmed": FLAG, "members_sum": COUNT,
+        },
+        count=up_to(PLACEMENTS_MAX),
+        _turn=COUNT,
+    )  # fmt: skip
 
     def __init__(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
         self.rows = np.zeros(PLACEMENTS_MAX, PLACEMENT)
@@ -172,6 +184,10 @@ class Rejections:
     total : int
         Rejections so far.
     """
+
+    BOUNDS: Final = bounds(
+        rows={"x": PLACE, "y": PLACE, "reach": PLACE, "model": COUNT, "newest_segment": COUNT}, total=COUNT
+    )  # fmt: skip
 
     def __init__(self) -> None:
         self.rows = np.zeros(PLACEMENTS_MAX, REJECTION)

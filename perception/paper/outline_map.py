@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from typing import Final
 
 import numpy as np
 
 from config.settings import MapConfig
 from drivers.messages import Firing
+from perception.bounds import CONSTANT, COUNT, PLACE, bounds, index_of, up_to
 from perception.edits import Segments
 from perception.kernel import Floats, Ints, kernel
 from perception.paper.parameters import PINNED_SHARE_MAX
@@ -126,6 +128,12 @@ class OutlineMap:
         Segments ever added.
     """
 
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT, _half_angle=CONSTANT, segments=PLACE, times=PLACE, status=up_to(PINNED), numbers=COUNT,
+        pinned=lambda self: up_to(int(PINNED_SHARE_MAX * len(self.times))),
+        start=lambda self: index_of(len(self.times)), count=lambda self: up_to(len(self.times)), total=COUNT,
+    )  # fmt: skip
+
     def __init__(
         self, config: MapConfig, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()
     ) -> None:  # fmt: skip
@@ -140,6 +148,11 @@ class OutlineMap:
         self.start = 0
         self.count = 0
         self.total = 0
+
+    def contradiction(self) -> str | None:
+        """Return why removing the oldest segments would never end, None if it does."""
+        held = int(np.count_nonzero(self.status == PINNED))
+        return None if self.pinned == held else f"pinned is {self.pinned}, but {held} segments are pinned"
 
     @property
     def size(self) -> int:

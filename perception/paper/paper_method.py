@@ -16,6 +16,7 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
+from perception.bounds import bounds, index_of
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     ClearMap,
@@ -61,6 +62,7 @@ class PaperPerception:
 
     SCRATCH: Final = ("_scratch",)
     """Not part of a snapshot: overwritten before each use."""
+    BOUNDS: Final = bounds({"_rejections.rows.model": lambda self: index_of(len(self._models))})
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
         mounts = mounts_array(ring.mounts)

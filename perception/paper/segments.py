@@ -14,6 +14,7 @@ import numpy as np
 from config.robot import RingConfig
 from config.settings import SegmentsConfig
 from drivers.messages import Firing
+from perception.bounds import CONSTANT, RANGE, Place, bounds, index_of, up_to
 from perception.kernel import Floats, kernel
 from perception.paper.parameters import READING_SPACING, READINGS_KEPT
 from perception.records import Record, Records, records, zeros
@@ -23,21 +24,21 @@ from perception.sensor_mounts import mounts_array, mounts_at
 class KeptReading(Record):
     """A range and where it was measured."""
 
-    x: float
+    x: Place
     """Place of the sensor, m."""
-    y: float
-    axis: float
+    y: Place
+    axis: Place
     """Direction of its axis, rad."""
-    range_m: float
-    robot_s: float
+    range_m: Annotated[float, RANGE]
+    robot_s: Place
 
 
 class SensorReadings(Record):
     """The last readings of a sensor, a ring buffer."""
 
-    newest: int
+    newest: Annotated[int, index_of(READINGS_KEPT)]
     """Index of the newest reading."""
-    count: int
+    count: Annotated[int, up_to(READINGS_KEPT)]
     """Readings kept."""
     kept: Annotated[Records[KeptReading], READINGS_KEPT]
 
@@ -183,6 +184,7 @@ class SegmentExtractor:
 
     SCRATCH: Final = ("_out", "_sensor_records")
     """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
+    BOUNDS: Final = bounds(_mounts=CONSTANT, _half_angle=CONSTANT, _sensors=SensorReadings.BOUNDS)
 
     def __init__(self, ring: RingConfig, config: SegmentsConfig) -> None:
         count = len(ring.mounts)

@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 from config.reload import MAP, differences
 from config.settings import Settings
 from perception.pipeline import Perception
-from perception.snapshot import Snapshot
+from perception.snapshot import Snapshot, bounds_of
 from runtime.cycle.drive_requests import first_request
 from runtime.cycle.step import CycleRecord, State, apply_settings, step
 from runtime.recording import channels
@@ -230,7 +230,7 @@ class Replayer:
         try:
             fresh = state.perception.snapshot()
             snapshot = perception_snapshot(frame, fresh)
-            check_snapshot(snapshot, fresh, self._settings)
+            check_snapshot(snapshot, fresh, bounds_of(state.perception))
             self._restore(state, state_fields(frame), snapshot)
             state.perception.labelled_objects()
             state.perception.archived_objects()

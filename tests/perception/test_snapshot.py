@@ -70,3 +70,20 @@ def test_the_state_of_one_method_is_not_put_into_the_other() -> None:
     chosen = load_settings("hallway", ["perception.method=paper"])
     with pytest.raises(ValueError, match="of other settings"):
         Perception(ring, chosen.models, chosen.perception).restore(paper.snapshot())
+
+
+class Contradicting(Part):
+    def contradiction(self) -> str | None:
+        return f"value is {self.value}, which is too much" if self.value > 1.0 else None
+
+
+Contradicting.__module__ = Part.__module__
+
+
+def test_a_snapshot_that_contradicts_itself_is_refused() -> None:
+    owner, other = Owner(), Owner()
+    owner.part, other.part = Contradicting(0.5), Contradicting(0.5)
+    put_back(owner, snapshot_of(other))
+    other.part.value = 2.0
+    with pytest.raises(ValueError, match=r"part\.value is 2\.0, which is too much"):
+        put_back(owner, snapshot_of(other))

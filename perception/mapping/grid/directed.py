@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing
+from perception.bounds import Bound, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
     BASE,
@@ -328,6 +329,9 @@ class DirectedGrid:
 
     SCRATCH: Final = (
         "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
+    )  # fmt: skip
+    BOUNDS: Final = bounds(
+        cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0.0, ANSWERS_MAX), _place=index_of(PLACES)
     )  # fmt: skip
 
     def __init__(self, window: Window, ring: Ring) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing
+from perception.bounds import Bound, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.window import Ring, Window, placed, row_of_beam, set_edges
 
@@ -101,6 +102,7 @@ class ElfesGrid:
     """
 
     SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_edges")
+    BOUNDS: Final = bounds(log_odds=Bound(-LOG_ODDS_MAX, LOG_ODDS_MAX))
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from config.robot import RingConfig
 from config.settings import GridConfig
 from drivers.messages import Firing
+from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats
 from perception.mapping.grid.window import Ring, Window
 from perception.percept import OccupancyWindow
@@ -89,6 +90,9 @@ class EvidenceGrid:
     """
 
     SCRATCH: Final = ("ring",)
+    BOUNDS: Final = bounds(
+        _way_m=PLACE, _at=PLACE._replace(nan=True), _heard=COUNT, _firings=COUNT, bearings=PLACE._replace(nan=True)
+    )  # fmt: skip
 
     def __init__(self, ring: RingConfig, config: GridConfig) -> None:
         self.ring = Ring(

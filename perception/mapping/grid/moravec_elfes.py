@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing
+from perception.bounds import SHARE, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.window import Ring, Window, placed, row_of_beam, set_edges
 
@@ -108,6 +109,7 @@ class MoravecElfesGrid:
     """
 
     SCRATCH: Final = ("window", "_ring", "_half_angle", "_edges")
+    BOUNDS: Final = bounds(cells=SHARE)
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
+from perception.bounds import CONSTANT, Bound, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.sensor_mounts import mounts_at
 
@@ -115,6 +116,12 @@ def placed(firing: Firing, ring: Ring) -> list[list[float]]:
     return np.column_stack([x, y, firing.ring_yaw + mounts[:, 2]]).tolist()  # type: ignore[no-any-return]
 
 
+def _corner_bound(window: Window) -> Bound:
+    """Return the bound of the number of the window's first cell."""
+    most = math.ceil(COORDINATE_MAX_M / window.cell_m) + window.cells
+    return Bound(-most, most)
+
+
 class Window:
     """The place of the window.
 
@@ -125,6 +132,8 @@ class Window:
     cell_m : float
         Side of a cell, m.
     """
+
+    BOUNDS: Final = bounds(cells=CONSTANT, cell_m=CONSTANT, corner=_corner_bound)
 
     def __init__(self, cells: int, cell_m: float) -> None:
         self.cells = cells

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes import manual_tracks, polygon_job
+from perception.bayes import manual_tracks
+from perception.bayes.job_records import NO_JOB, REFINEMENT
 from perception.bayes.kernel_settings import make_settings
 from perception.bayes.parameters import PLACED_STRAY_MAX_M, PLACED_STRAY_MAX_RAD
 from perception.bayes.state import CONFIRMED, PLACED, TENTATIVE, Memory
@@ -49,8 +50,8 @@ def test_the_job_on_a_polygon_that_is_moved_ends() -> None:
     memory = Memory(SENSORS, TRACKS)
     s, job = memory.s, memory.s[0].job
     t = manual_tracks.place_polygon(s, BOX_P, 0, 0.5, 0.5, 0.1)
-    for other, left in ((t + 1, polygon_job.REFINEMENT), (t, polygon_job.NO_JOB)):
-        job.kind, job.track = polygon_job.REFINEMENT, other
+    for other, left in ((t + 1, REFINEMENT), (t, NO_JOB)):
+        job.kind, job.track = REFINEMENT, other
         manual_tracks.move_polygon(s, BOX_P, t, 0.6, 0.5, 0.1)
         assert job.kind == left
     track = s[0].polygons[t]

@@ -10,8 +10,8 @@ import pytest
 from config.load import load_model
 from perception.bayes import polygon_initiation as initiation
 from perception.bayes.elements import REQUESTS_MAX
+from perception.bayes.job_records import INITIATION, NO_JOB
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.polygon_job import INITIATION, NO_JOB
 from perception.bayes.polygon_parameters import CHALLENGE_UNSEEN, QUANTUM_COST
 from perception.bayes.scratch import POLYGON
 from perception.bayes.state import ESTABLISHED, FREE, PLACED, TENTATIVE, Memory, PolygonTrack

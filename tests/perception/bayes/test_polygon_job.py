@@ -10,9 +10,10 @@ import pytest
 from config.load import load_settings
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.elements import POLYGON_BEARING_BINS, POLYGON_BIN_CAPACITY
+from perception.bayes.job_records import INITIATION, NO_JOB, REFINEMENT
 from perception.bayes.kernel_settings import make_settings
 from perception.bayes.polygon_initiation import advance_initiation, next_request
-from perception.bayes.polygon_job import INITIATION, NO_JOB, REFINEMENT, cost
+from perception.bayes.polygon_job import cost
 from perception.bayes.polygon_parameters import COLLECTING_COST, QUANTUM_COST
 from perception.bayes.polygon_tracks import advance_refinement, begin_refinement, polygon_quantum
 from perception.bayes.state import FREE, Memory

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from perception.bayes.job_records import PoseSearch
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.polygon_cross_path import NO_ANSWER_M
 from perception.bayes.polygon_likelihood import begin_search, continue_search, predict
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import Score
-from perception.bayes.state import PoseSearch
 from perception.records import records, zeros
 from tests import naive_polygon
 from tests.perception.bayes.box_readings import (

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from perception.bayes.job_records import PoseSearch
 from perception.bayes.object_report import polygon_covariance
 from perception.bayes.polygon_likelihood import begin_search, continue_search
 from perception.bayes.polygon_parameters import LATTICE_ATTEMPTS, LATTICE_CORRELATION_SHARE, LATTICE_PITCH
@@ -25,7 +26,7 @@ from perception.bayes.polygon_posterior import (
 )
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import Score
-from perception.bayes.state import Memory, PoseSearch
+from perception.bayes.state import Memory
 from perception.kernel import Floats
 from perception.records import records, zeros
 from tests.perception.bayes.box_readings import (

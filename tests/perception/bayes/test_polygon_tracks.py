@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes import polygon_job, polygon_tracks
+from perception.bayes import polygon_tracks
+from perception.bayes.job_records import ASSIGN, JUDGE, LATTICE, NO_JOB, REFINEMENT
 from perception.bayes.polygon_parameters import QUANTUM_COST
-from perception.bayes.pose_restarts import ASSIGN, JUDGE, LATTICE
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, Memory
 from tests.perception.bayes.box_readings import LEVEL, P, heard, keep_polygon_readings
 from tests.perception.bayes.tracks import SENSORS, TRACKS, examples
@@ -99,9 +99,9 @@ def test_a_refinement_finds_a_box_from_beside_it_and_establishes_it() -> None:
     track.x, track.y, track.heading = (truth + np.array([0.04, -0.03, 0.05])).tolist()
     assert polygon_tracks.begin_refinement(s, P, THRESHOLD)
     job = s[0].job
-    assert (job.kind, job.stage, job.track, job.reading_count) == (polygon_job.REFINEMENT, ASSIGN, 3, 24)
+    assert (job.kind, job.stage, job.track, job.reading_count) == (REFINEMENT, ASSIGN, 3, 24)
     assert (track.unseen, track.refinements) == (0, 1)
-    while job.kind != polygon_job.NO_JOB:
+    while job.kind != NO_JOB:
         polygon_tracks.advance_refinement(s, memory.tracks, P, QUANTUM_COST)
     assert track.status == ESTABLISHED
     assert track.reservoir == 24

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from perception.bayes import pose_restarts as restarts
+from perception.bayes.job_records import JUDGE, RESTART, SEARCH_NEAR, SEARCH_WIDE
 from perception.bayes.kernel_settings import make_settings
 from perception.bayes.polygon_parameters import NARROW_ROUNDS, NARROW_STEP_M, WIDE_ROUNDS, WIDE_STEP_M
-from perception.bayes.pose_restarts import JUDGE, RESTART, SEARCH_NEAR, SEARCH_WIDE
 from perception.bayes.state import Memory
 from tests.perception.bayes.box_readings import LEVEL, SETTINGS, P, S, enter_job
 from tests.perception.bayes.test_polygon_initiation import CHAIN

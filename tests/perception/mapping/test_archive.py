@@ -20,7 +20,7 @@ def record(number: int, x: float, y: float) -> NDArray[Any]:
 
 def test_records_are_found_by_place_and_number_as_in_a_list() -> None:
     rng = np.random.default_rng(7)
-    archive, held, numbers = Archive(DTYPE), dict[int, tuple[float, float]](), iter(range(1, 10_000))
+    archive, held, numbers = Archive(DTYPE, {}), dict[int, tuple[float, float]](), iter(range(1, 10_000))
     found = 0
     for _ in range(600):
         if rng.random() < 0.7 or not held:
@@ -47,7 +47,7 @@ def test_records_are_found_by_place_and_number_as_in_a_list() -> None:
 
 
 def test_a_grid_built_anew_gives_the_same_and_a_cleared_archive_nothing() -> None:
-    archive = Archive(DTYPE)
+    archive = Archive(DTYPE, {})
     for number in range(1, 100):
         archive.add(record(number, 0.37 * number, -0.21 * number))
     archive.take(5)
@@ -61,11 +61,11 @@ def test_a_grid_built_anew_gives_the_same_and_a_cleared_archive_nothing() -> Non
 
 def test_what_is_not_in_the_archive_cannot_be_taken() -> None:
     with pytest.raises(KeyError):
-        Archive(DTYPE).take(1)
+        Archive(DTYPE, {}).take(1)
 
 
 def test_nothing_that_was_taken_is_left_in_the_rows() -> None:
-    archive = Archive(DTYPE)
+    archive = Archive(DTYPE, {})
     for number in (1, 2, 3):
         archive.add(record(number, float(number), 0.0))
     for number in (1, 3, 2):

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 from config.settings import Settings
 from perception.bayes.bayes_method import BayesPerception
+from perception.bounds import Bound
 from perception.pipeline import Perception
-from perception.snapshot import Snapshot
+from perception.snapshot import Snapshot, bounds_of, numbers_of
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import open_recording, parse_settings
 from runtime.recording.replayer import Replayer, fresh_state, replay_cycle
 from runtime.recording.schema import StateFields, carried_state
-from runtime.recording.snapshot_bounds import CONSTANTS, SCRATCH, end_of, numbers_of
 
 FOLLOWING = 7
 """Cycles that are replayed from a poisoned state."""
@@ -36,6 +36,10 @@ class Moment(NamedTuple):
     def perception(self) -> Perception:
         """Return perception as a run with these settings starts."""
         return fresh_state(self.settings).perception
+
+    def bounds(self) -> dict[str, Bound]:
+        """Return the bounds of its state."""
+        return bounds_of(self.perception())
 
 
 def moments_of(path: Path) -> Iterator[Moment]:
@@ -80,8 +84,8 @@ def ends_in_error(moment: Moment, snapshot: Snapshot, scratch: float | None = No
 def fill_scratch(perception: Perception, number: float) -> None:
     """Write a number into all scratch of the Bayesian method, −1 where it does not fit; the paper's has none here."""
     if isinstance(perception.method, BayesPerception):
-        for name, values in numbers_of({SCRATCH.rstrip("."): perception.method.memory.state["scratch"]}):
-            if end_of(name, CONSTANTS) is None:
+        for name, values in numbers_of({"scratch": perception.method.memory.state["scratch"]}):
+            if name != "scratch.attracting_rows":  # written once
                 values[...] = number if values.dtype.kind == "f" or isinstance(number, int) else -1
 
 
