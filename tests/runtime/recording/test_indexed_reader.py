@@ -8,7 +8,7 @@ import struct
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -43,7 +43,7 @@ def exported(kind: str, name: str) -> Callable[[Path, Path], Path]:
     return export
 
 
-FILES: Final = MappingProxyType(
+FILES: Final[Mapping[str, Callable[[Path, Path], Path]]] = MappingProxyType(
     {
         "recording": lambda run, _folder: run,
         "recovered": recovered,
