@@ -68,7 +68,7 @@ def index_of(size: int) -> Bound:
 
 
 def up_to(most: int) -> Bound:
-    """Return the bound of a number of things of which there is room for `most`."""
+    """Return the bound of a number of items of which there is room for `most`."""
     return Bound(0, most)
 
 

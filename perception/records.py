@@ -108,7 +108,7 @@ def _bound(hint: Any) -> Bound | Fields | None:  # noqa: ANN401 - an annotation 
 
 
 def _without_bound(hint: Any) -> Any:  # noqa: ANN401 - an annotation may be anything
-    """Return an annotation with what tells of a field's shape only."""
+    """Return an annotation without its bound: the kind of a field, and its shape."""
     if get_origin(hint) is not Annotated:
         return hint
     kind, *details = get_args(hint)

@@ -23,7 +23,7 @@ _PARALLEL = 1e-12
 """Sine of the angle below which two sides count as parallel: rounding makes any crossing of theirs meaningless."""
 
 _FAR_M = 1e6
-"""Where objects wait that are not in the scene yet: beyond the hearing of any sensor."""
+"""Where objects wait that are not in the scene yet: beyond the range of any sensor."""
 
 NOWHERE = (_FAR_M, _FAR_M, 0.0)
 """Such an object."""

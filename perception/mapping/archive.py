@@ -51,7 +51,7 @@ class Archive:
         self._index: dict[int, int] = {}
 
     def contradiction(self) -> str | None:
-        """Return why the records cannot be told apart, None if each has a number of its own."""
+        """Return which records have no number of their own, None if each has one."""
         if len(np.unique(self.archived_rows["number"][: self.count])) < self.count:
             return f"count is {self.count}, but not as many objects have a number of their own"
         return None
