@@ -94,6 +94,7 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "perception/bayes/corner_model.py",
             "perception/bayes/elements.py",
             "perception/bayes/evidence.py",
+            "perception/bayes/job_records.py",
             "perception/bayes/kernel_settings.py",
             "perception/bayes/lateral_search.py",
             "perception/bayes/map_edits.py",

@@ -330,9 +330,7 @@ class DirectedGrid:
     SCRATCH: Final = (
         "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
     )  # fmt: skip
-    BOUNDS: Final = bounds(
-        cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0.0, ANSWERS_MAX), _place=index_of(PLACES)
-    )  # fmt: skip
+    BOUNDS: Final = bounds(cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0.0, ANSWERS_MAX), _place=index_of(PLACES))
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
@@ -349,8 +347,7 @@ class DirectedGrid:
         self._shares = np.zeros((room, 2))
         self._draws = make_draws()
         self._edges = np.zeros(4)
-        evidence = np.arange(-CERTAIN, CERTAIN + 1) / NAT
-        self._odds = (1.0 / (1.0 + np.exp(-evidence))).astype(np.float32)
+        self._odds = (1.0 / (1.0 + np.exp(np.arange(CERTAIN, -CERTAIN - 1, -1) / NAT))).astype(np.float32)
 
     @property
     def mirrors(self) -> float:
