@@ -330,7 +330,7 @@ class DirectedGrid:
     SCRATCH: Final = (
         "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
     )  # fmt: skip
-    BOUNDS: Final = bounds(cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0.0, ANSWERS_MAX), _place=index_of(PLACES))
+    BOUNDS: Final = bounds(cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0, ANSWERS_MAX), _place=index_of(PLACES))
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
