@@ -11,7 +11,7 @@ import sys
 
 from cyclopts import App, CycloptsError, Group
 
-from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.errors import DONE, WRONG_CALL, UserError
 from config.files import noting_files_read, one_line
 from runtime.cli.board_commands import firmware, probe_command, ring_test_command
 from runtime.cli.bridge_commands import foxglove, ros2, ros2_robot_command
@@ -64,8 +64,8 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         with ending_in_order():
             code = run_command(sys.argv[1:] if arguments is None else arguments)
-    except BrokenPipeError:  # the reader of the pipe has gone, as `head` does
-        code = FAILED
+    except BrokenPipeError:  # the reader of the pipe has what it wants, as `head` does
+        code = DONE
     sys.exit(code)
 
 

@@ -9,7 +9,8 @@ from cyclopts import Parameter
 from runtime.cli.options import Count, Flag, Force
 
 Connect = Annotated[
-    str | None, Parameter(help="Start URL of the run, with its token; by default that of the run on this machine.")
+    str | None,
+    Parameter(help="URL of the run, on another machine with its token; by default the newest run here."),
 ]
 
 

@@ -73,6 +73,11 @@ class LogStatus:
         return next((how for writer in writers if (how := writer.probe()) is not None), None)
 
 
+def takes_colours() -> bool:
+    """Return whether the user's terminal takes colours, by its type and https://no-color.org."""
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM") not in {"dumb", "unknown"}
+
+
 class _LevelFilter:
     """The first processor of structlog: drop lines below the configured level, but for those of `ALWAYS`."""
 
@@ -100,7 +105,7 @@ class _LineOutput:
         self._clock = clock
         self._is_terminal = terminal is not None and terminal.isatty()
         self._path = path
-        self._render = structlog.dev.ConsoleRenderer(colors=self._is_terminal, pad_event_to=0)
+        self._render = structlog.dev.ConsoleRenderer(colors=self._is_terminal and takes_colours(), pad_event_to=0)
 
     def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         limit = self._limits.setdefault(name, LineLimit(LINES_PER_S, LINES_BURST))

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from config.errors import DONE, FAILED, UserError
 from runtime.cli.start_signals import handled_by_loop
-from runtime.support.console_address import find_console
+from runtime.support.console_address import find_console, list_consoles
 from runtime.support.user_folders import state_folder
 
 NO_ROS: Final = (
@@ -46,8 +46,13 @@ def bridge_ros2(connect: str | None, arguments: Sequence[str]) -> int:
 
 
 def console_finder(connect: str | None) -> Callable[[], str]:
-    """Return a function that returns the start URL of the run: this one, or that of this machine's newest run."""
-    return (lambda: find_console(state_folder())) if connect is None else (lambda: connect)
+    """Return a function that returns the start URL of the run: this one, or that of this machine's newest run.
+
+    Runs beside the newest one are named on standard error.
+    """
+    if connect is None and (listed := list_consoles(state_folder())) is not None:
+        sys.stderr.write(f"echolocate: {listed}\n")
+    return lambda: find_console(state_folder(), connect)
 
 
 async def until_interrupted(work: Coroutine[Any, Any, None]) -> None:

@@ -6,12 +6,17 @@ What commands print comes from robots, recordings, file names and settings of ot
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import IO
+from typing import IO, Any, Final
 
 from rich.console import Console, ConsoleOptions, HighlighterType, JustifyMethod, OverflowMethod, RenderableType
+from rich.measure import Measurement
 from rich.segment import Segment
 from rich.style import Style
+from rich.table import Table
 from rich.text import Text
+
+WIDTH_MAX: Final = 10_000
+"""Width of a console without end."""
 
 
 class EscapingConsole(Console):
@@ -35,6 +40,20 @@ class EscapingConsole(Console):
         super().__init__(
             file=file, stderr=stderr, soft_wrap=soft_wrap, highlight=highlight, markup=False, emoji=False
         )  # fmt: skip
+
+    def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401 - as rich's
+        """Print as rich does, but no column of a table narrower than its longest word: rich would cut numbers.
+
+        The terminal wraps the lines of a table that does not fit. Without a terminal a table has its own width.
+        """
+        wide = self.options.update(max_width=WIDTH_MAX)
+        tables = [each for each in objects if isinstance(each, Table)]
+        for column in (column for table in tables for column in table.columns):
+            cells = (Measurement.get(self, wide, cell) for cell in (column.header, *column.cells))
+            column.min_width = max(cell.minimum if self.is_terminal else cell.maximum for cell in cells)
+        if tables:
+            options["crop"] = False
+        super().print(*objects, **options)
 
     def render_str(
         self,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from config.errors import FAILED, WRONG_CALL
+from config.errors import DONE, WRONG_CALL
 from tests.runtime.cli.user_errors import error_lines
 
 ROOT = Path(__file__).parents[3]
@@ -41,7 +41,7 @@ def test_a_closed_pipe_is_no_traceback_and_a_run_does_not_load_matplotlib() -> N
             [sys.executable, "-c", WITHOUT_MATPLOTLIB], env=ENVIRONMENT, stdout=out, stderr=subprocess.PIPE,
             text=True, check=False,
         )  # fmt: skip
-    assert (done.returncode, done.stderr) == (FAILED, "")
+    assert (done.returncode, done.stderr) == (DONE, "")
 
 
 @pytest.mark.promise("P28")

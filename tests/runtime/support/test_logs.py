@@ -162,6 +162,22 @@ def test_a_secret_goes_to_the_file_and_to_a_terminal_only(
     assert path.stat().st_mode & 0o777 == 0o600
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "coloured"), [("TERM", "xterm", True), ("TERM", "dumb", False), ("NO_COLOR", "1", False)]
+)
+def test_lines_are_coloured_where_the_terminal_takes_colours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str, value: str,
+    *, coloured: bool,
+) -> None:  # fmt: skip
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with open_log(LogConfig(file=str(tmp_path / "run.jsonl")), terminal=True) as log:
+        log.info("start")
+    assert ("\x1b[" in capsys.readouterr().err) == coloured
+
+
 @pytest.mark.promise("P22")
 def test_no_control_character_reaches_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Neither of a robot's name nor of an operator's text; the file has them in full, as JSON."""

@@ -6,13 +6,15 @@ import ast
 import asyncio
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
 from config.errors import DONE, FAILED, UserError
 from runtime.cli.app import run_command
 from runtime.cli.commands import ros2
-from runtime.support.console_address import announced
+from runtime.support.console_address import FOLDER, announced
+from runtime.support.file_lock import file_lock
 from runtime.support.user_folders import state_folder
 
 
@@ -40,6 +42,26 @@ def test_the_run_is_that_of_the_option_or_the_newest_one_here(
         find()
     with announced("http://h:2/?token=y", state_folder()):
         assert find() == "http://h:2/?token=y"
+        assert ros2.console_finder("http://h:2/")() == "http://h:2/?token=y"
+        assert ros2.console_finder("http://h:3/")() == "http://h:3/"
+
+
+def test_several_runs_are_named_without_their_tokens(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    older = state_folder() / FOLDER / "1"
+    older.parent.mkdir(parents=True)
+    older.touch(0o600)
+    older.write_text("http://127.0.0.1:1/?token=x\n")
+    os.utime(older, (1, 1))
+    with file_lock(older, "older"), announced("http://h:2/?token=y", state_folder()):
+        assert ros2.console_finder(None)() == "http://h:2/?token=y"
+        assert capsys.readouterr().err == (
+            "echolocate: 2 runs on this machine: http://h:2/, http://127.0.0.1:1/; "
+            "the newest is taken, --connect names another\n"
+        )
+        assert ros2.console_finder("http://127.0.0.1:1")() == "http://127.0.0.1:1/?token=x"
 
 
 async def test_a_signal_ends_it_in_order() -> None:

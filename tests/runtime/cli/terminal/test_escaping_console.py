@@ -59,3 +59,20 @@ def test_every_command_prints_on_such_a_console() -> None:
     for path in Path(str(commands.__file__)).parent.glob("*.py"):
         if path.name != "serve_console.py":  # the operator's
             assert not re.search(r"(?<!Escaping)\bConsole\(", path.read_text("utf-8")), path
+
+
+@pytest.mark.parametrize("width", [20, 40, 80])
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_no_number_of_a_table_is_cut(monkeypatch: pytest.MonkeyPatch, width: int, *, is_terminal: bool) -> None:
+    out = io.StringIO()
+    monkeypatch.setattr(out, "isatty", lambda: is_terminal)
+    monkeypatch.setenv("COLUMNS", str(width))
+    table = Table(title="figures")
+    for heading in ("between cycles: what", "median (ms)", "p99 (ms)", "p99.9 (ms)"):
+        table.add_column(heading)
+    table.add_row("line opened", "1234.567", "2345.678", "3456.789")
+    EscapingConsole(out).print(table)
+    shown = out.getvalue()
+    assert "…" not in shown
+    assert all(number in shown for number in ("1234.567", "2345.678", "3456.789"))
+    assert is_terminal or "between cycles: what" in shown
