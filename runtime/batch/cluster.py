@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from config.errors import FAILED, WRONG_CALL, UserError
 from runtime import VERSION
 from runtime.batch.dispatch import Done
-from runtime.batch.local_workers import local_workers
+from runtime.batch.local_workers import LOOK_PERIOD_S, local_workers
 from runtime.batch.runs import Run
 from runtime.batch.worker import Row, run_one
 from runtime.support.child_process import INTERPRETER
@@ -129,7 +130,7 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
             )
             client = stack.enter_context(Client(stack.enter_context(cluster)))
             command = (*WORKER_COMMAND, cluster.scheduler_address)
-            stack.enter_context(local_workers(command, workers, log))
+            started = tuple(stack.enter_context(local_workers(command, workers, log)))
             where, hint = "this machine", f"{log} says why"
         else:
             try:
@@ -139,9 +140,39 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
                     f"--scheduler {scheduler}: no scheduler answers there ({error}); start one with `dask scheduler`",
                     WRONG_CALL,
                 ) from None
-            where, hint = f"--scheduler {scheduler}", f"start some with `dask worker {scheduler}`"
-        try:
-            client.wait_for_workers(1, timeout=WORKERS_TIMEOUT_S)
-        except TimeoutError:
-            raise UserError(f"{where}: there is no worker after {WORKERS_TIMEOUT_S:g} s; {hint}", FAILED) from None
+            where, hint, started = f"--scheduler {scheduler}", f"start some with `dask worker {scheduler}`", ()
+        _await_worker(client, started, f"{where}: there is no worker", hint)
         yield DaskPool(client, as_completed())
+
+
+def _await_worker(
+    client: Client, started: Sequence[subprocess.Popen[bytes]], problem: str, hint: str
+) -> None:  # fmt: skip
+    """Wait for a worker, but no longer than the first ones of this machine live.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Connected to the scheduler.
+    started : sequence of Popen
+        The first workers of this machine.
+    problem, hint : str
+        What the error says.
+
+    Raises
+    ------
+    UserError
+        There is no worker.
+    """
+    deadline_s = time.monotonic() + WORKERS_TIMEOUT_S
+    while True:
+        have_died = bool(started) and all(process.poll() is not None for process in started)
+        try:
+            client.wait_for_workers(1, timeout=LOOK_PERIOD_S)
+        except TimeoutError:
+            if have_died:
+                raise UserError(f"{problem}: each one ends at its start; {hint}", FAILED) from None
+            if time.monotonic() >= deadline_s:
+                raise UserError(f"{problem} after {WORKERS_TIMEOUT_S:g} s; {hint}", FAILED) from None
+        else:
+            return

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -124,7 +125,11 @@ def make_runs(
     if scheduler is None:
         compile_kernels(left, console)
     workers = min(workers, len(left))
-    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "running", len(left)) as step:
+    with (
+        keeping_what_is_done(folder, console),
+        connected(scheduler, workers, folder / LOG) as pool,
+        progress(console, "running", len(left)) as step,
+    ):
         lines = ProgressLines(console, len(left), time.monotonic)
 
         def on_row(row: Row) -> None:
@@ -134,6 +139,25 @@ def make_runs(
             lines.step()
 
         return dispatch(left, pool, on_row, retries)
+
+
+@contextlib.contextmanager
+def keeping_what_is_done(folder: Path, console: Console) -> Iterator[None]:
+    """Say at an interrupt that the finished runs are kept.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are.
+    console : Console
+        Gets the line.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        text = f"interrupted: what is done is kept in {folder}; the same call goes on from there"
+        console.print(text, soft_wrap=True)
+        raise
 
 
 def compile_kernels(runs: Sequence[Run], console: Console, prepared: set[str] | None = None) -> None:

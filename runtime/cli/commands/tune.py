@@ -16,7 +16,15 @@ from config.settings import Settings
 from config.study import StudyConfig, Value, VaryConfig
 from runtime.cli.commands.offline_io import plain_console, require_package
 from runtime.cli.commands.output_files import writing
-from runtime.cli.commands.sweep import LOCK, LOG, PAGE, ProgressLines, compile_kernels, sweep_folder
+from runtime.cli.commands.sweep import (
+    LOCK,
+    LOG,
+    PAGE,
+    ProgressLines,
+    compile_kernels,
+    keeping_what_is_done,
+    sweep_folder,
+)  # fmt: skip
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.file_lock import file_lock
 from runtime.support.progress import progress
@@ -170,7 +178,11 @@ def run_maker(
     from runtime.batch.rows import RowFolder
 
     rows, prepared = RowFolder(folder), set[str]()
-    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "tuning", total) as step:
+    with (
+        keeping_what_is_done(folder, console),
+        connected(scheduler, workers, folder / LOG) as pool,
+        progress(console, "tuning", total) as step,
+    ):
         lines = ProgressLines(console, total, time.monotonic)
 
         def make(runs: Sequence[Run]) -> dict[str, Row]:

@@ -18,6 +18,7 @@ import pytest
 
 from config.errors import DONE, UserError
 from runtime import VERSION
+from runtime.batch import cluster
 from runtime.batch.cluster import DaskPool
 from runtime.batch.runs import Run
 
@@ -194,6 +195,16 @@ def pool_of(*results: FakeFuture) -> tuple[DaskPool, FakeClient]:
 
 
 RUN = Run("k", "scene", "clean", 0, "{}")
+
+
+@pytest.mark.soak
+def test_workers_that_cannot_start_are_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "WORKER_COMMAND", (sys.executable, "-c", "raise SystemExit('no module')"))
+    began_s = time.monotonic()
+    with pytest.raises(UserError, match="each one ends at its start"), cluster.connected(None, 2, tmp_path / "log"):
+        pass
+    assert time.monotonic() - began_s < 30.0
+    assert "no module" in (tmp_path / "log").read_text()
 
 
 def test_a_pool_keeps_two_runs_a_thread_under_way() -> None:

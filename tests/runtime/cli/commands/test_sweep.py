@@ -83,6 +83,7 @@ def test_a_sweep_that_was_stopped_makes_only_what_is_left(sweep: Sweep, capsys: 
         sweep(first)
     assert sweep(second) == DONE
     out, err = capsys.readouterr()
+    assert "interrupted: what is done is kept in study-sweep; the same call goes on from there" in err
     assert "4 of 6 runs are finished already" in err
     assert out.splitlines()[-2:] == ["study-sweep/runs.parquet", "study-sweep/report.html"]
     assert sorted(first.made + second.made) == [(angle, seed) for angle in (8.0, 12.0) for seed in range(3)]
