@@ -211,6 +211,8 @@ def run_robot(
         output.print(walls_table(summary["walls"], units))
     output.print(timing_table(summary))
     output.print(timing_line(summary))
+    if recording.summary_row is not None and recording.summary_row["file"] is not None:
+        output.print(f"recorded in {recording.summary_row['file']}", soft_wrap=True)
     if log_status.lost:
         output.print(
             f"{log_status.lost} lines of the log are missing: {log_status.last_error}; make room or choose another "
@@ -327,6 +329,8 @@ async def run_process(
                 view.console_url = page.url
         stack.enter_context(signals(process, reloader))
         if view is not None:
+            view.is_paused = lambda: control.is_paused
+            clock.on_change(view.draw_again)
             stack.enter_context(view.shown())
             stack.enter_context(keys(process.request, process.stop, TimeKeys(control, log).press))
             process.health.watch("view", view.probe)

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import math
 import os
+import signal
 import sys
 import termios
 import threading
@@ -122,6 +123,8 @@ class View:
         self._trail: deque[tuple[float, float]] = deque(maxlen=TRAIL)
         self.console_url: str | None = None
         """Address of the operator console; None without one."""
+        self.is_paused: Callable[[], bool] = lambda: False
+        """Whether time is paused now."""
         self._slot: Snapshot | None = None
         self._wake = threading.Event()
         self._done = False
@@ -161,6 +164,10 @@ class View:
         )  # fmt: skip
         self._wake.set()
 
+    def draw_again(self) -> None:
+        """Draw the newest picture again, as when time was paused."""
+        self._wake.set()
+
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
         """Show the view during the block."""
@@ -176,11 +183,13 @@ class View:
             sys.setswitchinterval(interval_s)
 
     def _draw(self) -> None:
+        snapshot: Snapshot | None = None
         with Live(console=self._console, auto_refresh=False, screen=False) as live:
             while not self._done:
                 self._wake.wait()
                 self._wake.clear()
-                snapshot, self._slot = self._slot, None
+                newest, self._slot = self._slot, None
+                snapshot = newest or snapshot
                 if snapshot is not None:
                     live.update(self.picture(snapshot), refresh=True)
 
@@ -218,6 +227,8 @@ class View:
         mode = snapshot.mode
         name = mode.mode.value.replace("_", " ")  # as on the page
         head = Text.assemble((f" {name} ", STYLES.get(mode.mode.value, "bold black on yellow")))
+        if self.is_paused():
+            head.append(" PAUSED ", style="bold black on cyan")
         head.append("" if snapshot.twist is None else f" {twist(snapshot.twist.v, snapshot.twist.w, self._units)}")
         reason, room = mode.reason or "", width - len(head.plain) - 2
         more = list[str]()
@@ -337,11 +348,18 @@ def keys(
             else:
                 on_other(key)
 
+    def take_keys() -> None:
+        # A process in the background may not change the terminal; fg continues it once more.
+        if os.tcgetpgrp(fd) == os.getpgrp():
+            tty.setcbreak(fd, termios.TCSANOW)  # which keeps a key that was pressed meanwhile
+
     tty.setcbreak(fd)
     loop.add_reader(fd, read)
+    loop.add_signal_handler(signal.SIGCONT, take_keys)  # the shell sets its own mode meanwhile
     try:
         yield
     finally:
+        loop.remove_signal_handler(signal.SIGCONT)
         loop.remove_reader(fd)
         with contextlib.suppress(termios.error):
             termios.tcsetattr(fd, termios.TCSADRAIN, before)

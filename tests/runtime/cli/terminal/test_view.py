@@ -7,6 +7,7 @@ import contextlib
 import io
 import os
 import pty
+import signal
 import sys
 import termios
 import threading
@@ -188,6 +189,20 @@ def test_pictures_are_taken_every_few_cycles_only() -> None:
     assert taken == len(records) // EVERY_CYCLES
 
 
+def test_a_pause_is_shown_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    file = Terminal()
+    view = View(SETTINGS, Console(file=file, width=100, force_terminal=True), "m")
+    view._slot = EMPTY
+    with view.shown():
+        view.draw_again()
+        until(lambda: "CONNECTING" in file.getvalue())
+        assert "PAUSED" not in file.getvalue()
+        view.is_paused = lambda: True
+        view.draw_again()
+        until(lambda: "PAUSED" in file.getvalue())
+
+
 def test_the_reason_why_the_robot_holds_is_shown() -> None:
     assert SETTINGS.world is not None
     records: list[CycleRecord] = []
@@ -222,6 +237,29 @@ async def test_keys_arm_halt_and_quit_and_leave_the_terminal_as_it_was(keyboard:
         await asyncio.wait_for(quits.wait(), 60.0)
     assert asked == [Request.ARM, Request.HALT, Request.HALT]
     assert termios.tcgetattr(sys.stdin.fileno()) == before
+
+
+async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
+    keyboard: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shell sets its own mode of the terminal while the program is stopped."""
+    fd = sys.stdin.fileno()
+    line_mode, is_in_front = termios.tcgetattr(fd), False
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _fd: os.getpgrp() if is_in_front else -1)
+    asked: list[Request] = []
+    with keys(asked.append, lambda: None):
+        termios.tcsetattr(fd, termios.TCSANOW, line_mode)
+        os.kill(os.getpid(), signal.SIGCONT)
+        await asyncio.sleep(0.05)
+        assert termios.tcgetattr(fd)[3] & termios.ICANON
+        is_in_front = True
+        os.kill(os.getpid(), signal.SIGCONT)
+        os.write(keyboard, b" ")
+        async with asyncio.timeout(60.0):
+            while not asked:
+                await asyncio.sleep(0.01)
+    assert asked == [Request.HALT]
+    assert termios.tcgetattr(fd) == line_mode
 
 
 async def test_without_a_terminal_there_are_no_keys(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
