@@ -11,6 +11,8 @@ from tests.browser.open_page import MODULE, Opened, Opener
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 RETRY_MS = (250, 500, 1000, 2000, 4000, 4000)
+HALT_CONFIRM_MS = 800
+HALT_ANSWER_MS = 3000
 REFUSED = r"WebSocket connection to .* failed|Failed to load resource"
 COUNT_LOSSES = f"""async () => {{
     const {{ connection }} = await {MODULE};
@@ -121,9 +123,36 @@ async def test_a_halt_without_a_connection_is_reported_and_sent_on_reconnecting(
     await server.drop()
     await opened.until("window.losses === 1", "the loss of the connection")
     await opened.page.keyboard.press("Space")
-    await opened.says("#toasts", "HALT could not be sent")
+    await opened.run_for(1)
+    await opened.says("#banner-halt", "HALT not confirmed")
     assert not server.received
     await opened.run_for(RETRY_MS[0])
     await server.wait("halt")
     assert server.received[0]["type"] == "halt", "before anything else"
     await opened.says("#mode-name", "SAFE STOP")
+    await opened.until("document.getElementById('banner-halt') === null", "the confirmation")
+
+
+async def test_a_halt_over_a_connection_that_hangs_is_unconfirmed_and_sent_over_a_new_one(
+    server: FakeServer, opener: Opener
+) -> None:
+    opened = await open_counting(server, opener)
+    server.silent = server.deaf = True
+    await opened.page.keyboard.press("Space")
+    await opened.run_for(HALT_CONFIRM_MS)
+    await opened.says("#banner-halt", "HALT not confirmed: use the robot's own stop")
+    server.silent = server.deaf = False
+    await opened.run_for(HALT_ANSWER_MS)
+    await opened.until("window.losses === 1", "the end of the dead connection")
+    await opened.run_for(RETRY_MS[0])
+    await opened.says("#mode-name", "SAFE STOP")
+    await opened.until("document.getElementById('banner-halt') === null", "the confirmation")
+    assert server.connections == 2
+
+
+async def test_a_halt_that_is_answered_shows_nothing(server: FakeServer, opener: Opener) -> None:
+    opened = await open_counting(server, opener)
+    await opened.page.keyboard.press("Space")
+    await opened.says("#mode-name", "SAFE STOP")
+    await opened.run_for(2 * HALT_CONFIRM_MS)
+    assert await opened.page.locator("#banner-halt").count() == 0

@@ -6,6 +6,9 @@ const RETRY_FIRST_MS = 250;
 const RETRY_MAX_MS = 4000;
 const ANSWER_MAX_MS = 10_000;
 const SILENCE_MAX_MS = 10_000;
+// A HALT without an answer for this long is reported as not confirmed, and sent again over a new connection.
+const HALT_CONFIRM_MS = 800;
+const HALT_ANSWER_MS = 3000;
 const MESSAGE_MAX = 65_536;
 // Refused while a recording is shown: its object numbers and poses are not those of the live run.
 const LIVE_ONLY = new Set([
@@ -33,6 +36,7 @@ export class Connection extends Emitter {
   #received_ms = 0;
   #challenge = undefined; // the newest of the server; a command that can begin a motion is refused without a fresh one
   #halting = false;
+  #unconfirmed = null;
   #probing = false;
   showsRecording = () => false;
 
@@ -63,19 +67,23 @@ export class Connection extends Emitter {
       this.emit("open");
     };
     socket.onmessage = (event) => this.#onMessage(event.data);
-    socket.onclose = (event) => {
-      if (this.#socket !== socket) return;
-      this.#socket = null;
-      this.#challenge = undefined;
-      for (const { refuse, timer } of this.#pending.values()) {
-        clearTimeout(timer);
-        refuse(new RequestError("the connection was lost before an answer came", { answered: false }));
-      }
-      this.#pending.clear();
-      this.emit("closed", { opened, reason: event.reason, code: event.code });
-      this.#timer = setTimeout(() => this.connect(), this.#retry_ms);
-      this.#retry_ms = Math.min(2 * this.#retry_ms, RETRY_MAX_MS);
-    };
+    socket.onclose = (event) => this.#lose(socket, opened, event);
+  }
+
+  // The end of a connection; of one that hangs, whose own end may take a minute, before it has ended.
+  #lose(socket, opened = true, { reason = "", code = 0 } = {}) {
+    if (this.#socket !== socket) return;
+    this.#socket = null;
+    this.#challenge = undefined;
+    for (const { refuse, timer } of this.#pending.values()) {
+      clearTimeout(timer);
+      refuse(new RequestError("the connection was lost before an answer came", { answered: false }));
+    }
+    this.#pending.clear();
+    this.emit("closed", { opened, reason, code });
+    this.#timer = setTimeout(() => this.connect(), this.#retry_ms);
+    this.#retry_ms = Math.min(2 * this.#retry_ms, RETRY_MAX_MS);
+    socket.close();
   }
 
   // Sends a message and resolves to its answer's data; rejects with a RequestError that says why not.
@@ -96,16 +104,26 @@ export class Connection extends Emitter {
     return this.#transmit(message, () => {}) !== null;
   }
 
-  // A HALT that may not have arrived is sent again as the first message of the next connection.
+  // A HALT is sent until it is answered: again as the first message of the next connection, and over a new one where this
+  // one hangs. "halt" is emitted with false when it is not confirmed in time, with true when it is.
   async halt() {
+    const socket = this.open ? this.#socket : null;
+    if (!this.#halting) this.#unconfirmed = setTimeout(() => this.emit("halt", false), socket === null ? 0 : HALT_CONFIRM_MS);
     this.#halting = true;
     try {
-      await this.request({ type: "halt" });
-      this.#halting = false;
+      await this.request({ type: "halt" }, HALT_ANSWER_MS);
+      this.#halted();
     } catch (error) {
-      this.#halting = !error.answered;
+      if (error.answered) this.#halted();
+      else if (socket !== null) this.#lose(socket);
       throw error;
     }
+  }
+
+  #halted() {
+    clearTimeout(this.#unconfirmed);
+    this.#halting = false;
+    this.emit("halt", true);
   }
 
   // The HTTP status of a plain request to the same address; null without an answer.
@@ -169,7 +187,7 @@ export class Connection extends Emitter {
     this.#probing = true;
     const socket = this.#socket;
     this.request({ type: "save_toml" }).catch((error) => {
-      if (!error.answered) socket.close();
+      if (!error.answered) this.#lose(socket);
     }).finally(() => {
       this.#probing = false;
     });

@@ -15,6 +15,8 @@ export class Drive {
       byId(id).addEventListener("click", typeof message === "function" ? message : () => this.#ask(message));
     }
     byId("halt").addEventListener("click", () => this.halt());
+    connection.on("halt", (confirmed) => notifications.banner("halt", confirmed ? null
+      : "HALT not confirmed: use the robot's own stop. It is sent again until the robot's process answers.", { bad: true }));
     byId("drive-request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
     run.on("session", () => {
@@ -36,8 +38,7 @@ export class Drive {
   }
 
   halt() {
-    this.connection.halt().catch((error) => this.notifications.toast(error.answered ? `HALT: ${error.message}`
-      : "HALT could not be sent: no connection. It is sent as soon as there is one; until then use the emergency stop of the base."));
+    this.connection.halt().catch((error) => error.answered && this.notifications.toast(`HALT: ${error.message}`));
     this.teleoperation.stop("HALT");
   }
 
