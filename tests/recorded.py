@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from unittest import mock
@@ -19,12 +19,13 @@ from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Pose
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
+from runtime.recording.channels import CHANNELS, CYCLE, KEYFRAME, RawMessage, decode, encode, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, PROFILE
 from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import cycle_head, open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.schema import FORMAT
+from runtime.recording.replayer import fresh_state
+from runtime.recording.schema import FORMAT, Keyframe, keyframe, perception_snapshot, state_fields
 from runtime.recording.storage import RecordingTarget, SingleFile
 from runtime.recording.verification import ReplayResult, verify_recording
 from runtime.recording.writer import RecorderStatus
@@ -189,6 +190,28 @@ def write_with_gap(source: Path, path: Path, cycle: int, gap_s: float) -> None:
             found["record"]["inputs"]["run_s"] += gap_s
             entries[k] = entry._replace(data=orjson.dumps(found))
     rewrite(entries, path)
+
+
+def spoil(source: Path, path: Path, spoiled: Collection[int], lost: Collection[int] = ()) -> list[int]:
+    """Write a recording with a number out of its bound in some keyframes, counted from 0, and without some cycles.
+
+    Return the cycles of all keyframes.
+    """
+    entries, cycles = [], list[int]()
+    with open_recording(source) as recording:
+        layout = fresh_state(recording.settings).perception.snapshot()
+    for entry in entries_of(source):
+        kept = entry
+        if entry.topic == KEYFRAME:
+            frame = decode(Keyframe, entry.data)
+            if len(cycles) in spoiled:
+                wrong = perception_snapshot(frame, layout) | {"canyon_map.firings": np.array(-7)}
+                kept = entry._replace(data=encode(keyframe(frame.cycle, frame.run_s, state_fields(frame), wrong)))
+            cycles.append(frame.cycle)
+        if entry.topic != CYCLE or cycle_head(entry)[0] not in lost:
+            entries.append(kept)
+    rewrite(entries, path)
+    return cycles
 
 
 def verify_file(path: Path, **span: float) -> ReplayResult:

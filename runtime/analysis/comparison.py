@@ -47,6 +47,8 @@ class Comparison:
     changed_commands: int = 0
     first_change_s: float | None = None
     """Time of the first command that differs, s after the first cycle."""
+    refused: list[str] = field(default_factory=list)
+    """Keyframes whose state was needed and refused, with the reason."""
 
 
 def compare_runs(
@@ -78,6 +80,8 @@ def compare_runs(
     first_run_s = None
     for found in replayer:
         on_message()
+        if found.refused is not None:
+            comparison.refused.append(found.refused)
         if found.recorded is None:
             continue
         inputs = found.recorded.inputs

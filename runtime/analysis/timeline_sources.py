@@ -20,12 +20,12 @@ from runtime.analysis.timeline_builder import FIRST_INTERVAL_S, TimelineBuilder
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, KEYFRAME, LOG, SERIAL, SUMMARY, RawMessage, decode
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
-from runtime.recording.replayer import Replayer, ReplayStep, keyframe_cycle
+from runtime.recording.replayer import KeyframeError, Replayer, ReplayStep, keyframe_cycle
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer
 from runtime.recording.ring_log_units import plausible_firings
 from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
-from runtime.recording.verification import Verifier
+from runtime.recording.verification import Verifier, refused_lines
 
 Progress = Callable[[], None]
 UNKNOWN_TWIST: Final = Twist(math.nan, math.nan)
@@ -100,7 +100,8 @@ def load_timeline(
 
 def between_keyframes(recording: Recording) -> range:
     """Return the cycles between the first and the last keyframe; none of a recording that has only few keyframes."""
-    cycles = [keyframe_cycle(message) for message in recording.messages() if message.topic == KEYFRAME]
+    found = (keyframe_cycle(message) for message in recording.messages() if message.topic == KEYFRAME)
+    cycles = [cycle for cycle in found if cycle is not None]
     return range(min(cycles) + 1, max(cycles) + 1) if len(cycles) >= SKIMMED_KEYFRAMES_MIN else range(0)
 
 
@@ -114,6 +115,8 @@ def _of_recording(
     collector, verifier = _Collector(timeline, interval_s), Verifier()
     replayer = Replayer(recording, skimmed=skimmed)
     for found in replayer:
+        if skimmed and found.refused is not None:
+            raise KeyframeError(found.refused)
         verifier.check(found, replayer)
         collector.add(found, replayer.state)
         on_step()
@@ -123,6 +126,7 @@ def _of_recording(
     collector.finish()
     timeline.cycles, timeline.refinement_stops = result.cycles, dict(result.refinement_stops)
     timeline.notes += [f"cycles {first} to {last} are missing" for first, last in result.missing]
+    timeline.notes += refused_lines(result.refused)
     timeline.notes += [str(region) for region in recording.corrupt_regions]
     if result.first_difference is not None:
         timeline.notes.append(f"the replay differs from the run, first in {result.first_difference}")

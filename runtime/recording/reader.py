@@ -246,7 +246,7 @@ def open_recording(path: Path) -> Iterator[Recording]:
             settings = parse_settings(info.settings)
         except ValidationError as error:
             raise RecordingError(
-                f"{path}: its settings are not valid in this version ({_first_error(error)}); replay it with the "
+                f"{path}: its settings are not valid in this version ({first_error(error)}); replay it with the "
                 f"version that wrote it, or give other settings by --with"
             ) from error
         recording = Recording(path, info, settings, data)
@@ -254,13 +254,14 @@ def open_recording(path: Path) -> Iterator[Recording]:
             yield recording
         except ValidationError as error:
             raise RecordingError(
-                f"{path}: a message in it is not valid in this version ({_first_error(error)}): replay it with the "
+                f"{path}: a message in it is not valid in this version ({first_error(error)}): replay it with the "
                 f"version that wrote it"
             ) from error
         del recording, scanner
 
 
-def _first_error(error: ValidationError) -> str:
+def first_error(error: ValidationError) -> str:
+    """Return in one line what is wrong first with a message."""
     first = error.errors(include_url=False, include_input=False)[0]
     return f"{'.'.join(map(str, first['loc']))}: {' '.join(first['msg'].split())}"
 

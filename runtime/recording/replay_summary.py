@@ -19,6 +19,7 @@ class VerifyRow(TypedDict):
     missing: list[tuple[int, int]]
     refinement: dict[str, int]
     times_real_time: float
+    refused_keyframes: list[str]
     damage: list[str]
 
 

@@ -10,9 +10,11 @@ from __future__ import annotations
 import contextlib
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
+
+from pydantic import ValidationError
 
 from config.reload import MAP, differences
 from config.settings import Settings
@@ -22,7 +24,7 @@ from runtime.cycle.drive_requests import first_request
 from runtime.cycle.step import CycleRecord, State, apply_settings, step
 from runtime.recording import channels
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, RawMessage, decode
-from runtime.recording.reader import Recording, RecordingError, cycle_head, parse_settings
+from runtime.recording.reader import Recording, RecordingError, cycle_head, first_error, parse_settings
 from runtime.recording.schema import (
     Keyframe,
     RunInfo,
@@ -39,6 +41,10 @@ KEYFRAME_HEAD: Final = re.compile(rb'\{"run_s":[^,]+,"cycle":(\d{1,15}),')
 GAP_MAX_S: Final = 3.0
 """Longest time between two cycles, s of the run, that a replay shown at a speed waits for. A cycle takes 1 s at most
 (`config.settings.CycleConfig.rate_hz`), so a longer one is a gap in the recording, of any length."""
+
+
+class KeyframeError(RecordingError):
+    """A state cannot be taken over from a keyframe; the rest of the recording can be replayed without it."""
 
 
 class KeyframePosition(NamedTuple):
@@ -83,6 +89,8 @@ class ReplayStep(NamedTuple):
     """If the message is a keyframe of the state that the replay has reached: that keyframe, to compare."""
     skimmed: bool = False
     """Whether the message is a cycle that was only read, as was asked for."""
+    refused: str | None = None
+    """If the message is a keyframe whose state cannot be taken over: which one, and why."""
 
 
 def fresh_state(settings: Settings) -> State:
@@ -90,6 +98,39 @@ def fresh_state(settings: Settings) -> State:
     return State(
         Perception(settings.ring, settings.models, settings.perception), drive_request=first_request(settings)
     )
+
+
+def adopt(frame: Keyframe, settings: Settings) -> State:
+    """Return the state in a keyframe, after every number in it was checked: compiled kernels check none.
+
+    Parameters
+    ----------
+    frame : Keyframe
+        From a recording.
+    settings : Settings
+        In force there.
+
+    Raises
+    ------
+    ValueError, ArithmeticError, LookupError
+        It is of other settings, a number in it is out of its bound, or its objects cannot be listed.
+    """
+    state = fresh_state(settings)
+    perception = state.perception
+    fresh = perception.snapshot()
+    snapshot = perception_snapshot(frame, fresh)
+    check_snapshot(snapshot, fresh, bounds_of(perception))
+    restore(state, state_fields(frame), snapshot)
+    perception.labelled_objects()
+    perception.archived_objects()
+    return state
+
+
+def restore(state: State, fields: StateFields, snapshot: Snapshot) -> None:
+    """Give a fresh state another content."""
+    state.perception.restore(snapshot)
+    for name, value in fields.items():
+        setattr(state, name, value)
 
 
 def replay_cycle(state: State, record: CycleRecord, settings: Settings) -> CycleRecord:
@@ -110,7 +151,7 @@ def replay_cycle(state: State, record: CycleRecord, settings: Settings) -> Cycle
 class Replayer:
     """An iterator over a recording's messages that runs the step at every cycle.
 
-    Cycles that follow a gap are skipped until the next keyframe, whose state is then taken over.
+    Cycles that follow a gap are skipped until the next keyframe, whose state is then taken over unless it is refused.
 
     Parameters
     ----------
@@ -121,6 +162,11 @@ class Replayer:
     skimmed : range
         Cycles that are read without being replayed, between two keyframes: among them the state is known at keyframes
         only. So a long recording is read in a small part of the time.
+
+    Raises
+    ------
+    KeyframeError
+        There is no such keyframe as `start`, or its state is refused.
 
     Attributes
     ----------
@@ -144,7 +190,8 @@ class Replayer:
             self._messages = self._since(None)
         elif isinstance(start, Checkpoint):
             self._apply_settings(start.settings)
-            self._restore(fresh_state(self._settings), start.state, start.snapshot)
+            self.state = fresh_state(self._settings)
+            restore(self.state, start.state, start.snapshot)
             self._messages = self._after_cycle(start)
         else:
             self._apply_settings(start.settings)
@@ -190,9 +237,11 @@ class Replayer:
         messages = self._since(start.chunk_offset)
         for message in messages:
             if message.topic == KEYFRAME and keyframe_cycle(message) == start.cycle:
-                self._adopt(decode(Keyframe, message.data))
-                break
-        yield from messages
+                refused = self._keyframe(message).refused
+                if refused is not None:
+                    raise KeyframeError(f"{self._recording.path}: {refused}")
+                return messages
+        raise KeyframeError(f"{self._recording.path}: the keyframe of cycle {start.cycle} cannot be read")
 
     def _apply_settings(self, data: dict[str, Any]) -> None:
         """Put other settings in force, as the run did at this point."""
@@ -210,32 +259,6 @@ class Replayer:
         if self.state is not None:
             with self._refusing(self.state.cycle + 1):
                 apply_settings(self.state, self._settings)
-
-    def _restore(self, state: State, fields: StateFields, snapshot: Snapshot) -> None:
-        """Continue from a fresh state of the settings in force, with other content."""
-        state.perception.restore(snapshot)
-        for name, value in fields.items():
-            setattr(state, name, value)
-        self.state = state
-
-    def _adopt(self, frame: Keyframe) -> None:
-        """Continue from a keyframe, after every number in it was checked: compiled kernels check none.
-
-        Raises
-        ------
-        RecordingError
-            It is of other settings, a number in it is out of its bounds, or its objects cannot be listed.
-        """
-        state = fresh_state(self._settings)
-        try:
-            fresh = state.perception.snapshot()
-            snapshot = perception_snapshot(frame, fresh)
-            check_snapshot(snapshot, fresh, bounds_of(state.perception))
-            self._restore(state, state_fields(frame), snapshot)
-            state.perception.labelled_objects()
-            state.perception.archived_objects()
-        except (ArithmeticError, LookupError, ValueError) as error:
-            raise RecordingError(f"{self._recording.path}: the keyframe of cycle {frame.cycle}: {error}") from error
 
     def _cycle(self, message: RawMessage) -> ReplayStep:
         record = self._recording.decode_cycle(message)
@@ -268,17 +291,51 @@ class Replayer:
             ) from error
 
     def _keyframe(self, message: RawMessage) -> ReplayStep:
-        frame = decode(Keyframe, message.data)
-        if self.state is not None and self.state.cycle == frame.cycle:
-            return ReplayStep(message, keyframe=frame)
-        self._adopt(frame)
+        cycle = keyframe_cycle(message)
+        try:
+            frame = decode(Keyframe, message.data)
+            if self.state is not None and self.state.cycle == frame.cycle:
+                return ReplayStep(message, keyframe=frame)
+            self.state = adopt(frame, self._settings)
+        except (ArithmeticError, LookupError, ValueError) as error:
+            why = first_error(error) if isinstance(error, ValidationError) else error
+            which = "a keyframe" if cycle is None else f"the keyframe of cycle {cycle}"
+            return ReplayStep(message, refused=f"{which} is refused: {why}")
         return ReplayStep(message)
 
 
-def keyframe_cycle(message: RawMessage) -> int:
-    """Return the cycle of a keyframe's message without decoding all of it."""
+def replay_from(
+    recording: Recording,
+    starts: Iterable[KeyframePosition | Checkpoint],
+    on_refused: Callable[[KeyframePosition | Checkpoint, KeyframeError], None],
+) -> Replayer:
+    """Return a replayer from the first of some starts that is not refused, else from the beginning of the file.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of which the whole file has been read once.
+    starts : iterable
+        Where to start, best first.
+    on_refused : callable
+        Called with each start that is refused, and why.
+    """
+    for start in starts:
+        try:
+            return Replayer(recording, start)
+        except KeyframeError as error:
+            on_refused(start, error)
+    return Replayer(recording)
+
+
+def keyframe_cycle(message: RawMessage) -> int | None:
+    """Return the cycle of a keyframe's message without decoding all of it; None if it cannot be decoded."""
     found = KEYFRAME_HEAD.match(message.data)
-    return decode(Keyframe, message.data).cycle if found is None else int(found[1])
+    if found is not None:
+        return int(found[1])
+    with contextlib.suppress(ValidationError):
+        return decode(Keyframe, message.data).cycle
+    return None
 
 
 class KeyframeFinder:
@@ -295,7 +352,7 @@ class KeyframeFinder:
         self._info = b""
 
     def find(self, chunk_offset: int, message: RawMessage) -> KeyframePosition | None:
-        """Return the position of a keyframe if the message is one; every message must be given, in file order.
+        """Return the position of a keyframe if the message is a valid one; give every message, in file order.
 
         Parameters
         ----------
@@ -305,7 +362,8 @@ class KeyframeFinder:
             The next message.
         """
         if message.topic == KEYFRAME:
-            return KeyframePosition(keyframe_cycle(message), chunk_offset, self._settings)
+            cycle = keyframe_cycle(message)
+            return None if cycle is None else KeyframePosition(cycle, chunk_offset, self._settings)
         if message.topic == SETTINGS:
             self._settings = decode(SettingsChange, message.data).settings
         elif message.topic == RUN_INFO and message.data != self._info:

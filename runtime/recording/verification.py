@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -15,7 +15,7 @@ import orjson
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CYCLE, encode
 from runtime.recording.reader import Recording, cycle_head
-from runtime.recording.replayer import KeyframeFinder, KeyframePosition, Replayer, ReplayStep
+from runtime.recording.replayer import KeyframeFinder, KeyframePosition, Replayer, ReplayStep, replay_from
 from runtime.recording.schema import (
     CarriedState,
     Cycle,
@@ -27,7 +27,7 @@ from runtime.recording.schema import (
 from runtime.timing.cycle_stats import CycleStats
 
 GAPS_MAX: Final = 1000
-"""Gaps that are listed."""
+"""Gaps that are listed, and refused keyframes."""
 ABSENT: Final = "nothing"
 OnStep = Callable[[ReplayStep, Replayer], None]
 
@@ -61,6 +61,8 @@ class ReplayResult:
     """Cycles not replayed: something before them is missing, and no keyframe has followed yet."""
     missing: list[tuple[int, int]] = field(default_factory=list)
     """First and last cycle of each gap in the recording, of the first `GAPS_MAX`."""
+    refused: list[str] = field(default_factory=list)
+    """Keyframes whose state was needed and refused, with the reason, of the first `GAPS_MAX`."""
     refinement_stops: Counter[str] = field(default_factory=Counter)
     """How often refinement ended for which cause."""
     recorded_s: float = 0.0
@@ -76,6 +78,11 @@ class ReplayResult:
         """Note a gap from one cycle to another; a small file can have millions of them."""
         if len(self.missing) < GAPS_MAX:
             self.missing.append((first, last))
+
+    def add_refused(self, text: str) -> None:
+        """Note a keyframe that was refused."""
+        if len(self.refused) < GAPS_MAX:
+            self.refused.append(text)
 
     @property
     def times_real_time(self) -> float:
@@ -93,12 +100,14 @@ def verify_recording(
     recording : Recording
         May be damaged: after a gap the replay continues at the next keyframe.
     since_s, until_s : float
-        Which part to replay, in s of the run's clock after the first cycle; it starts at the last keyframe before.
+        Which part to replay, in s of the run's clock after the first cycle; it starts at the last keyframe
+        before whose state is not refused, else at the beginning.
     on_step : callable, optional
         Called with every step and the replayer.
     """
-    start, first_run_s = _keyframe_before(recording, since_s)
-    replayer, verifier = Replayer(recording, start), Verifier()
+    starts, first_run_s = _keyframes_before(recording, since_s)
+    verifier = Verifier()
+    replayer = replay_from(recording, reversed(starts), lambda _, error: verifier.result.add_refused(str(error)))
     started_s = time.perf_counter()
     for found in replayer:
         if found.recorded is not None and found.recorded.inputs.run_s - first_run_s > until_s:
@@ -111,9 +120,9 @@ def verify_recording(
     return verifier.result
 
 
-def _keyframe_before(recording: Recording, since_s: float) -> tuple[KeyframePosition | None, float]:
-    """Return the last keyframe up to `since_s` after the first cycle, if any, and the time of that cycle, s."""
-    first_run_s, start, finder = math.inf, None, KeyframeFinder(recording)
+def _keyframes_before(recording: Recording, since_s: float) -> tuple[list[KeyframePosition], float]:
+    """Return the keyframes up to `since_s` after the first cycle, in file order, and the time of that cycle, s."""
+    first_run_s, starts, finder = math.inf, list[KeyframePosition](), KeyframeFinder(recording)
     is_before = True
     for offset, chunk in recording.chunks():
         for message in chunk:
@@ -123,10 +132,16 @@ def _keyframe_before(recording: Recording, since_s: float) -> tuple[KeyframePosi
                 first_run_s = min(first_run_s, run_s)
                 is_before = run_s - first_run_s <= since_s
                 if not since_s:
-                    return None, first_run_s
+                    return [], first_run_s
             elif frame is not None and is_before and first_run_s < math.inf:
-                start = frame
-    return start, first_run_s
+                starts.append(frame)
+    return starts, first_run_s
+
+
+def refused_lines(refused: Sequence[str]) -> list[str]:
+    """Return what to tell the user about refused keyframes: one line at most."""
+    others = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
+    return [f"{refused[0]}{others}; the replay goes on from an earlier or a later state" for _ in refused[:1]]
 
 
 class Verifier:
@@ -158,6 +173,8 @@ class Verifier:
             self.result.keyframes += 1
             difference = _keyframe_difference(found.keyframe, replayer.state)
             self._count(found.keyframe.cycle, difference)
+        elif found.refused is not None:
+            self.result.add_refused(found.refused)
 
     def _check_cycle(self, found: ReplayStep, recorded: CycleRecord) -> None:
         result, last, self._last = self.result, self._last, recorded

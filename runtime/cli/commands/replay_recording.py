@@ -146,7 +146,7 @@ def replay_again(
         There is no cycle to replay, or with `verify` the replay differs.
     """
     from runtime.recording.recorder import software_versions
-    from runtime.recording.verification import verify_recording
+    from runtime.recording.verification import refused_lines, verify_recording
 
     prepare_kernels(recording.settings, console)
     now, then = software_versions(), recording.info.versions
@@ -182,6 +182,8 @@ def replay_again(
         console.print(str(region))
     for first, last in result.missing:
         console.print(f"cycles {first} to {last} are missing in the recording; replay continues at the next keyframe")
+    for line in refused_lines(result.refused):
+        console.print(line)
     stops = sorted(result.refinement_stops.items())
     causes = ", ".join(f"{'nothing to refine' if cause == 'nothing' else cause} {count}" for cause, count in stops)
     output.print(
@@ -220,6 +222,7 @@ def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
             "missing": result.missing,
             "refinement": dict(result.refinement_stops),
             "times_real_time": round(result.times_real_time, 1),
+            "refused_keyframes": result.refused,
             "damage": [str(region) for region in recording.corrupt_regions],
         },
     }
@@ -297,11 +300,14 @@ def compare_with_settings(recording: Recording, settings: Settings, console: Con
         Units of the tables.
     """
     from runtime.analysis.comparison import compare_runs
+    from runtime.recording.verification import refused_lines
 
     prepare_kernels(settings, console)
     with progress(console, "replaying") as advance:
         comparison = compare_runs(recording, settings, advance)
     output = plain_console()
+    for line in refused_lines(comparison.refused):
+        console.print(line)
     for title, run in (("as it was", comparison.recorded), ("with the other settings", comparison.other)):
         output.print(title)
         output.print(objects_table(run.objects, units))

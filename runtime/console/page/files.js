@@ -41,6 +41,7 @@ export class Files {
     byId("file-rename").addEventListener("submit", (event) => this.#rename(event));
     connection.on("job", (job) => this.#follow(job));
     connection.on("opening", ({ share }) => setText(byId("file-opening"), `Opening: ${Math.round(100 * share)} %`));
+    connection.on("replay_problem", ({ error }) => this.#showProblem(error));
     run.on("state", () => this.#refresh());
   }
 
@@ -101,7 +102,13 @@ export class Files {
     this.#refresh();
   }
 
+  // What is wrong with the recording that is played stays on the page until it is closed.
+  #showProblem(text) {
+    this.notifications.banner("recording", text, { bad: true, buttons: [["Close", () => this.#showProblem(null)]] });
+  }
+
   async #play() {
+    this.#showProblem(null);
     setText(byId("file-opening"), "Opening …");
     byId("file-play").disabled = true;
     try {

@@ -18,7 +18,7 @@ import orjson
 
 from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import EncodedFrame
-from runtime.console.playback.replay_worker import ANSWER, HEADER, PROGRESS, SPEED_MAX, SPEED_MIN
+from runtime.console.playback.replay_worker import ANSWER, HEADER, PROGRESS, SPEED_MAX, SPEED_MIN, problem
 from runtime.console.protocols import Viewer
 from runtime.recording.folder_files import describe_recordings
 from runtime.recording.storage import find_recording
@@ -128,6 +128,7 @@ class ReplayProcess:
                     self._on_answer(orjson.loads(head))
                 else:
                     self._on_frame(EncodedFrame((self, source), number, head, changes, partial(bytes, whole)))
+        self._on_answer(problem("the process that replays the recording has ended: open the recording again"))
 
     async def _read(self) -> tuple[bytes, tuple[int, int], tuple[bytes, bytes, bytes]]:
         """Return the next message: its kind, a frame's source and number, and its parts."""

@@ -13,11 +13,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
+from pydantic import ValidationError
+
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, MODE, decode
-from runtime.recording.reader import Recording, RecordingError, cycle_head
-from runtime.recording.replayer import Checkpoint, KeyframeFinder, KeyframePosition, Replayer
+from runtime.recording.reader import Recording, RecordingError, cycle_head, first_error
+from runtime.recording.replayer import (
+    Checkpoint,
+    KeyframeError,
+    KeyframeFinder,
+    KeyframePosition,
+    replay_from,
+)
 from runtime.recording.schema import Bookmark, ModeChange
 
 LOOK_BACK: Final = 20
@@ -67,6 +75,8 @@ class ReplayCursor:
         Time at which each was entered, s after the first cycle, and the mode with its reason.
     jumps
         How often the cursor continued elsewhere than after the last cycle it yielded.
+    refused
+        What was found wrong with keyframes; none of them is tried again. The caller may take lines off.
 
     Raises
     ------
@@ -85,6 +95,7 @@ class ReplayCursor:
             raise RecordingError(f"{recording.path}: holds no cycle: the run ended before its first one")
         self.cycles = len(self._index.times_s)
         self.duration_s = self._index.times_s[-1]
+        self.refused: list[str] = []
         self._kept: OrderedDict[int, Checkpoint] = OrderedDict()
         self._kept_bytes = 0
         self._next = self.jumps = 0
@@ -114,17 +125,37 @@ class ReplayCursor:
         return max(1, bisect_right(self._index.times_s, s))
 
     def next_cycle(self) -> ReplayedCycle | None:
-        """Replay and return the next cycle whose state is known; None at the end."""
-        for step in self._replayer:
-            if step.message.topic == CYCLE:
-                self._next += 1
-                if step.replayed is not None and self._replayer.state is not None:
-                    self._keep()
-                    return ReplayedCycle(step.replayed, self._replayer.state)
+        """Replay and return the next cycle whose state is known; None at the end.
+
+        Raises
+        ------
+        RecordingError
+            A message is invalid, or a cycle cannot be replayed. The next seek starts anew.
+        """
+        try:
+            for step in self._replayer:
+                if step.refused is not None:
+                    self.refused.append(step.refused)
+                if step.message.topic == CYCLE:
+                    self._next += 1
+                    if step.replayed is not None and self._replayer.state is not None:
+                        self._keep()
+                        return ReplayedCycle(step.replayed, self._replayer.state)
+        except (RecordingError, ValidationError) as error:
+            self._next = self.cycles
+            if isinstance(error, ValidationError):
+                raise RecordingError(f"{self._recording.path}: an invalid message: {first_error(error)}") from error
+            raise
         return None
 
     def seek(self, position: int) -> Iterator[ReplayedCycle]:
-        """Go to a position; yield each cycle that is replayed on the way, the last of them at the position."""
+        """Go to a position; yield each cycle that is replayed on the way, the last of them at the position.
+
+        Raises
+        ------
+        RecordingError
+            As for `next_cycle`.
+        """
         position = min(max(1, position), self.cycles)
         base = self._nearest(position)
         if not base <= self._next < position:
@@ -160,12 +191,21 @@ class ReplayCursor:
         return max((at for at in (*self._index.keyframes, *self._kept) if at <= latest), default=0)
 
     def _begin_at(self, position: int) -> None:
-        """Go to a position with a known state, or to the beginning."""
-        start = self._kept.get(position) or self._index.keyframes.get(position)
-        if isinstance(start, Checkpoint):
-            self._kept.move_to_end(position)
-        self._replayer = Replayer(self._recording, start)
-        self._next = position
+        """Go to a position with a known state, or to the nearest one before whose state is not refused."""
+        starts: dict[int, KeyframePosition | Checkpoint] = {**self._index.keyframes, **self._kept}
+        before = {at: start for at, start in sorted(starts.items(), reverse=True) if at <= position}
+        refused = list[int]()
+
+        def on_refused(start: KeyframePosition | Checkpoint, error: KeyframeError) -> None:
+            refused.append(next(at for at, other in before.items() if other is start))
+            self.refused.append(str(error))
+
+        self._replayer = replay_from(self._recording, before.values(), on_refused)
+        for at in refused:
+            del self._index.keyframes[at]
+        self._next = next((at for at in before if at not in refused), 0)
+        if self._next in self._kept:
+            self._kept.move_to_end(self._next)
         self.jumps += 1
 
     def _keep(self) -> None:

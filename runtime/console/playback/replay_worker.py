@@ -23,6 +23,7 @@ from runtime.console.playback.replay_cursor import ReplayCursor, ReplayedCycle
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
 from runtime.recording.replayer import GAP_MAX_S
+from runtime.recording.verification import refused_lines
 
 FRAME_PERIOD_S: Final = 0.05
 """Shortest time between frames, at any speed."""
@@ -33,6 +34,8 @@ READ_BYTES: Final = 4096
 HEADER: Final = struct.Struct("!cIIIII")
 """Before each message to the client: its kind, source and number of a frame, and the lengths of three parts."""
 ANSWER, FRAME = b"a", b"f"
+PROBLEM: Final = "replay_problem"
+"""Type of the answers that say what is wrong with the recording; the page shows them."""
 PROGRESS: Final = "opening"
 """Type of the answers that say how much of the recording has been read, before its description."""
 PROGRESS_PERIOD_S: Final = 0.25
@@ -155,7 +158,17 @@ class ReplayWorker:
         return max(0.0, since_s + (next_s - from_s) / self._speed - self._clock())
 
     def advance(self) -> None:
-        """Replay one cycle at most, if one is due."""
+        """Replay one cycle at most, if one is due. Where the recording fails, pause and say so."""
+        try:
+            self._advance()
+        except RecordingError as error:
+            self._seek = self._playing_from = None
+            self._answer(problem(error))
+        refused, self._cursor.refused = self._cursor.refused, []
+        for line in refused_lines(refused):
+            self._answer(problem(line))
+
+    def _advance(self) -> None:
         if self._seek is not None:
             self._advance_seek(self._seek)
         elif self._playing_from is not None and self.wait_s <= 0.0:
@@ -178,7 +191,8 @@ class ReplayWorker:
     def _advance_seek(self, seek: Iterator[ReplayedCycle]) -> None:
         replayed = next(seek, None)
         if replayed is not None:
-            self._last = replayed
+            if self._cursor.position >= self._target:
+                self._last = replayed
             self._take(replayed)
             return
         self._seek = None
@@ -186,6 +200,8 @@ class ReplayWorker:
             self._playing_from = (self._clock(), self._cursor.t_s)
         if self._last is not None:
             self._show_frame(self._last)
+        else:
+            self._answer(problem("this moment cannot be replayed: cycles before it are missing; go to another one"))
 
     def _advance_playing(self, since_s: float, from_s: float) -> None:
         replayed = self._cursor.next_cycle()
@@ -217,6 +233,11 @@ class ReplayWorker:
             self._number += 1
             position = PlaybackPosition(round(self._cursor.t_s, 3), self._playing_from is not None, self._speed)
             self._show(self._source, self._number, self._frames.frame(replayed, position))
+
+
+def problem(text: object) -> dict[str, Any]:
+    """Return the answer that says what is wrong."""
+    return {"type": PROBLEM, "error": str(text)}
 
 
 def describe(cursor: ReplayCursor, more: dict[str, Any]) -> dict[str, Any]:
@@ -254,7 +275,7 @@ def run_worker(file: str, make: MakeFrameMaker) -> int:
             worker.execute({"do": "seek", "s": 0.0})
             _serve(worker)
     except RecordingError as error:
-        _write_answer({"error": str(error)})
+        _write_answer(problem(error))
     except BrokenPipeError:  # the client has gone
         return 0
     return 0
@@ -288,7 +309,7 @@ def _serve(worker: ReplayWorker) -> None:
                 try:
                     worker.execute(orjson.loads(line))
                 except (ValueError, KeyError, TypeError) as error:
-                    _write_answer({"error": f"{error}"})
+                    _write_answer(problem(error))
         worker.advance()
 
 

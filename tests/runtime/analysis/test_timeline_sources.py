@@ -16,6 +16,7 @@ from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording import replayer
+from tests.recorded import spoil
 
 REPLAY_CYCLE = replayer.replay_cycle
 
@@ -64,6 +65,23 @@ def test_a_long_recording_is_read_from_its_keyframes(
     times = [snapshot.t_s for snapshot in read.snapshots]
     assert times == sorted(times)
     assert len(times) > 5
+
+
+def test_a_recording_with_refused_keyframes_is_read_and_they_are_noted(
+    hall_run: Path, timeline: Timeline, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With all cycles there nothing is lost; after a gap it goes on at the next good keyframe."""
+    monkeypatch.setattr(timeline_sources, "SKIMMED_KEYFRAMES_MIN", 3)
+    path = tmp_path / "spoiled.mcap"
+    spoil(hall_run, path, {1})
+    read = load_timeline(TimelineSource(str(path)), ignore, skim=True)
+    assert (read.cycles, read.objects) == (timeline.cycles, timeline.objects)
+    first, *_ = spoil(hall_run, path, {0}, lost={10})
+    read = load_timeline(TimelineSource(str(path)), ignore)
+    assert 0 < read.cycles < timeline.cycles - (first - 10)
+    assert len(read.objects) >= 3
+    (note,) = (note for note in read.notes if "refused" in note)
+    assert f"the keyframe of cycle {first} is refused: canyon_map.firings is -7" in note
 
 
 def test_a_ring_log_has_echoes_and_objects_and_no_modes(hall_log: Path, timeline: Timeline) -> None:

@@ -11,9 +11,17 @@ import pytest
 from config.load import load_settings, with_known_room
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
 from runtime.recording.reader import open_recording
-from runtime.recording.replayer import KeyframeFinder, Replayer, ReplayStep, fresh_state, keyframe_cycle
+from runtime.recording.replayer import (
+    KeyframeError,
+    KeyframeFinder,
+    Replayer,
+    ReplayStep,
+    fresh_state,
+    keyframe_cycle,
+    replay_from,
+)
 from runtime.recording.schema import Cycle, Keyframe, perception_snapshot
-from tests.recorded import entries_of, hall, record, rewrite
+from tests.recorded import entries_of, hall, record, rewrite, spoil
 
 
 @pytest.mark.compiled
@@ -130,8 +138,54 @@ def test_cycles_after_a_gap_are_skipped_until_the_next_keyframe(paper_run: Path,
         assert replayer.checkpoint() is None
         rest = cycles(replayer)
     skipped = [step.recorded.cycle for step in rest if step.replayed is None and step.recorded is not None]
+    assert following is not None
     assert skipped == list(range(13, following + 1))
     assert all(is_equal(step) for step in rest[len(skipped) :])
+
+
+def test_a_refused_keyframe_costs_what_follows_up_to_the_next_one(paper_run: Path, tmp_path: Path) -> None:
+    path = tmp_path / "spoiled.mcap"
+    first, second, *_ = spoil(paper_run, path, {0}, lost={20})
+    assert 20 < first < second < 120
+    with open_recording(path) as recording:
+        steps = list(Replayer(recording))
+    refused = [step.refused for step in steps if step.refused is not None]
+    assert refused == [
+        f"the keyframe of cycle {first} is refused: canyon_map.firings is -7, expected 0 to 9.0072e+15"
+    ]
+    replayed = [step.recorded.cycle for step in steps if step.replayed is not None and step.recorded is not None]
+    assert replayed == [*range(1, 20), *range(second + 1, 121)]
+    assert all(is_equal(step) for step in steps if step.replayed is not None)
+
+
+def test_a_keyframe_that_is_not_valid_is_refused(paper_run: Path, tmp_path: Path) -> None:
+    entries = entries_of(paper_run)
+    where = [k for k, entry in enumerate(entries) if entry.topic == KEYFRAME]
+    for data in (b"{}", b'{"run_s":1.0,"cycle":40,"state":7}', b""):
+        entries[where[0]] = entries[where[0]]._replace(data=data)
+        rewrite(entries, tmp_path / "x.mcap")
+        with open_recording(tmp_path / "x.mcap") as recording:
+            steps = list(Replayer(recording))
+        (refused,) = (step.refused for step in steps if step.refused is not None)
+        assert "keyframe" in refused
+        assert "\n" not in refused
+        assert sum(step.replayed is not None for step in steps) == 120
+
+
+def test_a_replay_starts_at_the_best_state_that_is_not_refused(paper_run: Path, tmp_path: Path) -> None:
+    path = tmp_path / "spoiled.mcap"
+    first, last = spoil(paper_run, path, {1})
+    with open_recording(path) as recording:
+        finder, refused = KeyframeFinder(recording), list[KeyframeError]()
+        positions = [found for at, chunk in recording.chunks() for m in chunk if (found := finder.find(at, m))]
+        with pytest.raises(KeyframeError, match=f"spoiled.mcap: the keyframe of cycle {last} is refused"):
+            Replayer(recording, positions[1])
+        with pytest.raises(KeyframeError, match="the keyframe of cycle 77777 cannot be read"):
+            Replayer(recording, positions[1]._replace(cycle=77777))
+        for starts, begin in ((positions[::-1], first + 1), (positions[1:], 1)):
+            replayer = replay_from(recording, starts, lambda _, error: refused.append(error))
+            assert next(s.recorded.cycle for s in replayer if s.recorded and s.replayed) == begin
+    assert len(refused) == 2
 
 
 def test_the_cycle_of_a_keyframe_is_read_without_decoding(paper_run: Path) -> None:

@@ -23,7 +23,7 @@ from perception.pipeline import Perception
 from perception.snapshot import Snapshot, bounds_of, is_scratch, numbers_of
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import KEYFRAME, decode, encode
-from runtime.recording.reader import RecordingError, open_recording, parse_settings
+from runtime.recording.reader import open_recording, parse_settings
 from runtime.recording.replayer import Replayer, fresh_state
 from runtime.recording.schema import Keyframe, carried_state, keyframe, perception_snapshot, state_fields
 from runtime.recording.snapshot_bounds import check_snapshot
@@ -313,10 +313,10 @@ def test_the_replay_of_a_poisoned_keyframe_ends_in_one_line(edited: Path, tmp_pa
     )
     bad = keyframe(frame.cycle, frame.run_s, moment.fields, changed(moment, array, (field, 10**9)))
     rewrite([entries[0], entries[chosen]._replace(data=encode(bad)), *entries[chosen + 1 :]], tmp_path / "x.mcap")
-    with open_recording(tmp_path / "x.mcap") as recording, pytest.raises(RecordingError) as caught:
-        list(Replayer(recording))
-    assert f"{array}.{field}".rstrip(".") + " is 1000000000, expected 0 to " in str(caught.value)
-    assert "\n" not in str(caught.value)
+    with open_recording(tmp_path / "x.mcap") as recording:
+        refused = [step.refused for step in Replayer(recording) if step.refused is not None]
+    assert f"{array}.{field}".rstrip(".") + " is 1000000000, expected 0 to " in refused[0]
+    assert "\n" not in refused[0]
 
 
 def test_a_number_without_a_bound_is_refused() -> None:

@@ -15,8 +15,8 @@ from config.errors import DONE
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
 from runtime.recording.replayer import fresh_state
 from runtime.recording.schema import Cycle, Keyframe, keyframe, perception_snapshot, state_fields
-from runtime.recording.verification import ABSENT, GAPS_MAX, ReplayResult, find_difference
-from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verify_file
+from runtime.recording.verification import ABSENT, GAPS_MAX, ReplayResult, find_difference, refused_lines
+from tests.recorded import SECONDS, entries_of, hall, record, rewrite, spoil, verify_file
 
 ROOT = Path(__file__).parents[3]
 
@@ -79,6 +79,23 @@ def test_a_replay_by_the_papers_method_is_the_run_to_the_bit(tmp_path: Path) -> 
         assert result.first_difference is None, str(result.first_difference)
         assert result.cycles >= 20 * (10.0 - since_s)
         assert set(result.refinement_stops) >= {"budget", "converged", "nothing"}
+
+
+@pytest.mark.compiled
+def test_a_part_begins_at_an_earlier_keyframe_where_the_last_one_is_refused(run: Path, tmp_path: Path) -> None:
+    path = tmp_path / "spoiled.mcap"
+    frames = spoil(run, path, {1, 2})
+    for since_s, first, refused in (
+        (0.05 * frames[3] + 0.1, frames[3] + 1, 0),
+        (0.05 * frames[3] - 0.1, frames[0] + 1, 2),
+    ):
+        part = verify_file(path, since_s=since_s)
+        assert (part.first_cycle, len(part.refused)) == (first, refused)
+        assert part.cycles == 20 * SECONDS - first + 1
+        assert part.differences == (2 if refused else 0), "they differ from the state that they should hold"
+    assert refused_lines([]) == []
+    (line,) = refused_lines(part.refused)
+    assert "firings is -7, expected 0 to 9.0072e+15, and 1 more" in line
 
 
 @pytest.mark.compiled

@@ -15,7 +15,7 @@ from runtime.cli.app import run_command
 from runtime.cli.commands import replay_recording
 from runtime.cli.commands.replay_recording import Span, errors_line
 from runtime.recording.replayer import GAP_MAX_S
-from tests.recorded import SECONDS, write_with_gap
+from tests.recorded import SECONDS, spoil, write_with_gap
 
 
 @pytest.mark.parametrize(
@@ -41,6 +41,19 @@ def test_a_verified_replay_has_no_differences(run: Path, tmp_path: Path, capsys:
     assert (read["cycles"], read["verify"]["differences"], read["verify"]["first"]) == (240, 0, None)
     assert len(read["objects"]) >= 3
     assert "240 cycles from cycle 1 on, 0 differences, " in capsys.readouterr().out
+
+
+def test_a_refused_keyframe_is_one_line_and_no_error(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, summary = tmp_path / "spoiled.mcap", tmp_path / "summary.json"
+    first, *_ = spoil(run, path, {0}, lost={20})
+    for more in ([], ["--json", str(summary)], ["--with", "hallway"]):
+        assert run_command(["replay", str(path), *more]) == DONE
+        lines = [line for line in capsys.readouterr().err.splitlines() if "refused" in line]
+        assert len(lines) == 1
+        assert f"the keyframe of cycle {first} is refused: canyon_map.firings is -7, expected 0 to" in lines[0]
+    assert len(json.loads(summary.read_bytes())["verify"]["refused_keyframes"]) == 1
 
 
 class VirtualTime:

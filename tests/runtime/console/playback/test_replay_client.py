@@ -17,7 +17,7 @@ import pytest
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError
-from runtime.console.playback.replay_worker import ANSWER, HEADER
+from runtime.console.playback.replay_worker import ANSWER, HEADER, PROBLEM
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from tests.hil.machine import TIMEOUT_S
@@ -143,6 +143,9 @@ async def test_workers_are_limited_their_death_is_reported_and_none_outlives_the
         replay = client._open[id(page)]
         replay._process.kill()
         await until(lambda: replay.is_over)
+        await until(lambda: bool(page.messages))
+        assert page.messages[-1]["type"] == PROBLEM
+        assert "has ended: open the recording again" in page.messages[-1]["error"]
         with pytest.raises(ReplayError, match="has ended"):
             await client.seek(page, 1.0)
         await client.open(page, "hall.mcap")

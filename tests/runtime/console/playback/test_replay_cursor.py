@@ -9,11 +9,14 @@ from typing import Any
 
 import pytest
 
+from config.settings import Settings
 from runtime.console.playback.replay_cursor import KEPT_BYTES, LOOK_BACK, ReplayCursor
+from runtime.cycle.step import CycleRecord, State
+from runtime.recording import replayer
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, RawMessage, encode
 from runtime.recording.reader import RecordingError, open_recording
 from runtime.recording.schema import Bookmark
-from tests.recorded import entries_of, hall, record, rewrite
+from tests.recorded import entries_of, hall, record, rewrite, spoil
 from tests.runtime.console.stub_frames import fingerprint
 
 pytestmark = pytest.mark.compiled
@@ -145,6 +148,38 @@ def test_seek_over_a_gap(run: Path, tmp_path: Path, truth: list[dict[str, Any]])
         replayed = list(cursor.seek(cursor.position_at(3.0)))[-1]
         assert fingerprint(replayed) == truth[replayed.record.cycle - 1]
         assert replayed.record.cycle > 60
+
+
+def test_a_seek_goes_round_a_refused_keyframe(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> None:
+    path = tmp_path / "spoiled.mcap"
+    frames = spoil(run, path, {1, 2})
+    with open_recording(path) as recording:
+        cursor = ReplayCursor(recording)
+        for position in (frames[2] + 30, 1, frames[1] + 25, CYCLES, frames[2] + 30):
+            last = list(cursor.seek(position))[-1]
+            assert fingerprint(last) == truth[position - 1]
+        assert len(cursor.refused) == 2, "none is tried twice"
+        assert all("firings is -7" in line for line in cursor.refused)
+
+
+def test_a_seek_works_after_a_cycle_that_cannot_be_replayed(
+    run: Path, truth: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replay = replayer.replay_cycle
+
+    def failing(state: State, record: CycleRecord, settings: Settings) -> CycleRecord:
+        if record.cycle == 60:
+            raise ValueError("it is impossible")
+        return replay(state, record, settings)
+
+    monkeypatch.setattr(replayer, "replay_cycle", failing)
+    with open_recording(run) as recording:
+        cursor = ReplayCursor(recording)
+        for _ in range(2):
+            with pytest.raises(RecordingError, match=r"cycle 60 cannot be replayed.*it is impossible"):
+                list(cursor.seek(65))
+            for position in (50, 120):
+                assert fingerprint(list(cursor.seek(position))[-1]) == truth[position - 1]
 
 
 def test_bookmarks_have_their_time(run: Path, tmp_path: Path) -> None:

@@ -12,10 +12,10 @@ import orjson
 import pytest
 
 from runtime.console.playback.replay_cursor import ReplayCursor
-from runtime.console.playback.replay_worker import FRAME_PERIOD_S, FrameParts, ReplayWorker
-from runtime.recording.reader import open_recording, parse_settings
+from runtime.console.playback.replay_worker import FRAME_PERIOD_S, PROBLEM, FrameParts, ReplayWorker
+from runtime.recording.reader import RecordingError, open_recording, parse_settings
 from runtime.recording.replayer import GAP_MAX_S
-from tests.recorded import SECONDS, write_with_gap
+from tests.recorded import SECONDS, spoil, write_with_gap
 from tests.runtime.console.stub_frames import make_stub_frames
 
 pytestmark = pytest.mark.compiled
@@ -194,6 +194,45 @@ def test_after_a_seek_it_plays_on_from_there(it: WorkerCase) -> None:
     it.frames.clear()
     it.run_for(5.0)
     assert it.frames == []
+
+
+def test_a_refused_keyframe_is_reported_and_the_seek_is_completed(run: Path, tmp_path: Path) -> None:
+    frames = spoil(run, tmp_path / "spoiled.mcap", {1, 2, 3})
+    with open_recording(tmp_path / "spoiled.mcap") as recording:
+        case = WorkerCase(ReplayCursor(recording))
+        case.do(do="seek", s=0.05 * (frames[3] + 30))
+        case.run_for(1.0)
+        assert case.last["cycle"] == frames[3] + 31
+        (answer,) = case.answers
+    assert answer["type"] == PROBLEM
+    assert "firings is -7, expected 0 to 9.0072e+15, and 2 more; the replay goes on" in answer["error"]
+
+
+def test_a_place_without_a_state_and_a_cycle_that_fails_are_reported_and_the_worker_plays_on(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = spoil(run, tmp_path / "spoiled.mcap", range(100), lost={50})
+    with open_recording(tmp_path / "spoiled.mcap") as recording:
+        case = WorkerCase(ReplayCursor(recording))
+        case.do(do="seek", s=0.05 * frames[-1])
+        case.run_for(1.0)
+        assert case.frames == []
+        assert [answer["type"] for answer in case.answers] == [PROBLEM, PROBLEM]
+        assert case.answers[0]["error"].startswith(
+            "the recording has no state from which this moment can be replayed"
+        )
+        case.do(do="seek", s=1.0)
+        case.run_for(1.0)
+        assert case.last["cycle"] == 21
+        monkeypatch.setattr(case.worker._cursor, "next_cycle", failing)
+        case.do(do="play", speed=1.0)
+        case.run_for(1.0)
+        assert case.answers[2:] == [{"type": PROBLEM, "error": "cycle 7 cannot be replayed"}]
+        assert case.worker.wait_s == math.inf, "it is paused"
+
+
+def failing() -> None:
+    raise RecordingError("cycle 7 cannot be replayed")
 
 
 @pytest.mark.parametrize(
