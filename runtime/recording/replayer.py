@@ -239,9 +239,9 @@ class Replayer:
             if message.topic == KEYFRAME and keyframe_cycle(message) == start.cycle:
                 refused = self._keyframe(message).refused
                 if refused is not None:
-                    raise KeyframeError(f"{self._recording.path}: {refused}")
+                    raise KeyframeError(refused)
                 return messages
-        raise KeyframeError(f"{self._recording.path}: the keyframe of cycle {start.cycle} cannot be read")
+        raise KeyframeError(f"the keyframe of cycle {start.cycle} cannot be read")
 
     def _apply_settings(self, data: dict[str, Any]) -> None:
         """Put other settings in force, as the run did at this point."""

@@ -75,8 +75,6 @@ class ReplayCursor:
         Time at which each was entered, s after the first cycle, and the mode with its reason.
     jumps
         How often the cursor continued elsewhere than after the last cycle it yielded.
-    refused
-        What was found wrong with keyframes; none of them is tried again. The caller may take lines off.
 
     Raises
     ------
@@ -95,7 +93,8 @@ class ReplayCursor:
             raise RecordingError(f"{recording.path}: holds no cycle: the run ended before its first one")
         self.cycles = len(self._index.times_s)
         self.duration_s = self._index.times_s[-1]
-        self.refused: list[str] = []
+        self._refused: dict[str, bool] = {}
+        """What is wrong with which keyframe, and whether that was taken."""
         self._kept: OrderedDict[int, Checkpoint] = OrderedDict()
         self._kept_bytes = 0
         self._next = self.jumps = 0
@@ -135,7 +134,7 @@ class ReplayCursor:
         try:
             for step in self._replayer:
                 if step.refused is not None:
-                    self.refused.append(step.refused)
+                    self._refused.setdefault(step.refused, False)
                 if step.message.topic == CYCLE:
                     self._next += 1
                     if step.replayed is not None and self._replayer.state is not None:
@@ -162,6 +161,12 @@ class ReplayCursor:
             self._begin_at(base)
         while self._next < position and (replayed := self.next_cycle()) is not None:
             yield replayed
+
+    def take_refused(self) -> list[str]:
+        """Return which keyframes were refused, and why, each once."""
+        taken = [text for text, was_taken in self._refused.items() if not was_taken]
+        self._refused = dict.fromkeys(self._refused, True)
+        return taken
 
     def _index_file(self) -> None:
         """Fill the index, the bookmarks and the modes."""
@@ -198,7 +203,7 @@ class ReplayCursor:
 
         def on_refused(start: KeyframePosition | Checkpoint, error: KeyframeError) -> None:
             refused.append(next(at for at, other in before.items() if other is start))
-            self.refused.append(str(error))
+            self._refused.setdefault(str(error), False)
 
         self._replayer = replay_from(self._recording, before.values(), on_refused)
         for at in refused:

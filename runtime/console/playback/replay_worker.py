@@ -163,16 +163,19 @@ class ReplayWorker:
             self._advance()
         except RecordingError as error:
             self._seek = self._playing_from = None
-            self._answer(problem(error))
-        refused, self._cursor.refused = self._cursor.refused, []
-        for line in refused_lines(refused):
-            self._answer(problem(line))
+            self._report(str(error))
+        self._report()
 
     def _advance(self) -> None:
         if self._seek is not None:
             self._advance_seek(self._seek)
         elif self._playing_from is not None and self.wait_s <= 0.0:
             self._advance_playing(*self._playing_from)
+
+    def _report(self, *problems: str) -> None:
+        """Answer what is wrong with keyframes, and other problems, the one that matters most last."""
+        for text in (*refused_lines(self._cursor.take_refused()), *problems):
+            self._answer(problem(text))
 
     def _play(self, speed: float) -> None:
         if speed and not SPEED_MIN <= speed <= SPEED_MAX:
@@ -201,7 +204,7 @@ class ReplayWorker:
         if self._last is not None:
             self._show_frame(self._last)
         else:
-            self._answer(problem("this moment cannot be replayed: cycles before it are missing; go to another one"))
+            self._report("this moment cannot be replayed: cycles before it are missing; go to another one")
 
     def _advance_playing(self, since_s: float, from_s: float) -> None:
         replayed = self._cursor.next_cycle()

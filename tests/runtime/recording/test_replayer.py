@@ -178,7 +178,7 @@ def test_a_replay_starts_at_the_best_state_that_is_not_refused(paper_run: Path, 
     with open_recording(path) as recording:
         finder, refused = KeyframeFinder(recording), list[KeyframeError]()
         positions = [found for at, chunk in recording.chunks() for m in chunk if (found := finder.find(at, m))]
-        with pytest.raises(KeyframeError, match=f"spoiled.mcap: the keyframe of cycle {last} is refused"):
+        with pytest.raises(KeyframeError, match=f"^the keyframe of cycle {last} is refused"):
             Replayer(recording, positions[1])
         with pytest.raises(KeyframeError, match="the keyframe of cycle 77777 cannot be read"):
             Replayer(recording, positions[1]._replace(cycle=77777))
