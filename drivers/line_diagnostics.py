@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from config.robot import LinkConfig
+from drivers.heard_bytes import HeardBytes
 
 _NOISE_MIN = 3
 """Fewest corrupt frames that count as noise; one or two are normal where a line starts or ends."""
+_UNFRAMED_MIN = 64
+"""Bytes without odometry that count as more than the last echo and a broken frame."""
 
 
 def deadman_refused(name: str, deadman_s: float, link: LinkConfig) -> str | None:
@@ -47,7 +50,7 @@ def finer_than_line(resolution_m: float, unit_m: float) -> str | None:
     )
 
 
-def silence(silent_s: float, *, others: bool, bad: int) -> str:
+def silence(silent_s: float, *, others: bool, bad: int, heard: HeardBytes | None = None) -> str:
     """Return the message for missing odometry.
 
     Parameters
@@ -58,13 +61,23 @@ def silence(silent_s: float, *, others: bool, bad: int) -> str:
         Whether frames of other kinds are still received.
     bad
         Corrupt frames received since the last odometry.
+    heard
+        All bytes received since, where the driver keeps them.
     """
+    if heard is not None and heard.stranger is not None:
+        return f"no odometry for {silent_s:.2f} s, and {heard.stranger}"
     if (noisy := noise(bad, "it")) is not None:
         return f"no odometry for {silent_s:.2f} s, {noisy}; the connection is restored as soon as frames are valid"
     if others:
         return (
             f"no odometry for {silent_s:.2f} s although the robot sends other frames; its base has stopped working: "
             f"restart the robot"
+        )
+    if heard is not None and heard.total > _UNFRAMED_MIN:
+        return (
+            f"no odometry for {silent_s:.2f} s, and the {heard.total} bytes received since are no frame; the robot "
+            f"restarts, or the line is disturbed: check its power and cable; the connection is restored as soon as "
+            f"frames are valid"
         )
     return (
         f"nothing received for {silent_s:.2f} s; the robot is off or restarting, or its cable is loose: check its "
@@ -79,4 +92,34 @@ def noise(bad: int, what: str) -> str | None:
     return (
         f"{bad} corrupt frames came in place of {what}; noise on the line: check its cable and shield, and that "
         f"nothing else sends on it"
+    )
+
+
+def no_answer(what: str, frames: int, heard: HeardBytes) -> str:
+    """Return the message for a robot that does not answer a call.
+
+    Parameters
+    ----------
+    what
+        The call and how it was made, as "no answer to 3 HELLO commands".
+    frames
+        Valid frames received on the line so far.
+    heard
+        All bytes received.
+    """
+    if (stranger := heard.stranger) is not None:
+        return f"{what}, and {stranger}"
+    if frames:
+        return (
+            f"{what} although the robot sends other frames; the line to it is broken, or another program reads its "
+            f"port: check the cable, and that no other program uses the port; then restart the robot"
+        )
+    if heard.total:
+        return (
+            f"{what}, and what is received is no frame of this protocol; another device is on this port, or the "
+            f"line has another speed: check the port and link.baud"
+        )
+    return (
+        f"{what} and nothing is received; the robot is off, or on another port: check its power and cable, and "
+        f"link.port; the connection is restored as soon as it answers"
     )

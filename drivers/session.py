@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from typing import Final, Generic, Protocol, TypeVar
 
 from drivers.driver import LineState, Received
+from drivers.heard_bytes import HeardBytes
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
 FIRINGS_MAX: Final = 1024
@@ -43,7 +45,8 @@ class Session(ABC, Generic[S]):
     def __init__(self, stamper: S) -> None:
         self.stamper = stamper
         self._state = LineState.CLOSED
-        self._problem: str | None = None
+        self._problem: str | Callable[[], str] | None = None
+        """What is wrong; a function where that follows what is received."""
         self._identity: Identity | None = None
         self._earlier_counts = LinkCounts()
         self._run_s = 0.0
@@ -52,6 +55,7 @@ class Session(ABC, Generic[S]):
         self._odometry: Odometry | None = None
         self._flags, self._rebooted = Flags.NONE, False
         self._noted = set[str]()
+        self._heard = HeardBytes()
 
     @property
     def state(self) -> LineState:
@@ -61,7 +65,7 @@ class Session(ABC, Generic[S]):
     @property
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
-        return self._problem
+        return self._problem() if callable(self._problem) else self._problem
 
     @property
     def identity(self) -> Identity | None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import Final
 
 from config.files import one_line
 from config.robot import RobotConfig
+from drivers import line_diagnostics
 from drivers.arcos.frames import ConfigPacket, RobotName
+from drivers.arcos.handshake import Stage
+from drivers.heard_bytes import HeardBytes
 from drivers.line_diagnostics import deadman_refused
 
 WATCHDOG_DEFAULT_S: Final = 2.0
@@ -53,6 +57,28 @@ STOP_PRESSED: Final = (
 )
 
 
+_UNANSWERED: Final = MappingProxyType({
+    Stage.CLOSING: (
+        "the robot sends the packets of an open session and does not end it",
+        "it receives nothing, or another client holds it open: end the other client, check the line, and press the "
+        "robot's reset button",
+    ),
+    Stage.SYNC1: (
+        "the robot answers SYNC0 and not {}",
+        "it is in the middle of another client's start, loses packets, or is no Pioneer: end other clients, then "
+        "restart it, or its simulator",
+    ),
+    Stage.CONFIG: (
+        "the robot answers the SYNCs, but neither OPEN nor CONFIG",
+        "it loses packets or is no Pioneer: check the line, then restart it, or its simulator",
+    ),
+    Stage.DONE: (
+        "the robot answers the SYNCs and opens its session, but sends no odometry",
+        "its controller has stopped working: restart it, or its simulator",
+    ),
+})  # fmt: skip
+
+
 def watchdog_note(deadman_s: float) -> str:
     """Return the message about a base that drives on for long if this program is killed."""
     return (
@@ -92,26 +118,25 @@ def deadman_s(packet: ConfigPacket | None) -> float:
     return 1e-3 * packet.watchdog_ms
 
 
-def no_answer(*, bauds: tuple[int, ...], heard: int) -> str:
+def no_answer(bauds: tuple[int, ...], frames: int, heard: HeardBytes) -> str:
     """Return the message for a robot that does not answer SYNC0.
 
     Parameters
     ----------
     bauds
         Speeds at which it was called; none on a line without a speed.
-    heard
-        Bytes received that were no frame.
+    frames, heard
+        Valid frames, and all bytes, received so far.
     """
     tried = f" at {', '.join(map(str, bauds))} baud" if bauds else ""
-    if heard:
-        return (
-            f"no answer to SYNC0{tried}, and what is received is no frame of this protocol; another device is on "
-            f"this port, or the line is disturbed: check the port and the cable"
-        )
-    return (
-        f"no answer to SYNC0{tried} and nothing is received; the robot is off, or on another port: check its power "
-        f"and cable, and link.port; the connection is restored as soon as it answers"
-    )
+    return line_diagnostics.no_answer(f"no answer to SYNC0{tried}", frames, heard)
+
+
+def unanswered(stage: Stage, heard: HeardBytes) -> str:
+    """Return the message for a robot that answers, but leaves a later stage of the handshake unanswered."""
+    what, remedy = _UNANSWERED.get(stage, _UNANSWERED[Stage.SYNC1])
+    what = what.format(stage.value)
+    return f"{what}; {remedy}" if heard.stranger is None else f"{what}, and {heard.stranger}"
 
 
 def not_receiving(unanswered_s: float) -> str:

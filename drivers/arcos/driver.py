@@ -88,7 +88,8 @@ class ArcosDriver(Session[PoseStamper]):
         self._is_set_up = self._is_first_sip = False
         self._has_session = self._was_reset = self._is_ending = False
         self._halting, self._enabling, self._receiver = Halting(), Enabling(), ReceiverMonitor()
-        self._bad_at_sip = self._battery = 0
+        self._bad_at_sip = self._battery = self._failures = 0
+        self._heard_baud = 0
         self.stamper.set_polling(self._polling)
 
     @property
@@ -97,7 +98,7 @@ class ArcosDriver(Session[PoseStamper]):
         moving_s = self._halting.moving_s(self._run_s)
         if self._state is LineState.READY and moving_s > _MOVING_MAX_S:
             return diagnostics.not_stopping(moving_s)
-        return self._problem
+        return super().problem
 
     @property
     def battery_v(self) -> float | None:
@@ -123,8 +124,9 @@ class ArcosDriver(Session[PoseStamper]):
         self._problem = None
         self._is_ending = False
         self._refused_until_s = -math.inf
+        self._heard.clear()
         if self._has_session:  # the robot has kept the speed
-            self._handshake.restart(run_s)
+            self._handshake.resume(run_s)
         else:
             self._handshake.start(run_s)
 
@@ -138,9 +140,14 @@ class ArcosDriver(Session[PoseStamper]):
     def receive(self, data: bytes, run_s: float) -> None:
         """Take bytes from the line, split anywhere."""
         self._run_s = self._data_s = run_s
-        if self._state is not LineState.CLOSED:
-            for packet in self._decoder.feed(data):
-                self._take(packet)
+        if self._state is LineState.CLOSED:
+            return
+        if self._heard_baud != self._handshake.baud:
+            self._heard_baud = self._handshake.baud
+            self._heard.begin_speed()
+        self._heard.received(data)
+        for packet in self._decoder.feed(data):
+            self._take(packet)
 
     def tick(self, run_s: float) -> None:
         """Let time pass: go on with the handshake; stop the base and go DOWN if the robot is silent for too long."""
@@ -153,6 +160,8 @@ class ArcosDriver(Session[PoseStamper]):
         if self._state is LineState.READY:
             self._supervise()
         elif run_s >= self._refused_until_s:
+            if self._heard.total and not self._decoder.frames:
+                self._handshake.hear_noise()
             self._handshake.tick(run_s)
             self._go_on()
 
@@ -201,9 +210,12 @@ class ArcosDriver(Session[PoseStamper]):
         commands = () if is_syncing and writable else self._halting.commands(self._run_s)
         if writable:
             commands += self._due_commands()
+        data = b"".join(map(encode, commands))
         if commands:
             self._sent_s = self._run_s
-        return b"".join(map(encode, commands))
+        if len(commands) > 1:  # a SYNC, which the robot does echo, is sent alone
+            self._heard.sent(data)
+        return data
 
     def _due_commands(self) -> tuple[Command, ...]:
         """Return the commands that are due besides a stop; one at a time of those that can wait."""
@@ -230,7 +242,7 @@ class ArcosDriver(Session[PoseStamper]):
         if silent_s > silence_max_s:
             others = self._packet_s - self._sip_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_at_sip
-            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad))
+            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self._heard))
         elif unanswered_s > 2.0 * silence_max_s:
             self._go_down(diagnostics.not_receiving(unanswered_s))
         elif self._enabling.tries > self._config.link.tries:
@@ -280,12 +292,7 @@ class ArcosDriver(Session[PoseStamper]):
     def _go_on(self) -> None:
         """Follow the handshake: check what the robot says, and set it up at the end."""
         handshake = self._handshake
-        if handshake.stage is Stage.SYNC0:
-            if handshake.sweeps and self._state is LineState.HANDSHAKE and self._run_s - self._called_s >= _CALLING_S:
-                self._state = LineState.DOWN
-                self._problem = diagnostics.no_answer(bauds=handshake.bauds, heard=self._decoder.bad)
-        elif self._state is LineState.DOWN and handshake.stage is not Stage.CLOSING:
-            self._state = LineState.HANDSHAKE
+        self._judge_progress()
         if handshake.stage is Stage.CONFIG and handshake.name is not None:
             wrong = diagnostics.wrong_robot(handshake.name, self._config)
             if wrong is not None:
@@ -294,7 +301,25 @@ class ArcosDriver(Session[PoseStamper]):
             self._set_up()
         elif handshake.stage is Stage.DONE and self._run_s - self._sip_s > _OPENING_S:
             self._abandon()
-            handshake.restart(self._run_s)
+            handshake.give_up(self._run_s)
+
+    def _judge_progress(self) -> None:
+        """Go DOWN if the robot has long been called and leaves a stage unanswered, and up again once it answers."""
+        handshake, stages = self._handshake, tuple(Stage)
+        is_late = self._run_s - self._called_s >= _CALLING_S
+        has_failed = handshake.failures > self._failures
+        self._failures = handshake.failures
+        is_called_in_vain = handshake.stage is Stage.SYNC0 and handshake.sweeps and self._state is LineState.HANDSHAKE
+        if is_late and (has_failed or is_called_in_vain):
+            stage, bauds, self._state = handshake.unanswered, handshake.bauds, LineState.DOWN
+            if handshake.failures:
+                self._problem = lambda: diagnostics.unanswered(stage, self._heard)
+            else:
+                self._problem = lambda: diagnostics.no_answer(bauds, self._decoder.frames, self._heard)
+        elif self._state is LineState.DOWN:
+            answered = handshake.unanswered if handshake.failures else Stage.SYNC0
+            if stages.index(handshake.stage) > stages.index(answered):
+                self._state = LineState.HANDSHAKE
 
     def _set_up(self) -> None:
         """Check and adopt what the robot reports of itself, and queue the commands that set it up."""
@@ -334,6 +359,7 @@ class ArcosDriver(Session[PoseStamper]):
         flags = flags_of(sip, (packet and packet.low_battery) or 0)
         self._odometry, firings = self.stamper.sip(sip, self._run_s, flags, self.line_baud, after_loss=after_loss)
         self._sip_s, self._bad_at_sip = self._run_s, self._decoder.bad
+        self._heard.clear()
         self._flags |= flags
         self._battery = sip.battery_10 or sip.battery
         self._firings += firings

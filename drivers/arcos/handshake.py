@@ -1,8 +1,11 @@
 """The start of a session: find the robot's line speed, SYNC0 to SYNC2, OPEN, its configuration, a faster line.
 
 A robot that an earlier client left open may be moving, or its watchdog may have stopped it and the next command of
-any kind sets it in motion again. So every SYNC0 follows a STOP and an ESTOP, which a robot without a session ignores.
-A robot in a session answers SYNC0 with its SIPs; that session is closed.
+any kind sets it in motion again. Such a robot sends SIPs unasked. So the line is listened to first: a robot that
+sends SIPs is stopped and its session closed; where bytes come at a wrong speed, each SYNC0 follows a STOP and an
+ESTOP. On a silent line the first SYNC0 comes alone, because some simulators take the first packet of a session,
+whatever it is, for a SYNC and count on. A robot that has not answered that one may be open and mute: STOP and ESTOP
+come before the next.
 """
 
 from __future__ import annotations
@@ -21,6 +24,11 @@ CLOSE: Final = (Command(CommandNumber.CLOSE, 1),)
 
 _LIKELY_BAUDS: Final = (9600, 38400, 115200, 19200, 57600)
 """Speeds at which a robot may listen, the likely ones first."""
+_LISTEN_S: Final = 0.25
+"""Time to listen before the first SYNC0, s: two and a half times the usual period of SIPs."""
+_SOCKET_REPLY_S: Final = 1.0
+"""Least time for the answer to a SYNC over a network, s, as other clients wait: nothing is lost there, simulators
+take up to 0.2 s on an idle computer, and one that counts packets never answers after a repeated SYNC."""
 _CLOSING_S: Final = 0.2
 """Time after CLOSE until the robot waits for SYNC0, s."""
 _CONFIG_S: Final = 0.21
@@ -37,7 +45,8 @@ _AUTO_BAUD: Final = 2
 class Stage(Enum):
     """What is sent next, or answered next."""
 
-    CLOSING = "closing"
+    LISTENING = "listening"
+    CLOSING = "CLOSE"
     SYNC0 = "SYNC0"
     SYNC1 = "SYNC1"
     SYNC2 = "SYNC2"
@@ -71,42 +80,61 @@ class Handshake:
         Whether the robot was in a session when it was called.
     keeps_baud
         Whether the robot did not follow to the speed of `link`.
+    failures
+        How often a robot that answers left a later stage unanswered, since `restart`.
+    unanswered
+        The last such stage.
     """
 
     def __init__(self, link: LinkConfig, *, has_speed: bool) -> None:
         self.bauds = tuple(dict.fromkeys((_LIKELY_BAUDS[0], link.baud, *_LIKELY_BAUDS))) if has_speed else ()
         self.baud = link.baud
-        self.stage = Stage.SYNC0
-        self.sweeps = 0
+        self.stage = Stage.LISTENING
+        self.sweeps = self.failures = 0
+        self.unanswered = Stage.SYNC1
         self.name: RobotName | None = None
         self.config: ConfigPacket | None = None
         self.was_open = self.keeps_baud = False
         self._link = link
         self._run_s = self._since_s = 0.0
         self._tries = 0
-        self._is_due = False
+        self._is_due = self._is_wary = False
+        self._reply_s = link.reply_timeout_s if has_speed else max(link.reply_timeout_s, _SOCKET_REPLY_S)
         self._slow_baud = link.baud
         self._is_sending = False
         self._order = self.bauds
 
     @property
     def is_syncing(self) -> bool:
-        """Whether another command could break the sequence of SYNCs; each SYNC0 stops the base before it."""
-        return self.stage in {Stage.SYNC0, Stage.SYNC1, Stage.SYNC2}
+        """Whether another command could break the sequence of SYNCs; it stops a base that may move itself."""
+        return self.stage in {Stage.LISTENING, Stage.CLOSING, Stage.SYNC0, Stage.SYNC1, Stage.SYNC2}
 
     def start(self, run_s: float) -> None:
         """Begin on a line that was just opened, at the likeliest speed."""
         if self.bauds:
             self.baud = self.bauds[0]
+        self.resume(run_s)
+
+    def resume(self, run_s: float) -> None:
+        """Begin on a line that was opened again, at the speed that its robot had."""
         self.restart(run_s)
+        self._is_wary = False
+        self._listen()
 
     def restart(self, run_s: float) -> None:
-        """Begin again, at the present speed first."""
-        self._run_s, self.sweeps = run_s, 0
+        """Begin again on the same line, at the present speed first: stop the base at once, as it may still move."""
+        self._run_s, self.sweeps, self.failures, self._is_wary = run_s, 0, 0, True
         self._order = tuple(dict.fromkeys((self.baud, *self.bauds))) if self.bauds else ()
         self.name = self.config = None
         self.was_open = self.keeps_baud = self._is_sending = False
         self._enter(Stage.SYNC0)
+
+    def give_up(self, run_s: float) -> None:
+        """Begin again, as the session that was opened brings nothing."""
+        failures = self.failures
+        self.restart(run_s)
+        self.failures = failures
+        self._fail(Stage.DONE)
 
     def commands(self) -> tuple[Command, ...]:
         """Return the commands to send now, and consider them sent; those of one call belong into one write."""
@@ -118,7 +146,7 @@ class Handshake:
             case Stage.CLOSING:
                 return *STOP, *CLOSE
             case Stage.SYNC0:
-                return *STOP, Command(CommandNumber.PULSE)
+                return *(STOP if self._is_wary or self._tries > 1 else ()), Command(CommandNumber.PULSE)
             case Stage.SYNC1:
                 return (Command(CommandNumber.OPEN),)
             case Stage.SYNC2:
@@ -140,9 +168,13 @@ class Handshake:
         if self._is_due or self.stage is Stage.DONE:
             return
         match self.stage:
+            case Stage.LISTENING:
+                if waited_s >= _LISTEN_S:
+                    self._enter(Stage.SYNC0)
             case Stage.CLOSING:
                 if waited_s >= _CLOSING_S:
-                    self._enter(Stage.SYNC0)
+                    self._is_wary = False
+                    self._listen()
             case Stage.CONFIG:
                 if waited_s >= _CONFIG_S:
                     self._repeat_config()
@@ -155,8 +187,14 @@ class Handshake:
                     self.baud, self.keeps_baud = self._slow_baud, True
                     self._enter(Stage.DONE)
             case _:
-                if waited_s >= self._link.reply_timeout_s:
+                if waited_s >= self._reply_s:
                     self._repeat_sync()
+
+    def hear_noise(self) -> None:
+        """Take bytes that are no packet: a robot in a session, at another speed of the line."""
+        if self.stage is Stage.LISTENING and self.bauds:
+            self._is_wary = True
+            self._enter(Stage.SYNC0)
 
     def take(self, packet: Packet) -> None:
         """Take a packet from the robot."""
@@ -169,7 +207,9 @@ class Handshake:
             case RobotName() if stage is Stage.SYNC2:
                 self.name = packet
                 self._enter(Stage.CONFIG)
-            case Sip() if stage in {Stage.SYNC0, Stage.SYNC1, Stage.SYNC2}:
+            case Sip() if stage in {Stage.LISTENING, Stage.SYNC0, Stage.SYNC1, Stage.SYNC2}:
+                if self.was_open:
+                    self._fail(Stage.CLOSING)
                 self.was_open = True
                 self._enter(Stage.CLOSING)
             case Sip() if stage is Stage.CONFIG:
@@ -188,6 +228,13 @@ class Handshake:
     def _enter(self, stage: Stage) -> None:
         self.stage, self._is_due, self._tries = stage, True, 0
 
+    def _listen(self) -> None:
+        self._enter(Stage.LISTENING)
+        self._is_due, self._since_s = False, self._run_s
+
+    def _fail(self, stage: Stage) -> None:
+        self.failures, self.unanswered, self._is_wary = self.failures + 1, stage, True
+
     def _repeat_sync(self) -> None:
         """Repeat a SYNC; after the last try of SYNC0 at another speed, and of the others from the beginning."""
         self._is_due = True
@@ -195,6 +242,7 @@ class Handshake:
             return
         self._tries = 0
         if self.stage is not Stage.SYNC0:
+            self._fail(self.stage)
             self.stage = Stage.SYNC0
         elif self._order:
             following = (self._order.index(self.baud) + 1) % len(self._order)
@@ -207,5 +255,8 @@ class Handshake:
         """Request the configuration again; go on without it, or from the beginning if nothing comes at all."""
         if self._tries < _CONFIG_TRIES:
             self._is_due = True
+        elif self._is_sending:
+            self._enter(Stage.DONE)
         else:
-            self._enter(Stage.DONE if self._is_sending else Stage.SYNC0)
+            self._fail(Stage.CONFIG)
+            self._enter(Stage.SYNC0)

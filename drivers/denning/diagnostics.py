@@ -5,7 +5,9 @@ from __future__ import annotations
 from types import MappingProxyType
 
 from config.robot import RobotConfig
+from drivers import line_diagnostics
 from drivers.denning.frames import CAN_LISTEN, TENTH_FT_M, VERSION, Ident, NakCode
+from drivers.heard_bytes import HeardBytes
 from drivers.line_diagnostics import deadman_refused
 
 _RADIUS_TOLERANCE_MM = 1.0
@@ -74,7 +76,7 @@ def coarse_ranges(ident: Ident, resolution_m: float) -> str | None:
     )
 
 
-def no_answer(command: str, tries: int, *, frames: int, bad: int, baud: int) -> str:
+def no_answer(command: str, tries: int, frames: int, heard: HeardBytes) -> str:
     """Return the message for a command that stayed unanswered.
 
     Parameters
@@ -83,26 +85,10 @@ def no_answer(command: str, tries: int, *, frames: int, bad: int, baud: int) -> 
         Its name in the protocol.
     tries
         How often it was sent.
-    frames, bad
-        Valid and corrupt frames received on the line so far.
-    baud
-        The line's speed.
+    frames, heard
+        Valid frames, and all bytes, received on the line so far.
     """
-    what = f"no answer to {tries} {command} commands"
-    if frames:
-        return (
-            f"{what} although the robot sends other frames; the line to it is broken or something else reads its "
-            f"port: check the cable, and that no other program uses the port"
-        )
-    if bad:
-        return (
-            f"{what} and all that is received is corrupt; likely the baud rate: check that the robot is set to "
-            f"{baud} baud, or set link.baud"
-        )
-    return (
-        f"{what} and nothing is received; the robot is off, or on another port: check its power and cable, and "
-        f"link.port; the connection is restored as soon as it answers"
-    )
+    return line_diagnostics.no_answer(f"no answer to {tries} {command} commands", frames, heard)
 
 
 def not_receiving(unacknowledged_s: float) -> str:

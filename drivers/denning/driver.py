@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from config.files import one_line
@@ -81,7 +82,7 @@ class DenningDriver(Session[PoseStamper]):
         if self._problem is None and self._state is LineState.READY:
             corrupt = self._echo_timeout.corrupt_frames(self._run_s, self._decoder.bad)
             return line_diagnostics.noise(corrupt, "its echoes")
-        return self._problem
+        return super().problem
 
     @property
     def _line_counts(self) -> LinkCounts:
@@ -92,6 +93,7 @@ class DenningDriver(Session[PoseStamper]):
         self.line_closed()
         self._run_s = self._last_frame_s = run_s
         self._flush_first = True
+        self._heard.clear()
         self._drive_acks = CommandAckMonitor()
         self._start_handshake()
 
@@ -108,6 +110,7 @@ class DenningDriver(Session[PoseStamper]):
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
+        self._heard.received(data)
         for frame in self._decoder.feed(data):
             self._last_frame_s = run_s
             self._take_frame(frame)
@@ -120,9 +123,8 @@ class DenningDriver(Session[PoseStamper]):
         commands = self._commands
         given_up = [n for n in _SEND_ORDER if n in commands and commands[n].tick(run_s)] if commands else ()
         if given_up:
-            name = given_up[0]
-            frames, bad, baud = self._decoder.frames, self._decoder.bad, self._config.link.baud
-            self._go_down(diagnostics.no_answer(name, commands[name].tries, frames=frames, bad=bad, baud=baud))
+            name, tries = given_up[0], commands[given_up[0]].tries
+            self._go_down(lambda: diagnostics.no_answer(name, tries, self._decoder.frames, self._heard))
         if self._state is LineState.READY:
             self._check_timeouts()
             if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
@@ -190,6 +192,7 @@ class DenningDriver(Session[PoseStamper]):
             # Not a pending command: it needs no answer, because other timeouts detect a lost robot.
             self._must_identify = False
             out += encode(Hello(self._next_seq(), self._version))
+        self._heard.sent(bytes(out))
         if out and self._flush_first:
             # Ends the incomplete frame that an earlier user of the line may have left in the robot's decoder.
             self._flush_first = False
@@ -205,7 +208,7 @@ class DenningDriver(Session[PoseStamper]):
             # A single echo may follow the last odometry before the robot falls silent.
             others = self._last_frame_s - self._odometry_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_at_odometry
-            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad))
+            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self._heard))
         elif unacknowledged_s > _UNACKNOWLEDGED_SHARE * silence_max_s:
             self._go_down(diagnostics.not_receiving(unacknowledged_s))
         elif self._echo_timeout.expired(self._run_s):
@@ -243,7 +246,7 @@ class DenningDriver(Session[PoseStamper]):
         if halt is not None:
             self._queue("HALT")
 
-    def _go_down(self, problem: str) -> None:
+    def _go_down(self, problem: str | Callable[[], str]) -> None:
         self._state = LineState.DOWN
         self._problem = problem
         self._abandon()
@@ -351,6 +354,7 @@ class DenningDriver(Session[PoseStamper]):
             self._start_handshake()
             return
         self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
+        self._heard.clear()
         self._odometry = sample
         if (error := self.stamper.clock_error) is not None and error > 0.0:
             self._go_down(diagnostics.wrong_clock_rate(error))

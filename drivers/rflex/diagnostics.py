@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from drivers import line_diagnostics
+from drivers.heard_bytes import HeardBytes
+
 BRAKE_STAYS_ON: Final = (
     "the brake stays on although it was released; likely the emergency stop is pressed or the battery is too low: "
     "release it and check its voltage, then arm again"
@@ -38,17 +41,14 @@ def fail_safe(seconds: float) -> str:
     )
 
 
-def no_answer(*, heard: bool) -> str:
-    """Return the message for a robot that does not answer; `heard` says whether anything is received."""
-    if heard:
+def no_answer(frames: int, heard: HeardBytes) -> str:
+    """Return the message for a robot that does not answer, given valid frames and all bytes received so far."""
+    if frames and heard.stranger is None:
         return (
-            "no report of both axes and of the brake, though something is received; another device is on this port, "
-            "or the line is disturbed: check the port, link.baud (115200) and the cable"
+            f"no report of both axes and of the brake, though {frames} other frames are received; another device is "
+            f"on this port, or the line is disturbed: check the port, link.baud (115200) and the cable"
         )
-    return (
-        "no answer to the request for reports and nothing is received; the robot is off, or on another port: check "
-        "its power and cable, and link.port; the connection is restored as soon as it answers"
-    )
+    return line_diagnostics.no_answer("no answer to the request for reports", frames, heard)
 
 
 def not_receiving(unanswered_s: float) -> str:

@@ -102,7 +102,7 @@ class RflexDriver(Session[Measurements]):
         halting_s = self._brake.halting_s(self._run_s)
         if self._state is LineState.READY and halting_s > _HALTING_MAX_S:
             return diagnostics.not_stopping(halting_s)
-        return self._problem
+        return super().problem
 
     @property
     def battery_v(self) -> float | None:
@@ -119,6 +119,7 @@ class RflexDriver(Session[Measurements]):
         """Stop the base and request reports, on a line that has just been opened."""
         self.line_closed()
         self._run_s = run_s
+        self._heard.clear()
         self._begin(LineState.HANDSHAKE, None)
 
     def line_closed(self) -> None:
@@ -130,9 +131,11 @@ class RflexDriver(Session[Measurements]):
     def receive(self, data: bytes, run_s: float) -> None:
         """Take bytes from the line, split anywhere."""
         self._run_s = run_s
-        if self._state is not LineState.CLOSED:
-            for frame in self._decoder.feed(data):
-                self._take(frame)
+        if self._state is LineState.CLOSED:
+            return
+        self._heard.received(data)
+        for frame in self._decoder.feed(data):
+            self._take(frame)
 
     def tick(self, run_s: float) -> None:
         """Let time pass: call the robot again, stop a base that gets no velocity, go DOWN if the robot is silent."""
@@ -143,8 +146,8 @@ class RflexDriver(Session[Measurements]):
             if run_s - self._setup_s >= self._config.link.reply_timeout_s and not self._queue:
                 self._set_up()
             if run_s - self._called_s > _CALLING_S and self._state is LineState.HANDSHAKE:
-                heard = self._decoder.frames + self._decoder.bad > 0
-                self._state, self._problem = LineState.DOWN, diagnostics.no_answer(heard=heard)
+                self._state = LineState.DOWN
+                self._problem = lambda: diagnostics.no_answer(self._decoder.frames, self._heard)
 
     def halt(self) -> None:
         """Stop the base at once, repeat that until it stands, then set its brake."""
@@ -200,7 +203,10 @@ class RflexDriver(Session[Measurements]):
         if frame is None:
             return b""
         self._sent_s = self._run_s
-        return encode(frame)
+        data = encode(frame)
+        if self._state is not LineState.READY:
+            self._heard.sent(data)
+        return data
 
     def _next_command(self) -> Frame | None:
         """Return the next command that is due: a velocity first, its second axis next, then all that can wait."""
@@ -254,7 +260,7 @@ class RflexDriver(Session[Measurements]):
         if silent_s > link.silence_max_s:
             others = self._report_s - self._sample_s > 0.5 * link.silence_max_s
             bad = self._decoder.bad - self._bad_at_sample
-            self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad))
+            self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self._heard))
         elif unanswered_s > 2.0 * link.silence_max_s:
             self._begin(LineState.DOWN, diagnostics.not_receiving(unanswered_s))
         elif self._brake.mode is Mode.RELEASING and self._brake.tries > link.tries:
@@ -301,6 +307,7 @@ class RflexDriver(Session[Measurements]):
         if not isinstance(sample, Odometry):
             return
         self._sample_s, self._bad_at_sample = self._run_s, self._decoder.bad
+        self._heard.clear()
         self._brake.observe_speed(sample.twist)
         self._stall.observe(sample.twist, self._run_s)
         if self._state is not LineState.READY:

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.arcos.diagnostics import deadman_s, no_answer, watchdog_note, wrong_robot, wrong_watchdog
+from drivers.arcos.diagnostics import deadman_s, no_answer, unanswered, watchdog_note, wrong_robot, wrong_watchdog
 from drivers.arcos.frames import ConfigPacket, RobotName
+from drivers.arcos.handshake import Stage
+from drivers.heard_bytes import HeardBytes
 from tests.drivers.arcos.harness import P3DX_FILE
 from tests.drivers.arcos.vectors import P3DX
 
@@ -38,8 +40,22 @@ def test_a_watchdog_that_is_off_or_slow_is_refused() -> None:
 
 
 def test_the_message_about_a_mute_line_says_what_was_tried_and_heard() -> None:
-    assert "at 9600, 38400 baud and nothing is received" in no_answer(bauds=(9600, 38400), heard=0)
-    assert "no answer to SYNC0, and what is received is no frame" in no_answer(bauds=(), heard=9)
+    heard = HeardBytes()
+    assert "at 9600, 38400 baud and nothing is received" in no_answer((9600, 38400), 0, heard)
+    heard.received(b"\xf3" * 9)
+    assert "no answer to SYNC0, and what is received is no frame" in no_answer((), 0, heard)
+    assert "no answer to SYNC0 although the robot sends other frames" in no_answer((), 1, heard)
+    heard.received(b"Hello from the sketch\r\n" * 9)
+    assert "and a device sends text, as 'Hello from the sketch'" in no_answer((), 1, heard)
+    assert "as 'Hello from the sketch'" in unanswered(Stage.SYNC1, heard)
+
+
+@pytest.mark.parametrize("stage", [Stage.CLOSING, Stage.SYNC1, Stage.SYNC2, Stage.CONFIG, Stage.DONE])
+def test_each_stage_that_stays_unanswered_is_named(stage: Stage) -> None:
+    message = unanswered(stage, HeardBytes())
+    assert message.count("; ") == 1
+    assert ": " in message
+    assert (stage.value in message) or stage in {Stage.CLOSING, Stage.DONE}
 
 
 def test_the_note_about_the_watchdog_names_its_time() -> None:

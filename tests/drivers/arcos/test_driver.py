@@ -36,7 +36,7 @@ def driving() -> Harness:
     return harness
 
 
-def test_a_session_begins_with_a_stop_and_sets_the_robot_up(harness: Harness) -> None:
+def test_a_session_begins_with_a_sync_and_sets_the_robot_up(harness: Harness) -> None:
     harness.open()
     assert harness.state() is LineState.HANDSHAKE
     sent = harness.run(3.0)
@@ -54,9 +54,9 @@ def test_a_session_begins_with_a_stop_and_sets_the_robot_up(harness: Harness) ->
         N.SONARCYCLE,
         N.POLLING,
     ]
-    start = [N.STOP, N.ESTOP, N.PULSE, N.OPEN, N.CLOSE, N.OPEN, N.CONFIG, N.HOSTBAUD, N.PULSE]
+    start = [N.PULSE, N.OPEN, N.CLOSE, N.OPEN, N.CONFIG, N.HOSTBAUD, N.PULSE]
     assert numbers(sent)[: len(start + setup)] == start + setup
-    assert sent[9] == Command(N.ENABLE, 0), "a simulator begins its first session with motors on"
+    assert sent[7] == Command(N.ENABLE, 0), "a simulator begins its first session with motors on"
     identity = harness.driver.identity
     assert identity is not None
     assert (identity.name, identity.sensors, identity.deadman_s, identity.odometry_period_s) == ("box", 16, 2.0, 0.1)
@@ -86,6 +86,8 @@ def test_a_robot_that_was_left_open_at_another_speed_is_found_stopped_and_closed
 def test_whole_frames_are_sent_in_one_write(harness: Harness) -> None:
     """One simulator is deaf for a session after a frame that came in two pieces."""
     harness.open()
+    harness.driver.receive(b"\xf3", harness.now)
+    harness.driver.tick(harness.now)
     data = harness.driver.outgoing(writable=True)
     assert data == b"".join(map(encode, (Command(N.STOP), Command(N.ESTOP), Command(N.PULSE))))
     assert harness.driver.outgoing(writable=True) == b""

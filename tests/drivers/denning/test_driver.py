@@ -175,7 +175,7 @@ def test_noise_instead_of_an_answer_points_at_the_baud_rate() -> None:
         harness.received()
         harness.robot.receive(b"\x9f\x33\0", harness.now)
         harness.pass_time(0.01)
-    assert "likely the baud rate" in (harness.robot.problem or "")
+    assert "or the line has another speed: check the port and link.baud" in (harness.robot.problem or "")
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_a_port_that_sends_noise(monkeypatch: pytest.MonkeyPatch) -> None:
         link.live = noisy  # type: ignore[method-assign]
 
     text = refusal(monkeypatch, noise, disturb=only_noise)
-    assert "likely the baud rate" in text
+    assert "or the line has another speed" in text
 
 
 def test_a_line_that_is_lost_before_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ from drivers.arcos import diagnostics as arcos
 from drivers.denning import diagnostics as denning
 from drivers.driver import LineState
 from drivers.emulator.faults import Fault, Mute
+from drivers.heard_bytes import HeardBytes
 from drivers.rflex import diagnostics as rflex
 from runtime.cycle.line_messages import HARDWARE, ROBOT_LINE, ProgramLine, messages_on
 from runtime.cycle.modes import Mode
@@ -24,13 +25,15 @@ from tests.runtime.virtual_time import in_virtual_time
 SILENCES = [
     line_diagnostics.silence(0.5, others=others, bad=bad) for others, bad in itertools.product((False, True), (0, 9))
 ]
+NOTHING, NOISE = HeardBytes(), HeardBytes()
+NOISE.received(b"\xf3\x9a" * 9)
 UNANSWERED = [
-    *(denning.no_answer("HELLO", 3, frames=n, bad=bad, baud=115200) for n, bad in [(0, 0), (9, 0)]),
-    *(arcos.no_answer(bauds=(9600,), heard=heard) for heard in (0, 9)),
-    *(rflex.no_answer(heard=heard) for heard in (False, True)),
+    *(denning.no_answer("HELLO", 3, frames, NOTHING) for frames in (0, 9)),
+    *(arcos.no_answer((9600,), frames, NOTHING) for frames in (0, 9)),
+    *(rflex.no_answer(frames, NOTHING) for frames in (0, 9)),
 ]
 DEAF = [denning.not_receiving(0.5), arcos.not_receiving(0.5), rflex.not_receiving(0.5)]
-SETTINGS = [denning.refusal("PATTERN", 4), denning.no_answer("HELLO", 3, frames=0, bad=9, baud=115200)]
+SETTINGS = [denning.refusal("PATTERN", 4), denning.no_answer("HELLO", 3, 0, NOISE)]
 LOST = "the line /a was lost (its other end is closed); likely it was unplugged: plug it in again"
 EMULATOR = ProgramLine("the emulator", "start the run again")
 

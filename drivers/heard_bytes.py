@@ -1,0 +1,84 @@
+"""The bytes that a line brings in place of a robot's frames, and what they say about the device that sends them.
+
+Two kinds of strangers are common on a serial port: a device that sends text, as a board that prints or a GPS
+receiver, and one that sends back what it gets, as a loopback, a terminal or a modem. Their bytes alone distinguish
+them from a robot.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from config.files import one_line
+
+_KEPT: Final = 512
+"""Newest bytes that are looked at."""
+_TEXT_SHARE: Final = 0.8
+"""Bytes are text if at least this share of them stands in runs of printable ones.
+
+Of random bytes, as at a wrong speed of the line, 4 % do; of a boot message with colours or odd bytes more than 90 %.
+"""
+_TEXT_MIN: Final = 8
+"""Fewest bytes that are judged."""
+_RUN: Final = re.compile(rb"[\r\n]*[\t\x20-\x7e]{6,}[\r\n]*")
+_QUOTED_MAX: Final = 60
+"""Longest quotation, characters."""
+_ECHO_MIN: Final = 6
+"""Shortest write that counts when it comes back, bytes."""
+
+
+class HeardBytes:
+    """The newest bytes of a line.
+
+    Attributes
+    ----------
+    total
+        Number of bytes received since `clear`.
+    """
+
+    def __init__(self) -> None:
+        self.total = 0
+        self._received = self._sent = b""
+        self._stranger: str | None = None
+
+    def clear(self) -> None:
+        """Forget all bytes: the robot has sent what it should, or this is another line."""
+        self.total, self._received, self._stranger = 0, b"", None
+
+    def begin_speed(self) -> None:
+        """Forget the bytes, as those to come have another speed; keep what was found out."""
+        self._stranger, self._received = self.stranger, b""
+
+    def sent(self, data: bytes) -> None:
+        """Take a write that no robot of the protocol sends back."""
+        if len(data) >= _ECHO_MIN:
+            self._sent = data
+
+    def received(self, data: bytes) -> None:
+        """Take bytes from the line."""
+        self.total += len(data)
+        self._received = (self._received + data)[-_KEPT:]
+
+    @property
+    def stranger(self) -> str | None:
+        """What device sends these bytes, likely cause, next action; None if they may be a robot's."""
+        data = self._received
+        if self._sent and self._sent in data:
+            return (
+                "what this program sends comes back; the other end echoes it, as a loopback, a terminal or a modem "
+                "does: give the robot's own port"
+            )
+        runs = _RUN.findall(data)
+        if len(data) < _TEXT_MIN or sum(map(len, runs)) < _TEXT_SHARE * len(data):
+            return self._stranger
+        return (
+            f"a device sends text, as {_quoted(runs[-1])}; it is not the robot, or the robot runs another firmware: "
+            f"give the robot's own port, or install its firmware"
+        )
+
+
+def _quoted(data: bytes) -> str:
+    """Return printable text in quotation marks, cut to a length that fits into a message."""
+    text = one_line(data.decode("ascii").strip().replace("\t", " "))
+    return f"'{text if len(text) <= _QUOTED_MAX else text[: _QUOTED_MAX - 1] + '…'}'"

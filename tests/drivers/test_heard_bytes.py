@@ -1,0 +1,51 @@
+"""What is said about the bytes of a device that is no robot."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from drivers.heard_bytes import HeardBytes
+
+
+def heard(*chunks: bytes) -> HeardBytes:
+    bytes_ = HeardBytes()
+    for chunk in chunks:
+        bytes_.received(chunk)
+    return bytes_
+
+
+def test_text_is_quoted_safely_and_cut() -> None:
+    assert "as 'Ready'" in (heard(b"\r\n\r\n  Ready \r\n").stranger or "")
+    long = heard(b"x" * 4000).stranger or ""
+    assert "x" * 59 + "…'" in long
+    assert "x" * 61 not in long
+    hostile = heard(b"\x1b]0;owned\x07" + b"hello, I am text\r\n" * 9).stranger or ""
+    assert hostile.isprintable()
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_neither_noise_nor_short_words_are_text(seed: int) -> None:
+    assert heard(random.Random(seed).randbytes(512)).stranger is None
+    assert heard(b"ok\r\n").stranger is None
+    assert heard().stranger is None
+
+
+def test_what_was_found_out_outlasts_a_change_of_speed_but_not_another_line() -> None:
+    bytes_ = heard(b"GPS ready\r\n")
+    bytes_.begin_speed()
+    bytes_.received(b"\xf3" * 30)
+    assert "GPS ready" in (bytes_.stranger or "")
+    bytes_.clear()
+    assert bytes_.stranger is None
+    assert bytes_.total == 0
+
+
+def test_only_a_whole_write_that_comes_back_is_an_echo() -> None:
+    bytes_ = HeardBytes()
+    bytes_.sent(b"\xfa\xfb\x03\x1d\x00\x1d\xfa\xfb\x03\x37\x00\x37")
+    bytes_.received(b"\xfa\xfb\x03\x1d\x00\x1d")
+    assert bytes_.stranger is None, "one simulator takes it for a SYNC"
+    bytes_.received(b"\xfa\xfb\x03\x37\x00\x37")
+    assert "what this program sends comes back" in (bytes_.stranger or "")
