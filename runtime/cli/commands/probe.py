@@ -18,20 +18,26 @@ from config.files import list_shipped, one_line
 from config.load import load_robot
 from config.robot import RobotConfig
 from drivers.driver import LineState
+from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
 from drivers.registry import make_driver
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cycle.connection import POLL_S, Connection
 
-ANSWER_MAX_S: Final = 2.0
-"""Longest wait for a robot's first frame, s; a controller that is being reset by the opened port takes longer."""
+ANSWER_MAX_S: Final = 3.0
+"""Longest wait for a robot's first frame, s: as long as it takes to call a Pioneer at every speed of its line."""
 READY_MAX_S: Final = 6.0
 """Longest wait from the first frame until the robot is ready, s."""
 NETWORK_S: Final = 2.0
 """How long runs on the local network may take to answer, s."""
 LOOK_S: Final = 1.0
 """How long a robot that is ready is listened to, for its sensors and its state, s."""
+NOTHING: Final = "nothing answers: is the robot on, and is this its cable?"
+NO_FRAME: Final = (
+    "no robot answers, and what is received is no frame of a known robot; another device is on this port, or one of "
+    "another speed: name its file with --robot"
+)
 WARNINGS: Final = (
     (Flags.MOTOR_FAULT, "a motor reports a fault"),
     (Flags.BUMPER, "a bumper is pressed"),
@@ -56,6 +62,8 @@ class _Answer(NamedTuple):
     """The robot in words; None if it is none of this kind."""
     problem: str | None = None
     """Why it is not, or why the port cannot be opened."""
+    stranger: str | None = None
+    """Who sent the bytes that were no frame, None if none came."""
     fired: int = 0
     """How many of its sensors have fired."""
     is_whole: bool = False
@@ -130,6 +138,7 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
         Robots by the names by which they are run.
     """
     said, best = list[str](), (0, Finding(None, ()))
+    strangers = list[str]()
     for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
         for name, config in family:
             answer = await _try(port, config)
@@ -138,6 +147,8 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
                     best = (answer.fired, Finding(name, (answer.text,)))
                 if answer.is_whole:
                     return best[1]
+            if answer.stranger is not None:
+                strangers.append(answer.stranger)
             if answer.problem is not None:
                 said.append(f"as {name}: {answer.problem}" if answer.has_answered else answer.problem)
             if not answer.has_answered:
@@ -146,7 +157,8 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
             return best[1]
         if said and not answer.has_answered and answer.problem is not None:
             break  # the port cannot be opened
-    return Finding(None, tuple(said or ["nothing answers: is the robot on, and is this its cable?"]))
+    known = [stranger for stranger in strangers if stranger != NO_FRAME]
+    return Finding(None, tuple(said or (known or strangers or [NOTHING])[:1]))
 
 
 def run_it(port: str, robot: str) -> str:
@@ -160,23 +172,24 @@ def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
 
 async def _try(port: str, config: RobotConfig) -> _Answer:
     """Return what the driver of one robot finds out; it is never released, so nothing moves."""
-    driver, clock = make_driver(config), time.monotonic
+    config = config.model_copy(update={"link": config.link.model_copy(update={"port": port})})
+    driver, clock, heard = make_driver(config), time.monotonic, HeardBytes()
 
     def send() -> None:
         link.set_baud(driver.line_baud)
         if link.is_open and (data := driver.outgoing(writable=link.writable)):
+            heard.sent(data)
             link.send(data)
 
     def opened() -> None:
         driver.line_opened(clock())
         send()
 
-    link = Link(
-        config.link.model_copy(update={"port": port}),
-        opened,
-        lambda data: driver.receive(data, clock()),
-        lambda _reason: driver.line_closed(),
-    )
+    def received(data: bytes) -> None:
+        heard.received(data)
+        driver.receive(data, clock())
+
+    link = Link(config.link, opened, received, lambda _reason: driver.line_closed())
     try:
         await link.open_once()
     except LinkError as error:
@@ -190,7 +203,8 @@ async def _try(port: str, config: RobotConfig) -> _Answer:
             if driver.state is LineState.DOWN and has_answered:
                 return _Answer(has_answered=True, problem=driver.problem)
             if clock() - begin_s > (READY_MAX_S if has_answered else ANSWER_MAX_S):
-                return _Answer(has_answered)
+                stranger = heard.stranger or NO_FRAME if heard.total and not has_answered else None
+                return _Answer(has_answered, stranger=stranger)
             await asyncio.sleep(POLL_S)
         if not link.is_open:
             return _Answer(has_answered=False, problem=link.last_error)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import socketserver
+import threading
 import tty
 from pathlib import Path
 
@@ -115,3 +117,53 @@ def test_no_port_and_one_that_cannot_be_opened(
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2, "the same for every robot, so it is said once"
     assert "none" in lines[1]
+
+
+class Peer(socketserver.BaseRequestHandler):
+    """A device on the network that is no robot."""
+
+    def handle(self) -> None:
+        while data := self.request.recv(4096):
+            self.request.sendall(self.answer(data))
+
+    def answer(self, data: bytes) -> bytes:
+        raise NotImplementedError
+
+
+class Talker(Peer):
+    def answer(self, _data: bytes) -> bytes:
+        return b"220 print server ready\r\n"
+
+
+class Mirror(Peer):
+    def answer(self, data: bytes) -> bytes:
+        return data
+
+
+class OnlySync0(Peer):
+    def answer(self, data: bytes) -> bytes:
+        return data if data == bytes.fromhex("fafb03000000") else b""
+
+
+@pytest.mark.parametrize(
+    ("peer", "robot", "said"),
+    [
+        (Talker, None, "a device sends text, as '220 print server ready'"),
+        (Talker, "p3dx", "a device sends text, as '220 print server ready'"),
+        (Mirror, "denning", "what this program sends comes back"),
+        (OnlySync0, "p3dx", "as p3dx: the robot answers SYNC0 and not SYNC1"),
+    ],
+)
+def test_a_device_that_is_no_robot_is_named_and_a_socket_has_no_speeds(
+    peer: type[Peer], robot: str | None, said: str,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(probe, "ANSWER_MAX_S", 0.5)
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), peer) as server:
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
+        named = () if robot is None else ("--robot", robot)
+        assert run_command(["probe", f"socket://127.0.0.1:{server.server_address[1]}", *named]) == FAILED
+        server.shutdown()
+    out = capsys.readouterr().out
+    assert said in " ".join(out.split())
+    assert "baud" not in out
