@@ -15,6 +15,7 @@ from bench.console import figures as figures_of
 from bench.console import measure as measure_console
 from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
 from bench.estimator import Peer
+from bench.lie_commands import lies
 from bench.map_commands import corner_bound, false_canyons, false_drums, false_walls, grid, map_size, walls
 from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
@@ -225,6 +226,7 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
 
 
 for command in (
+    lies,
     localization,
     known_room,
     place_bound,

@@ -156,7 +156,7 @@ class Measurements:
             last = here
         elif self._is_new and self._is_zero(here) and not self._is_zero(last):
             return self._restarted()
-        elif robot_s <= last[2]:
+        elif robot_s < last[2]:
             return None
         elif not self._is_possible(last, here):
             suspect, self._suspect = self._suspect, here

@@ -14,6 +14,7 @@ from typing import Final
 
 from drivers.driver import LineState
 from drivers.messages import Flags
+from runtime.cycle.clock_monitor import ClockState
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.motion_monitor import Movement
 
@@ -56,6 +57,23 @@ STANDS: Final = (
 NOT_HALTED: Final = (
     "the base does not obey HALT and drives on, or brakes far less than body.acceleration_max_m_s2: stop it by its "
     "emergency switch; HALT is sent again and again; repair the base, then restart the program"
+)
+CLOCK_REASONS: Final = MappingProxyType(
+    {
+        ClockState.RIGHT: None,
+        ClockState.STANDS: (
+            "the robot's clock stands still, so it is unknown how old its echoes are: check the source of its "
+            "stamps, restart the robot, then re-arm"
+        ),
+        ClockState.SLOW: (
+            "the robot's clock runs slowly, or its data come later and later, so its echoes are older than it says: "
+            "check the load of robot and line, restart the robot, then re-arm"
+        ),
+        ClockState.FAST: (
+            "the robot's clock leapt ahead or runs fast, so its speeds and the ages of its echoes are wrong: check "
+            "the source of its stamps, restart the robot, then re-arm"
+        ),
+    }
 )
 
 
@@ -100,7 +118,12 @@ class ModeState:
 
 
 def advance(
-    state: ModeState, inputs: Inputs, flags: Flags, gap_s: float, movement: Movement = Movement.AS_COMMANDED
+    state: ModeState,
+    inputs: Inputs,
+    flags: Flags,
+    gap_s: float,
+    movement: Movement = Movement.AS_COMMANDED,
+    clock: ClockState = ClockState.RIGHT,
 ) -> ModeState:
     """Return the mode in which a cycle decides.
 
@@ -116,12 +139,14 @@ def advance(
         Time since the cycle before.
     movement : Movement
         How the base moves by its odometry.
+    clock : ClockState
+        How the robot's clock runs.
     """
     run_s, request, fault = inputs.run_s, inputs.request, inputs.fault
     if state.mode is Mode.FAULT:
         return state
     if state.mode is Mode.DRIVE:
-        reason = why_stop(state, inputs, flags, gap_s) or _why_moving(movement)
+        reason = why_stop(state, inputs, flags, gap_s) or CLOCK_REASONS[clock] or _why_moving(movement)
         if reason is not None:
             return state.enter(Mode.SAFE_STOP, run_s, reason)
         return state.enter(Mode.READY, run_s, DISARMED) if request is Request.DISARM else state
@@ -141,7 +166,7 @@ def advance(
     if movement in {Movement.UNCOMMANDED, Movement.UNSTOPPED}:
         is_known = state.mode is Mode.SAFE_STOP and state.reason == MOVES and state.arming_run_s is None
         return state if is_known else state.enter(Mode.SAFE_STOP, run_s, MOVES)
-    return _advance_arming(state, inputs, flags, gap_s)
+    return _advance_arming(state, inputs, flags, gap_s, clock)
 
 
 def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> str | None:
@@ -209,7 +234,7 @@ def _why_latched(flags: Flags) -> str | None:
     return None
 
 
-def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> ModeState:
+def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float, clock: ClockState) -> ModeState:
     """Return the mode of a robot in READY or SAFE_STOP on a working line, by the progress of arming.
 
     RELEASE clears the latch and the flags of what caused it. What is still set afterwards is present, and the robot
@@ -223,7 +248,7 @@ def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float
     if inputs.request is Request.DISARM:
         # Entering SAFE_STOP again sets the latch, which the arming has already cleared.
         return state.enter(state.mode, run_s, DISARMED)
-    if (reason := _why_interrupt(inputs, gap_s)) is not None:
+    if (reason := _why_interrupt(inputs, gap_s) or CLOCK_REASONS[clock]) is not None:
         return state.enter(Mode.SAFE_STOP, run_s, reason)
     waited_s, reason = run_s - state.arming_run_s, _why_latched(flags)
     if waited_s >= ARMING_MIN_S and reason is None:

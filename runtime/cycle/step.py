@@ -23,6 +23,7 @@ from drivers.messages import Flags, Odometry, Pose, Twist
 from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
+from runtime.cycle.clock_monitor import ClockMonitor
 from runtime.cycle.drive_requests import (
     NO_MAP,
     STANDSTILL,
@@ -116,6 +117,8 @@ class State:
     """Why the robot does not move although it may drive; None if it moves."""
     motion_monitor: MotionMonitor = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
+    clock_monitor: ClockMonitor = field(default_factory=ClockMonitor)
+    """Whether the robot's clock keeps time."""
     goal_drive: GoalDrive | None = None
     """The drive to a goal so far; None without a goal, or before its first cycle in DRIVE."""
     percept: Percept | None = None
@@ -211,6 +214,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
         state.perception.reset()
         state.odometry = None
         state.motion_monitor = MotionMonitor()
+        state.clock_monitor = ClockMonitor()
         state.leg = None
         state.drive_request = after_reboot(state.drive_request)  # a goal is a place in the odometry before the reboot
         state.last_firing_robot_s = 0.0
@@ -230,6 +234,11 @@ def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) 
     if accepts:
         _accept_drive_request(state, inputs)
     state.motion_monitor = state.motion_monitor.observe(inputs.received.odometry, inputs.run_s, settings.body)
+    if inputs.line is LineState.READY:
+        received = inputs.received
+        state.clock_monitor = state.clock_monitor.observe(received.odometry, received.firings, inputs.run_s)
+    else:  # what is on its way is unknown
+        state.clock_monitor = ClockMonitor()
     command = _command(state, inputs, settings)
     if inputs.line is LineState.READY:  # no other command reaches the base
         twist = command if isinstance(command, Twist) else None
@@ -277,7 +286,7 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     map_frame = state.perception.known_map_frame() if needs_map(state.drive_request) else None
     state.goal_place = None if goal is None else goal_place(goal, state.goal_place, map_frame, gap_s)
     movement = state.motion_monitor.movement
-    state.mode = advance(before, inputs, flags, gap_s, movement)
+    state.mode = advance(before, inputs, flags, gap_s, movement, state.clock_monitor.clock)
     if state.mode.mode is Mode.DRIVE:
         decision = _drive(state, inputs, settings, map_frame, gap_s)
         if isinstance(decision, Drive):
@@ -297,13 +306,12 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
-    view, obstacles = state.perception.surroundings(
-        odometry.robot_s, odometry.ring_yaw, odometry.pose.theta, age_max_s
-    )
-    blind_s = min(*view.sensor_ages_s.tolist(), odometry.robot_s)  # numpy's call would take longer
+    now_s = state.clock_monitor.now_s(odometry.robot_s, inputs.run_s)
+    view, obstacles = state.perception.surroundings(now_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)
+    blind_s = min(*view.sensor_ages_s.tolist(), now_s)  # numpy's call would take longer
     if blind_s > age_max_s:
         likely = inputs.line_problem or "check the ring's power and cable"
-        if odometry.robot_s - state.last_firing_robot_s > age_max_s:
+        if now_s - state.last_firing_robot_s > age_max_s:
             return Stop(f"the ring has not reported for {blind_s:.1f} s: {likely}, then re-arm")
         return Stop(
             f"the ring fires, but no sensor has given a usable range for {blind_s:.1f} s, as all are masked or "
@@ -316,7 +324,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if needs_space(state.drive_request):
         percept = replace(
             percept, occupancy=state.perception.occupancy(), canyons=state.perception.canyons(),
-            steady=state.perception.steady_obstacles(odometry.robot_s, age_max_s),
+            steady=state.perception.steady_obstacles(now_s, age_max_s),
         )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,

@@ -17,6 +17,7 @@ import numpy as np
 from behaviors.leave_canyon import Detour
 from behaviors.valley.polar_histogram import SECTORS
 from drivers.messages import CrossPaths, Firing, Floats, Odometry, Pose, Twist
+from runtime.cycle.clock_monitor import ClockMonitor
 from runtime.cycle.drive_requests import validate
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.modes import ModeState
@@ -199,9 +200,22 @@ def check_state(state: Mapping[str, Any]) -> None:
     if (problem := validate(state["drive_request"])) is not None:
         raise ValueError(f"state.drive_request: {problem}")
     _motion("state.motion_monitor", state["motion_monitor"])
+    _clock("state.clock_monitor", state["clock_monitor"])
     for response in state["vectors"]:
         _bounded("state.vectors.x", response.x, PLACE_MAX_M)
         _bounded("state.vectors.y", response.y, PLACE_MAX_M)
+
+
+def _clock(what: str, monitor: ClockMonitor) -> None:
+    _count(f"{what}.repeats", monitor.repeats)
+    for name, reading in (("newest", monitor.newest), ("late", monitor.late)):
+        if reading is not None:
+            _time(f"{what}.{name}.robot_s", reading.robot_s)
+            _time(f"{what}.{name}.run_s", reading.run_s)
+    for name, lead in (("lead", monitor.lead), ("heard", monitor.heard)):
+        if lead is not None:
+            for time_s in (lead.begin_run_s, lead.newest_s, *lead.before_s):
+                _time(f"{what}.{name}", time_s)
 
 
 def _goal_drive(what: str, drive: GoalDrive) -> None:

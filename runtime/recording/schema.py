@@ -19,6 +19,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from perception.snapshot import Snapshot, fixed_shape
+from runtime.cycle.clock_monitor import ClockMonitor
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import MotionMonitor
 from runtime.cycle.step import CycleRecord, State
@@ -194,7 +195,13 @@ class ObjectList(TimedPayload):
 _HINTS: Final = get_type_hints(State)
 _CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in {"perception", "percept", "step_settings"})
 _ADDED: Final = MappingProxyType(
-    {"motion_monitor": MotionMonitor(), "goal_place": None, "goal_drive": None, "trail": ()}
+    {
+        "motion_monitor": MotionMonitor(),
+        "clock_monitor": ClockMonitor(),
+        "goal_place": None,
+        "goal_drive": None,
+        "trail": (),
+    }
 )
 """Fields that older recordings of this format lack, with the value that they had then."""
 CarriedState: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here

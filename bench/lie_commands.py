@@ -1,0 +1,61 @@
+"""The measurement of robots that lie, and of the false alarms of robots that do not."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from rich.console import Console
+
+from bench.table import report
+from config.load import load_settings
+from runtime.support.kernel_cache import use_kernel_cache
+from runtime.support.kernel_warmup import prepare_kernels
+
+
+def lies(
+    *,
+    json: str = "lies.json",
+    robots: str = "",
+    rooms: str = "room,office,hallway,furnished",
+    kinds: str = "",
+    seeds: int = 1,
+    first: int = 0,
+    moments: int = 5,
+    honest: bool = False,
+    recognise: bool = False,
+) -> int:
+    """Drive robots that lie through rooms, with the truth of contacts.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    robots, kinds
+        Names with commas between them; all shipped robots, and all kinds of lies, if not given.
+    rooms
+        Of room, office, hallway, furnished, goal and corridor.
+    seeds, first
+        Number of generated rooms, and the first one's seed.
+    moments
+        At how many random moments each lie begins.
+    honest
+        Drive without a lie, two minutes each, and count the stops.
+    recognise
+        Run recognition as well, which takes most of the time.
+    """
+    use_kernel_cache()
+    from bench.lies import KINDS, ROBOTS, lies_table, measure, trials
+    from bench.lies import honest as honest_plans
+
+    console = Console(stderr=True)
+    prepare_kernels(load_settings("hallway"), console)
+    chosen, where = robots.split(",") if robots else ROBOTS, rooms.split(",")
+    numbers, moments = range(first, first + max(1, seeds)), max(1, moments)
+    plans = (
+        honest_plans(chosen, where, numbers, moments)
+        if honest
+        else trials(chosen, where, kinds.split(",") if kinds else tuple(KINDS), numbers, moments)
+    )
+    with console.status("bench") as status:
+        results = measure(plans, status.update, recognises=recognise)
+    return report(json, [asdict(one) for one in results], lies_table(results))

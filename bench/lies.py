@@ -1,0 +1,329 @@
+"""Drives of robots that lie: whether one touches anything at speed, and how soon the lie is named.
+
+Each trial is a drive in virtual time through a room, the protocol included. At a random moment a lie begins; from
+then on the drive lasts until the robot stops by itself, at most for `LIE_S`. What the robot touches, and how fast, is
+the emulator's truth and not what the robot reports. A lie is named by a stop with a reason, by a sensor that is
+reported, or by a note of the driver, each of them a line of the log.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import numpy as np
+from pydantic import TypeAdapter
+from rich.table import Table
+
+from config.load import load_settings
+from config.settings import Settings
+from config.world import StartConfig, WallConfig, WorldConfig
+from drivers.emulator.acoustics import clearance
+from drivers.emulator.faults import Fault
+from drivers.emulator.memory_transport import MemoryLine
+from drivers.emulator.scene import compile_scene
+from drivers.messages import Pose
+from drivers.registry import make_device, make_driver
+from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.modes import Mode
+from runtime.cycle.preparation import prepared_state, unprepared_state
+from runtime.cycle.step import apply_command, step
+from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
+from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
+
+ROBOTS: Final = (
+    "amigo", "atrvjr", "b21r", "b21r-base", "b21r-both", "denning", "ears", "magellan", "p3at", "p3dx", "p3dx-sh",
+    "peoplebot", "powerbot",
+)  # fmt: skip
+ROOMS: Final = ("room", "office", "hallway", "furnished", "goal", "corridor")
+KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
+    "frozen": {"kind": "frozen_ring"},
+    "latched clock": {"kind": "clock_error"},
+    "silent": {"kind": "silent_ring"},
+    "at the maximum": {"kind": "constant_ring", "range_m": math.inf},
+    "blind near": {"kind": "blind_near"},
+    "constant": {"kind": "constant_ring"},
+    "dropped": {"kind": "dropped_readings"},
+    "dropped, silent": {"kind": "dropped_readings", "silent": True},
+    "random": {"kind": "outliers", "share": 1.0},
+    "turned 90": {"kind": "turned_ring"},
+    "turned 180": {"kind": "turned_ring", "angle_deg": 180.0},
+    "long 1.5 ft": {"kind": "range_offset"},
+    "long 4 ft": {"kind": "range_offset", "offset_m": 1.2192},
+    "short 1.5 ft": {"kind": "range_offset", "offset_m": -0.4572},
+    "replayed": {"kind": "replayed_echoes"},
+    "clock at half": {"kind": "clock_error", "rate": 0.5},
+    "clock at double": {"kind": "clock_error", "rate": 2.0},
+    "clock leaps": {"kind": "clock_error", "rate": 1.0, "leap_s": 0.6},
+    "clock leaps back": {"kind": "clock_error", "rate": 1.0, "leap_s": -0.6},
+    "object at .1 m": {"kind": "sudden_object", "distance_m": 0.1},
+    "object at .3 m": {"kind": "sudden_object", "distance_m": 0.3},
+})  # fmt: skip
+"""The kinds of lies; `constant_ring` of +inf stands for the ring's greatest range."""
+CLOCK: Final = "clock"
+"""Kinds with this word change nothing on a robot whose packets carry no stamps."""
+AT_SPEED_M_S: Final = 0.05
+"""A slower contact is none that counts."""
+FROM_S, UNTIL_S = 3.0, 25.0
+"""When a lie begins, after the robot was armed."""
+LIE_S: Final = 20.0
+"""How long it lasts at most."""
+HONEST_S: Final = 120.0
+"""How long an honest drive lasts at most."""
+BUMPER: Final = "bumper contact"
+"""A stop with this reason names no lie."""
+CORRIDOR_M: Final = (0.7, 1.6)
+"""Free width of a corridor beside the robot, m."""
+CORRIDOR_LENGTH_M: Final = 9.0
+TILT_RAD: Final = math.radians(8.0)
+"""Greatest angle between a corridor and the robot's first heading."""
+
+
+Plan: TypeAlias = tuple[str, str, str | None, int, int]
+"""Robot, room, kind, seed and moment of a trial."""
+
+
+class Drive(NamedTuple):
+    """What is driven where."""
+
+    settings: Settings
+    world: WorldConfig
+
+
+@dataclass(frozen=True, slots=True)
+class TrialResult:
+    """What became of one drive.
+
+    Attributes
+    ----------
+    robot, room, kind
+        As in the options of the command; kind None is an honest drive.
+    seed, moment
+        Of the drive, and number of its moment.
+    began_s
+        When the lie began.
+    speed_m_s
+        The robot's true speed at that moment.
+    contact_m_s
+        The greatest speed of a contact after it; 0 without one.
+    contact_s, named_s
+        When that came, and when the lie was named, from its beginning; None if never.
+    said
+        The reason, report or note that names it; of an honest drive, the reason of its stop.
+    drive_s
+        How long the drive lasted.
+    """
+
+    robot: str
+    room: str
+    kind: str | None
+    seed: int
+    moment: int
+    began_s: float
+    speed_m_s: float
+    contact_m_s: float
+    contact_s: float | None
+    named_s: float | None
+    said: str | None
+    drive_s: float
+
+    @property
+    def is_contact(self) -> bool:
+        """Whether it touched something at speed."""
+        return self.contact_m_s > AT_SPEED_M_S
+
+
+def make_drive(robot: str, room: str, seed: int) -> Drive:
+    """Return a drive: shipped runs and missions in the shipped worlds, or a generated world.
+
+    Parameters
+    ----------
+    robot
+        A shipped robot file.
+    room
+        One of `ROOMS`.
+    seed
+        Of a generated world, and of a mission's schemas.
+    """
+    if room in {"office", "hallway"}:
+        settings = load_settings(room, robot=robot)
+        assert settings.world is not None
+        return Drive(settings, settings.world)
+    if room == "corridor":
+        settings = load_settings("room", ["behaviors.move_ahead.distance_m=30.0"], robot=robot)
+        return Drive(settings, _corridor(settings.body.radius_m, seed))
+    if room == "goal":
+        world = _furnished(seed, load_settings("room", robot=robot).body.radius_m)
+        goal = _goal(seed, world)
+        settings = load_settings("office", [f"goal={{x_m={goal.x:.2f}, y_m={goal.y:.2f}}}"], robot=robot)
+        return Drive(settings, world)
+    settings = load_settings("room", robot=robot, mission="wander")
+    assert settings.world is not None
+    return Drive(settings, settings.world if room == "room" else _furnished(seed, settings.body.radius_m))
+
+
+def _furnished(seed: int, radius_m: float) -> WorldConfig:
+    """Return a furnished room with a start that is clear of everything."""
+    room, rng = furnished_room(seed), np.random.default_rng([seed, 38])
+    scene = compile_scene(room.world)
+    x = y = 0.0
+    for _ in range(200):
+        x, y = room.place(*rng.uniform(-0.4, 0.4, 2).tolist())
+        if clearance(x, y, scene.circles, scene.segments) > radius_m + 0.25:
+            break
+    start = StartConfig(x_m=x, y_m=y, heading_deg=float(rng.uniform(-180.0, 180.0)))
+    return room.world.model_copy(update={"start": start})
+
+
+def _goal(seed: int, world: WorldConfig) -> Pose:
+    """Return a place in the room, in odometry's frame."""
+    room, rng = furnished_room(seed), np.random.default_rng([seed, 39])
+    start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+    there = max((room.place(*rng.uniform(-0.35, 0.35, 2).tolist()) for _ in range(4)),
+                key=lambda place: math.dist(place, (start.x, start.y)))  # fmt: skip
+    return start.inverse().compose(Pose(*there, 0.0))
+
+
+def _corridor(radius_m: float, seed: int) -> WorldConfig:
+    rng = np.random.default_rng([seed, 40])
+    half, length = radius_m + 0.5 * float(rng.uniform(*CORRIDOR_M)), CORRIDOR_LENGTH_M
+    corners = [(-1.5, -half), (length, -half), (length, half), (-1.5, half)]
+    walls = tuple(
+        WallConfig(x1_m=a[0], y1_m=a[1], x2_m=b[0], y2_m=b[1])
+        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
+    )
+    tilt_deg = math.degrees(float(rng.uniform(-TILT_RAD, TILT_RAD)))
+    return WorldConfig(wall=walls, acoustics=ACOUSTICS, start=StartConfig(x_m=0.0, y_m=0.0, heading_deg=tilt_deg))
+
+
+def make_lie(kind: str, settings: Settings, begin_s: float) -> Fault:
+    """Return the fault of a kind of lie that begins then and does not end."""
+    values: dict[str, Any] = dict(KINDS[kind])
+    if values.get("range_m") == math.inf:
+        values["range_m"] = settings.ring.range_max_m
+    adapter: TypeAdapter[Fault] = TypeAdapter(Fault)
+    return adapter.validate_python(values | {"at_s": begin_s, "duration_s": 1e4})
+
+
+def run_trial(
+    robot: str,
+    room: str,
+    kind: str | None,
+    seed: int,
+    moment: int,
+    *,
+    recognises: bool = False,
+) -> TrialResult:
+    """Return the result of one drive.
+
+    Parameters
+    ----------
+    robot, room, kind, seed, moment
+        As in `TrialResult`.
+    recognises
+        Whether recognition runs as well; it takes most of the time.
+    """
+    drive = make_drive(robot, room, seed)
+    settings = drive.settings
+    rng = np.random.default_rng([seed, moment, 41])
+    begin_s = 0.0 if kind is None else float(rng.uniform(FROM_S, UNTIL_S))
+    faults = () if kind is None else (make_lie(kind, settings, begin_s),)
+    device, driver = make_device(settings, drive.world, 1000 * seed + moment, faults=faults), make_driver(settings)
+    line = MemoryLine(driver, device)
+    state = (prepared_state if recognises else unprepared_state)(settings)
+    budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
+    until_s = begin_s + (HONEST_S if kind is None else LIE_S)
+    run_s = before_m_s = speed_m_s = contact_m_s = 0.0
+    contact_s = named_s = said = None
+    known: set[object] = set()
+    while run_s < until_s:
+        cycle += 1
+        run_s = cycle / settings.cycle.rate_hz
+        line.exchange(run_s)
+        inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
+        budget.begin()
+        step(state, inputs, settings, lambda command: apply_command(driver, command), budget)
+        truth = device.truth
+        reports = {(report.sensor, report.fault): report.reason for report in state.perception.sensor_reports()}
+        if run_s < begin_s:
+            known |= set(reports) | set(inputs.received.notes)
+            before_m_s, speed_m_s = truth.contact_m_s, abs(truth.twist.v)
+            continue
+        if contact_s is None and truth.contact_m_s > max(before_m_s, AT_SPEED_M_S):
+            contact_m_s, contact_s = truth.contact_m_s, run_s - begin_s
+        if named_s is None:
+            texts = []
+            if kind is not None:
+                texts += [text for key, text in reports.items() if key not in known]
+                texts += [note for note in inputs.received.notes if note not in known]
+            if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
+                texts.append(str(state.mode.reason))
+            if texts:
+                named_s, said = run_s - begin_s, texts[-1]
+        if contact_s is not None or state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}:
+            until_s = min(until_s, run_s + 1.0)
+    return TrialResult(
+        robot, room, kind, seed, moment, begin_s, speed_m_s, contact_m_s, contact_s, named_s, said, run_s
+    )
+
+
+def trials(
+    robots: Sequence[str], rooms: Sequence[str], kinds: Sequence[str], seeds: Iterable[int], moments: int
+) -> Iterator[Plan]:
+    """Yield the arguments of each trial, without errors of clocks that a robot does not have."""
+    for robot in robots:
+        stamped = load_settings("room", robot=robot).robot.driver != "arcos"
+        for room, seed, moment in product(rooms, seeds, range(moments)):
+            for kind in kinds:
+                if stamped or CLOCK not in kind:
+                    yield robot, room, kind, seed, moment
+
+
+def measure(plans: Iterable[Plan], tell: Callable[[str], None], *, recognises: bool = False) -> list[TrialResult]:
+    """Return the results of all trials."""
+    results: list[TrialResult] = []
+    for plan in plans:
+        results.append(run_trial(*plan, recognises=recognises))
+        contacts, unnamed = sum(one.is_contact for one in results), sum(one.named_s is None for one in results)
+        tell(
+            f"{len(results)} drives, {contacts} contacts, {unnamed} without a name: {plan[0]} in {plan[1]}, {plan[2]}"
+        )
+    return results
+
+
+def honest(robots: Sequence[str], rooms: Sequence[str], seeds: Iterable[int], moments: int) -> Iterator[Plan]:
+    """Yield the arguments of each honest drive."""
+    yield from (
+        (robot, room, None, seed, k) for robot, room, seed, k in product(robots, rooms, seeds, range(moments))
+    )
+
+
+def lies_table(results: Sequence[TrialResult]) -> Table:
+    """Return the table: contacts at speed, lies without a name, and seconds to the name, by kind and robot."""
+    robots = list(dict.fromkeys(result.robot for result in results))
+    drives = sum(result.drive_s for result in results) / 3600.0
+    table = Table(
+        title=f"{len(results)} drives, {drives:.1f} h: contacts above {AT_SPEED_M_S:g} m/s, lies not named / drives, "
+        f"median and greatest time to the name, s",
+        title_justify="left",
+    )
+    table.add_column("lie")
+    for robot in robots:
+        table.add_column(robot, justify="right")
+    for kind in dict.fromkeys(result.kind for result in results):
+        of = [[one for one in results if (one.robot, one.kind) == (robot, kind)] for robot in robots]
+        table.add_row(kind or "honest", *(_cell(ones) for ones in of))
+    return table
+
+
+def _cell(results: Sequence[TrialResult]) -> str:
+    if not results:
+        return "–"
+    contacts, unnamed = sum(one.is_contact for one in results), sum(one.named_s is None for one in results)
+    named = sorted(one.named_s for one in results if one.named_s is not None)
+    times = f" {named[len(named) // 2]:.1f} {named[-1]:.1f}" if named else ""
+    return f"{contacts} {unnamed}/{len(results)}{times}"
