@@ -165,7 +165,11 @@ def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float,
     for turn in range(PLACED_TIMES):
         spread = hear(room, wall, p, along, is_near, CELL_M if turn == 0 else 0.0, found)
         if turn < PLACED_TIMES - 1:
-            along += step_along(found, wall)
+            step = step_along(found, wall)
+            if math.isnan(step):
+                clear_corner(found)
+                return False
+            along += step
     if is_near:
         is_corner = found.far_echoes >= EDGE_ECHOES_MIN and found.far_echoes > found.far_passes
         is_shown = found.echoes >= EDGE_ECHOES_MIN and found.echoes > ALONE_LEAD * found.passes and not is_corner

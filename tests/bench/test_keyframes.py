@@ -1,0 +1,92 @@
+"""Every keyframe of every honest run is adopted: the short form, and an hour of each robot in each world."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import pytest
+
+from bench.keyframes import (
+    GRIDS,
+    METHODS,
+    PLACES,
+    ROBOTS,
+    WORLDS,
+    Adopted,
+    adopt_all,
+    runs,
+    settings_of,
+    shares_after,
+)
+from config.load import load_settings
+from perception.snapshot import bounds_of
+from runtime.recording.replayer import fresh_state
+
+pytestmark = pytest.mark.compiled
+
+SHORT_S = 6.0
+HOUR_S = 3600.0
+ROWS = tuple(runs())
+SHORT = tuple(ROWS[len(ROBOTS) * (r // 4) + r] for r in range(len(ROBOTS)))
+"""Each robot once, and all methods, grids, ways of localisation and worlds among them."""
+
+
+def check(found: Adopted, seconds: float, period_s: float) -> None:
+    assert found.refused == []
+    assert found.keyframes == int(seconds / period_s)
+
+
+def test_any_two_values_meet_in_a_run() -> None:
+    factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS)
+    for (i, some), (j, others) in itertools.combinations(enumerate(factors), 2):
+        assert {(row[i], row[j]) for row in ROWS} == set(itertools.product(some, others))
+    assert [set(column) for column in zip(*SHORT, strict=True)] == [set(values) for values in factors]
+
+
+@pytest.mark.parametrize("seed", range(len(SHORT)))
+def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> None:
+    """And no number would come near its bound in a day if it grew on as it does here."""
+    settings = settings_of(SHORT[seed])
+    found = adopt_all(settings, seed, SHORT_S, 1.0)
+    check(found, SHORT_S, 1.0)
+    share, name = shares_after(SHORT_S, found, settings)[0]
+    assert share < 0.5, name
+
+
+@pytest.mark.parametrize(
+    ("run", "robot", "seconds", "sets"),
+    [
+        ("office", "denning", 48.0, ()),
+        ("room", "p3dx", 90.0, ("perception.grid.method=off",)),
+        ("room", "ears", 48.0, ("perception.grid.method=elfes",)),
+    ],
+)
+def test_no_keyframe_of_the_shipped_runs_is_refused(
+    run: str, robot: str, seconds: float, sets: tuple[str, ...]
+) -> None:
+    mission = "round-the-room" if run == "room" else None
+    settings = load_settings(run, sets, robot=robot, mission=mission)
+    check(adopt_all(settings, 0, seconds, 12.0), seconds, 12.0)
+
+
+def test_a_refused_keyframe_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = settings_of(ROWS[0])
+    name = "canyon_map.firings"
+    bounds = bounds_of(fresh_state(settings).perception)
+    narrow = {**bounds, name: bounds[name]._replace(high=3)}
+    monkeypatch.setattr("runtime.recording.replayer.bounds_of", lambda _: narrow)
+    found = adopt_all(settings, 0, 2.0, 1.0)
+    assert len(found.refused) == 2
+    assert name in found.refused[0]
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("number", range(len(ROWS)), ids=lambda k: "-".join(ROWS[k]))
+def test_no_keyframe_of_an_hour_is_refused(number: int, measured: Callable[[str], None]) -> None:
+    settings = settings_of(ROWS[number])
+    found = adopt_all(settings, number, HOUR_S, settings.recording.keyframe_period_s)
+    check(found, HOUR_S, settings.recording.keyframe_period_s)
+    share, name = shares_after(HOUR_S, found, settings)[0]
+    assert share < 0.5, name
+    measured(f"{found.keyframes} keyframes, 0 refused; {name} would take {share:.1g} of its bound after a day")
