@@ -21,6 +21,8 @@ class Ros2Config(Strict):
     """Topics of `sensor_msgs/Range`: one for each sensor, or one for all of them."""
     frames: Annotated[TomlList[Name], Field(max_length=SENSORS_MAX)] = ()
     """The frame of each sensor, in the order of the ring."""
+    zero_is_silence: bool = False
+    """Whether a range of 0 or below means that nothing was heard; else such a reading is not used."""
     odometry: Name = "odom"
     """Topic of `nav_msgs/Odometry`."""
     base_frame: Name = "base_link"

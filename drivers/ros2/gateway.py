@@ -19,6 +19,7 @@ from typing import Any, Final
 from config.robot import RobotConfig
 from drivers.messages import Pose, Twist
 from drivers.ros2.gateway_port import READY
+from drivers.ros2.range_meaning import Limits
 from drivers.ros2.robot_side import STILL, RobotSide
 
 ODOMETRY_MAX_S: Final = 15.0
@@ -131,7 +132,8 @@ class Gateway:
 
     def _on_range(self, message: Any) -> None:  # noqa: ANN401 - a message of ROS
         with self._lock:
-            self._side.reading(message.header.frame_id, message.range, _seconds(message.header.stamp))
+            limits = Limits(message.min_range, message.max_range)
+            self._side.reading(message.header.frame_id, message.range, _seconds(message.header.stamp), limits)
             self._pass_on()
 
     def _on_odometry(self, message: Any) -> None:  # noqa: ANN401 - a message of ROS

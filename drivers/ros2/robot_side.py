@@ -15,6 +15,7 @@ from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Drive, Halt, Hello, Listen, NakCode, Pattern, Release
 from drivers.messages import Flags, Pose, Twist, wrap_angle
+from drivers.ros2.range_meaning import Limits, range_meaning
 
 UNIT_MIN_UM: Final = 200
 """Least unit of a range, µm: with it a count of 16 bits reaches 13 m."""
@@ -27,6 +28,7 @@ STILL: Final = Twist(0.0, 0.0)
 NOTES_MAX: Final = 100
 I16: Final = 0x7FFF
 NAME: Final = "ROS 2"
+UNKNOWN_LIMITS: Final = Limits(math.nan, math.nan)
 
 
 class RobotSide:
@@ -124,7 +126,7 @@ class RobotSide:
 
     # From the robot.
 
-    def reading(self, frame: str, range_m: float, stamp_s: float) -> None:
+    def reading(self, frame: str, range_m: float, stamp_s: float, limits: Limits = UNKNOWN_LIMITS) -> None:
         """Take a range of the sensor with this frame (m), measured at a time of the robot's stamps, s."""
         sensor = self._sensors.get(frame.lstrip("/"))
         if sensor is None:
@@ -139,7 +141,7 @@ class RobotSide:
             self._send_group()
         if not self._group:
             self._group_s = stamp_s
-        self._group[sensor] = self._count(range_m)
+        self._group[sensor] = self._count(frame, range_m, limits)
 
     def odometry(self, frame: str, stamp_s: float, pose: Pose, twist: Twist, host_s: float) -> None:
         """Take a sample of the odometry of a frame: pose (m, rad) and velocity at a time of the robot's stamps, s."""
@@ -180,14 +182,20 @@ class RobotSide:
             self._first_s = stamp_s - EARLIER_S
         self._last_s, self._last_host_s = stamp_s, host_s
 
-    def _count(self, range_m: float) -> int:
-        """Return a range as a count: REP 117 has +inf for no echo, -inf for too near, NaN for a fault."""
+    def _count(self, frame: str, value: float, limits: Limits) -> int:
+        """Return a range as a count."""
         ring = self._config.ring
-        if math.isnan(range_m) or range_m == -math.inf:
+        meaning = range_meaning(
+            value, Limits(ring.range_min_m, min(ring.range_max_m, ring.window_m)), limits, 1e-6 * self._unit_um,
+            zero_is_silence=self._config.ros2.zero_is_silence,
+        )  # fmt: skip
+        if meaning.oddity is not None:
+            self._note(meaning.oddity.value.format(frame=frame, least_m=meaning.least_m), meaning.oddity.name)
+        if math.isnan(meaning.range_m):
             return frames.FAULT
-        if range_m > ring.range_max_m or range_m > ring.window_m:
+        if math.isinf(meaning.range_m):
             return frames.NO_ECHO_COUNT
-        return max(1, round(1e6 * max(range_m, ring.range_min_m) / self._unit_um))
+        return max(1, round(1e6 * meaning.range_m / self._unit_um))
 
     def _send_group(self) -> None:
         group, self._group = self._group, {}
@@ -208,9 +216,10 @@ class RobotSide:
             return
         self._seq = (self._seq + 1) % 256
 
-    def _note(self, text: str) -> None:
-        if text not in self._noted and len(self._noted) < NOTES_MAX:
-            self._noted.add(text)
+    def _note(self, text: str, kind: str = "") -> None:
+        """Keep a message unless the same one, or one of its kind, has been kept before."""
+        if (kind or text) not in self._noted and len(self._noted) < NOTES_MAX:
+            self._noted.add(kind or text)
             self._notes.append(text)
 
 

@@ -71,7 +71,12 @@ def robot_file(heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: f
         )
     mounts = {name: mount_of(name, heard.base, heard.frames) for name in heard.ranges}
     names = sorted(mounts, key=lambda name: (mounts[name][2] % (2.0 * math.pi), name))  # counter-clockwise from ahead
-    limits = list(heard.ranges.values())
+    limits = [limit for limit in heard.ranges.values() if 0.0 <= limit[0] < limit[1] < math.inf]
+    if not limits:
+        raise RobotFileError(
+            "no sensor says between which ranges it measures: set min_range and max_range in its messages, or write "
+            "the robot file by hand"
+        )
     range_max_m = max(limit[1] for limit in limits)
     step_s = max(STEP_MIN_S, 2.0 * range_max_m / SOUND_M_S + 1e-3, firing_period_s(heard.stamps_s.values()))
     return {

@@ -98,13 +98,26 @@ def test_an_unknown_frame_is_one_line() -> None:
 
 @pytest.mark.parametrize(
     ("range_m", "passed_on"),
-    [(math.inf, math.inf), (4.01, math.inf), (-math.inf, math.nan), (math.nan, math.nan), (0.02, 0.1), (2.0, 2.0)],
+    [
+        (math.inf, math.inf),
+        (4.01, math.inf),
+        (-math.inf, math.nan),
+        (math.nan, math.nan),
+        (0.02, math.nan),
+        (0.0, math.nan),
+        (-1.0, math.nan),
+        (4.0, math.inf),
+        (3.99, 3.99),
+        (0.1, 0.1),
+        (2.0, 2.0),
+    ],
 )
 def test_what_a_range_means(range_m: float, passed_on: float) -> None:
     robot = ready()
     robot.range_of = lambda sensor: range_m  # type: ignore[method-assign]  # noqa: ARG005
     robot.run(0.5)
     np.testing.assert_allclose(robot.firings[-1].ranges_m[3], passed_on, atol=1e-6)
+    assert len(robot.notes) == (range_m < 0.1), "one line for all sensors and readings"
 
 
 def test_headings_are_unwrapped() -> None:

@@ -43,12 +43,20 @@ def test_the_file_is_valid_and_lists_the_sensors_with_their_places() -> None:
     assert config.ros2.cmd_vel == "/r1/cmd_vel"
 
 
+def test_a_sensor_without_limits_leaves_them_to_the_others() -> None:
+    part = heard()
+    part.ranges["us0"] = (math.nan, math.inf, 0.4)
+    tables = robot_file(part, radius_m=0.3, speed_m_s=0.4, turn_rad_s=1.0)
+    assert (tables["ring"]["range_min_m"], tables["ring"]["range_max_m"]) == (0.05, 3.0)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"ranges": {}}, "no sensor_msgs/Range"),
         ({"odometry": None}, "no nav_msgs/Odometry"),
         ({"frames": {}}, "no frames of TF lead from the sensor 'us0' to 'base', only to 'us0'"),
+        ({"ranges": {"us0": (0.0, 0.0, 0.4), "us1": (math.nan, 4.0, 0.5)}}, "between which ranges it measures"),
         ({"ranges": {f"u{k}": (0.1, 4.0, 0.4) for k in range(25)}}, "25 range sensors"),
     ],
 )
