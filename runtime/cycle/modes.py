@@ -38,6 +38,11 @@ LINE_REASONS: Final = MappingProxyType(
     }
 )
 
+WAITING: Final = "waiting for the robot: "
+"""Begins the reason of a SAFE_STOP while the line is not READY; what follows is the driver's, and changes with it."""
+RESTORED: Final = "the line to the robot was lost and is back: check where the robot stands, then re-arm"
+STARTING: Final = "it is being connected again"
+
 HALTED: Final = "halted by the operator; re-arm to continue"
 DISARMED: Final = "disarmed by the operator; re-arm to continue"
 HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
@@ -159,14 +164,23 @@ def advance(
         return replace(state, arming_run_s=None) if is_known else state.enter(Mode.SAFE_STOP, run_s, fault)
     if inputs.line is not LineState.READY:
         if state.mode is Mode.SAFE_STOP:
-            return replace(state, arming_run_s=None)
+            return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs))
         return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem, arming_run_s=None)
+    if state.mode is Mode.SAFE_STOP and (state.reason or "").startswith(WAITING):
+        state = replace(state, reason=RESTORED)
     if state.mode is Mode.CONNECTING:
         state = state.enter(Mode.READY, run_s)
     if movement in {Movement.UNCOMMANDED, Movement.UNSTOPPED}:
         is_known = state.mode is Mode.SAFE_STOP and state.reason == MOVES and state.arming_run_s is None
         return state if is_known else state.enter(Mode.SAFE_STOP, run_s, MOVES)
     return _advance_arming(state, inputs, flags, gap_s, clock)
+
+
+def _why_waiting(reason: str | None, inputs: Inputs) -> str:
+    """Return the reason of a SAFE_STOP on a line that is not READY: the newest that is known of it."""
+    if inputs.line_problem is not None or inputs.line is not LineState.HANDSHAKE:
+        return WAITING + (inputs.line_problem or LINE_REASONS[inputs.line])
+    return reason if reason is not None and reason.startswith(WAITING) else WAITING + STARTING
 
 
 def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> str | None:

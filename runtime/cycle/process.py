@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.settings import Settings
-from drivers.driver import LineState, RobotDriver
+from drivers.driver import RobotDriver
 from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
@@ -24,6 +24,7 @@ from runtime.cycle.connection import Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
+from runtime.cycle.line_log import LineLog
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.mode_log import ModeLog
@@ -138,6 +139,7 @@ class RobotProcess:
         self._connection = Connection(self._link, self._driver, self._send, self._clock, line_messages)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
         self._mode_log = ModeLog(log, self._notifier)
+        self._line_log = LineLog(log, line_messages)
         self._alerts = Alerts()
         self._request: Request | None = None
         self._is_request_valid = always_valid
@@ -320,6 +322,7 @@ class RobotProcess:
         received, on_firing = record.inputs.received, self._observers.on_firing
         if self._state.mode.entered_since(before):
             self._mode_log.entered(self._state, record.inputs.run_s)
+        self._line_log.observe(record, self._driver)
         for line in self._alerts.update(received, self._state.perception, record.inputs.run_s):
             self._log.warning(line)
         if on_firing is not None:
@@ -379,7 +382,7 @@ class RobotProcess:
     def _on_closed(self, reason: str) -> None:
         self._driver.line_closed()
         if not self._stop.is_set():
-            self._log.warning("line lost", reason=self._line_messages.problem(LineState.CLOSED, reason))
+            self._line_log.lost(reason, self._clock())
 
     async def _shut_down(self, link_task: asyncio.Task[None]) -> None:
         """Halt the base and wait until it has stopped; then close the line."""

@@ -96,15 +96,21 @@ TRANSITIONS = [
     (READY, replace(QUIET, gap_s=3.0), Mode.READY, None, False),
     (STOPPED, QUIET, Mode.SAFE_STOP, "a reason", False),
     (STOPPED, flags(Flags.BUMPER), Mode.SAFE_STOP, "a reason", False),
-    (STOPPED, line(LineState.CLOSED), Mode.SAFE_STOP, "a reason", False),
+    (STOPPED, line(LineState.CLOSED), Mode.SAFE_STOP, "waiting for the robot: the line to the robot is gone", False),
     (STOPPED, ARM, Mode.SAFE_STOP, "a reason", True),
-    (STOPPED, replace(ARM, line=LineState.DOWN), Mode.SAFE_STOP, "a reason", False),
+    (STOPPED, replace(ARM, line=LineState.DOWN), Mode.SAFE_STOP, "waiting for the robot: ", False),
     (STOPPED, HALT, Mode.SAFE_STOP, "halted by the operator", False),
     (arming(STOPPED, TOO_SOON), QUIET, Mode.SAFE_STOP, "a reason", True),
     (arming(STOPPED, WAITED), QUIET, Mode.DRIVE, None, False),
     (arming(STOPPED, WAITED), flags(Flags.LATCHED), Mode.SAFE_STOP, "a reason", True),
     (arming(STOPPED, TOO_LONG), flags(Flags.LATCHED), Mode.SAFE_STOP, "latch does not clear", False),
-    (arming(STOPPED, WAITED), line(LineState.DOWN), Mode.SAFE_STOP, "a reason", False),
+    (
+        arming(STOPPED, WAITED),
+        line(LineState.DOWN, "silence"),
+        Mode.SAFE_STOP,
+        "waiting for the robot: silence",
+        False,
+    ),
     (arming(STOPPED, WAITED), HALT, Mode.SAFE_STOP, "halted by the operator", False),
     (CONNECTING, DISARM, Mode.READY, None, False),
     (READY, DISARM, Mode.READY, None, False),
@@ -270,3 +276,25 @@ def test_entering_the_same_mode_again_counts_as_entered() -> None:
     assert not replace(DRIVE, arming_run_s=1.0, reason="another").entered_since(DRIVE)
     assert DRIVE.enter(Mode.DRIVE, NOW).entered_since(DRIVE)
     assert STOPPED.entered_since(DRIVE)
+
+
+def test_the_reason_of_a_stop_follows_the_line_and_says_when_it_is_back() -> None:
+    state = advance_by(DRIVE, line(LineState.DOWN, "silence"))
+    said = [state.reason]
+    for seen in (
+        line(LineState.CLOSED, "unplugged"),
+        line(LineState.HANDSHAKE),
+        line(LineState.DOWN, "a p3at"),
+        QUIET,
+        QUIET,
+    ):
+        state = advance_by(state, seen)
+        said.append(state.reason)
+    assert said[:4] == [
+        "silence",
+        *[f"waiting for the robot: {text}" for text in ("unplugged", "unplugged", "a p3at")],
+    ]
+    assert said[4] is not None
+    assert "is back" in said[4]
+    assert said[5] == said[4]
+    assert advance_by(state, ARM).arming_run_s is not None

@@ -1,0 +1,120 @@
+"""What the log says about the line while the robot runs: its loss and return, corrupt frames, refused arming."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from drivers.driver import LineState, RobotDriver
+from drivers.messages import LinkCounts
+from drivers.token_bucket import LineLimit
+from runtime.cycle.inputs import Request
+from runtime.cycle.line_messages import LineMessages
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import CycleRecord
+
+if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
+LINES_PER_S: Final = 1.0 / 60.0
+LINES_BURST: Final = 3.0
+"""Losses and returns that are logged one by one: a cable that is moved causes some; one that is loose, thousands."""
+NOISE_S: Final = 5.0
+"""Time over which corrupt frames are counted, s."""
+NOISE_MIN: Final = 10
+NOISE_SHARE: Final = 0.05
+"""A line with so many corrupt frames, and such a share of all, is noisy: a good one has none but where it begins."""
+NO_REASON: Final = "the robot is not ready"
+
+CORRUPT: Final = (
+    "{:.0%} of the frames are corrupt, {:.0f} a second; noise on the line: check its cable and shield, and that "
+    "nothing else sends on it"
+)
+ANOTHER: Final = (
+    "another robot answers on this port: '{}' in place of '{}'; likely it took the port's name: check that it is the "
+    "one of this run before it is armed"
+)
+
+
+class LineLog:
+    """Logs what is new about the line, each fact once and at a bounded rate.
+
+    Parameters
+    ----------
+    log : structlog logger
+        Of the run.
+    messages : LineMessages
+        Words messages for what is at the other end of the line.
+    """
+
+    def __init__(self, log: FilteringBoundLogger, messages: LineMessages) -> None:
+        self._log = log
+        self._messages = messages
+        self._limits = {name: LineLimit(LINES_PER_S, LINES_BURST) for name in ("line lost", "line down", "line back")}
+        self._refusals = LineLimit(1.0, LINES_BURST)
+        self._is_ready = True
+        self._problem: str | None = None
+        self._robot: str | None = None
+        self._counts = LinkCounts()
+        self._counted_s: float | None = None
+        self._is_noisy = False
+
+    def lost(self, reason: str, run_s: float) -> None:
+        """Log that the line was closed."""
+        self._say("line lost", run_s, reason=self._messages.problem(LineState.CLOSED, reason))
+
+    def observe(self, record: CycleRecord, driver: RobotDriver) -> None:
+        """Log what a cycle brought."""
+        inputs, run_s = record.inputs, record.inputs.run_s
+        if inputs.line is LineState.READY:
+            if not self._is_ready:
+                self._returned(driver, run_s)
+            elif self._robot is None and driver.identity is not None:
+                self._robot = driver.identity.name
+        elif inputs.line is not LineState.CLOSED and inputs.line_problem not in (None, self._problem):
+            self._problem = inputs.line_problem
+            self._say("line down", run_s, reason=inputs.line_problem)
+        self._is_ready = inputs.line is LineState.READY
+        if inputs.request is Request.ARM:
+            self._judge_arming(record)
+        if self._counted_s is None or not 0.0 <= run_s - self._counted_s < NOISE_S:
+            self._count(driver.counts, run_s)
+
+    def _returned(self, driver: RobotDriver, run_s: float) -> None:
+        self._problem = None
+        name = None if driver.identity is None else driver.identity.name
+        if self._robot is not None and name is not None and name != self._robot:
+            self._log.warning(ANOTHER.format(name, self._robot))
+        self._robot = name or self._robot
+        self._say("line back", run_s, robot=name)
+
+    def _judge_arming(self, record: CycleRecord) -> None:
+        """Log why the robot is not being armed although it was requested."""
+        mode = record.mode
+        if mode.mode is Mode.DRIVE or mode.arming_run_s is not None:
+            return
+        left_out = self._refusals.take(record.inputs.run_s)
+        if left_out is not None:
+            reason = mode.reason or record.inputs.line_problem or NO_REASON
+            self._log.warning("arming refused", mode=mode.mode.value, reason=reason, **_more(left_out))
+
+    def _count(self, counts: LinkCounts, run_s: float) -> None:
+        before, self._counts = self._counts, counts
+        since_s, self._counted_s = self._counted_s, run_s
+        if since_s is None or run_s <= since_s:
+            return
+        bad, good = counts.bad - before.bad, counts.frames - before.frames
+        was_noisy, self._is_noisy = self._is_noisy, bad >= NOISE_MIN and bad >= NOISE_SHARE * (bad + good)
+        if self._is_noisy and not was_noisy:
+            text = CORRUPT.format(bad / (bad + good), bad / (run_s - since_s))
+            self._log.warning(self._messages.message(text))
+
+    def _say(self, event: str, run_s: float, **values: object) -> None:
+        """Log an event, or count it if there were many of its kind."""
+        left_out = self._limits[event].take(run_s)
+        if left_out is not None:
+            write = self._log.info if event == "line back" else self._log.warning
+            write(event, **values, **_more(left_out))
+
+
+def _more(left_out: int) -> dict[str, int]:
+    return {"suppressed_before": left_out} if left_out else {}
