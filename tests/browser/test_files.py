@@ -165,3 +165,13 @@ async def test_a_robot_is_described_with_a_picture_of_its_ring_and_saved(server:
     await opened.says("#robot-error", "does not look ahead")
     await page.locator("#robot-this").press("Enter")
     await expect(page.locator("#robot-sensors li")).to_have_count(24)
+
+
+async def test_what_is_wrong_with_a_played_recording_stays_on_the_page(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    text = "the keyframe of cycle 800 is refused: count is 7, expected 0 to 4; the replay goes on from an earlier state"
+    await server.send({"type": "replay_problem", "error": text})
+    await opened.says("#banner-recording", text)
+    await opened.save_screenshot("files-problem")
+    await opened.page.locator("#banner-recording").get_by_role("button", name="Close").press("Enter")
+    await expect(opened.page.locator("#banner-recording")).to_have_count(0)
