@@ -169,7 +169,7 @@ async def test_a_robot_is_described_with_a_picture_of_its_ring_and_saved(server:
 
 async def test_what_is_wrong_with_a_played_recording_stays_on_the_page(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
-    text = "the keyframe of cycle 800 is refused: count is 7, expected 0 to 4; the replay goes on from an earlier state"
+    text = "the keyframe of cycle 800 is refused: count is 7, expected 0 to 4"
     await server.send({"type": "replay_problem", "error": text})
     await opened.says("#banner-recording", text)
     await opened.save_screenshot("files-problem")
