@@ -7,6 +7,7 @@ grids and ways of localisation in turn, so that any two of these values meet; `-
 from __future__ import annotations
 
 import itertools
+import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -138,7 +139,7 @@ def adopt_all(settings: Settings, seed: int, seconds: float, period_s: float) ->
     def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
         if state.odometry is not None:
             last.append(state.odometry.pose)
-            found.way_m += np.hypot(last[-1].x - last[0].x, last[-1].y - last[0].y)
+            found.way_m += math.hypot(last[-1].x - last[0].x, last[-1].y - last[0].y)
             del last[:-1]
         if record.cycle % every:
             return

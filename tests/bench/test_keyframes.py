@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Callable
 
 import pytest
@@ -19,6 +20,7 @@ from bench.keyframes import (
     settings_of,
     shares_after,
 )
+from config.errors import DONE
 from config.load import load_settings
 from perception.snapshot import bounds_of
 from runtime.recording.replayer import fresh_state
@@ -79,6 +81,14 @@ def test_a_refused_keyframe_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     found = adopt_all(settings, 0, 2.0, 1.0)
     assert len(found.refused) == 2
     assert name in found.refused[0]
+
+
+def test_a_line_of_json_is_printed_for_each_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(seconds=41.0, robots=("amigo",), worlds=("hallway",)) == DONE
+    (line,) = capsys.readouterr().out.splitlines()
+    row = json.loads(line)
+    assert (row["robot"], row["world"], row["keyframes"], row["refused"]) == ("amigo", "hallway", 1, [])
+    assert row["way_m"] > 5.0
 
 
 @pytest.mark.soak

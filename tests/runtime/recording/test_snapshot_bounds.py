@@ -116,8 +116,19 @@ def test_no_state_with_correction_of_drift_is_refused() -> None:
 
 @pytest.mark.compiled
 @pytest.mark.boundscheck
-def test_no_state_in_a_known_room_is_refused_and_a_poisoned_one_is_harmless() -> None:
-    settings = with_known_room(load_settings("irregular", ["perception.method=paper"]), "irregular")
+@pytest.mark.parametrize(
+    ("place", "grid", "method"),
+    [("room", "off", "paper"), ("drift", "directed", "bayes"), ("room", "moravec_elfes", "bayes"),
+     ("drift", "elfes", "bayes")],
+)  # fmt: skip
+def test_no_state_with_a_place_and_a_grid_is_refused_and_a_poisoned_one_is_harmless(
+    place: str, grid: str, method: str
+) -> None:
+    sets = [f"perception.method={method}", f"perception.grid.method={grid}", "perception.grid.cells=32"]
+    sets.append(f"perception.localization.correct_drift={str(place == 'drift').lower()}")
+    settings = load_settings("irregular", sets)
+    if place == "room":
+        settings = with_known_room(settings, "irregular")
     assert settings.world is not None
     perception, rng = Perception(settings.ring, settings.models, settings.perception), np.random.default_rng(3)
     fresh, firings = perception.snapshot(), faulty(drive(settings.world, (-6.0, 2.0)))
@@ -129,7 +140,7 @@ def test_no_state_in_a_known_room_is_refused_and_a_poisoned_one_is_harmless() ->
         if k % CHECKED_EVERY == 0:
             is_honest(perception, settings)
             moment = Moment(k, settings, carried_state(last), perception.snapshot(), [])
-            stages.add(int(moment.snapshot["known_room._stage"]))
+            stages.add(int(moment.snapshot.get("known_room._stage", np.array(k))))
             poisoned = randomised(moment, rng)
             other = moment.perception()
             with contextlib.suppress(ArithmeticError, LookupError, ValueError):
@@ -139,6 +150,8 @@ def test_no_state_in_a_known_room_is_refused_and_a_poisoned_one_is_harmless() ->
                 for _ in range(40):
                     other.refine()
                 other.localized()
+                other.occupancy()
+                other.labelled_objects()
     assert len(stages) >= 2
     localized = perception.localized()
     assert localized is not None
