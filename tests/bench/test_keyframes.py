@@ -16,6 +16,7 @@ from bench.keyframes import (
     WORLDS,
     Adopted,
     adopt_all,
+    main,
     runs,
     settings_of,
     shares_after,
