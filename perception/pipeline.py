@@ -44,6 +44,7 @@ from perception.mapping.canyons import ENDS_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method, make_method
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
+from perception.ring_monitor import RingMonitor
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
@@ -79,6 +80,7 @@ class Perception:
     ) -> None:
         self.method = make_method(ring, models, config) if method is None else method
         self.sensor_monitor = SensorMonitor(ring)
+        self.ring_monitor = RingMonitor(ring)
         corrects = config.localization.correct_drift
         self.map_frame = MapFrame(ring, models) if corrects else None
         """Corrects drift, where the settings say so; what `method` holds is in the filter's frame then."""
@@ -134,6 +136,7 @@ class Perception:
         if len(firing.ranges_m) != self._sensors:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges, but the ring has {self._sensors} sensors")
         trusted, possible = self.sensor_monitor.filter(firing)
+        self.ring_monitor.observe(possible)
         self._echoes.update(possible)
         if self.known_room is not None:
             self.known_room.observe(trusted)
@@ -329,6 +332,7 @@ class Perception:
         if self.known_room is not None:
             self.known_room.reset()
         self.sensor_monitor.reset()
+        self.ring_monitor.reset()
         self._echoes.clear()
 
     def apply_settings(self, config: PerceptionConfig) -> None:
@@ -352,6 +356,7 @@ class Perception:
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""
         self.sensor_monitor.set_firing_pattern(ring)
+        self.ring_monitor.set_reach(ring.window_m)
         self._reach_m = reach_m(ring)
 
     def sensor_reports(self) -> tuple[SensorReport, ...]:

@@ -121,6 +121,8 @@ class State:
     """Whether the robot's clock keeps time."""
     goal_drive: GoalDrive | None = None
     """The drive to a goal so far; None without a goal, or before its first cycle in DRIVE."""
+    ring_problem: str | None = None
+    """Why the readings of the newest firings cannot be true; None if they can. Made anew each cycle, not recorded."""
     percept: Percept | None = None
     """What the last cycle decided on; None if it did not drive. It is made anew each cycle and not recorded."""
     step_settings: StepSettings | None = None
@@ -224,6 +226,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
     for firing in inputs.received.firings:
         new_segments += state.perception.observe(firing)
         state.last_firing_robot_s = firing.robot_s
+    state.ring_problem = state.perception.ring_monitor.take_problem()
     return new_segments
 
 
@@ -305,6 +308,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
+    if state.ring_problem is not None:
+        return Stop(state.ring_problem)
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
     now_s = state.clock_monitor.now_s(odometry.robot_s, inputs.run_s)
     view, obstacles = state.perception.surroundings(now_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)

@@ -1,0 +1,88 @@
+"""Records of what is remembered of each sensor and of the ring, for the tests of `perception.ring_tests`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from perception.bounds import PLACE, POSITIVE, Count, Flag, Place
+from perception.kernel import Floats
+from perception.records import Record
+
+SILENCE_M: Final = -1.0
+"""In place of the range of a reading without an echo, m."""
+HALVES: Final = 2
+"""Parts of the ring that may fail by themselves: all of it, and what looks ahead."""
+QUARTERS: Final = 3
+"""Quarter turns, counter-clockwise, by which a ring may be mounted wrongly."""
+LOOK_KINDS: Final = 4
+"""Kinds of looks at a known echo, each with a rate of misses of its own."""
+
+
+class SensorPlace(Record):
+    """Where a sensor was at a reading, in the odometry's frame."""
+
+    range_m: Annotated[float, PLACE]
+    """The reading, m; `SILENCE_M` without an echo."""
+    x: Place
+    """Place of the sensor, m."""
+    y: Place
+    axis: Place
+    """Direction of its axis, rad."""
+    path_m: Place
+    """The ring's way until then, m."""
+
+
+class EchoTrace(Record):
+    """What is remembered of one sensor."""
+
+    is_known: Flag
+    """Whether it has made a reading."""
+    last_m: Annotated[float, PLACE]
+    """The last reading, m; `SILENCE_M` without an echo."""
+    standstill: Count
+    """The standstill of the ring's readings to which `repeat` belongs."""
+    repeat: SensorPlace
+    """Where it repeated its reading first in that standstill."""
+    repeated_nat: Annotated[float, POSITIVE]
+    """Evidence that it repeats an old reading, nat."""
+    heard: SensorPlace
+    """The last echo."""
+    agreed: Count
+    """Echoes in succession, each of which was where the one before had led to expect it."""
+    silences: Count
+    """Looks without an echo since the last echo."""
+    anchor: SensorPlace
+    """The echo with which later ones of the same surface are compared …"""
+    is_anchored: Flag
+    """… if there is one."""
+
+
+class RingTrace(Record):
+    """What is remembered of the ring."""
+
+    is_started: Flag
+    x: Place
+    """Place of the last firing, m."""
+    y: Place
+    travel_rad: Place
+    """Direction of the last motion, rad."""
+    path_m: Place
+    """Its way so far, m."""
+    standstill: Count
+    """Number of the present standstill of the readings; a reading that changes ends it."""
+    repeated_nat: Annotated[float, POSITIVE]
+    """Evidence that the ring repeats old readings, nat."""
+    missed_nat: Annotated[Floats, HALVES, POSITIVE]
+    """Evidence that readings do not depend on what is there, nat."""
+    silent: Count
+    """Of the misses in that evidence, those without an echo, …"""
+    elsewhere: Count
+    """… and those with an echo elsewhere."""
+    turned_nat: Annotated[Floats, QUARTERS, POSITIVE]
+    """Evidence that the ring is mounted turned by so many quarters, nat."""
+    misses: Annotated[Floats, LOOK_KINDS, POSITIVE]
+    """Looks of each kind that missed a known echo, …"""
+    looks: Annotated[Floats, LOOK_KINDS, POSITIVE]
+    """… and all of them."""
+
+

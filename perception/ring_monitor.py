@@ -1,0 +1,102 @@
+"""Detection of a ring whose readings contradict its own motion: a ring that lies as a whole.
+
+`perception.sensor_monitor` finds single sensors that differ from their neighbours. What the whole ring says can only
+be compared with how it moves. An honest ring among things that stand still is compared with these:
+
+- *Repeating.* Every sensor that looks ahead repeats its last reading to the bit, although the odometry brings it
+  nearer to whatever answers. A wall along the path explains equal readings. A robot whose wheels slip looks the same,
+  so the reason names both.
+- *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
+  ranges are. How often an honest ring misses a known echo is learned on the way.
+- *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°.
+
+Each is a sequential test with one threshold, `perception.ring_tests.EVIDENCE_NAT`. A lie that agrees with the motion,
+as ranges that are all too long by the same amount do, cannot be found in this way.
+"""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from config.robot import RingConfig
+from drivers.messages import Firing
+from perception.bounds import CONSTANT, bounds, index_of
+from perception.records import records, zeros
+from perception.ring_memory import QUARTERS, EchoTrace, RingTrace
+from perception.ring_tests import NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
+from perception.sensor_monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
+from perception.sensor_mounts import mounts_array, mounts_at
+
+_TURNED: Final = (
+    "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
+    "its cables and the order of its sensors, then re-arm"
+)
+REASONS: Final = MappingProxyType({
+    REPEATED: "the ring repeats old readings although the odometry moves on: it is frozen, or the wheels turn and "
+    "the robot does not move; check the ring's power and cables, and whether the wheels slip, then re-arm",
+    VANISHED: "most echoes that the ring heard have vanished at once, and the robot has not moved past them: the "
+    "ring hears nothing, or not all; check its power and cables and what covers it, then re-arm",
+    SCATTERED: "the ring's readings are unrelated from one firing to the next: they do not come from what is "
+    "there; check the ring for noise, crosstalk and loose cables, and the odometry for a jump, then re-arm",
+    TURNED: _TURNED.format("90°, counter-clockwise,"),
+    TURNED + 1: _TURNED.format("180°"),
+    TURNED + 2: _TURNED.format("90°, clockwise,"),
+})  # fmt: skip
+"""What happened, the likely cause, the next action."""
+
+
+class RingMonitor:
+    """Compares the readings of the ring with its motion.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    """
+
+    SCRATCH: Final = ("_echo_records", "_ring_records")
+    """Not part of a snapshot: views of arrays that are."""
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT, _reach_m=CONSTANT, _echoes=EchoTrace.BOUNDS,
+        _ring=RingTrace.BOUNDS, _found=index_of(TURNED + QUARTERS),
+    )  # fmt: skip
+
+    def __init__(self, ring: RingConfig) -> None:
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
+        self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
+        self._reach_m = ring.window_m
+        self._echoes = zeros(EchoTrace, len(ring.mounts))
+        self._echo_records = records(EchoTrace, self._echoes)
+        self._ring = zeros(RingTrace, 1)
+        self._ring_records = records(RingTrace, self._ring)
+        self._found = NOTHING
+
+    def observe(self, firing: Firing) -> None:
+        """Test a firing, in which sensors that are masked have no readings."""
+        pose, mounts = firing.pose, mounts_at(firing, self._mounts, self._turning)
+        found = check_motion(
+            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), mounts, self._half_angle,
+            self._tolerance, self._reach_m, self._echo_records, self._ring_records,
+        )  # fmt: skip
+        if found != NOTHING:
+            self._found = int(found)
+
+    def take_problem(self) -> str | None:
+        """Return why the readings since the last call cannot be true, once; None if they can."""
+        found, self._found = self._found, NOTHING
+        return None if found == NOTHING else REASONS[found]
+
+    def set_reach(self, reach_m: float) -> None:
+        """Expect echoes up to another range, m."""
+        self._reach_m = reach_m
+
+    def reset(self) -> None:
+        """Start again after the odometry was reset."""
+        self._echoes[...] = np.zeros((), self._echoes.dtype)
+        self._ring[...] = np.zeros((), self._ring.dtype)
+        self._found = NOTHING
