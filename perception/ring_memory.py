@@ -40,8 +40,8 @@ class EchoTrace(Record):
     last_m: Annotated[float, PLACE]
     """The last reading, m; `SILENCE_M` without an echo."""
     standstill: Count
-    """The standstill of the ring's readings to which `repeat` belongs."""
-    repeat: SensorPlace
+    """The standstill of the ring's readings to which `repeated` belongs."""
+    repeated: SensorPlace
     """Where it repeated its reading first in that standstill."""
     repeated_nat: Annotated[float, POSITIVE]
     """Evidence that it repeats an old reading, nat."""
@@ -49,6 +49,10 @@ class EchoTrace(Record):
     """The last echo."""
     agreed: Count
     """Echoes in succession, each of which was where the one before had led to expect it."""
+    agreed_m: Annotated[float, PLACE]
+    """The last of these, m, …"""
+    agreed_path_m: Place
+    """… and the ring's way until then, m."""
     silences: Count
     """Looks without an echo since the last echo."""
     anchor: SensorPlace
@@ -84,5 +88,3 @@ class RingTrace(Record):
     """Looks of each kind that missed a known echo, …"""
     looks: Annotated[Floats, LOOK_KINDS, POSITIVE]
     """… and all of them."""
-
-

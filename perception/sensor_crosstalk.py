@@ -5,9 +5,15 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.kernel import kernel
-from perception.sensor_memory import SensorMemory
+import numpy as np
+from numpy.typing import NDArray
 
+from perception.kernel import Floats, kernel
+from perception.records import Records
+from perception.sensor_memory import RingMemory, SensorMemory
+
+REGULARITY_GAIN: Final = 0.05
+"""Weight of the newest firing in the regularity of the firing pattern."""
 SHORT_M: Final = 0.15
 """Crosstalk: a reading is short if it is below those before and after it by this, m, …"""
 SHORT_SHARE: Final = 0.05
@@ -18,6 +24,44 @@ DOUBT_SHARE: Final = 0.02
 """… and by this share, for noise. A wrong doubt costs a firing, a wrong mask a sensor: that one has wider limits."""
 SHORT_READINGS_MAX: Final = 8.0
 """Short readings that are crosstalk; each other reading subtracts two."""
+
+
+@kernel
+def find_set(
+    ranges: Floats, sets: NDArray[np.uint8], sensors: Records[SensorMemory], ring: Records[RingMemory]
+) -> int:
+    """Return the index of the set of sensors that fired; enter a new set, over the oldest where all are in use.
+
+    Parameters
+    ----------
+    ranges : (n,) float
+        Readings of the firing, m: NaN for a sensor that did not fire, inf for one without an echo.
+    sets : (sets, n) uint8
+        Known sets, one a row: 1 for each sensor of the set. A new set overwrites a row.
+    sensors : (n,) records
+        What is remembered of each sensor. Crosstalk counts of an overwritten set are cleared.
+    ring : (1,) records
+        What is remembered of the ring. The number of sets and the regularity are updated.
+    """
+    seen = ring[0].sets_seen
+    k: int
+    for k in range(min(seen, sets.shape[0])):
+        same = True
+        for i in range(ranges.shape[0]):
+            if (sets[k, i] == 1) == math.isnan(ranges[i]):
+                same = False
+                break
+        if same:
+            ring[0].regularity += REGULARITY_GAIN * (1.0 - ring[0].regularity)
+            return k
+    ring[0].regularity -= REGULARITY_GAIN * ring[0].regularity
+    k = seen % sets.shape[0]
+    for i in range(ranges.shape[0]):
+        sets[k, i] = 0 if math.isnan(ranges[i]) else 1
+        sensors[i].short_readings[k] = 0.0
+        sensors[i].is_crossed[k] = 0
+    ring[0].sets_seen += 1
+    return k
 
 
 @kernel

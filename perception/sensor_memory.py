@@ -7,12 +7,14 @@ from typing import Annotated, Final
 from perception.bounds import FINITE, FLAG, PLACE, Count, Place, Share, index_of, up_to
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
-from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
+from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 
 SETS_MAX: Final = 32
 """Sets of sensors that fire together that are distinguished; a firing pattern has at most 24."""
 
 
+TOO_NEAR_READINGS: Final = 5
+"""Readings below the least range, less the others, that are a fault; as many others clear it."""
 RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 """Of a range; infinite where nothing was heard, or nothing is known yet."""
 
@@ -63,7 +65,9 @@ class SensorMemory(Record):
     """The value it is stuck at, m."""
     off_stuck: Count
     """Consecutive readings away from that value."""
-    faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK)]
+    too_near: Annotated[int, up_to(TOO_NEAR_READINGS)]
+    """Readings below the least range, less the others."""
+    faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK | TOO_NEAR)]
     """Fault bits of `perception.sensor_report`."""
     short_readings: Annotated[Floats, SETS_MAX, FINITE]
     """For each set, short readings less those that were not."""

@@ -9,6 +9,7 @@ A single reading proves nothing; how readings change while the robot moves and w
 - *Silent.* The sensor hears nothing over a long distance while both neighbours hear echoes. Its silence, which would
   mean free space, is not mapped; its first echo is. It is no more than a suspicion: along a hall, a healthy sensor
   hears nothing either. So its silence still counts as a look (`perception.fresh_echoes`), which has no echo.
+- *Too near.* The sensor answers ranges below the least that it can measure.
 - *Failing.* The sensor should fire and reports no range, however often the ring fires.
 - *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not depend on which other sensors fired. A
   reading that is shorter than the one before it in another set of sensors is not trusted until a reading in another
@@ -44,6 +45,8 @@ surfaces."""
 NEAR_SHARE: Final = 0.45
 """Near limit as a share of the ring's reach. Along a straight wall a beam measures up to 2.2 times as far as its
 neighbour 15° nearer to the wall, so an echo beyond this does not predict what the neighbour hears."""
+LEAST_SHARE: Final = 0.5
+"""What is below this share of the least range is too near to be measured; a calibration doubles a range at most."""
 SAME_AXIS_RAD: Final = 1e-6
 """Sensors whose axes differ by less look the same way and are not neighbours."""
 TOLERANCE_MIN_M: Final = 0.005
@@ -121,7 +124,7 @@ class SensorMonitor:
     """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
     BOUNDS: Final = bounds(
         changes=COUNT, _mounts=CONSTANT, _neighbours=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
-        _near=CONSTANT, _sensors=SensorMemory.BOUNDS, _ring=RingMemory.BOUNDS, _sets=FLAG,
+        _least=CONSTANT, _near=CONSTANT, _sensors=SensorMemory.BOUNDS, _ring=RingMemory.BOUNDS, _sets=FLAG,
     )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
@@ -135,6 +138,7 @@ class SensorMonitor:
         self._expected = fires(ring)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
+        self._least = LEAST_SHARE * ring.range_min_m
         self._near = NEAR_SHARE * ring.range_max_m
         self._sensors = zeros(SensorMemory, count)
         self._sensor_records = records(SensorMemory, self._sensors)
@@ -155,8 +159,8 @@ class SensorMonitor:
             self._turns[self._turning] = pose.theta - firing.ring_yaw
         changed = check_firing(
             firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._mounts, self._turns,
-            self._neighbours, self._expected, self._half_angle, self._tolerance, self._near, self._sensor_records,
-            self._ring_records, self._sets, trusted, possible,
+            self._neighbours, self._expected, self._half_angle, self._tolerance, self._least, self._near,
+            self._sensor_records, self._ring_records, self._sets, trusted, possible,
         )  # fmt: skip
         self.changes += changed & FAULTS_CHANGED
         if firing.cross_paths is not None and not are_sound(self._sensor_records):

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-SensorFault: TypeAlias = Literal["failing", "stuck", "silent", "crosstalk"]
+SensorFault: TypeAlias = Literal["failing", "stuck", "too_near", "silent", "crosstalk"]
 
 STUCK: Final = 1
 SILENT: Final = 2
 FAILING: Final = 4
 CROSSTALK: Final = 8
+TOO_NEAR: Final = 16
 """Bits of a sensor's fault word. A sensor may have several faults; the most severe one is reported."""
 
 
@@ -52,6 +53,13 @@ def describe_fault(sensor: int, faults: int, stuck_m: float, partners: Sequence[
             "stuck",
             f"sensor {sensor} always answers {stuck_m:.2f} m although the base has moved on: masked; look for "
             f"something that hangs in front of it, then replace it",
+        )
+    if faults & TOO_NEAR:
+        return SensorReport(
+            sensor,
+            "too_near",
+            f"sensor {sensor} answers ranges far below ring.range_min_m, which it cannot measure: masked; check its "
+            f"trigger and supply, and that nothing covers it, or correct range_min_m",
         )
     if faults & SILENT:
         return SensorReport(

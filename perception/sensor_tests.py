@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
-from perception.sensor_crosstalk import count_short_readings, is_doubtful
-from perception.sensor_memory import RingMemory, SensorMemory
-from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
+from perception.sensor_crosstalk import count_short_readings, find_set, is_doubtful
+from perception.sensor_memory import TOO_NEAR_READINGS, RingMemory, SensorMemory
+from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 from perception.sensor_wall import NOISE_SHARE, is_along_wall
 
 # The thresholds below were tuned on the simulated halls of tests/perception/test_sensor_monitor.py: no healthy sensor
@@ -41,8 +41,6 @@ NEAR_ECHO_SHARE: Final = 0.5
 """Silent: near echoes of either neighbour for each firing without an echo."""
 LEAP_M: Final = 0.3
 """A change of the reading by more than this is a leap, m."""
-REGULARITY_GAIN: Final = 0.05
-"""Weight of the newest firing in the regularity of the firing pattern."""
 REGULARITY_MIN: Final = 0.8
 """Below this regularity the sets do not recur, and crosstalk is not tested."""
 RECOVERY_READINGS: Final = 5
@@ -53,44 +51,6 @@ MISSED_FIRINGS_MAX: Final = 72
 
 FAULTS_CHANGED, LESS_TRUSTED, LESS_POSSIBLE = 1, 2, 4
 """Bits of `check_firing`'s result: a fault began or ended; readings are not trusted; readings are masked."""
-
-
-@kernel
-def find_set(
-    ranges: Floats, sets: NDArray[np.uint8], sensors: Records[SensorMemory], ring: Records[RingMemory]
-) -> int:
-    """Return the index of the set of sensors that fired; enter a new set, over the oldest where all are in use.
-
-    Parameters
-    ----------
-    ranges : (n,) float
-        Readings of the firing, m: NaN for a sensor that did not fire, inf for one without an echo.
-    sets : (sets, n) uint8
-        Known sets, one a row: 1 for each sensor of the set. A new set overwrites a row.
-    sensors : (n,) records
-        What is remembered of each sensor. Crosstalk counts of an overwritten set are cleared.
-    ring : (1,) records
-        What is remembered of the ring. The number of sets and the regularity are updated.
-    """
-    seen = ring[0].sets_seen
-    k: int
-    for k in range(min(seen, sets.shape[0])):
-        same = True
-        for i in range(ranges.shape[0]):
-            if (sets[k, i] == 1) == math.isnan(ranges[i]):
-                same = False
-                break
-        if same:
-            ring[0].regularity += REGULARITY_GAIN * (1.0 - ring[0].regularity)
-            return k
-    ring[0].regularity -= REGULARITY_GAIN * ring[0].regularity
-    k = seen % sets.shape[0]
-    for i in range(ranges.shape[0]):
-        sets[k, i] = 0 if math.isnan(ranges[i]) else 1
-        sensors[i].short_readings[k] = 0.0
-        sensors[i].is_crossed[k] = 0
-    ring[0].sets_seen += 1
-    return k
 
 
 @kernel
@@ -290,11 +250,24 @@ def update_run_faults(
 
 
 @kernel
+def count_too_near(c: SensorMemory, is_too_near: bool) -> None:
+    """Set or clear a sensor's fault `TOO_NEAR`, given whether its reading is below the least that it can measure.
+
+    A thing so near that the sensor rings on looks the same, and must not be driven at either.
+    """
+    c.too_near = min(TOO_NEAR_READINGS, c.too_near + 1) if is_too_near else max(0, c.too_near - 1)
+    if c.too_near == TOO_NEAR_READINGS:
+        c.faults |= TOO_NEAR
+    elif c.too_near == 0:
+        c.faults &= ~TOO_NEAR
+
+
+@kernel
 def check_firing(
     ranges: Floats, x: float, y: float, yaw: float, mounts: Floats, turns: Floats, neighbours: Ints,
     expected: NDArray[np.bool_],
-    half_angle: float, tolerance: float, near: float, sensors: Records[SensorMemory], ring: Records[RingMemory],
-    sets: NDArray[np.uint8], trusted: Floats, possible: Floats,
+    half_angle: float, tolerance: float, least: float, near: float, sensors: Records[SensorMemory],
+    ring: Records[RingMemory], sets: NDArray[np.uint8], trusted: Floats, possible: Floats,
 ) -> int:  # fmt: skip
     """Test the readings of a firing; return the bits `FAULTS_CHANGED`, `LESS_TRUSTED` and `LESS_POSSIBLE`.
 
@@ -316,6 +289,8 @@ def check_firing(
         Half the beam's width, rad.
     tolerance : float
         Readings that differ by no more than this are equal, m.
+    least : float
+        Ranges below this cannot be measured, m.
     near : float
         Echoes nearer than this are near, m.
     sensors : (n,) records
@@ -380,10 +355,11 @@ def check_firing(
         for k in range(sets.shape[0]):
             if c.is_crossed[k]:
                 c.faults |= CROSSTALK
-        if c.faults & STUCK or c.is_crossed[fired_set]:
+        count_too_near(c, r < least)
+        if c.faults & (STUCK | TOO_NEAR) or c.is_crossed[fired_set]:
             trusted[i] = possible[i] = math.nan
             changed |= LESS_TRUSTED | LESS_POSSIBLE
-        elif c.faults & SILENT and not math.isfinite(r):
+        elif r < least or (c.faults & SILENT and not math.isfinite(r)):
             trusted[i] = math.nan
             changed |= LESS_TRUSTED
         if c.faults != before:

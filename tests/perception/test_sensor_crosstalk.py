@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.sensor_crosstalk import SHORT_READINGS_MAX, count_short_readings, is_doubtful
-from perception.sensor_memory import SensorMemory
+from perception.sensor_crosstalk import SHORT_READINGS_MAX, count_short_readings, find_set, is_doubtful
+from perception.sensor_memory import RingMemory, SensorMemory
 
 
 def sensor(readings: int = 2, last_m: float = 4.0, before_last_m: float = 4.0) -> Records[SensorMemory]:
@@ -57,3 +60,19 @@ def test_a_reading_is_doubtful_if_it_is_shorter_than_motion_explains() -> None:
     assert not is_doubtful(c[0], 1.0, 3.0, 0.0, 1), "the base has come nearer"
     assert not is_doubtful(c[0], 1.0, 0.0, 0.0, 0), "with the same partners"
     assert not is_doubtful(sensor(readings=0)[0], 1.0, 0.0, 0.0, 1)
+
+
+def test_sets_are_known_again_and_the_oldest_is_overwritten() -> None:
+    memory = records(SensorMemory, zeros(SensorMemory, 4))
+    whole, sets = records(RingMemory, zeros(RingMemory, 1)), np.zeros((2, 4), np.uint8)
+    a, b, c = (
+        np.array([2.0 if bit else math.nan for bit in bits]) for bits in ((1, 0, 1, 0), (0, 1, 0, 1), (1, 1, 1, 1))
+    )
+    assert [find_set(r, sets, memory, whole) for r in (a, b, a, b)] == [0, 1, 0, 1]
+    memory[2].short_readings[0], memory[2].is_crossed[0] = 5.0, 1
+    regularity = whole[0].regularity
+    assert find_set(c, sets, memory, whole) == 0
+    assert whole[0].regularity < regularity
+    assert (memory[2].short_readings[0], memory[2].is_crossed[0]) == (0.0, 0)
+    assert find_set(a, sets, memory, whole) == 1
+    assert whole[0].sets_seen == 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, describe_fault
+from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR, describe_fault
 
 
 @pytest.mark.parametrize(
@@ -16,6 +16,7 @@ from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, describe
         (CROSSTALK, "crosstalk", "sensor 7 reads short when it fires together with 3, 11 and not otherwise"),
         (FAILING | STUCK | SILENT | CROSSTALK, "failing", "check its cable and its board"),
         (STUCK | SILENT | CROSSTALK, "stuck", "look for something that hangs in front of it"),
+        (TOO_NEAR | SILENT, "too_near", "sensor 7 answers ranges far below ring.range_min_m"),
         (SILENT | CROSSTALK, "silent", "check that nothing covers it"),
         (CROSSTALK, "crosstalk", "fire them apart (ring.firing)"),
     ],

@@ -9,8 +9,8 @@ import pytest
 
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
-from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
-from perception.sensor_report import FAILING, SILENT, STUCK
+from perception.sensor_memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, SensorMemory
+from perception.sensor_report import FAILING, SILENT, STUCK, TOO_NEAR
 from perception.sensor_tests import (
     EQUAL_READINGS_MIN,
     FAULTS_CHANGED,
@@ -23,7 +23,6 @@ from perception.sensor_tests import (
     RECOVERY_READINGS,
     begin_run,
     check_firing,
-    find_set,
     is_silent,
     is_stuck,
     neighbour_counts,
@@ -44,21 +43,6 @@ def sensors() -> Records[SensorMemory]:
 
 def ring() -> Records[RingMemory]:
     return records(RingMemory, zeros(RingMemory, 1))
-
-
-def test_sets_are_known_again_and_the_oldest_is_overwritten() -> None:
-    memory, whole, sets = sensors(), ring(), np.zeros((2, COUNT), np.uint8)
-    a, b, c = (
-        np.array([2.0 if bit else math.nan for bit in bits]) for bits in ((1, 0, 1, 0), (0, 1, 0, 1), (1, 1, 1, 1))
-    )
-    assert [find_set(r, sets, memory, whole) for r in (a, b, a, b)] == [0, 1, 0, 1]
-    memory[2].short_readings[0], memory[2].is_crossed[0] = 5.0, 1
-    regularity = whole[0].regularity
-    assert find_set(c, sets, memory, whole) == 0
-    assert whole[0].regularity < regularity
-    assert (memory[2].short_readings[0], memory[2].is_crossed[0]) == (0.0, 0)
-    assert find_set(a, sets, memory, whole) == 1
-    assert whole[0].sets_seen == 4
 
 
 def run_of(memory: Records[SensorMemory], length: int, changes: int, leaps: int, near: int = 0) -> None:
@@ -158,8 +142,8 @@ class Checker:
 
     def __call__(self, ranges: Floats, x: float = 0.0, yaw: float = 0.0) -> int:
         return check_firing(
-            ranges, x, 0.0, yaw, MOUNTS, np.zeros(COUNT), NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors,
-            self.ring, self.sets, self.trusted, self.possible,
+            ranges, x, 0.0, yaw, MOUNTS, np.zeros(COUNT), NEIGHBOURS, self.expected, HALF, 0.01, 0.1, 3.0,
+            self.sensors, self.ring, self.sets, self.trusted, self.possible,
         )  # fmt: skip
 
 
@@ -208,3 +192,19 @@ def test_a_firing_without_readings_or_pose_is_ignored() -> None:
     assert check(np.full(COUNT, 2.0), x=math.inf) == 0
     assert check.ring[0].firings == 0
     np.testing.assert_array_equal(check.trusted, np.full(COUNT, 2.0))
+
+
+def test_a_sensor_that_reads_what_it_cannot_is_masked_until_it_behaves() -> None:
+    check = Checker()
+    near, far = np.array([0.09, 2.0, 2.0, 2.0]), np.array([0.11, 2.0, 2.0, 2.0])
+    assert check(near) & LESS_TRUSTED
+    assert math.isnan(check.trusted[0])
+    assert check.possible[0] == 0.09, "the robot keeps clear of what may be there"
+    for _ in range(TOO_NEAR_READINGS - 1):
+        check(near)
+    assert check.sensors[0].faults == TOO_NEAR
+    assert math.isnan(check.possible[0])
+    for _ in range(TOO_NEAR_READINGS):
+        check(far)
+    assert check.sensors[0].faults == 0
+    assert check.possible[0] == 0.11

@@ -1,0 +1,166 @@
+"""The test of whether a ring repeats old readings; see `perception.ring_tests`."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import Floats, kernel
+from perception.records import Records
+from perception.ring_memory import EchoTrace, RingTrace, SensorPlace
+from perception.sensor_wall import NOISE_SHARE
+
+REPEAT_NAT: Final = math.log(100.0)
+"""Evidence of a reading that repeats, to the bit, what it should have changed by `STEP_MIN_M` or three tolerances."""
+STEP_MIN_M: Final = 0.06
+"""See `REPEAT_NAT`, m: ten times the error of a short way's odometry and of a range in steps of a millimetre."""
+REPEATS_MAX: Final = 3.0
+"""Such changes of one sensor that count: a single sensor may be stuck, which says nothing about the ring."""
+
+
+@kernel
+def wrapped(angle: float) -> float:
+    """Return an angle wrapped into [−π, π)."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@kernel
+def mark(place: SensorPlace, r: float, x: float, y: float, axis: float, path_m: float) -> None:
+    """Enter a reading and where the sensor made it."""
+    place.range_m, place.x, place.y, place.axis, place.path_m = r, x, y, axis, path_m
+
+
+@kernel
+def is_parallel_wall(
+    i: int, r: float, dx: float, dy: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float,
+    lean: float, reach: float, echoes: Records[EchoTrace], path_m: float,
+) -> bool:  # fmt: skip
+    """Return whether a wall along the path explains the reading of sensor `i`.
+
+    A rough wall beside the path answers a sensor from the direction in its beam that is nearest to the wall's normal,
+    as far as the wall goes on. The sensors that look square to the path hear how far away such a wall is, until the
+    robot has passed it; those that look back hear it for longer.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    r : float
+        Its echo's range, m.
+    dx, dy : float
+        By how much it has moved, m.
+    yaw : float
+        Direction of the ring, rad.
+    mounts, half_angle, tolerance, reach, echoes
+        As for `check_motion`.
+    lean : float
+        Angle between wall and path, rad, up to which the wall counts as along the path.
+    path_m : float
+        The ring's way so far, m.
+    """
+    path = math.atan2(dy, dx)
+    forward, left = math.sin(yaw - path), math.cos(yaw - path)
+    axis = wrapped(yaw + mounts[i, 2] - path)
+    for turn in range(2):
+        side = 1.0 - 2.0 * turn
+        nearest = min(max(0.5 * math.pi, side * axis - half_angle), side * axis + half_angle)
+        if math.sin(nearest) < 1e-3:
+            continue
+        beside = side * (mounts[i, 0] * forward + mounts[i, 1] * left)
+        slack = tolerance + NOISE_SHARE * r + abs(r / math.tan(nearest)) * lean
+        for k in range(len(echoes)):
+            c = echoes[k]
+            bearing = side * wrapped(yaw + mounts[k, 2] - path)
+            is_fresh = c.agreed_m > 0.0 and path_m - c.agreed_path_m <= reach
+            if is_fresh and abs(bearing - 0.5 * math.pi) <= half_angle:
+                wall = side * (mounts[k, 0] * forward + mounts[k, 1] * left) + c.agreed_m
+                if abs((wall - beside) / math.sin(nearest) - r) <= slack:
+                    return True
+    return False
+
+
+@kernel
+def changes_due(
+    i: int, x: float, y: float, axis: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float,
+    reach: float, echoes: Records[EchoTrace], path_m: float,
+) -> float:  # fmt: skip
+    """Return how many times sensor `i` should have changed the reading that it repeats.
+
+    A surface whose normal lies in the beam comes nearer by at least d·cos(ψ + β) when the sensor moves by d at an
+    angle ψ to its axis, β being half the beam; after a turn by two beams it hears what another sensor heard before.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    x, y, axis : float
+        Its place (m) and the direction of its axis (rad).
+    yaw, mounts, half_angle, tolerance, reach, echoes
+        As for `check_motion`.
+    path_m : float
+        The ring's way so far, m.
+    """
+    c = echoes[i]
+    dx, dy, turned = x - c.repeated.x, y - c.repeated.y, axis - c.repeated.axis
+    if abs(turned) <= half_angle:
+        beam = half_angle + abs(turned)
+        along = abs(dx * math.cos(axis) + dy * math.sin(axis))
+        across = abs(dy * math.cos(axis) - dx * math.sin(axis))
+        due = math.floor((along * math.cos(beam) - across * math.sin(beam)) / max(STEP_MIN_M, 3.0 * tolerance))
+        if due < 1:
+            return 0.0
+        lean = min(1.0, tolerance / math.hypot(dx, dy))  # the range stays within the tolerance for so long
+        if is_parallel_wall(i, c.last_m, dx, dy, yaw, mounts, half_angle, tolerance, lean, reach, echoes, path_m):
+            return 0.0
+        return min(REPEATS_MAX, float(due))
+    if abs(turned) <= 2.0 * half_angle:
+        return 0.0
+    nearest, off = -1, half_angle
+    for k in range(len(echoes)):
+        away = abs(wrapped(mounts[k, 2] - mounts[i, 2] - turned))
+        if k != i and echoes[k].is_known and away < off:
+            nearest, off = k, away
+    if nearest < 0 or abs(echoes[nearest].last_m - c.last_m) <= tolerance + 0.1 * c.last_m:
+        return 0.0
+    return min(REPEATS_MAX, math.floor(abs(turned) / (2.0 * half_angle)))
+
+
+@kernel
+def weigh_repeat(
+    i: int, r: float, x: float, y: float, axis: float, yaw: float, is_ahead: bool, mounts: Floats, half_angle: float,
+    tolerance: float, reach: float, echoes: Records[EchoTrace], ring: Records[RingTrace],
+) -> None:  # fmt: skip
+    """Test whether all readings of the ring repeat; a reading ahead that differs from the last one ends that.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    r : float
+        Its reading, m; `SILENCE_M` without an echo.
+    x, y, axis : float
+        Its place (m) and the direction of its axis (rad).
+    yaw, mounts, half_angle, tolerance, reach, echoes, ring
+        As for `check_motion`.
+    is_ahead : bool
+        Whether it looks in the direction of travel.
+    """
+    c, all_of = echoes[i], ring[0]
+    if not c.is_known or r != c.last_m:
+        if c.is_known and is_ahead:
+            all_of.standstill += 1
+            all_of.repeated_nat = 0.0
+        elif c.is_known and c.standstill == all_of.standstill:
+            all_of.repeated_nat = max(0.0, all_of.repeated_nat - c.repeated_nat)
+        c.standstill, c.repeated_nat = 0, 0.0
+        c.is_known, c.last_m = 1, r
+    elif c.standstill != all_of.standstill:
+        c.standstill, c.repeated_nat = all_of.standstill, 0.0
+        mark(c.repeated, r, x, y, axis, all_of.path_m)
+    elif r >= 0.0 and c.repeated_nat < REPEATS_MAX * REPEAT_NAT:
+        due = REPEAT_NAT * changes_due(
+            i, x, y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of.path_m
+        )
+        if due > c.repeated_nat:
+            all_of.repeated_nat += due - c.repeated_nat
+            c.repeated_nat = due

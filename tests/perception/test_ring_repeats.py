@@ -1,0 +1,75 @@
+"""Whether a ring repeats old readings: what a wall along the path, a turn and a way explain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.records import Records, records, zeros
+from perception.ring_memory import SILENCE_M, EchoTrace, RingTrace
+from perception.ring_repeats import REPEAT_NAT, REPEATS_MAX, changes_due, is_parallel_wall, mark, weigh_repeat
+
+MOUNTS = np.array([[0.0, 0.0, math.radians(15.0 * k)] for k in range(24)])
+HALF = math.radians(12.0)
+TOLERANCE = 0.005
+
+
+def heard(*ranges: tuple[int, float]) -> Records[EchoTrace]:
+    """Return a memory in which sensors, by number, have repeated a range since the ring was at the origin."""
+    echoes = records(EchoTrace, zeros(EchoTrace, 24))
+    for k, r in ranges:
+        echoes[k].is_known, echoes[k].last_m, echoes[k].agreed_m = 1, r, r
+        mark(echoes[k].repeated, r, 0.0, 0.0, MOUNTS[k, 2], 0.0)
+    return echoes
+
+
+def due(echoes: Records[EchoTrace], i: int, x: float, turned: float = 0.0) -> float:
+    axis = MOUNTS[i, 2] + turned
+    return changes_due(i, x, 0.0, axis, turned, MOUNTS, HALF, TOLERANCE, 5.0, echoes, x)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_rough_wall_beside_the_path_explains_what_sensors_hear_of_it(side: int) -> None:
+    square, oblique = 6 * side % 24, 3 * side % 24
+    at_edge = 1.2 / math.sin(math.radians(57.0))
+    echoes = heard((square, 1.2), (oblique, at_edge))
+    for r, explained in ((at_edge, True), (0.7, False), (2.5, False)):
+        found = is_parallel_wall(oblique, r, 0.3, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, 0.01, 5.0, echoes, 0.3)
+        assert bool(found) is explained
+    echoes = heard((oblique, at_edge))
+    assert not is_parallel_wall(oblique, at_edge, 0.3, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, 0.01, 5.0, echoes, 0.3)
+
+
+def test_a_sensor_that_looks_ahead_should_change_with_the_way() -> None:
+    echoes = heard((0, 2.0))
+    assert [due(echoes, 0, x) for x in (0.05, 0.07, 0.13, 1.0)] == [0.0, 1.0, 2.0, REPEATS_MAX]
+    assert due(heard((6, 2.0)), 6, 1.0) == 0.0, "what is beside the path does not come nearer"
+
+
+def test_after_a_turn_a_sensor_should_hear_what_another_heard() -> None:
+    turned = math.radians(30.0)
+    assert due(heard((0, 2.0), (2, 3.0)), 0, 0.0, turned) == 1.0
+    assert due(heard((0, 2.0), (2, 2.1)), 0, 0.0, turned) == 0.0, "alike all around"
+    assert due(heard((0, 2.0)), 0, 0.0, turned) == 0.0, "nothing is known of where it looks"
+    assert due(heard((0, 2.0), (2, 3.0)), 0, 0.0, math.radians(20.0)) == 0.0, "it may still hear the same"
+
+
+def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
+    echoes, ring = heard(), records(RingTrace, zeros(RingTrace, 1))
+    ring[0].standstill = 1
+
+    def fire(i: int, r: float, x: float) -> None:
+        axis = MOUNTS[i, 2]
+        weigh_repeat(i, r, x, 0.0, axis, 0.0, i != 12, MOUNTS, HALF, TOLERANCE, 5.0, echoes, ring)
+
+    for x in (0.0, 0.01, 0.08):
+        fire(0, 2.0, x)
+        fire(12, 3.0, x)
+        fire(6, SILENCE_M, x)
+    assert ring[0].repeated_nat == pytest.approx(2.0 * REPEAT_NAT)
+    fire(12, 3.1, 0.08)
+    assert ring[0].repeated_nat == pytest.approx(REPEAT_NAT)
+    fire(0, 1.9, 0.08)
+    assert ring[0].repeated_nat == 0.0

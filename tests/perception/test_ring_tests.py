@@ -1,0 +1,106 @@
+"""The sequential tests of a ring against its motion: how evidence comes, goes, and becomes a verdict."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.kernel import Floats
+from perception.records import records, zeros
+from perception.ring_memory import EchoTrace, RingTrace
+from perception.ring_tests import EVIDENCE_NAT, NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
+
+COUNT = 24
+MOUNTS = np.array([[0.0, 0.0, math.tau * k / COUNT] for k in range(COUNT)])
+HALF, TOLERANCE, REACH = math.radians(12.0), 0.005, 7.0
+STEP_M = 0.02
+
+
+class Ring:
+    """A ring whose readings a test chooses."""
+
+    def __init__(self) -> None:
+        self.echoes, self.memory = zeros(EchoTrace, COUNT), zeros(RingTrace, 1)
+        self.x = 0.0
+
+    def fire(self, ranges: Floats) -> int:
+        found = check_motion(
+            ranges, self.x, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, REACH, records(EchoTrace, self.echoes),
+            records(RingTrace, self.memory),
+        )  # fmt: skip
+        self.x += STEP_M
+        return int(found)
+
+    @property
+    def missed_nat(self) -> float:
+        return float(self.memory["missed_nat"][0].max())
+
+
+def honest(x: float, quarter: int = 0) -> Floats:
+    """Return what a ring, mounted turned by quarters, hears of a different surface square to each of its sensors."""
+    axes = MOUNTS[:, 2] + 0.5 * math.pi * quarter
+    return 3.0 + 0.02 * np.arange(COUNT) - x * np.cos(axes)
+
+
+def after(way_m: float) -> Ring:
+    ring = Ring()
+    while ring.x < way_m:
+        assert ring.fire(honest(ring.x)) == NOTHING
+    return ring
+
+
+def test_an_honest_ring_has_no_evidence_against_it() -> None:
+    ring = after(2.0)
+    assert ring.memory["repeated_nat"][0] == ring.missed_nat == 0.0
+    assert ring.memory["turned_nat"].max() == 0.0
+
+
+def test_equal_readings_on_the_way_are_repeats() -> None:
+    ring = after(0.5)
+    last = honest(ring.x - STEP_M)
+    found = [ring.fire(last) for _ in range(10)]
+    assert REPEATED in found
+    assert set(found) == {NOTHING, REPEATED}
+
+
+def test_silence_and_the_maximum_are_the_same_and_randomness_is_another_thing() -> None:
+    rng = np.random.default_rng(1)
+    for ranges, reason in (
+        (np.full(COUNT, math.inf), VANISHED),
+        (np.full(COUNT, REACH), VANISHED),
+        (rng.uniform(0.2, 1.5, COUNT), SCATTERED),
+    ):
+        assert after(0.5).fire(ranges) == reason
+
+
+def test_a_few_misses_are_honest_and_a_verdict_begins_anew() -> None:
+    ring = after(0.5)
+    ranges = honest(ring.x)
+    ranges[:4] = math.inf
+    assert ring.fire(ranges) == NOTHING
+    assert 0.0 < ring.memory["missed_nat"].max() + 1e-9 < EVIDENCE_NAT
+    assert ring.fire(honest(ring.x)) == NOTHING
+    assert ring.missed_nat == 0.0
+    assert ring.fire(np.full(COUNT, math.inf)) == VANISHED
+    assert ring.missed_nat == 0.0
+
+
+@pytest.mark.parametrize("quarter", [1, 2, 3])
+def test_a_ring_that_is_turned_is_named(quarter: int) -> None:
+    ring, found = Ring(), set[int]()
+    while ring.x < 2.0 and not found:
+        found |= {ring.fire(honest(ring.x, quarter))} - {NOTHING}
+    assert found == {TURNED + quarter - 1}
+
+
+def test_what_is_not_finite_and_what_did_not_fire_says_nothing() -> None:
+    ring = after(0.5)
+    before = ring.memory.tobytes()
+    ring.x = math.nan
+    assert ring.fire(honest(0.5)) == NOTHING
+    assert ring.memory.tobytes() == before
+    ring.x = 0.5
+    assert ring.fire(np.full(COUNT, math.nan)) == NOTHING
+    assert ring.missed_nat == 0.0
