@@ -1,7 +1,7 @@
 """Detection of a ring whose readings contradict its own motion: a ring that lies as a whole.
 
 `perception.sensor_monitor` finds single sensors that differ from their neighbours. What the whole ring says can only
-be compared with how it moves. An honest ring among things that stand still is compared with these:
+be compared with how it moves. An honest ring among objects that stand still is compared with these:
 
 - *Repeating.* Every sensor that looks ahead repeats its last reading to the bit, although the odometry brings it
   nearer to whatever answers. A wall along the path explains equal readings. A robot whose wheels slip looks the same,

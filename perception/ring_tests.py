@@ -1,7 +1,7 @@
 """The kernels behind `perception.ring_monitor`: sequential tests of a ring's readings against its own motion.
 
 Each test sums the logarithms of likelihood ratios, never below zero (CUSUM, Page 1954): how much better a reading is
-explained by a ring that lies than by an honest one among things that stand still. The sum is compared with
+explained by a ring that lies than by an honest one among objects that stand still. The sum is compared with
 `EVIDENCE_NAT`, the one threshold.
 """
 
@@ -175,7 +175,7 @@ def weigh_change(
 
 
 @kernel
-def verdict(all_of: RingTrace) -> int:
+def conclusion(all_of: RingTrace) -> int:
     """Return what the evidence says of the ring: `NOTHING`, or what is wrong."""
     if all_of.repeated_nat >= EVIDENCE_NAT:
         return REPEATED
@@ -222,7 +222,7 @@ def check_motion(
     echoes : (n,) records
         What is remembered of each sensor. Updated.
     ring : (1,) record
-        What is remembered of the ring. Updated. After a verdict the evidence is dropped.
+        What is remembered of the ring. Updated. After a finding the evidence is dropped.
     """
     if not math.isfinite(x + y + yaw):
         return NOTHING
@@ -251,7 +251,7 @@ def check_motion(
         weigh_look(echoes[i], r, own_x, own_y, axis, is_ahead, half_angle, tolerance, reach, all_of)
         if r >= 0.0:
             weigh_change(i, r, own_x, own_y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of)
-    found = verdict(all_of)
+    found = conclusion(all_of)
     if found != NOTHING:
         begin_evidence(all_of)
     return found

@@ -253,7 +253,7 @@ def update_run_faults(
 def count_too_near(c: SensorMemory, is_too_near: bool) -> None:
     """Set or clear a sensor's fault `TOO_NEAR`, given whether its reading is below the least that it can measure.
 
-    A thing so near that the sensor rings on looks the same, and must not be driven at either.
+    An object so near that the sensor rings on looks the same, and must not be driven at either.
     """
     c.too_near = min(TOO_NEAR_READINGS, c.too_near + 1) if is_too_near else max(0, c.too_near - 1)
     if c.too_near == TOO_NEAR_READINGS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -34,11 +34,11 @@ TOO_FEW_ECHOES = {("silent", "amigo"), ("at its maximum", "amigo"), ("half turne
 FOUND_M = 1.5
 """Way after which a lie is found, m."""
 
-Lie = Callable[[Floats, "Liar"], Floats]
-Path = list[tuple[float, float, float]]
+Lie = Callable[[Floats, "LieContext"], Floats]
+Path = Sequence[tuple[float, float, float]]
 
 
-class Liar:
+class LieContext:
     """What lies are made of: the ring, its last readings, and chance."""
 
     def __init__(self, ring: RingConfig, seed: int) -> None:
@@ -48,30 +48,30 @@ class Liar:
         self.behind = np.array([np.abs(np.remainder(axes - axis, math.tau) - math.pi).argmin() for axis in axes])
 
 
-def frozen(ranges: Floats, liar: Liar) -> Floats:
-    return np.where(np.isnan(liar.last) | np.isnan(ranges), ranges, liar.last)
+def frozen(ranges: Floats, context: LieContext) -> Floats:
+    return np.where(np.isnan(context.last) | np.isnan(ranges), ranges, context.last)
 
 
-def silent(ranges: Floats, _: Liar) -> Floats:
+def silent(ranges: Floats, _: LieContext) -> Floats:
     return np.where(np.isnan(ranges), ranges, math.inf)
 
 
-def at_maximum(ranges: Floats, liar: Liar) -> Floats:
-    return np.where(np.isnan(ranges), ranges, liar.ring.range_max_m)
+def at_maximum(ranges: Floats, context: LieContext) -> Floats:
+    return np.where(np.isnan(ranges), ranges, context.ring.range_max_m)
 
 
-def at_three_feet(ranges: Floats, _: Liar) -> Floats:
+def at_three_feet(ranges: Floats, _: LieContext) -> Floats:
     return np.where(np.isnan(ranges), ranges, 0.9144)
 
 
-def at_random(ranges: Floats, liar: Liar) -> Floats:
-    drawn = liar.rng.uniform(liar.ring.range_min_m, liar.ring.window_m, len(ranges))
+def at_random(ranges: Floats, context: LieContext) -> Floats:
+    drawn = context.rng.uniform(context.ring.range_min_m, context.ring.window_m, len(ranges))
     return np.where(np.isnan(ranges), ranges, drawn)
 
 
-def half_turned(ranges: Floats, liar: Liar) -> Floats:
-    liar.last = np.where(np.isnan(ranges), liar.last, ranges)
-    return np.where(np.isnan(ranges), ranges, liar.last[liar.behind])
+def half_turned(ranges: Floats, context: LieContext) -> Floats:
+    context.last = np.where(np.isnan(ranges), context.last, ranges)
+    return np.where(np.isnan(ranges), ranges, context.last[context.behind])
 
 
 LIES: dict[str, tuple[Lie, set[int]]] = {
@@ -86,16 +86,16 @@ def firings(
 ) -> Iterator[tuple[float, Firing]]:
     """Yield the firings along a path, one for each pose, with the way since a lie began, m."""
     sonar = Sonar(ring, compile_scene(world), world.acoustics, np.random.default_rng(seed))
-    liar, way, last = Liar(ring, seed), 0.0, path[0]
+    context, way, last = LieContext(ring, seed), 0.0, path[0]
     sets = itertools.cycle([sensors(mask) for mask in firing_pattern(ring).masks])
     for k, ((x, y, yaw), fired) in enumerate(zip(path, sets, strict=False)):
         way += math.dist((x, y), last[:2])
         last = (x, y, yaw)
         ranges = sonar.fire(Pose(x, y, yaw), yaw, fired)
         if lie is not None and way >= begins_m:
-            ranges = lie(ranges, liar)
+            ranges = lie(ranges, context)
         else:
-            liar.last = np.where(np.isnan(ranges), liar.last, ranges)
+            context.last = np.where(np.isnan(ranges), context.last, ranges)
         yield way - begins_m, Firing(0.05 * k, Pose(x, y, yaw), yaw, ranges)
 
 
@@ -161,7 +161,7 @@ def test_an_honest_ring_is_never_found_to_lie(halls: int, robot: str, measured: 
     measured(f"{robot}: {drives} honest drives, none stopped")
 
 
-def test_a_robot_whose_wheels_slip_is_told_so() -> None:
+def test_slipping_wheels_are_named_as_the_other_cause() -> None:
     ring = load_settings("room", robot="p3dx").ring
     world, path = room(0, CLEAN)
     still = [path[0]] * len(path)
@@ -189,13 +189,13 @@ def test_a_leap_of_the_odometry_and_a_reset_begin_anew() -> None:
         assert monitor.take_problem() is None
 
 
-def test_a_problem_is_told_once() -> None:
+def test_a_problem_is_reported_once() -> None:
     ring = load_settings("room").ring
     monitor = RingMonitor(ring)
     world, path = room(1, ROUGH)
-    told = []
+    problems = []
     for _, firing in firings(ring, world, path, frozen, 1.2):
         monitor.observe(firing)
-        told.append(monitor.take_problem())
-    assert told.count(None) >= len(told) - 6
-    assert REASONS[REPEATED] in told
+        problems.append(monitor.take_problem())
+    assert problems.count(None) >= len(problems) - 6
+    assert REASONS[REPEATED] in problems

@@ -1,4 +1,4 @@
-"""The sequential tests of a ring against its motion: how evidence comes, goes, and becomes a verdict."""
+"""The sequential tests of a ring against its motion: how evidence comes, goes, and becomes a result."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_equal_readings_on_the_way_are_repeats() -> None:
     assert set(found) == {NOTHING, REPEATED}
 
 
-def test_silence_and_the_maximum_are_the_same_and_randomness_is_another_thing() -> None:
+def test_silence_and_the_maximum_are_the_same_and_randomness_is_something_else() -> None:
     rng = np.random.default_rng(1)
     for ranges, reason in (
         (np.full(COUNT, math.inf), VANISHED),
@@ -75,7 +75,7 @@ def test_silence_and_the_maximum_are_the_same_and_randomness_is_another_thing() 
         assert after(0.5).fire(ranges) == reason
 
 
-def test_a_few_misses_are_honest_and_a_verdict_begins_anew() -> None:
+def test_a_few_misses_are_honest_and_a_finding_begins_anew() -> None:
     ring = after(0.5)
     ranges = honest(ring.x)
     ranges[:4] = math.inf
