@@ -69,6 +69,18 @@ class Cluster:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class MapPlace:
+    """Where a run knew its robot to be in a map."""
+
+    pose: Pose
+    """Of the robot in the map."""
+    covariance: Floats
+    """Of x, y (m) and heading (rad), shape (3, 3)."""
+    map_in_odom: Pose
+    """The map's frame in that of odometry."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RunSnapshot:
     """What perception and odometry had found at one moment."""
 
@@ -87,6 +99,8 @@ class RunSnapshot:
     """The walls recognised; each has its `ends`."""
     grid: KnownCells | None = None
     """What the evidence grid holds; None where the settings keep none."""
+    place: MapPlace | None = None
+    """Where the robot is in a map; None where that is not known."""
 
 
 @dataclass(frozen=True, slots=True)

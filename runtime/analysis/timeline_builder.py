@@ -26,6 +26,7 @@ from runtime.analysis.timeline import (
     Cluster,
     CrossPathRows,
     Echoes,
+    MapPlace,
     MapView,
     RunSnapshot,
     Timeline,
@@ -182,6 +183,7 @@ class TimelineBuilder:
             RunSnapshot(
                 t_s, self._pose, self._yaw, self._row_count, rows[:, :4], self._clusters_of(rows),
                 perception.objects(), walls_of(perception), None if window is None else known_cells(window),
+                _place_of(perception),
             )
         )  # fmt: skip
 
@@ -202,6 +204,11 @@ def _turned_echoes(to: Pose, echoes: Echoes) -> Echoes:
     turned["y"] = to.y + s * echoes["x"] + c * echoes["y"]
     turned["bearing"] += to.theta
     return turned
+
+
+def _place_of(perception: Perception) -> MapPlace | None:
+    here, map_in_odom = perception.localized(), perception.known_map_frame()
+    return None if here is None or map_in_odom is None else MapPlace(here.pose, here.covariance, map_in_odom)
 
 
 def walls_of(perception: Perception) -> tuple[DetectedObject, ...]:

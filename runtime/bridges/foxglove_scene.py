@@ -88,9 +88,9 @@ class SceneChannels:
 
     def _write_frames(self, state: Message, at: int) -> None:
         x, y, theta = state["pose"]
-        localized = state["localized"]
-        odom = Pose(0.0, 0.0, 0.0) if localized is None else Pose(*localized["frame"]).inverse()
-        rows = (("map", "odom", odom), ("odom", "base", Pose(x, y, theta)))
+        localized, rows = state["localized"], [("odom", "base", Pose(x, y, theta))]
+        if localized is not None and localized["status"] == "tracking":
+            rows.insert(0, ("map", "odom", Pose(*localized["frame"]).inverse()))
         transforms = [
             fx.FrameTransform(
                 timestamp=stamp(at), parent_frame_id=parent, child_frame_id=child,

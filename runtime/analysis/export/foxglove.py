@@ -1,7 +1,7 @@
 """Export of a run for Foxglove: an MCAP file with Foxglove's own schemas, written by its SDK.
 
-Frames: `world` (if the true world is known) → `odom` → `base`, which turns with the wheels. Echoes are in `odom`,
-from the pose that the ring had at their firing.
+Frames: `map` (while the robot knows its place in one) → `odom` → `base`, which turns with the wheels. Echoes are in
+`odom`, from the pose that the ring had at their firing; so is the true world, where the odometry began.
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ from runtime.analysis.export.shapes import (
     FiringScan,
     even_radius,
     firing_scans,
+    truth_outlines,
     whole_ring,
     yaw_quaternion,
 )
 from runtime.analysis.plots.cross_arcs import cross_arcs, heard_cross_paths, newest_cross_paths
-from runtime.analysis.plots.geometry import outline, world_outlines
+from runtime.analysis.plots.geometry import outline
 from runtime.analysis.timeline import CrossPathRows, LogEntry, RunSnapshot, Timeline
 
 ARC_POINTS: Final = 9
@@ -122,14 +123,11 @@ class _RunExporter:
             write(timeline.unix_ns(t_s))
 
     def _write_truth(self, at: int) -> None:
-        self._frame("world", "odom", self._timeline.start, at)
-        if self._timeline.world is None:
-            return
-        closed, lines = world_outlines(self._timeline.world)
-        loops = [line(points.tolist(), TRUTH, closed=True) for points in closed]
-        walls = [line(points.tolist(), TRUTH, closed=False) for points in lines]
-        entity = fx.SceneEntity(timestamp=stamp(at), frame_id="world", id="truth", lines=[*loops, *walls])
-        self._truth.log(fx.SceneUpdate(entities=[entity]), log_time=at)
+        closed, lines = truth_outlines(self._timeline)
+        drawn = [line(points, TRUTH, closed=True) for points in closed]
+        drawn += [line(points, TRUTH, closed=False) for points in lines]
+        if drawn:
+            scene(self._truth, "truth", drawn, [], at)
 
     def _frame(self, parent: str, child: str, pose: Pose, at: int) -> None:
         frame = fx.FrameTransform(
@@ -164,6 +162,8 @@ class _RunExporter:
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
         settings = self._timeline.settings
+        if snapshot.place is not None:
+            self._frame("map", "odom", snapshot.place.map_in_odom.inverse(), at)
         if len(self._timeline.cross_paths):
             newest = newest_cross_paths(self._timeline.cross_paths, snapshot.t_s)
             write_cross_paths(self._crosses, newest, math.radians(settings.ring.beam_half_angle_deg), at)

@@ -1,49 +1,73 @@
-"""Export of a run as a ROS 2 bag, without ROS: ranges, odometry, markers and frames, written by rosbags.
+"""Export of a run as a ROS 2 bag, without ROS: what the live bridge publishes, written by rosbags.
 
-Topics: `/sonar/s00` … (sensor_msgs/Range), each in its own frame below `ring`; `/odom`; `/markers`, with the arcs of
-cross paths; `/grid` (nav_msgs/OccupancyGrid), where the run kept an evidence grid; `/tf` and `/tf_static`. The frame
-`ring` is the pose of the ring at the last firing: on a synchro drive it does not turn with `base_link`.
+Topics, frames, covariances and the quality of service that each connection offers are those of `echolocate ros2`, see
+`runtime.analysis.export.ros_messages`. Two topics more show what the bridge does not have: `/markers`, with outline
+segments, clusters and the arcs of cross paths, and `/truth`, the true world where the odometry began.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from rosbags.interfaces import (
+    Nodetype,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.interfaces import Qos as BagQos
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from drivers.messages import Odometry, Pose
-from perception.mapping.grid.known_cells import KnownCells
+from drivers.messages import Odometry
+from drivers.ros_tf import Frame
+from runtime.analysis.export.ros_messages import (
+    DEPTHS,
+    FRAMES_DEPTH,
+    QOS,
+    Fields,
+    Frames,
+    Messages,
+    Output,
+    Qos,
+    header,
+    line_marker,
+    mode,
+)
 from runtime.analysis.export.shapes import (
     CLUSTER,
     CROSS,
-    MODEL,
     SEGMENT,
     TRUTH,
-    Colour,
     FiringScan,
+    Points,
     firing_scans,
-    yaw_quaternion,
+    truth_outlines,
 )
 from runtime.analysis.plots.cross_arcs import cross_arcs, heard_cross_paths, newest_cross_paths
-from runtime.analysis.plots.geometry import outline, world_outlines
-from runtime.analysis.timeline import RunSnapshot, Timeline
+from runtime.analysis.timeline import ModeEntry, RunSnapshot, Timeline
 
 if TYPE_CHECKING:
-    from rosbags.typesys.store import Msg, Msgarg
+    from collections.abc import Sequence
+
+    from rosbags.typesys.store import Msg
+
+    from perception.detected_object import DetectedObject
 
 VERSION: Final = 9
-LINE_M: Final = 0.02
-STRIP, LINES = 4, 5
-"""Types of `visualization_msgs/Marker`."""
+LINES: Final = 5
+"""A type of `visualization_msgs/Marker`."""
 DELETE_ALL: Final = 3
-
-Points = list[tuple[float, float]]
+ENDLESS: Final = QosTime(9_223_372_036, 854_775_807)
+"""As rosbag2 writes it."""
+TF: Final = "tf2_msgs/TFMessage"
 
 
 def write_bag(timeline: Timeline, folder: Path) -> list[Path]:
@@ -67,8 +91,11 @@ class _RunExporter:
         self._writer = writer
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._connections: dict[str, Any] = {}
-        self._models = {model.name: model for model in timeline.settings.models}
-        self._whole = timeline.settings.perception.method == "bayes"
+        self._say = Messages(Frames())
+        self._models = [
+            {"name": m.name, "vertices": m.vertices_m, "closed": m.closed, "arc_radius_m": m.arc_radius_m}
+            for m in timeline.settings.models
+        ]
 
     def write(self) -> None:
         """Write everything, in order of time."""
@@ -76,169 +103,134 @@ class _RunExporter:
         items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._write_static)]
         items += [(t, partial(self._write_odometry, odometry)) for t, odometry in timeline.odometry]
         items += [(scan.t_s, partial(self._write_scan, scan)) for scan in firing_scans(timeline)]
+        items += [(entered.t_s, partial(self._write_mode, entered)) for entered in timeline.modes]
         items += [(snapshot.t_s, partial(self._write_snapshot, snapshot)) for snapshot in timeline.snapshots]
-        if not timeline.odometry:
-            items += [(m.t_s, partial(self._write_base, m.pose)) for m in timeline.snapshots]
         for t_s, write in sorted(items, key=lambda item: item[0]):
             write(timeline.unix_ns(t_s))
 
-    def _make(self, kind: str, **values: Msgarg) -> Msg:
+    def _write(self, output: Output, at: int, qos: BagQos | None = None) -> None:
+        topic, kind = f"/{output.topic.lstrip('/')}", output.kind.replace("/", "/msg/")
+        if topic not in self._connections:
+            offered = qos or bag_qos(QOS[output.kind])
+            self._connections[topic] = self._writer.add_connection(
+                topic, kind, typestore=self._store, offered_qos_profiles=[offered]
+            )
+        data = self._store.serialize_cdr(self._message(kind, output.fields), kind)
+        self._writer.write(self._connections[topic], at, data)
+
+    def _message(self, kind: str, fields: Fields) -> Msg:
+        """Return a message of a type; fields that are not given are zero, empty or false."""
+        _, definitions = self._store.fielddefs[kind]
+        values = {name: self._value(form, fields.get(name)) for name, form in definitions}
         return self._store.types[kind](**values)
 
-    def _write(self, topic: str, kind: str, message: object, at: int) -> None:
-        if topic not in self._connections:
-            self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
-        self._writer.write(self._connections[topic], at, self._store.serialize_cdr(message, kind))
+    def _value(self, form: Any, value: Any) -> Any:  # noqa: ANN401 - a field of any message
+        node, about = form
+        if node is Nodetype.NAME:
+            return self._message(about, value or {})
+        if node is Nodetype.BASE:
+            empty: object = {"string": "", "bool": False}.get(about[0], 0)
+            return empty if value is None else value
+        element, length = about
+        rows = [] if value is None else value
+        if element[0] is Nodetype.BASE and element[1][0] != "string":
+            return np.zeros(length, element[1][0]) if value is None else np.asarray(rows, element[1][0])
+        return [self._value(element, row) for row in rows]
 
-    def _time(self, at: int) -> Msg:
-        return self._make("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
-
-    def _header(self, frame: str, at: int) -> Msg:
-        return self._make("std_msgs/msg/Header", stamp=self._time(at), frame_id=frame)
-
-    def _vector(self, x: float, y: float, z: float = 0.0) -> Msg:
-        return self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
-
-    def _point(self, x: float, y: float) -> Msg:
-        return self._make("geometry_msgs/msg/Point", x=float(x), y=float(y), z=0.0)
-
-    def _turn(self, yaw: float) -> Msg:
-        x, y, z, w = yaw_quaternion(yaw)
-        return self._make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
-
-    def _placed(self, pose: Pose) -> Msg:
-        return self._make(
-            "geometry_msgs/msg/Pose", position=self._point(pose.x, pose.y), orientation=self._turn(pose.theta)
-        )
-
-    def _frames(self, topic: str, frames: list[tuple[str, str, Pose]], at: int) -> None:
-        message = [
-            self._make(
-                "geometry_msgs/msg/TransformStamped", header=self._header(parent, at), child_frame_id=child,
-                transform=self._make(
-                    "geometry_msgs/msg/Transform", translation=self._vector(pose.x, pose.y),
-                    rotation=self._turn(pose.theta),
-                ),
-            )
-            for parent, child, pose in frames
+    def _write_frames(self, frames: Sequence[Frame], at: int, *, static: bool = False) -> None:
+        transforms = [
+            {
+                "header": header(frame.parent, frame.stamp_ns), "child_frame_id": frame.child,
+                "transform": {
+                    "translation": dict(zip("xyz", frame.translation, strict=True)),
+                    "rotation": dict(zip("xyzw", frame.rotation, strict=True)),
+                },
+            }
+            for frame in frames
         ]  # fmt: skip
-        self._write(topic, "tf2_msgs/msg/TFMessage", self._make("tf2_msgs/msg/TFMessage", transforms=message), at)
+        offered = bag_qos(Qos.LATCHED) if static else bag_qos(Qos.RELIABLE, FRAMES_DEPTH)
+        self._write(Output("tf_static" if static else "tf", TF, {"transforms": transforms}), at, offered)
 
     def _write_static(self, at: int) -> None:
-        """Write what never moves: the sensors on the ring, the start of the odometry, the true world."""
+        """Write what never moves: the sensors on the ring, and the true world."""
         ring = self._timeline.settings.ring
-        mounts = ((i, mount) for i, mount in enumerate(ring.mounts) if i not in ring.turning)
-        sensors = [("ring", f"sonar_{i:02d}", Pose(*mount)) for i, mount in mounts]
-        self._frames("/tf_static", [("world", "odom", self._timeline.start), *sensors], at)
-        if self._timeline.world is not None:
-            closed, lines = world_outlines(self._timeline.world)
-            rows = [*((_looped(points.tolist())) for points in closed), *(points.tolist() for points in lines)]
-            markers = [self._marker("truth", i, STRIP, row, TRUTH, at, "world") for i, row in enumerate(rows)]
-            self._markers("/truth", markers, at)
-
-    def _write_base(self, pose: Pose, at: int) -> None:
-        self._frames("/tf", [("odom", "base_link", pose)], at)
+        self._write_frames(self._say.static(ring.mounts, ring.turning, at), at, static=True)
+        closed, lines = truth_outlines(self._timeline)
+        if closed or lines:
+            self._write_markers("truth", self._lines("truth", [*map(_looped, closed), *lines], TRUTH, at), at)
 
     def _write_odometry(self, odometry: Odometry, at: int) -> None:
-        self._write_base(odometry.pose, at)
-        unknown = np.zeros(36)
-        twist = self._make(
-            "geometry_msgs/msg/Twist", linear=self._vector(odometry.twist.v, 0.0),
-            angular=self._vector(0.0, 0.0, odometry.twist.w),
-        )  # fmt: skip
-        message = self._make(
-            "nav_msgs/msg/Odometry", header=self._header("odom", at), child_frame_id="base_link",
-            pose=self._make(
-                "geometry_msgs/msg/PoseWithCovariance", pose=self._placed(odometry.pose), covariance=unknown
-            ),
-            twist=self._make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
-        )  # fmt: skip
-        self._write("/odom", "nav_msgs/msg/Odometry", message, at)
+        self._write_frames(self._say.base_frames(odometry.pose, odometry.ring_yaw, at), at)
+        self._write(self._say.odometry(odometry.pose, odometry.twist, at), at)
+
+    def _write_mode(self, entered: ModeEntry, at: int) -> None:
+        self._write(mode(entered.mode), at)
 
     def _write_scan(self, scan: FiringScan, at: int) -> None:
         ring = self._timeline.settings.ring
-        turned = [
-            ("odom", f"sonar_{int(row['sensor']):02d}", Pose(float(row["x"]), float(row["y"]), float(row["bearing"])))
-            for row in scan.rows
-            if int(row["sensor"]) in ring.turning
-        ]
-        self._frames("/tf", [("odom", "ring", Pose(scan.x, scan.y, scan.yaw)), *turned], at)
+        half, limits = math.radians(ring.beam_half_angle_deg), (ring.range_min_m, ring.range_max_m)
         for row in scan.rows:
-            name = f"s{int(row['sensor']):02d}"
-            # Without an echo the range is inf, as REP 117 defines.
-            message = self._make(
-                "sensor_msgs/msg/Range", header=self._header(f"sonar_{name[1:]}", at), radiation_type=0,
-                field_of_view=2.0 * math.radians(ring.beam_half_angle_deg), min_range=ring.range_min_m,
-                max_range=ring.range_max_m, range=float(row["range_m"]), variance=0.0,
-            )  # fmt: skip
-            self._write(f"/sonar/{name}", "sensor_msgs/msg/Range", message, at)
+            self._write(self._say.range(int(row["sensor"]), float(row["range_m"]), limits, half, at), at)
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
-        segments: Points = [(x, y) for x, y in snapshot.segments.reshape(-1, 2).tolist()]
-        markers = [self._marker("all", 0, STRIP, [], TRUTH, at, action=DELETE_ALL)]
-        if segments:
-            markers.append(self._marker("segments", 0, LINES, segments, SEGMENT, at))
-        newest = heard_cross_paths(newest_cross_paths(self._timeline.cross_paths, snapshot.t_s))
-        for number, arc in enumerate(
-            cross_arcs(newest, math.radians(self._timeline.settings.ring.beam_half_angle_deg))
-        ):
-            markers.append(self._marker("cross_paths", number, STRIP, arc.tolist(), CROSS, at))
-        for number, c in enumerate(snapshot.clusters):
-            corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
-            markers.append(self._marker("clusters", number, STRIP, _looped(corners), CLUSTER, at))
-        for number, seen in enumerate(snapshot.objects):
-            points, closed = outline(seen, self._models.get(seen.model), whole=self._whole)
-            row = _looped(points.tolist()) if closed else points.tolist()
-            markers.append(self._marker(f"models/{seen.model}", number, STRIP, row, MODEL, at))
-        self._markers("/markers", markers, at)
+        if (place := snapshot.place) is not None:
+            self._write_frames([self._say.map_frame(place.map_in_odom, at)], at)
+            known = [float(place.covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2))]
+            here = (place.pose.x, place.pose.y, place.pose.theta)
+            self._write(self._say.place(here, known if all(map(math.isfinite, known)) else None, at), at)
+        seen = [as_seen(one) for one in (*snapshot.objects, *snapshot.walls)]
+        markers, poses = self._say.objects(seen, self._models, at)
+        self._write_markers("objects", [self._delete_all(at), *markers], at)
+        for pose in poses:
+            self._write(pose, at)
+        self._write_markers("markers", [self._delete_all(at), *self._drawn(snapshot, at)], at)
         if snapshot.grid is not None and snapshot.grid.percent.size:
-            self._write_grid(snapshot.grid, at)
+            known_cells = snapshot.grid
+            corner, shape = (known_cells.x_m, known_cells.y_m), known_cells.percent.shape
+            self._write(
+                self._say.grid(corner, known_cells.cell_m, (shape[0], shape[1]), known_cells.percent.ravel(), at), at
+            )
 
-    def _write_grid(self, known: KnownCells, at: int) -> None:
-        rows, columns = known.percent.shape
-        about = self._make(
-            "nav_msgs/msg/MapMetaData", map_load_time=self._time(at), resolution=known.cell_m, width=columns,
-            height=rows, origin=self._placed(Pose(known.x_m, known.y_m, 0.0)),
-        )  # fmt: skip
-        kind = "nav_msgs/msg/OccupancyGrid"
-        self._write(
-            "/grid",
-            kind,
-            self._make(kind, header=self._header("odom", at), info=about, data=known.percent.ravel()),
-            at,
-        )
+    def _drawn(self, snapshot: RunSnapshot, at: int) -> list[Fields]:
+        """Return the markers of what objects are made of."""
+        segments: Points = [(x, y) for x, y in snapshot.segments.reshape(-1, 2).tolist()]
+        newest = heard_cross_paths(newest_cross_paths(self._timeline.cross_paths, snapshot.t_s))
+        arcs = cross_arcs(newest, math.radians(self._timeline.settings.ring.beam_half_angle_deg))
+        boxes = [
+            _looped([(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)])
+            for c in snapshot.clusters
+        ]
+        drawn = [{**marker, "type": LINES} for marker in self._lines("segments", [segments], SEGMENT, at) if segments]
+        drawn += self._lines("cross_paths", [arc.tolist() for arc in arcs], CROSS, at)
+        return drawn + self._lines("clusters", boxes, CLUSTER, at)
 
-    def _markers(self, topic: str, markers: list[Msg], at: int) -> None:
-        kind = "visualization_msgs/msg/MarkerArray"
-        self._write(topic, kind, self._make(kind, markers=markers), at)
+    def _lines(self, group: str, rows: Iterable[Points], colour: tuple[float, float, float], at: int) -> list[Fields]:
+        head = header(self._say.odom, at)
+        return [line_marker(points, colour, header=head, ns=group, id=number) for number, points in enumerate(rows)]
 
-    def _marker(
-        self,
-        group: str,
-        number: int,
-        kind: int,
-        points: Points,
-        colour: Colour,
-        at: int,
-        frame: str = "odom",
-        action: int = 0,
-    ) -> Msg:
-        r, g, b = colour
-        stamp = self._make("builtin_interfaces/msg/Time", sec=0, nanosec=0)
-        nothing = self._make(
-            "sensor_msgs/msg/CompressedImage", header=self._make("std_msgs/msg/Header", stamp=stamp, frame_id=""),
-            format="", data=np.zeros(0, np.uint8),
-        )  # fmt: skip
-        return self._make(
-            "visualization_msgs/msg/Marker", header=self._header(frame, at), ns=group, id=number, type=kind,
-            action=action, pose=self._placed(Pose(0.0, 0.0, 0.0)), scale=self._vector(LINE_M, 0.0),
-            color=self._make("std_msgs/msg/ColorRGBA", r=r, g=g, b=b, a=1.0),
-            lifetime=self._make("builtin_interfaces/msg/Duration", sec=0, nanosec=0), frame_locked=False,
-            points=[self._point(x, y) for x, y in points], colors=[], texture_resource="", texture=nothing,
-            uv_coordinates=[], text="", mesh_resource="",
-            mesh_file=self._make("visualization_msgs/msg/MeshFile", filename="", data=np.zeros(0, np.uint8)),
-            mesh_use_embedded_materials=False,
-        )  # fmt: skip
+    def _delete_all(self, at: int) -> Fields:
+        return {"header": header(self._say.odom, at), "action": DELETE_ALL}
+
+    def _write_markers(self, topic: str, markers: list[Fields], at: int) -> None:
+        self._write(Output(topic, "visualization_msgs/MarkerArray", {"markers": markers}), at)
+
+
+def bag_qos(qos: Qos, depth: int | None = None) -> BagQos:
+    """Return a quality of service as a bag's metadata have it; `ros2 bag play` offers it again."""
+    reliability = QosReliability.BEST_EFFORT if qos is Qos.SENSOR_DATA else QosReliability.RELIABLE
+    durability = QosDurability.TRANSIENT_LOCAL if qos is Qos.LATCHED else QosDurability.VOLATILE
+    return BagQos(
+        QosHistory.KEEP_LAST, depth or DEPTHS[qos], reliability, durability, ENDLESS, ENDLESS,
+        QosLiveliness.AUTOMATIC, ENDLESS, avoid_ros_namespace_conventions=False,
+    )  # fmt: skip
+
+
+def as_seen(seen: DetectedObject) -> dict[str, object]:
+    """Return an object as a state of the console has it."""
+    return {
+        "number": seen.number, "model": seen.model, "x": seen.x, "y": seen.y, "theta": seen.theta,
+        "score": seen.score, "probability": seen.probability, "covariance": seen.covariance, "ends": seen.ends,
+    }  # fmt: skip
 
 
 def _looped(points: Points) -> Points:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from config.robot import RingConfig
+from drivers.messages import Floats, Pose
+from runtime.analysis.plots.geometry import world_outlines
 from runtime.analysis.timeline import Echoes, Timeline
 
 HEIGHT_M = 0.9
@@ -26,6 +28,7 @@ TRUTH: Final = (0.6, 0.6, 0.6)
 """Red, green and blue, from 0 to 1; close to the colours of the figures, see `runtime.analysis.plots.plot_style`."""
 
 Quaternion = tuple[float, float, float, float]
+Points = list[tuple[float, float]]
 
 
 def yaw_quaternion(yaw: float) -> Quaternion:
@@ -65,6 +68,20 @@ def scans_of(rows: Echoes, ring: RingConfig) -> Iterator[FiringScan]:
         yield FiringScan(
             float(first["t_s"]), float(first["x"]) - c * mx + s * my, float(first["y"]) - s * mx - c * my, yaw, part
         )  # fmt: skip
+
+
+def truth_outlines(timeline: Timeline) -> tuple[list[Points], list[Points]]:
+    """Return the true world in odometry's frame: closed outlines and lines, m; nothing if it is not known."""
+    if timeline.world is None:
+        return [], []
+    start = timeline.start.inverse()
+
+    def moved(rows: Iterable[Floats]) -> list[Points]:
+        places = [[start.compose(Pose(x, y, 0.0)) for x, y in row.tolist()] for row in rows]
+        return [[(place.x, place.y) for place in row] for row in places]
+
+    closed, lines = world_outlines(timeline.world)
+    return moved(closed), moved(lines)
 
 
 def even_radius(mounts: Sequence[Sequence[float]]) -> float | None:

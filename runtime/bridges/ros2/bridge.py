@@ -12,9 +12,17 @@ from config.errors import UserError
 from runtime.bridges.console_client import ConsoleClient, ConsoleError, stay_connected
 from runtime.bridges.ros2.node import BridgeNode
 from runtime.bridges.ros2.operator import Operator
-from runtime.bridges.ros2.topics import Topics
+from runtime.bridges.ros2.topics import Topics, disconnected
 
 GRID_PERIOD_S: Final = 1.0
+NO_MAP: Final = (
+    "the run has no map: publish the goal in the frame of odometry, start the run with --map FILE, or load a map on "
+    "its page"
+)
+NO_PLACE: Final = (
+    "the robot does not know its place in the map yet: give it one with initialpose, drive until `pose` is published,"
+    " or publish the goal in the frame of odometry"
+)
 NO_RUN: Final = "there is no connection to the run: start it, or look at the bridge's log"
 
 
@@ -30,6 +38,7 @@ async def run_bridge(find: Callable[[], str], arguments: Sequence[str]) -> None:
     """
     bridge = _Bridge(asyncio.get_running_loop())
     node = bridge.node = BridgeNode(arguments, bridge)
+    node.publish(disconnected(round(1e9 * node.now_s())), ())
     try:
         await stay_connected(find, bridge.serve, node.warn)
     finally:
@@ -52,18 +61,24 @@ class _Bridge:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
         self._operator: Operator | None = None
+        self._topics: Topics | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def serve(self, client: ConsoleClient) -> None:
         """Serve one connection until it ends."""
-        node, topics = self.node, Topics(self.node.frames)
+        node = self.node
+        topics = self._topics = Topics(
+            node.frames, max_range_for_silence=node.max_range_for_silence, with_scan=node.publishes_scan
+        )
         operator = self._operator = Operator(client, node.timeout_s, node.warn, time.monotonic)
         work = asyncio.gather(operator.drive(), _ask_for_grid(client) if node.publishes_grid else asyncio.sleep(0.0))
         try:
             async for message in client.messages():
                 match message["type"]:
                     case "state":
-                        frames, outputs = topics.take(message, node.now_s())
+                        host_s = time.monotonic()
+                        node.look_around(host_s)
+                        frames, outputs = topics.take(message, node.now_s(), host_s)
                         if topics.note is not None:
                             node.warn(topics.note)
                         node.publish(outputs, frames)
@@ -77,7 +92,8 @@ class _Bridge:
                     case "role":
                         await operator.yield_control()
         finally:
-            self._operator = None
+            self._operator = self._topics = None
+            node.publish(disconnected(round(1e9 * node.now_s())), ())
             work.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await work
@@ -101,7 +117,14 @@ class _Bridge:
 
     def goal(self, x: float, y: float, heading_rad: float | None, frame: str) -> None:
         """Drive to a place."""
-        self._begin(self._reporting("goal_pose", lambda operator: operator.goal(x, y, heading_rad, frame)))
+
+        async def work(operator: Operator) -> None:
+            place = None if self._topics is None else self._topics.place
+            if frame == "map" and place != "tracking":
+                raise UserError(NO_MAP if place is None else NO_PLACE)
+            await operator.goal(x, y, heading_rad, frame)
+
+        self._begin(self._reporting("goal_pose", work))
 
     def place(self, x: float, y: float, theta: float) -> None:
         """Say where the robot is in the map."""

@@ -1,8 +1,7 @@
 """The node: publishers, subscriptions, services and parameters of the bridge. The only module of it that needs ROS.
 
 rclpy runs in a thread of its own; whatever it receives is passed on by the functions of `Commands`. Messages are made
-from the plain data of `runtime.bridges.ros2.topics`. QoS is what receivers of such topics ask for: sensor data for
-ranges, transient local for what is sent once.
+from plain data, see `runtime.analysis.export.ros_messages`.
 """
 
 from __future__ import annotations
@@ -24,30 +23,34 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from sensor_msgs.msg import Range
+from sensor_msgs.msg import LaserScan, Range
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drivers import ros_tf
-from runtime.bridges.ros2.topics import Frames, Output
+from runtime.analysis.export.ros_messages import DEPTHS, FRAMES_DEPTH, QOS, Frames, Output, Qos
 
-BEST_EFFORT: Final = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+PROFILES: Final = MappingProxyType({
+    Qos.SENSOR_DATA: QoSProfile(depth=DEPTHS[Qos.SENSOR_DATA], reliability=ReliabilityPolicy.BEST_EFFORT),
+    Qos.RELIABLE: QoSProfile(depth=DEPTHS[Qos.RELIABLE]),
+    Qos.LATCHED: QoSProfile(depth=DEPTHS[Qos.LATCHED], durability=DurabilityPolicy.TRANSIENT_LOCAL),
+})  # fmt: skip
 NEWEST: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For velocities: it matches every publisher, and a late one is worth nothing."""
-RELIABLE: Final = QoSProfile(depth=10)
-LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-FRAMES: Final = QoSProfile(depth=100)
+FRAMES: Final = QoSProfile(depth=FRAMES_DEPTH)
 TYPES: Final = MappingProxyType({
-    "sensor_msgs/Range": (Range, BEST_EFFORT),
-    "nav_msgs/Odometry": (Odometry, RELIABLE),
-    "nav_msgs/OccupancyGrid": (OccupancyGrid, LATCHED),
-    "geometry_msgs/PoseWithCovarianceStamped": (PoseWithCovarianceStamped, RELIABLE),
-    "visualization_msgs/MarkerArray": (MarkerArray, RELIABLE),
-    "diagnostic_msgs/DiagnosticArray": (DiagnosticArray, RELIABLE),
-    "std_msgs/String": (String, LATCHED),
+    "sensor_msgs/Range": Range,
+    "sensor_msgs/LaserScan": LaserScan,
+    "nav_msgs/Odometry": Odometry,
+    "nav_msgs/OccupancyGrid": OccupancyGrid,
+    "geometry_msgs/PoseWithCovarianceStamped": PoseWithCovarianceStamped,
+    "visualization_msgs/MarkerArray": MarkerArray,
+    "diagnostic_msgs/DiagnosticArray": DiagnosticArray,
+    "std_msgs/String": String,
 })  # fmt: skip
-"""Class and QoS of each type of message."""
+GRAPH_S: Final = 1.0
+"""How often other nodes are looked at."""
 ELEMENTS: Final = MappingProxyType(
     {"markers": Marker, "points": Point, "status": DiagnosticStatus, "values": KeyValue}
 )
@@ -94,11 +97,17 @@ class BridgeNode:
         self.frames = Frames(**values, prefix=self._parameter("frame_prefix", ""))
         self.timeout_s = float(self._parameter("cmd_vel_timeout", 0.15))
         self._age_max_s = float(self._parameter("cmd_vel_age_max", 0.5))
-        self._publishes_tf = bool(self._parameter("publish_tf", True))  # noqa: FBT003 - a value
-        self.publishes_grid = bool(self._parameter("publish_grid", True))  # noqa: FBT003 - a value
-        if self._publishes_tf:
-            self._tf = ros_tf.create_publisher(self._node, "/tf", FRAMES)
-            self._tf_static = ros_tf.create_publisher(self._node, "/tf_static", LATCHED)
+        both = self._switch("publish_tf", default=True)
+        switches = {values["map"]: "publish_map_tf", self.frames.named(values["odom"]): "publish_odom_tf"}
+        self._without = {
+            parent for parent, name in switches.items() if not (self._switch(name, default=True) and both)
+        }
+        self.publishes_grid = self._switch("publish_grid", default=True)
+        self.max_range_for_silence = self._switch("no_echo_as_max_range", default=False)
+        self.publishes_scan = self._switch("publish_scan", default=False)
+        self._tf = ros_tf.create_publisher(self._node, "/tf", FRAMES)
+        self._tf_static = ros_tf.create_publisher(self._node, "/tf_static", PROFILES[Qos.LATCHED])
+        self._looked_s = -math.inf
         self._subscribe()
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -108,14 +117,20 @@ class BridgeNode:
     def _parameter(self, name: str, default: Any) -> Any:  # noqa: ANN401 - the value of any parameter
         return self._node.declare_parameter(name, default).value
 
+    def _switch(self, name: str, *, default: bool) -> bool:
+        return bool(self._parameter(name, default))
+
     def _subscribe(self) -> None:
-        node = self._node
-        if self._parameter("cmd_vel_stamped", True):  # noqa: FBT003 - a value
+        node, reliable = self._node, PROFILES[Qos.RELIABLE]
+        stamped = self._switch("cmd_vel_stamped", default=True)
+        self._velocity_hint = f"start the bridge with -p cmd_vel_stamped:={str(not stamped).lower()}"
+        self._subscriptions = [
             node.create_subscription(TwistStamped, "cmd_vel", self._on_stamped, NEWEST)
-        else:
-            node.create_subscription(Twist, "cmd_vel", self._on_velocity, NEWEST)
-        node.create_subscription(PoseStamped, "goal_pose", self._on_goal, RELIABLE)
-        node.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_place, RELIABLE)
+            if stamped
+            else node.create_subscription(Twist, "cmd_vel", self._on_velocity, NEWEST),
+            node.create_subscription(PoseStamped, "goal_pose", self._on_goal, reliable),
+            node.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_place, reliable),
+        ]
         for name in ("arm", "disarm", "halt"):
             node.create_service(Trigger, name, self._service(name))
 
@@ -139,18 +154,39 @@ class BridgeNode:
 
     def publish(self, outputs: Sequence[Output], frames: Sequence[ros_tf.Frame]) -> None:
         """Publish the messages and frames of a state."""
-        if self._publishes_tf and frames:
-            self._tf.publish(ros_tf.encode(frames))
+        wanted = [frame for frame in frames if frame.parent not in self._without]
+        if wanted:
+            self._tf.publish(ros_tf.encode(wanted))
         for topic, kind, fields in outputs:
             publisher = self._publishers.get(topic)
             if publisher is None:
                 publisher = self._publishers[topic] = self._create_publisher(topic, kind)
-            publisher.publish(_fill(TYPES[kind][0](), fields))
+            publisher.publish(_fill(TYPES[kind](), fields))
 
     def publish_static(self, frames: Sequence[ros_tf.Frame]) -> None:
         """Publish the frames that do not move, for receivers now and later."""
-        if self._publishes_tf:
-            self._tf_static.publish(ros_tf.encode(frames))
+        self._tf_static.publish(ros_tf.encode(frames))
+
+    def look_around(self, host_s: float) -> None:
+        """Warn once of a second bridge, and of a publisher whose type this node does not take; at a time, s."""
+        if host_s - self._looked_s < GRAPH_S:
+            return
+        self._looked_s = host_s
+        if self._node.count_publishers("mode") > 1:
+            topic = self._node.resolve_topic_name("mode")
+            self.warn_once(
+                f"another bridge publishes {topic}, too: receivers get both; stop one, or give each its namespace: "
+                f"--ros-args -r __ns:=/robot2"
+            )
+        for subscription in self._subscriptions:
+            topic, own = subscription.topic_name, _name_of(subscription.msg_type)
+            for other in self._node.get_publishers_info_by_topic(topic):
+                if other.topic_type != own:
+                    hint = self._velocity_hint if topic.endswith("cmd_vel") else f"publish {own}"
+                    self.warn_once(
+                        f"{topic} is not carried out: {other.node_name} publishes {other.topic_type}, and this "
+                        f"bridge takes {own}; {hint}"
+                    )
 
     def close(self) -> None:
         """End the node and its thread."""
@@ -164,20 +200,17 @@ class BridgeNode:
             self._executor.spin()
 
     def _create_publisher(self, topic: str, kind: str) -> Any:  # noqa: ANN401 - a publisher of ROS
-        message, qos = TYPES[kind]
-        offered = (
-            "best effort" if qos is BEST_EFFORT else "transient local" if qos is LATCHED else "reliable, volatile"
-        )
+        qos = QOS[kind]
 
         def incompatible(_: object) -> None:
             where = "sonar/*" if topic.startswith("sonar/") else topic
             self.warn_once(
-                f"QoS mismatch on {where}: a subscriber asks for more than is offered ({offered}) and gets nothing; "
-                f"give it the QoS of {'sensor data' if qos is BEST_EFFORT else 'the system default'}"
+                f"QoS mismatch on {where}: a subscriber asks for more than is offered ({qos.value}) and gets "
+                f"nothing; give it the QoS of {'sensor data' if qos is Qos.SENSOR_DATA else 'the system default'}"
             )
 
         events = PublisherEventCallbacks(incompatible_qos=incompatible, use_default_callbacks=False)
-        return self._node.create_publisher(message, topic, qos, event_callbacks=events)
+        return self._node.create_publisher(TYPES[kind], topic, PROFILES[qos], event_callbacks=events)
 
     def _on_stamped(self, message: Any) -> None:  # noqa: ANN401 - a message of ROS
         frame, stamp = message.header.frame_id.lstrip("/"), message.header.stamp
@@ -242,6 +275,11 @@ def yaw_of(q: Any) -> float | None:  # noqa: ANN401 - a message of ROS
     if abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0) > 0.01:
         return None
     return math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+
+
+def _name_of(kind: Any) -> str:  # noqa: ANN401 - a class of ROS
+    """Return the name of a type of message, as `geometry_msgs/msg/Twist`."""
+    return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
 
 
 def _fill(message: Any, fields: dict[str, Any]) -> Any:  # noqa: ANN401 - any message of ROS

@@ -1,7 +1,8 @@
 """ROS time of the robot's own clock.
 
 Ranges, odometry and frames of one state carry the robot's times, which are exact to each other; when a state arrives
-varies. So the offset between the two clocks is the smallest seen, and rises slowly in order to follow their drift.
+varies. So the offset between the two clocks is the smallest seen, and rises slowly in order to follow their drift. A
+state that comes late, after a stall, keeps the time of its measurement.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ DRIFT: Final = 1e-3
 """How fast the offset may rise, s/s: ten times the drift of two quartz clocks."""
 JUMP_S: Final = 0.5
 """A clock that differs by more from what the other one says has jumped."""
+LATE_MAX_S: Final = 5.0
+"""If states come later than `JUMP_S` for this long, the robot's clock stood still: stalls of a busy machine and what
+queues up in them last a second or two."""
 
 
 class StampClock:
@@ -20,25 +24,33 @@ class StampClock:
 
     def __init__(self) -> None:
         self._offset_s = math.nan
-        self._ros_s = 0.0
+        self._robot_s = self._ros_s = self._host_s = 0.0
+        self._late_since_s = math.inf
 
-    def update(self, robot_s: float, ros_s: float, *, is_steady: bool) -> str | None:
+    def update(self, robot_s: float, ros_s: float, host_s: float, *, is_steady: bool) -> str | None:
         """Take in that a state of this robot's time arrived; return the message if a clock has jumped.
 
         Parameters
         ----------
-        robot_s, ros_s : float
-            The robot's clock in the state, and ROS time when it arrived, s.
+        robot_s, ros_s, host_s : float
+            The robot's clock in the state, ROS time and this machine's monotonic clock when it arrived, s.
         is_steady : bool
             Whether the robot's time runs as fast as ROS time: not while an emulated run is paused or slowed down.
         """
+        if is_steady and robot_s == self._robot_s and not math.isnan(self._offset_s):
+            return None  # nothing new was measured
         offset_s, before_s, elapsed_s = ros_s - robot_s, self._offset_s, ros_s - self._ros_s
-        self._ros_s = ros_s
+        was_set = abs(elapsed_s - (host_s - self._host_s)) > JUMP_S
+        restarted = robot_s < self._robot_s
+        self._robot_s, self._ros_s, self._host_s = robot_s, ros_s, host_s
         if math.isnan(before_s) or not is_steady:
-            self._offset_s = offset_s
+            self._offset_s, self._late_since_s = offset_s, math.inf
             return None
-        if abs(offset_s - before_s) > JUMP_S:
-            self._offset_s = offset_s
+        self._late_since_s = min(self._late_since_s, host_s) if offset_s - before_s > JUMP_S else math.inf
+        stood_still = host_s - self._late_since_s > LATE_MAX_S
+        has_jumped = abs(offset_s - before_s) > JUMP_S
+        if has_jumped and (was_set or restarted or stood_still or offset_s < before_s):
+            self._offset_s, self._late_since_s = offset_s, math.inf
             return (
                 f"clock jump: ROS time and the robot's clock differ by {offset_s - before_s:+.2f} s from before; the "
                 f"robot restarted, or the time of ROS or of this machine was set: stamps follow the new time"

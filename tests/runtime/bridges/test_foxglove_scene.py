@@ -51,9 +51,7 @@ def full_state() -> dict[str, Any]:
 def test_a_state_is_on_the_topics_of_the_export(tmp_path: Path) -> None:
     found = written(tmp_path / "a.mcap", "denning", full_state())
     assert found.keys() == {"/tf", "/pose", "/ring", "/segments", "/models", "/truth", "/log", "/state"}
-    assert [(t.parent_frame_id, t.child_frame_id) for t in found["/tf"][0].transforms] == [
-        ("map", "odom"), ("odom", "base")
-    ]  # fmt: skip
+    assert [(t.parent_frame_id, t.child_frame_id) for t in found["/tf"][0].transforms] == [("odom", "base")]
     (scan,) = found["/ring"]
     assert len(scan.ranges) == 24
     assert scan.ranges[0] == pytest.approx(2.381)
@@ -66,6 +64,16 @@ def test_a_state_is_on_the_topics_of_the_export(tmp_path: Path) -> None:
     assert found["/log"][0].message == "mode mode=DRIVE"
     assert set(found["/state"][0]) == set(STATE_FIELDS)
     assert found["/state"][0]["phases"] == {"decide": 3.0}
+
+
+def test_the_map_has_a_frame_while_the_place_in_it_is_known(tmp_path: Path) -> None:
+    place = {"pose": [1.0, 0.0, 0.0], "covariance": None, "frame": [0.5, 0.0, 0.0], "probability": 0.9}
+    for status in ("tracking", "localizing", "lost"):
+        found = written(
+            tmp_path / f"{status}.mcap", "denning", full_state() | {"localized": {**place, "status": status}}
+        )
+        parents = [t.parent_frame_id for t in found["/tf"][0].transforms]
+        assert parents == (["map", "odom"] if status == "tracking" else ["odom"])
 
 
 def test_cross_paths_are_arcs_from_where_the_ring_stood(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from config.load import load_settings
 from drivers.messages import Firing, Pose
 from runtime.analysis.export.foxglove import write_foxglove
-from runtime.analysis.timeline import Timeline
+from runtime.analysis.timeline import MapPlace, Timeline
 from runtime.analysis.timeline_builder import TimelineBuilder
 from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid
 
@@ -59,7 +60,7 @@ def test_a_run_for_foxglove(tmp_path: Path) -> None:
         first.setdefault(topic, proto)
         times.append(log_ns)
     assert seen == {
-        ("/tf", "foxglove.FrameTransforms"): 1 + 4,
+        ("/tf", "foxglove.FrameTransforms"): 4,
         ("/pose", "foxglove.PoseInFrame"): 4,
         ("/ring", "foxglove.LaserScan"): 12,
         ("/segments", "foxglove.SceneUpdate"): 4,
@@ -74,13 +75,25 @@ def test_a_run_for_foxglove(tmp_path: Path) -> None:
     assert len(newest["/models"].entities[0].lines) == 3
     assert len(newest["/segments"].entities[0].lines[0].points) == 2 * 3
     assert len(newest["/clusters"].entities[0].lines) == 3 * 3
-    start = first["/tf"].transforms[0]
-    assert (start.parent_frame_id, start.child_frame_id) == ("world", "odom")
-    assert start.translation.x == pytest.approx(-1.8288)
+    base = first["/tf"].transforms[0]
+    assert (base.parent_frame_id, base.child_frame_id) == ("odom", "base")
+    assert newest["/truth"].entities[0].frame_id == "odom"
+    assert run.world is not None
+    xs = [line.points[0].x for line in newest["/truth"].entities[0].lines]
+    assert min(xs) == pytest.approx(min(d.x_m for d in run.world.drum) + 0.3048 + 1.8288, abs=0.01)
     scan = newest["/ring"]
     assert [i for i, r in enumerate(scan.ranges) if not math.isnan(r)] == [6]
     assert math.isinf(scan.ranges[6])
     assert newest["/log"].message == "sensor 7 never answers"
+
+
+def test_the_map_has_a_frame_while_the_place_in_it_is_known(tmp_path: Path) -> None:
+    run = synthetic_timeline()
+    run.snapshots[1] = replace(run.snapshots[1], place=MapPlace(Pose(1.0, 0.0, 0.0), np.eye(3), Pose(0.5, 0.0, 0.0)))
+    (path,) = write_foxglove(run, tmp_path / "fox.mcap")
+    frames = [proto.transforms[0] for topic, _, _, proto in messages(path) if topic == "/tf"]
+    ((child, x),) = [(f.child_frame_id, f.translation.x) for f in frames if f.parent_frame_id == "map"]
+    assert (child, x) == ("odom", -0.5)
 
 
 def test_cross_paths_are_arcs(tmp_path: Path) -> None:
