@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
+from config.errors import UserError
 from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.link import Link
@@ -220,11 +221,10 @@ class RobotProcess:
             footprint = Footprint(self._memory)
             try:
                 self._arm_when_ready = arm
-                if self._preparation is not None:
-                    await self._prepare(self._preparation)
+                if self._preparation is None or await self._prepare(self._preparation):
                     footprint = Footprint(self._memory)
-                with self._memory.driving():
-                    await self._run_cycles(seconds)
+                    with self._memory.driving():
+                        await self._run_cycles(seconds)
             finally:
                 process_row = footprint.close()
                 self._scheduler.close()
@@ -234,11 +234,16 @@ class RobotProcess:
             self._mode_log.stop_reasons,
         )  # fmt: skip
 
-    async def _prepare(self, preparation: Preparation) -> None:
-        """Run cycles without perception until recognition is ready; it begins with an empty map."""
-        await run_until_prepared(preparation, self._settings, self._unprepared_cycle, self._stop, self._log)
+    async def _prepare(self, preparation: Preparation) -> bool:
+        """Run cycles without perception until recognition is ready, with an empty map; return whether it is."""
+        try:
+            await run_until_prepared(preparation, self._settings, self._unprepared_cycle, self._stop, self._log)
+        except Exception as error:  # noqa: BLE001 - as in a cycle of the run itself
+            self._fail(error)
+            return False
         mode, self._state = self._state.mode, prepared_state(self._settings)
         self._state.mode = mode
+        return True
 
     def _unprepared_cycle(self, progress: str) -> None:
         """Run a cycle before recognition is ready: the line is served, the echoes are shown, the robot stands."""
@@ -336,11 +341,12 @@ class RobotProcess:
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""
         self._halt()
-        what = f"the cycle failed ({describe_exception(error)})"
-        reason = f"{what}, likely through a program error: see the log, then restart the program"
+        is_known, what = isinstance(error, UserError), f"the cycle failed ({describe_exception(error)})"
+        likely = f"{what}, likely through a program error: see the log, then restart the program"
+        reason = str(error) if is_known else likely
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
         self._mode_log.entered(self._state, self._clock())
-        self._log.error("the cycle failed", exc_info=error)
+        self._log.error("the cycle failed", exc_info=None if is_known else error)
 
     def _carry_out(self, command: Command, stale_run_s: float) -> None:
         """Send the command, but no velocity after `stale_run_s`: the next cycle stops the drive for such a gap."""

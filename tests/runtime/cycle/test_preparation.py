@@ -125,9 +125,23 @@ def test_a_run_can_end_before_recognition_is_ready(monkeypatch: pytest.MonkeyPat
 
 def test_a_preparation_that_fails_ends_the_run_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Run(monkeypatch, Preparation(error=UserError("no room", FAILED)))
-    with pytest.raises(UserError, match="no room"):
-        run.drive(3.0)
+    run.drive(3.0)
     assert run.cycles == []
+    assert (run.summary["mode"], run.summary["stop_reasons"]) == ("FAULT", ["no room"])
+
+
+def test_a_fault_before_recognition_is_ready_is_a_reason_in_the_summary(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("out of order")
+
+    run = Run(monkeypatch, Preparation())
+    run.drive(0.5, {1.0: lambda process: process.health.report("the view", ValueError("no screen"))})
+    assert run.summary["mode"] == "SAFE_STOP"
+    assert "the view (ValueError: no screen)" in run.summary["stop_reasons"][0]
+    run = Run(monkeypatch, Preparation())
+    run.drive(0.5, {1.0: lambda process: monkeypatch.setattr(process, "_gather", fail)})
+    assert (run.summary["mode"], run.cycles) == ("FAULT", [])
+    assert "the cycle failed (RuntimeError: out of order, " in run.summary["stop_reasons"][0]
 
 
 def test_the_empty_map_refuses_edits_and_changes_with_nothing() -> None:
