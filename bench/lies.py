@@ -66,6 +66,8 @@ KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
 """The kinds of lies; `constant_ring` of +inf stands for the ring's greatest range."""
 CLOCK: Final = "clock"
 """Kinds with this word change nothing on a robot whose packets carry no stamps."""
+MOVED_M: Final = 0.5
+"""A robot that has driven less since a lie began has hardly changed what it hears."""
 AT_SPEED_M_S: Final = 0.05
 """A slower contact is none that counts."""
 FROM_S, UNTIL_S = 3.0, 25.0
@@ -116,6 +118,8 @@ class TrialResult:
         The reason, report or note that names it; of an honest drive, the reason of its stop.
     drive_s
         How long the drive lasted.
+    way_m
+        How far the robot truly drove after the lie began, or in an honest drive.
     """
 
     robot: str
@@ -130,6 +134,12 @@ class TrialResult:
     named_s: float | None
     said: str | None
     drive_s: float
+    way_m: float
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether it drove far enough for its motion to contradict a lie."""
+        return self.way_m > MOVED_M
 
     @property
     def is_contact(self) -> bool:
@@ -237,7 +247,8 @@ def run_trial(
     state = (prepared_state if recognises else unprepared_state)(settings)
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
-    run_s = before_m_s = speed_m_s = contact_m_s = 0.0
+    run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0
+    place = device.truth.pose
     contact_s = named_s = said = None
     known: set[object] = set()
     while run_s < until_s:
@@ -247,12 +258,14 @@ def run_trial(
         inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
         budget.begin()
         step(state, inputs, settings, lambda command: apply_command(driver, command), budget)
-        truth = device.truth
+        truth, before = device.truth, place
+        place = truth.pose
         reports = {(report.sensor, report.fault): report.reason for report in state.perception.sensor_reports()}
         if run_s < begin_s:
             known |= set(reports) | set(inputs.received.notes)
             before_m_s, speed_m_s = truth.contact_m_s, abs(truth.twist.v)
             continue
+        way_m += math.hypot(place.x - before.x, place.y - before.y)
         if contact_s is None and truth.contact_m_s > max(before_m_s, AT_SPEED_M_S):
             contact_m_s, contact_s = truth.contact_m_s, run_s - begin_s
         if named_s is None:
@@ -267,7 +280,19 @@ def run_trial(
         if contact_s is not None or state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}:
             until_s = min(until_s, run_s + 1.0)
     return TrialResult(
-        robot, room, kind, seed, moment, begin_s, speed_m_s, contact_m_s, contact_s, named_s, said, run_s
+        robot,
+        room,
+        kind,
+        seed,
+        moment,
+        begin_s,
+        speed_m_s,
+        contact_m_s,
+        contact_s,
+        named_s,
+        said,
+        run_s,
+        way_m,
     )
 
 
@@ -307,8 +332,9 @@ def lies_table(results: Sequence[TrialResult]) -> Table:
     robots = list(dict.fromkeys(result.robot for result in results))
     drives = sum(result.drive_s for result in results) / 3600.0
     table = Table(
-        title=f"{len(results)} drives, {drives:.1f} h: contacts above {AT_SPEED_M_S:g} m/s, lies not named / drives, "
-        f"median and greatest time to the name, s",
+        title=f"{len(results)} drives, {drives:.1f} h: contacts above {AT_SPEED_M_S:g} m/s; lies without a "
+        f"name / drives that went on for {MOVED_M:g} m or were named;\nmedian and greatest time to the name, s; of "
+        f"honest drives stops / drives",
         title_justify="left",
     )
     table.add_column("lie")
@@ -323,7 +349,9 @@ def lies_table(results: Sequence[TrialResult]) -> Table:
 def _cell(results: Sequence[TrialResult]) -> str:
     if not results:
         return "–"
-    contacts, unnamed = sum(one.is_contact for one in results), sum(one.named_s is None for one in results)
-    named = sorted(one.named_s for one in results if one.named_s is not None)
+    contacts, named = sum(one.is_contact for one in results), sorted(one.named_s for one in results if one.named_s)
+    if results[0].kind is None:
+        return f"{contacts} {len(named)}/{len(results)}"
+    unnamed = sum(one.named_s is None and one.is_driving for one in results)
     times = f" {named[len(named) // 2]:.1f} {named[-1]:.1f}" if named else ""
-    return f"{contacts} {unnamed}/{len(results)}{times}"
+    return f"{contacts} {unnamed}/{len(named) + unnamed}{times}"

@@ -249,9 +249,8 @@ class RobotProcess:
         """Run a cycle before recognition is ready: the line is served, the echoes are shown, the robot stands."""
         (run_s, host_s), before = self._clock.both(), self._state.mode
         self._apply_live_settings()
-        inputs = self._gather(run_s, host_s)
         record = unprepared_step(
-            self._state, inputs, self._settings, progress, lambda command: self._carry_out(command, run_s)
+            self._state, self._gather(run_s, host_s), self._settings, progress, lambda c: self._carry_out(c, run_s)
         )
         self._report(record, before, self._observers.on_unprepared_cycle)
 
@@ -311,16 +310,12 @@ class RobotProcess:
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:
         """Run the pure step with this process's line and clock."""
-        host_clock = self._clock.host
-        refine_until_host_s = now.host_s + self._settings.cycle.perception_budget_s
+        host_clock, refine_until_host_s = self._clock.host, now.host_s + self._settings.cycle.perception_budget_s
         return step(
-            self._state,
-            inputs,
-            self._settings,
+            self._state, inputs, self._settings,
             lambda command: self._carry_out(command, inputs.run_s + inputs.gap_max_s),
-            lambda _done: host_clock() < refine_until_host_s,
-            mark,
-        )
+            lambda _done: host_clock() < refine_until_host_s, mark,
+        )  # fmt: skip
 
     def _report(self, record: CycleRecord, before: ModeState, on_cycle: OnCycle | None) -> None:
         """Record and show the cycle, and log what is new about mode, sensors and odometry."""
@@ -341,12 +336,12 @@ class RobotProcess:
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""
         self._halt()
-        is_known, what = isinstance(error, UserError), f"the cycle failed ({describe_exception(error)})"
+        what = f"the cycle failed ({describe_exception(error)})"
         likely = f"{what}, likely through a program error: see the log, then restart the program"
-        reason = str(error) if is_known else likely
+        reason = str(error) if isinstance(error, UserError) else likely
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
         self._mode_log.entered(self._state, self._clock())
-        self._log.error("the cycle failed", exc_info=None if is_known else error)
+        self._log.error("the cycle failed", exc_info=error)
 
     def _carry_out(self, command: Command, stale_run_s: float) -> None:
         """Send the command, but no velocity after `stale_run_s`: the next cycle stops the drive for such a gap."""
