@@ -4,6 +4,10 @@ A new reading of a sensor replaces only what that sensor heard in the same direc
 removes it. So a reading at maximum range leaves no obstacle, and neighbours do not erase each other's echoes. A ring
 that turns keeps what it heard in other directions. A sensor that reports a fault, or whose reading is not believed,
 has not looked: its last echo ages.
+
+While no sensor hears anything, steady echoes that fall silent as the robot comes nearer stay obstacles, and do not
+age: a ring that has failed hears nothing either, and the robot must not drive at what it heard before. What falls
+silent before a robot that stands has left.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.messages import Firing
+from drivers.messages import Firing, Pose
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
 from perception.sensor_mounts import mounts_at
@@ -24,6 +28,11 @@ LOOKS: Final = 16
 STEADY_M: Final = 0.3
 STEADY_S: Final = 1.5
 """An echo is steady if another look, by the same sensor or another one, put one this near no longer ago than this."""
+
+NEARER_M: Final = 1e-3
+"""A robot that has come nearer by this since the last firing drives, m."""
+TOLERANCE_M: Final = 0.005
+"""A reading within this of the ring's reach is a silence: so some rings report it, m."""
 
 
 @kernel
@@ -47,8 +56,9 @@ def is_steady(points: Floats, times: Floats, heard: NDArray[np.bool_], px: float
 
 @kernel
 def record_echoes(
-    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, points: Floats,
-    bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
+    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, reach: float,
+    points: Floats, bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
+    last: Floats, lost: Floats, is_lost: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     """Enter the readings of a firing.
 
@@ -62,6 +72,8 @@ def record_echoes(
         Place (m) and direction (rad) of the ring, time of the firing (s).
     same : float
         Angle up to which a new look replaces an older one of the same sensor, rad.
+    reach : float
+        Range up to which the ring listens, m; a reading there is a silence to `lost`.
     points : (n, looks, 2) float
         Places of each sensor's echoes, m. Updated.
     bearings : (n, looks) float
@@ -72,7 +84,14 @@ def record_echoes(
         Whether it heard an echo then. Updated.
     steady : (n, looks) bool
         Whether another look agreed with that echo. Updated.
+    last : (2,) float
+        Place of the ring at the last firing, m. Updated.
+    lost : (n, 2) float
+        Places of the last steady echoes that a silence removed, m. Updated.
+    is_lost : (n,) bool
+        Whether the ring has heard nothing since, and came nearer to that place when it was lost. Updated.
     """
+    hears = False
     c = math.cos(yaw)
     s = math.sin(yaw)
     for i in range(ranges.shape[0]):
@@ -81,14 +100,19 @@ def record_echoes(
             continue
         bearing = yaw + mounts[i, 2]
         is_echo = math.isfinite(r)
-        reach = r if is_echo else 0.0
-        px = x + c * mounts[i, 0] - s * mounts[i, 1] + reach * math.cos(bearing)
-        py = y + s * mounts[i, 0] + c * mounts[i, 1] + reach * math.sin(bearing)
+        away = r if is_echo else 0.0
+        px = x + c * mounts[i, 0] - s * mounts[i, 1] + away * math.cos(bearing)
+        py = y + s * mounts[i, 0] + c * mounts[i, 1] + away * math.sin(bearing)
+        hears = hears or r < reach
         agrees = is_echo and is_steady(points, times, heard, px, py, t)
         oldest = 0
         for k in range(times.shape[1]):
             turned = bearing - bearings[i, k]
             if abs(turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5)) <= same:
+                if r >= reach and heard[i, k] and steady[i, k]:
+                    came = math.hypot(points[i, k, 0] - last[0], points[i, k, 1] - last[1])
+                    if math.hypot(points[i, k, 0] - x, points[i, k, 1] - y) < came - NEARER_M:
+                        lost[i, 0], lost[i, 1], is_lost[i] = points[i, k, 0], points[i, k, 1], True
                 times[i, k] = -math.inf
                 heard[i, k] = False
             if times[i, k] < times[i, oldest]:
@@ -100,6 +124,9 @@ def record_echoes(
         if is_echo:
             points[i, oldest, 0] = px
             points[i, oldest, 1] = py
+    last[0], last[1] = x, y
+    if hears:
+        is_lost[:] = False
 
 
 @kernel
@@ -171,20 +198,29 @@ class FreshEchoes:
         Half the width of a beam, rad. A look within half of it of an older one is in the same direction.
     turning : tuple of int
         The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
+    reach_m : float
+        Range up to which the ring listens, m.
     """
 
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _half_angle=CONSTANT, _points=PLACE, _bearings=PLACE, _times=PLACE._replace(infinite=True)
+        _mounts=CONSTANT, _half_angle=CONSTANT, _points=PLACE, _bearings=PLACE, _times=PLACE._replace(infinite=True),
+        _last=PLACE, _lost=PLACE, _heard_reach_m=CONSTANT,
     )  # fmt: skip
 
-    def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = (), reach_m: float = math.inf
+    ) -> None:
         self._mounts, self._turning = mounts, turning
+        self._heard_reach_m = reach_m - TOLERANCE_M
         self._half_angle = half_angle
         self._points = np.zeros((len(mounts), LOOKS, 2))
         self._bearings = np.zeros((len(mounts), LOOKS))
         self._times = np.full((len(mounts), LOOKS), -math.inf)
         self._heard = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
         self._steady = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
+        self._last = np.zeros(2)
+        self._lost = np.zeros((len(mounts), 2))
+        self._is_lost = np.zeros(len(mounts), dtype=np.bool_)
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
@@ -192,8 +228,8 @@ class FreshEchoes:
         mounts = mounts_at(firing, self._mounts, self._turning)
         record_echoes(
             firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
-            float(firing.robot_s), 0.5 * self._half_angle, self._points, self._bearings, self._times, self._heard,
-            self._steady,
+            float(firing.robot_s), 0.5 * self._half_angle, self._heard_reach_m, self._points, self._bearings,
+            self._times, self._heard, self._steady, self._last, self._lost, self._is_lost,
         )  # fmt: skip
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
@@ -214,10 +250,42 @@ class FreshEchoes:
             self._bearings, self._times, self._heard, self._points, float(robot_s), float(age_max_s), fresh, ages,
             sensor_ages, points,
         )  # fmt: skip
-        return Looks(fresh[:k], ages[:k], sensor_ages, points[:h])
+        echoes = points[:h]
+        if self._is_lost.any():
+            echoes = np.concatenate([echoes, self.lost_points()])
+        return Looks(fresh[:k], ages[:k], sensor_ages, echoes)
+
+    def lost_points(self) -> Floats:
+        """Return a copy of the steady echoes that were lost since the ring last heard anything, shape (k, 2), m."""
+        lost: Floats = self._lost[self._is_lost]
+        return lost
+
+    def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
+        """Return how far ahead the nearest of these stands, m; all are then forgotten, as the robot stops for it.
+
+        None if there is none in the robot's way so near.
+
+        Parameters
+        ----------
+        pose : Pose
+            The robot's, in odometry's frame.
+        near_m, half_width_m : float
+            Length and half the width of the way ahead, m.
+        """
+        if not self._is_lost.any():
+            return None
+        dx, dy = (self.lost_points() - (pose.x, pose.y)).T
+        c, s = math.cos(pose.theta), math.sin(pose.theta)
+        ahead, across = c * dx + s * dy, c * dy - s * dx
+        near = ahead[(ahead > 0.0) & (ahead < near_m) & (np.abs(across) < half_width_m)]
+        if not len(near):
+            return None
+        self._is_lost[:] = False
+        return float(near.min())
 
     def clear(self) -> None:
         """Remove all readings."""
         self._heard[:] = False
         self._steady[:] = False
+        self._is_lost[:] = False
         self._times[:] = -math.inf

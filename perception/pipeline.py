@@ -96,7 +96,7 @@ class Perception:
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
-        self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning)
+        self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning, ring.window_m)
         self._reach_m = reach_m(ring)
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
@@ -288,6 +288,10 @@ class Perception:
     def steady_obstacles(self, robot_s: float, age_max_s: float) -> Floats:
         """Return those of the obstacles with which another look agrees: shape (k, 2), m."""
         return self._echoes.steady_points(robot_s, age_max_s)
+
+    def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
+        """Return how far ahead the robot comes near to what the ring lost, as `FreshEchoes.take_lost_ahead`."""
+        return self._echoes.take_lost_ahead(pose, near_m, half_width_m)
 
     def surroundings(
         self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float

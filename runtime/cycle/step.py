@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
 from behaviors.avoid_past import Trail
@@ -65,6 +65,10 @@ __all__ = [
     "apply_settings",
     "step",
 ]
+
+
+LOST_AHEAD_M: Final = 0.4
+"""A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
 
 
 class Order(Enum):
@@ -321,6 +325,13 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         return Stop(
             f"the ring fires, but no sensor has given a usable range for {blind_s:.1f} s, as all are masked or "
             f"report faults: {likely}, then re-arm"
+        )
+    clear_m = settings.body.radius_m + behaviors.arbiter.clearance_m
+    lost_m = state.perception.take_lost_ahead(odometry.pose, clear_m + LOST_AHEAD_M, clear_m)
+    if lost_m is not None:
+        return Stop(
+            f"the ring hears nothing any more, not even what stood {lost_m:.1f} m ahead: unless that is gone, check "
+            f"the ring's power and cables, then re-arm"
         )
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)

@@ -100,3 +100,40 @@ def test_an_echo_is_steady_where_another_look_agrees() -> None:
     assert echoes.steady_points(0.1, 1.5) == pytest.approx(np.array([[1.5, 0.0]]))
     echoes.update(at(0.2, 0.0, 4.0, 3.5))
     assert echoes.steady_points(0.2, 1.5) == pytest.approx(np.array([[0.0, 3.9]]))
+
+
+def approach(silent_from: float, echo_of: int | None = None) -> FreshEchoes:
+    """Drive towards a wall at 3 m that one sensor hears; somewhere nothing is heard, or an echo elsewhere."""
+    echoes = FreshEchoes(MOUNTS, BEAM, (), 5.0)
+    for k in range(30):
+        x = 0.05 * k
+        ranges = np.full(len(MOUNTS), math.inf)
+        if x < silent_from:
+            ranges[0] = 3.0 - x - MOUNTS[0, 0]
+        elif echo_of is not None:
+            ranges[echo_of] = 2.0
+        echoes.update(Firing(0.1 * k, Pose(x, 0.0, 0.0), 0.0, ranges))
+    return echoes
+
+
+def test_in_a_ring_that_falls_silent_what_stood_ahead_stays_and_is_reported_once() -> None:
+    echoes = approach(0.9)
+    assert echoes.points(20.0, 1.5)[:, 0] == pytest.approx([3.0])
+    assert echoes.take_lost_ahead(Pose(1.5, 0.0, 0.0), 1.0, 0.5) is None, "it is farther ahead"
+    assert echoes.take_lost_ahead(Pose(2.5, 0.0, math.pi), 1.0, 0.5) is None, "it is behind"
+    assert echoes.take_lost_ahead(Pose(2.5, 1.0, 0.0), 1.0, 0.5) is None, "it is beside the way"
+    assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) == pytest.approx(0.5)
+    assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
+    assert len(echoes.points(20.0, 1.5)) == 0
+
+
+def test_what_is_gone_is_forgotten_as_soon_as_the_ring_hears_anything() -> None:
+    echoes = approach(0.9, echo_of=1)
+    assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
+
+
+def test_what_leaves_a_robot_that_stands_is_gone() -> None:
+    echoes = FreshEchoes(MOUNTS, BEAM, (), 5.0)
+    for k in range(10):
+        echoes.update(at(0.1 * k, 0.0, 1.0 if k < 6 else math.inf, math.inf))
+    assert len(echoes.points(1.0, 1.5)) == 0
