@@ -201,10 +201,13 @@ def residual_evidence(
 
 
 def place_readings(
-    last: dict[int, Array], mounts: Array, pose: tuple[float, float, float], ranges: Array, reach: float,
-    half_box: float,
+    last: dict[int, Array], stands: dict[int, tuple[int, int]], mounts: Array, pose: tuple[float, float, float],
+    ranges: Array, reach: float, half_box: float, sigma: tuple[float, float],
 ) -> list[tuple[float, ...]]:  # fmt: skip
-    """Return the new readings of this firing in the odometry's frame: x, y, axis, range, sensor."""
+    """Return the new readings of this firing in the odometry's frame: x, y, axis, range, sensor.
+
+    Of those from one place the first, second, fourth and so on are new; three in turn that differ begin a new series.
+    """
     turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
     new = []
     for i, (mount, r) in enumerate(zip(mounts, ranges, strict=True)):
@@ -215,13 +218,18 @@ def place_readings(
             2 * SILENT if r >= reach else r,
         ])  # fmt: skip
         old = last.get(i)
-        if (
-            old is not None
-            and math.dist(q[:2], old[:2]) < 0.05 * FT
-            and q[2:4] @ old[2:4] > 0.9998
-            and abs(q[4] - old[4]) <= half_box
-        ):
+        moved = math.inf if old is None or q[2:4] @ old[2:4] <= 0.9998 else math.dist(q[:2], old[:2])
+        looks, differ = stands.get(i, (0, 0))
+        if old is not None and moved < 0.005:
+            var = sigma[0] ** 2 + (sigma[1] * min(q[4], old[4])) ** 2 + half_box**2 / 3 + 1e-6 * FT**2
+            differ = differ + 1 if abs(q[4] - old[4]) > 2 * half_box + 3 * math.sqrt(2 * var) else 0
+            stands[i] = (1, 0) if differ == 3 else (looks + 1, differ)
+            if math.log2(stands[i][0]) % 1 != 0:
+                continue
+        elif old is not None and moved < 0.05 * FT and abs(q[4] - old[4]) <= half_box:
             continue
+        else:
+            stands[i] = (1, 0)
         last[i] = q
         new.append((*q, float(i)))
     return new

@@ -75,6 +75,10 @@ class Sensor(Record):
     """Readings ever put there."""
     last: Annotated[Reading, UNHEARD]
     """The last reading that was not redundant."""
+    looks: Count
+    """Readings from its place; see `observe.says_new`."""
+    changed: Count
+    """The newest of them that in turn differ from `last`."""
     crossed: Annotated[Reading, UNHEARD]
     """Where it stood when others last listened to it; without a range."""
 

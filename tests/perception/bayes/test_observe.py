@@ -26,6 +26,7 @@ from tests.perception.bayes.tracks import (
     kept_by,
     new_memory,
     numbers,
+    pair,
     place_of,
     random_drive,
     random_track,
@@ -38,11 +39,14 @@ def test_readings_are_placed_and_remembered(examples: int) -> None:
     rng, memory = np.random.default_rng(9), new_memory()
     scratch, sensors = memory.state["scratch"], memory.state["sensors"][0]
     last: dict[int, np.ndarray] = {}
+    stands: dict[int, tuple[int, int]] = {}
     memories: list[list[np.ndarray]] = [[] for _ in range(SENSORS)]
     entered = 0
     for pose, time_s, ranges in random_drive(rng, examples):
         m = observe.place_readings(memory.s, P, MOUNTS, *pose, ranges)
-        want = naive_tracks.place_readings(last, MOUNTS, pose, ranges, S.range_max_m, S.half_resolution_m)
+        want = naive_tracks.place_readings(
+            last, stands, MOUNTS, pose, ranges, S.range_max_m, S.half_resolution_m, pair(NOISES[0])
+        )
         assert m == len(want)
         fired = np.column_stack([numbers(scratch["fired"][0])[:m, :5], scratch["fired_sensors"][0, :m]])
         assert fired == pytest.approx(np.array(want).reshape(m, 6), rel=1e-12, abs=1e-12)
