@@ -6,7 +6,6 @@ This runs for every firing. Its cost depends on the ring and on the number of tr
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.cross_path import circle_error, is_crossed, is_near_circle
 from perception.bayes.elements import CROSS_EVERY, CROSS_HISTORY, HISTORY, Reading
@@ -17,110 +16,23 @@ from perception.bayes.pairing import make_segments
 from perception.bayes.parameters import (
     ASSOCIATION_MARGIN_M,
     CERTAIN_PROBABILITY,
-    CHANGED_MIN,
     HYPOTHESES_PER_FIRING,
     KEEPING_MARGIN_M,
-    STANDING_M,
     STILL_COS,
     STILL_M,
 )
+from perception.bayes.placement import COORDINATE_MAX_M, place_readings
 from perception.bayes.polygon_initiation import request_polygon
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading, keep_reading
 from perception.bayes.scratch import PROPOSED, UNEXPLAINED, PairSegment
 from perception.bayes.settings_record import SettingsRecord
-from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, CircleTracks, Sensor, StateRecord
+from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, CircleTracks, StateRecord
 from perception.bayes.track_initiation import initiate_circle
 from perception.bayes.track_selection import is_waiting
 from perception.bayes.walls import update_lines
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
-
-COORDINATE_MAX_M: Final = 0.5 * FAR
-"""A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""
-
-
-@kernel
-def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
-    """Return whether a reading from the place of the sensor's last one is evidence; count it.
-
-    The errors of readings from one place are not independent: what their mean is off by stays, however many they are.
-    So the first, second, fourth, eighth and so on count, whatever they read. If those that repeat the last range were
-    left out instead, ranges that vary by a count would outnumber silences, and after minutes the surroundings would
-    seem to answer at any angle. When several in turn are different, the surroundings have changed, and counting
-    begins anew.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        Updated.
-    range_m : float
-        The range, m.
-    tolerance : float
-        Greatest difference between two ranges of one surface, m.
-    """
-    sensor.looks += 1
-    sensor.changed = sensor.changed + 1 if abs(range_m - sensor.last.range_m) > tolerance else 0
-    if sensor.changed >= CHANGED_MIN:
-        sensor.looks = 1
-        sensor.changed = 0
-    return bool(sensor.looks & (sensor.looks - 1) == 0)
-
-
-@kernel
-def place_readings(
-    s: StateRecord, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
-) -> int:  # fmt: skip
-    """Write the fired readings to the scratch in the odometry frame; return how many of them are not redundant.
-
-    An invalid pose or range is left out, because it would corrupt every sum.
-
-    Parameters
-    ----------
-    s, p, mounts, px, py, yaw, ranges
-        As for `associate`.
-    """
-    s[0].scratch.crosses = 0
-    if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
-        return 0
-    scratch = s[0].scratch
-    var0, rel2 = noise_variance(s, p)
-    half_box = p[0].half_resolution_m
-    c = math.cos(yaw)
-    sn = math.sin(yaw)
-    m = 0
-    for i in range(ranges.shape[0]):
-        r = ranges[i]
-        if not r >= 0.0:  # also true for NaN
-            continue
-        if r >= p[0].range_max_m:
-            r = 2.0 * FAR
-        x = px + c * mounts[i, 0] - sn * mounts[i, 1]
-        y = py + sn * mounts[i, 0] + c * mounts[i, 1]
-        ux = math.cos(yaw + mounts[i, 2])
-        uy = math.sin(yaw + mounts[i, 2])
-        sensor = s[0].sensors[i]
-        last = sensor.last
-        moved = math.hypot(x - last.x, y - last.y)
-        is_near = moved < STILL_M and ux * last.axis_x + uy * last.axis_y > STILL_COS
-        if is_near and moved < STANDING_M:
-            if not says_new(sensor, r, tolerance_m(2.0 * half_box, 2.0 * (var0 + rel2 * min(r, last.range_m) ** 2))):
-                continue
-        elif is_near and abs(r - last.range_m) <= half_box:
-            continue
-        else:
-            sensor.looks = 1
-            sensor.changed = 0
-        last.x = x
-        last.y = y
-        last.axis_x = ux
-        last.axis_y = uy
-        last.range_m = r
-        copy_reading(last, scratch.fired[m])
-        scratch.fired_sensors[m] = i
-        scratch.explained_by[m] = UNEXPLAINED
-        m += 1
-    return m
 
 
 @kernel

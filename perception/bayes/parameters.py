@@ -80,11 +80,6 @@ HISTORY_SPACING_M: Final = 0.2 * FOOT_M
 STILL_M: Final = 0.05 * FOOT_M
 STILL_COS: Final = 0.9998
 """A reading is redundant if its sensor moved and turned less than this (1°) and its range is the same."""
-STANDING_M: Final = 0.005
-"""A sensor that moved less is where it was; odometry trembles by less than this."""
-CHANGED_MIN: Final = 3
-"""So many readings in turn that differ from the last one say that the surroundings have changed: of drop-outs of 10 %
-one in a thousand series is so long."""
 ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
 KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
 """Distance outside a beam at which a centre may lie for the reading to be associated and kept."""

@@ -76,7 +76,7 @@ class Sensor(Record):
     last: Annotated[Reading, UNHEARD]
     """The last reading that was not redundant."""
     looks: Count
-    """Readings from its place; see `observe.says_new`."""
+    """Readings from its place; see `placement.says_new`."""
     changed: Count
     """The newest of them that in turn differ from `last`."""
     crossed: Annotated[Reading, UNHEARD]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes import circle_posterior, cross_path, observe, occlusion, range_fit, reservoir
+from perception.bayes import circle_posterior, cross_path, observe, occlusion, placement, range_fit, reservoir
 from perception.bayes.elements import CROSS_EVERY, CROSS_HISTORY, CROSSES_MAX, GRID_CELLS
 from perception.bayes.scratch import UNEXPLAINED, CircleFit, CirclePosterior, LinearReading, LineFit, Score
 from perception.bayes.state import ESTABLISHED
@@ -193,7 +193,7 @@ def test_cross_paths_of_a_firing_are_placed_remembered_and_associated() -> None:
     nothing = np.full(len(MOUNTS), np.nan)
 
     def hear(half_paths: Floats, pose: tuple[float, float, float] = pose) -> int:
-        assert observe.place_readings(memory.s, P, MOUNTS, *pose, nothing) == 0
+        assert placement.place_readings(memory.s, P, MOUNTS, *pose, nothing) == 0
         observe.hear_crosses(
             memory.s, memory.tracks, P, MOUNTS, *pose, 0, np.array([0, 0, 0]), np.array([1, 2, 0]), half_paths
         )

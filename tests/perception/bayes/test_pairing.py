@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from perception.bayes import noise_estimation, observe, pairing
+from perception.bayes import noise_estimation, observe, pairing, placement
 from perception.bayes.elements import HISTORY
 from perception.bayes.parameters import MAPPED_LENGTH_MIN_M
 from perception.bayes.range_fit import FAR
@@ -35,7 +35,7 @@ def test_segments_equal_their_oracle(examples: int) -> None:
     memories: list[list[np.ndarray]] = [[] for _ in range(SENSORS)]
     segments, segment = 0, zeros(PairSegment, 1)
     for pose, time_s, ranges in random_drive(rng, examples):
-        m = observe.place_readings(memory.s, P, MOUNTS, *pose, ranges)
+        m = placement.place_readings(memory.s, P, MOUNTS, *pose, ranges)
         fired = np.column_stack([numbers(scratch["fired"][0])[:m, :5], scratch["fired_sensors"][0, :m]])
         memory.s[0].noise_level = int(rng.integers(len(NOISES)))
         var0, rel2 = noise_estimation.noise_variance(memory.s, P)

@@ -11,7 +11,8 @@ from config.world import AcousticsConfig, DrumConfig, WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Pose
-from perception.bayes.observe import associate_circles, place_readings
+from perception.bayes.observe import associate_circles
+from perception.bayes.placement import place_readings
 from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_map import update_walls
 from perception.bayes.wall_report import wall_ends
