@@ -21,7 +21,7 @@ from runtime.console.playback.replay_worker import ANSWER, HEADER, PROBLEM
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from tests.hil.machine import TIMEOUT_S
-from tests.recorded import hall, record
+from tests.recorded import hall, record, spoil
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -106,6 +106,17 @@ async def test_a_recording_is_opened_moved_and_closed(folder: Path) -> None:
         count = len(page.frames)
         await asyncio.sleep(0)
         assert len(page.frames) == count
+
+
+async def test_a_recording_with_refused_keyframes_is_played_and_they_are_named(folder: Path, tmp_path: Path) -> None:
+    spoil(folder / "hall.mcap", tmp_path / "spoiled.mcap", range(100))
+    page = Page()
+    async with replay_client(tmp_path) as client:
+        await client.open(page, "spoiled.mcap")
+        await client.seek(page, 4.5)
+        await until(lambda: bool(page.frames) and page.last["cycle"] == 91)
+        (problem,) = (message for message in page.messages if message["type"] == PROBLEM)
+        assert "canyon_map.firings is -7" in problem["error"]
 
 
 async def test_invalid_recordings_positions_and_speeds_are_refused(folder: Path) -> None:
