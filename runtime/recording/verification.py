@@ -80,8 +80,8 @@ class ReplayResult:
             self.missing.append((first, last))
 
     def add_refused(self, text: str) -> None:
-        """Note a keyframe that was refused."""
-        if len(self.refused) < GAPS_MAX:
+        """Note a keyframe that was refused; it may be met at the start and again on the way."""
+        if len(self.refused) < GAPS_MAX and text not in self.refused:
             self.refused.append(text)
 
     @property

@@ -84,7 +84,8 @@ def test_a_replay_by_the_papers_method_is_the_run_to_the_bit(tmp_path: Path) -> 
 @pytest.mark.compiled
 def test_a_part_begins_at_an_earlier_keyframe_where_the_last_one_is_refused(run: Path, tmp_path: Path) -> None:
     path = tmp_path / "spoiled.mcap"
-    frames = spoil(run, path, {1, 2})
+    frames, gap = spoil(run, path, {1, 2}), tmp_path / "gap.mcap"
+    spoil(run, gap, {1, 2}, lost={frames[0] + 5})
     for since_s, first, refused in (
         (0.05 * frames[3] + 0.1, frames[3] + 1, 0),
         (0.05 * frames[3] - 0.1, frames[0] + 1, 2),
@@ -93,6 +94,7 @@ def test_a_part_begins_at_an_earlier_keyframe_where_the_last_one_is_refused(run:
         assert (part.first_cycle, len(part.refused)) == (first, refused)
         assert part.cycles == 20 * SECONDS - first + 1
         assert part.differences == (2 if refused else 0), "they differ from the state that they should hold"
+    assert len(verify_file(gap, since_s=0.05 * frames[3] - 0.1).refused) == 2, "met twice, noted once"
     assert refused_lines([]) == []
     (line,) = refused_lines(part.refused)
     assert "firings is -7, expected 0 to 9.0072e+15, and 1 more" in line
