@@ -23,6 +23,7 @@ NOISE_S: Final = 5.0
 NOISE_MIN: Final = 10
 NOISE_SHARE: Final = 0.05
 """A line with so many corrupt frames, and such a share of all, is noisy: a good one has none but where it begins."""
+EVENTS: Final = ("line lost", "line down", "line back", "line flooded")
 NO_REASON: Final = "the robot is not ready"
 
 CORRUPT: Final = (
@@ -49,9 +50,9 @@ class LineLog:
     def __init__(self, log: FilteringBoundLogger, messages: LineMessages) -> None:
         self._log = log
         self._messages = messages
-        self._limits = {name: LineLimit(LINES_PER_S, LINES_BURST) for name in ("line lost", "line down", "line back")}
+        self._limits = {name: LineLimit(LINES_PER_S, LINES_BURST) for name in EVENTS}
         self._refusals = LineLimit(1.0, LINES_BURST)
-        self._is_ready = True
+        self._is_ready, self._is_flooded = True, False
         self._problem: str | None = None
         self._robot: str | None = None
         self._counts = LinkCounts()
@@ -62,8 +63,8 @@ class LineLog:
         """Log that the line was closed."""
         self._say("line lost", run_s, reason=self._messages.problem(LineState.CLOSED, reason))
 
-    def observe(self, record: CycleRecord, driver: RobotDriver) -> None:
-        """Log what a cycle brought."""
+    def observe(self, record: CycleRecord, driver: RobotDriver, flood: str | None = None) -> None:
+        """Log what a cycle brought; `flood` says that bytes are dropped."""
         inputs, run_s = record.inputs, record.inputs.run_s
         if inputs.line is LineState.READY:
             if not self._is_ready:
@@ -74,6 +75,9 @@ class LineLog:
             self._problem = inputs.line_problem
             self._say("line down", run_s, reason=inputs.line_problem)
         self._is_ready = inputs.line is LineState.READY
+        if flood is not None and not self._is_flooded:
+            self._say("line flooded", run_s, reason=flood)
+        self._is_flooded = flood is not None
         if inputs.request is Request.ARM:
             self._judge_arming(record)
         if self._counted_s is None or not 0.0 <= run_s - self._counted_s < NOISE_S:

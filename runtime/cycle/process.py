@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 from config.errors import UserError
 from config.settings import Settings
 from drivers.driver import RobotDriver
+from drivers.line_budget import FLOOD_HOLD_S, ReceiveBudget
 from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
@@ -132,10 +133,9 @@ class RobotProcess:
         self._state = prepared_state(settings) if preparation is None else unprepared_state(settings)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self.timing_monitor.timed
-        on_opened, on_data = timed(LINE_OPENED, self._on_opened), timed(LINK_RECEIVE, self._on_data)
-        self._link = Link(
-            settings.link, on_opened, on_data, timed(LINE_LOST, self._on_closed), **line_options(settings)
-        )
+        handlers = (timed(LINE_OPENED, self._on_opened), timed(LINK_RECEIVE, self._on_data))
+        self._link = Link(settings.link, *handlers, timed(LINE_LOST, self._on_closed), **line_options(settings))
+        self._budget = ReceiveBudget(settings.link)
         self._clock.on_change(self._link.release)
         self._connection = Connection(self._link, self._driver, self._send, self._clock, line_messages)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
@@ -302,10 +302,10 @@ class RobotProcess:
         request = self._request if self._is_request_valid() else None
         self._request = None
         edits, self._edits = tuple(self._edits[:EDITS_PER_CYCLE]), self._edits[EDITS_PER_CYCLE:]
+        overrun = self._budget.flood(run_s) or self._scheduler.overrun
         return gather_inputs(
-            self._driver, run_s, request, echo_age_s=echo_age_s, overrun=self._scheduler.overrun,
-            fault=self.health.fault(), edits=edits, drive_request=self._drive_inputs.take(), host_s=host_s,
-            line_messages=self._line_messages,
+            self._driver, run_s, request, echo_age_s=echo_age_s, overrun=overrun, fault=self.health.fault(),
+            edits=edits, drive_request=self._drive_inputs.take(), host_s=host_s, line_messages=self._line_messages,
         )  # fmt: skip
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:
@@ -322,7 +322,7 @@ class RobotProcess:
         received, on_firing = record.inputs.received, self._observers.on_firing
         if self._state.mode.entered_since(before):
             self._mode_log.entered(self._state, record.inputs.run_s)
-        self._line_log.observe(record, self._driver)
+        self._line_log.observe(record, self._driver, self._budget.flood(record.inputs.run_s))
         for line in self._alerts.update(received, self._state.perception, record.inputs.run_s):
             self._log.warning(line)
         if on_firing is not None:
@@ -352,8 +352,7 @@ class RobotProcess:
             apply_command(self._driver, command)
             self._send()
             if self._clock() > stale_run_s:
-                # The process was suspended between reading the clock and sending: the velocity may have set a base
-                # in motion that its deadman had stopped. The HALT follows directly.
+                # This process was suspended meanwhile: the base may move again that its deadman had stopped.
                 self._halt()
 
     def _send(self) -> None:
@@ -374,6 +373,9 @@ class RobotProcess:
 
     def _on_data(self, data: bytes) -> None:
         (run_s, host_s), waiting = self._clock.both(), self._driver.firings_waiting
+        if not self._budget.accepts(data, run_s):
+            self._link.hold(FLOOD_HOLD_S)
+            return
         self._driver.receive(data, run_s)
         if self._driver.firings_waiting > waiting:
             self._scheduler.on_echo(run_s)

@@ -13,7 +13,7 @@ from config.errors import UserError
 from config.files import one_line
 from runtime.recording.extent import recording_extent
 from runtime.recording.folder_index import create_listed, listed_names
-from runtime.recording.storage import SUFFIX, find_recording, list_recordings, pin_of
+from runtime.recording.storage import SUFFIX, find_recording, is_pinned, list_recordings, pin_of
 from runtime.support.file_lock import is_locked
 
 NAME: Final = re.compile(r"[^\W_][\w .,()+=@-]*", re.ASCII)
@@ -46,7 +46,7 @@ def describe_recordings(folder: Path) -> list[FolderFile]:
         path = folder / file
         extent = recording_extent(path)
         state: Completeness = "complete" if extent.is_complete else "live" if is_locked(path) else "incomplete"
-        found.append(FolderFile(file, size, modified_s, extent.duration_s, state, pin_of(path).exists()))
+        found.append(FolderFile(file, size, modified_s, extent.duration_s, state, is_pinned(path)))
     return found
 
 
@@ -88,7 +88,7 @@ def rename_recording(folder: Path, name: str, to: str) -> str:
     except OSError as error:
         raise _refused(name, "renamed", error) from error
     try:
-        if pin_of(path).exists():
+        if is_pinned(path):
             pin_of(new).touch()
         else:
             pin_of(new).unlink(missing_ok=True)
@@ -128,7 +128,7 @@ def delete_recording(folder: Path, name: str) -> None:
         There is no such recording, a run is writing it, it is pinned, or the disk refuses.
     """
     path = _finished(folder, name)
-    if pin_of(path).exists():
+    if is_pinned(path):
         raise UserError(f"{name} is pinned: unpin it first")
     try:
         path.unlink()

@@ -193,7 +193,7 @@ class RotatingFolder:
 
     def remove_empty(self, current: Path) -> bool:
         """Remove a closed file in which nothing happened, unless it is pinned; return whether it was removed."""
-        if pin_of(current).exists():
+        if is_pinned(current):
             return False
         current.unlink()
         return True
@@ -254,6 +254,14 @@ class RotatingFolder:
 def pin_of(path: Path) -> Path:
     """Return the path of the empty file that pins a recording."""
     return path.with_name(f"{path.name}{PIN_SUFFIX}")
+
+
+def is_pinned(path: Path) -> bool:
+    """Return whether a recording is pinned."""
+    try:
+        return pin_of(path).exists()
+    except OSError:  # the name leaves no room for a suffix
+        return False
 
 
 def has_bookmark(path: Path) -> bool:
@@ -318,7 +326,7 @@ def find_recording(folder: Path, name: str) -> Path | None:
     path = folder / name
     try:
         is_file = path.is_file()
-    except ValueError:  # a NUL in the name
+    except (OSError, ValueError):  # a name that no file can have: too long, or with a NUL
         return None
     return path if is_file and path.name == name and name.endswith(SUFFIX) and is_utf8(name) else None
 

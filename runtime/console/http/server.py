@@ -46,6 +46,8 @@ JOINS_BURST: Final = 32
 """New websockets at once: all pages of a run may be reloaded twice."""
 REST_MAX_S: Final = 0.1
 """Longest pause after a message, s; longer work was this process being suspended."""
+FILE_NAME_MAX: Final = 255
+"""Bytes of a file's name, as of most file systems."""
 DOWNLOADS: Final = ("/recording", "/made")
 """Paths of recordings and of files that jobs made."""
 WRONG_TOKEN: Final = "a wrong token, or none"  # noqa: S105 - a text
@@ -196,8 +198,10 @@ class Server:
 
     async def _download(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
         """Send a recording, or a file that a job made."""
-        context = self._context
-        file = await context.file_of(request.path, request.query.get("job", ""), request.query.get("file", ""))
+        context, name = self._context, request.query.get("file", "")
+        if len(name.encode(errors="replace")) > FILE_NAME_MAX or not name.isprintable():
+            return self._refuse(request, HTTPStatus.BAD_REQUEST, "a name that no file can have")
+        file = await context.file_of(request.path, request.query.get("job", ""), name)
         if file is None:
             return web.Response(status=404, text="there is no such file: list the files again")
         try:
