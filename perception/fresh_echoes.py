@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
-from perception.bounds import CONSTANT, PLACE, bounds
-from perception.kernel import Floats, kernel
+from perception.bounds import CONSTANT, COUNT, PLACE, bounds
+from perception.kernel import Floats, Ints, kernel
 from perception.sensor_mounts import mounts_at
 
 LOOKS: Final = 16
@@ -29,6 +29,8 @@ STEADY_M: Final = 0.3
 STEADY_S: Final = 1.5
 """An echo is steady if another look, by the same sensor or another one, put one this near no longer ago than this."""
 
+SILENT_ROUNDS: Final = 4
+"""A ring has fallen silent if it has heard nothing for so many looks of each sensor."""
 NEARER_M: Final = 1e-3
 """A robot that has come nearer by this since the last firing drives, m."""
 TOLERANCE_M: Final = 0.005
@@ -58,7 +60,7 @@ def is_steady(points: Floats, times: Floats, heard: NDArray[np.bool_], px: float
 def record_echoes(
     ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, reach: float,
     points: Floats, bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
-    last: Floats, lost: Floats, is_lost: NDArray[np.bool_],
+    last: Floats, lost: Floats, is_lost: NDArray[np.bool_], silences: Ints,
 ) -> None:  # fmt: skip
     """Enter the readings of a firing.
 
@@ -90,6 +92,8 @@ def record_echoes(
         Places of the last steady echoes that a silence removed, m. Updated.
     is_lost : (n,) bool
         Whether the ring has heard nothing since, and came nearer to that place when it was lost. Updated.
+    silences : (1,) int
+        Looks since the ring last heard anything. Updated.
     """
     hears = False
     c = math.cos(yaw)
@@ -104,6 +108,7 @@ def record_echoes(
         px = x + c * mounts[i, 0] - s * mounts[i, 1] + away * math.cos(bearing)
         py = y + s * mounts[i, 0] + c * mounts[i, 1] + away * math.sin(bearing)
         hears = hears or r < reach
+        silences[0] += 1
         agrees = is_echo and is_steady(points, times, heard, px, py, t)
         oldest = 0
         for k in range(times.shape[1]):
@@ -127,6 +132,7 @@ def record_echoes(
     last[0], last[1] = x, y
     if hears:
         is_lost[:] = False
+        silences[0] = 0
 
 
 @kernel
@@ -204,7 +210,7 @@ class FreshEchoes:
 
     BOUNDS: Final = bounds(
         _mounts=CONSTANT, _half_angle=CONSTANT, _points=PLACE, _bearings=PLACE, _times=PLACE._replace(infinite=True),
-        _last=PLACE, _lost=PLACE, _heard_reach_m=CONSTANT,
+        _last=PLACE, _lost=PLACE, _silences=COUNT, _heard_reach_m=CONSTANT,
     )  # fmt: skip
 
     def __init__(
@@ -219,6 +225,7 @@ class FreshEchoes:
         self._heard = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
         self._steady = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
         self._last = np.zeros(2)
+        self._silences = np.zeros(1, np.int64)
         self._lost = np.zeros((len(mounts), 2))
         self._is_lost = np.zeros(len(mounts), dtype=np.bool_)
 
@@ -230,6 +237,7 @@ class FreshEchoes:
             firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
             float(firing.robot_s), 0.5 * self._half_angle, self._heard_reach_m, self._points, self._bearings,
             self._times, self._heard, self._steady, self._last, self._lost, self._is_lost,
+            self._silences,
         )  # fmt: skip
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
@@ -263,7 +271,7 @@ class FreshEchoes:
     def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
         """Return how far ahead the nearest of these stands, m; all are then forgotten, as the robot stops for it.
 
-        None if there is none in the robot's way so near.
+        None if there is none in the robot's way so near, or if the ring has not fallen silent.
 
         Parameters
         ----------
@@ -272,7 +280,7 @@ class FreshEchoes:
         near_m, half_width_m : float
             Length and half the width of the way ahead, m.
         """
-        if not self._is_lost.any():
+        if self._silences[0] < SILENT_ROUNDS * len(self._mounts) or not self._is_lost.any():
             return None
         dx, dy = (self.lost_points() - (pose.x, pose.y)).T
         c, s = math.cos(pose.theta), math.sin(pose.theta)

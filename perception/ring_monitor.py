@@ -29,7 +29,7 @@ from perception.records import records, zeros
 from perception.ring_memory import QUARTERS, EchoTrace, RingTrace
 from perception.ring_tests import NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
 from perception.sensor_monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
-from perception.sensor_mounts import mounts_array, mounts_at
+from perception.sensor_mounts import mounts_array, turn_mounts
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
@@ -58,15 +58,18 @@ class RingMonitor:
         The sensors.
     """
 
-    SCRATCH: Final = ("_echo_records", "_ring_records")
-    """Not part of a snapshot: views of arrays that are."""
+    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned")
+    """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT, _reach_m=CONSTANT, _echoes=EchoTrace.BOUNDS,
-        _ring=RingTrace.BOUNDS, _found=index_of(TURNED + QUARTERS),
+        _mounts=CONSTANT, _turning=CONSTANT, _turns=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
+        _reach_m=CONSTANT, _echoes=EchoTrace.BOUNDS, _ring=RingTrace.BOUNDS, _found=index_of(TURNED + QUARTERS),
     )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
-        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
+        self._mounts = mounts_array(ring.mounts)
+        self._turned = self._mounts.copy()
+        self._turning = np.isin(np.arange(len(ring.mounts)), ring.turning)
+        self._turns = bool(ring.turning)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
         self._reach_m = ring.window_m
@@ -78,7 +81,10 @@ class RingMonitor:
 
     def observe(self, firing: Firing) -> None:
         """Test a firing, in which sensors that are masked have no readings."""
-        pose, mounts = firing.pose, mounts_at(firing, self._mounts, self._turning)
+        pose, mounts = firing.pose, self._mounts
+        if self._turns:
+            mounts = self._turned
+            turn_mounts(self._mounts, self._turning, float(pose.theta - firing.ring_yaw), mounts)
         found = check_motion(
             firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), mounts, self._half_angle,
             self._tolerance, self._reach_m, self._echo_records, self._ring_records,

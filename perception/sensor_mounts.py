@@ -10,10 +10,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Firing
-from perception.kernel import Floats
+from perception.kernel import Floats, kernel
 
 
 def mounts_array(mounts: Sequence[tuple[float, float, float]]) -> Floats:
@@ -40,6 +41,29 @@ def turned_mounts(mounts: Floats, turning: tuple[int, ...], turn: float) -> Floa
     c, s = math.cos(turn), math.sin(turn)
     turned[rows] = np.column_stack([c * x - s * y, s * x + c * y, axis + turn])
     return turned
+
+
+@kernel
+def turn_mounts(mounts: Floats, turning: NDArray[np.bool_], turn: float, turned: Floats) -> None:
+    """Turn the mounts of some sensors about the ring's centre, as `turned_mounts` without a new array.
+
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor.
+    turning : (n,) bool
+        Whether each sensor turns.
+    turn : float
+        By how much, rad.
+    turned : (n, 3) float
+        The mounts after the turn. Overwritten.
+    """
+    c, s = math.cos(turn), math.sin(turn)
+    for i in range(len(mounts)):
+        x, y, axis = mounts[i]
+        turned[i, 0], turned[i, 1], turned[i, 2] = x, y, axis
+        if turning[i]:
+            turned[i, 0], turned[i, 1], turned[i, 2] = c * x - s * y, s * x + c * y, axis + turn
 
 
 def mounts_at(firing: Firing, mounts: Floats, turning: tuple[int, ...]) -> Floats:

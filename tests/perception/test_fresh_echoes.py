@@ -125,6 +125,7 @@ def test_in_a_ring_that_falls_silent_what_stood_ahead_stays_and_is_reported_once
     assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) == pytest.approx(0.5)
     assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
     assert len(echoes.points(20.0, 1.5)) == 0
+    assert approach(1.35).take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None, "it may hear something next"
 
 
 def test_what_is_gone_is_forgotten_as_soon_as_the_ring_hears_anything() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
-from perception.sensor_mounts import mounts_array, reach_m
+from perception.sensor_mounts import mounts_array, reach_m, turn_mounts, turned_mounts
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -36,3 +36,10 @@ def test_a_silence_shows_free_space_up_to_the_nearest_end_of_a_window() -> None:
     sensors = "[{x_m=0.2, y_m=0.1, angle_deg=90}, {x_m=0.2, y_m=0.0, angle_deg=0}]"
     irregular = load_settings(DATA / "corridor.toml", [f"ring.sensors={sensors}", "ring.firing.sets=[[0, 1]]"]).ring
     assert reach_m(irregular) == pytest.approx(5.1)
+
+
+def test_the_mounts_that_turn_are_the_same_in_place_and_in_a_new_array() -> None:
+    mounts = mounts_array(load_settings("hallway").ring.mounts)
+    turned, turning = np.zeros_like(mounts), (0, 5, 7)
+    turn_mounts(mounts, np.isin(np.arange(24), turning), 0.7, turned)
+    np.testing.assert_allclose(turned, turned_mounts(mounts, turning, 0.7), atol=1e-12)
