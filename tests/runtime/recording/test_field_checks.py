@@ -64,16 +64,15 @@ def _with_big(changed: object, at: Any, key: object, new: int) -> bytes:
 
 
 def replayed(entries: list[RawMessage], path: Path) -> str:
-    """Return how the replay of these messages ends: an error's text, or nothing."""
+    """Return how the replay of these messages ends: an error's text, why a keyframe is refused, or nothing."""
     rewrite(entries, path)
     try:
         with open_recording(path) as recording:
-            for _ in Replayer(recording):
-                pass
+            refused = [step.refused for step in Replayer(recording) if step.refused is not None]
             list(recording.cycle_records())
     except RecordingError as error:
         return str(error)
-    return ""
+    return "; ".join(refused)
 
 
 @pytest.mark.compiled
