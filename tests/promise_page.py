@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from tests.promises import PROMISES, PromiseTest, Results
+from tests.promises import LIMITS, PROMISES, PromiseTest, Results
 
 NO_PROMISE = "–"
 """Stands for an ID in rows of tests without one."""
@@ -97,5 +97,10 @@ def render(rows: Sequence[Row], *, soak: bool) -> str:
     ]
     kept = dict.fromkeys(row.promise for row in rows if row.promise in PROMISES)
     lines += [f"- **{one}: {PROMISES[one].text}.** {PROMISES[one].figure}." for one in kept]
+    if not soak:
+        lines += ["", "## What nothing can contradict", ""]
+        lines += ["A lie is found where it contradicts the robot's own motion, clock or map. These do not:", ""]
+        lines += [f"- {limit}" for limit in LIMITS]
+        lines += ["", "## Measurements"]
     lines += ["", "| promise | test | measured | on |", "|---|---|---|---|"]
     return "\n".join([*lines, *map(str, rows)]) + "\n"

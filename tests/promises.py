@@ -33,6 +33,27 @@ class Promise(NamedTuple):
     figure: str
 
 
+LIMITS: Sequence[str] = (
+    "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
+    "most such silences are named at once, and some are not before a contact.",
+    "Ranges that are all too long, or too short, by the same length: they change as the robot's motion says. A "
+    "map of the room contradicts them; without one, only a bumper stops the robot.",
+    "Sensors that do not hear what is near, where they have heard nothing of it from farther away.",
+    "Echoes of an earlier drive that fit the present one, as replays in a corridor along its walls do.",
+    "A ring that is mounted turned by a small angle, or two sensors exchanged, until the objects that result are "
+    "seen to be wrong: measure it with `echolocate calibrate`.",
+    "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
+    "then, and nothing is touched. Where nothing echoes, silence is true and false alike.",
+    "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
+    "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
+    "since it is there after .33 s.",
+    "Something that no beam meets, or that returns no echo: glass at a slant, cloth, what is above or below the "
+    "beams.",
+    "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",
+    "Odometry that is wrong by less than a quarter: the map suffers, and the distances that are kept do not.",
+)
+"""What nothing that the robot reports can contradict, so that no stop and no message is promised."""
+
 PROMISES: Mapping[str, Promise] = MappingProxyType(
     {
         "P1": Promise(
@@ -74,9 +95,12 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "SAFE_STOP until re-armed",
         ),
         "P8": Promise(
-            "Crosstalk, ghosts and stuck sensors are caught",
+            "Crosstalk, ghosts, stuck sensors and rings that lie are caught",
             "pattern changes expose crosstalk; a sensor that never changes or always fails is masked and reported; "
-            "late, duplicate and out-of-window echoes never reach perception; no honest sensor masked",
+            "a ring that freezes, and a robot's clock that is latched, leaps or runs at half or "
+            "double speed, at random moments of drives of any shipped robot through any room: a reason or a line "
+            "names it, and nothing is touched above .05 m/s; late, duplicate and out-of-window echoes never reach "
+            "perception; no honest sensor masked, no honest drive stopped",
         ),
         "P9": Promise(
             "The map recovers from false readings",
@@ -156,8 +180,9 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "It never drives blind",
             "sensors fail, one, many or all, at random moments of random drives with any pattern: no motion towards "
             "a direction of the body's path without a usable range or believed silence there that is younger than "
-            "echo_age_max_s + 0.15 s, and nothing touched; a pattern with which the robot could not drive is refused "
-            "wherever it can be set",
+            "echo_age_max_s + 0.15 s, and nothing touched, also where nine of ten readings are missing; no echo "
+            "counts as younger than the time since it arrived, whatever the robot's clock says; a pattern with which "
+            "the robot could not drive is refused wherever it can be set",
         ),
         "P25": Promise(
             "The base is not believed on its word",

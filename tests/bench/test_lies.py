@@ -1,0 +1,103 @@
+"""Robots that lie: what their own motion or clock contradicts is named, and nothing is touched at speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import product
+
+import numpy as np
+import pytest
+
+from bench.lies import KINDS, ROBOTS, Plan, TrialResult, honest, lies_table, make_lie, measure, run_trial, trials
+from config.load import load_robot, load_settings
+
+pytestmark = pytest.mark.compiled
+promised = pytest.mark.promise("P8")
+
+RING = ("frozen", "dropped")
+CLOCKS = tuple(kind for kind in KINDS if "clock" in kind)
+HOUSE = ("room", "office", "hallway", "furnished")
+
+
+def drawn(kinds: Iterable[str], count: int, seed: int) -> list[Plan]:
+    """Return random trials of the kinds, without the clocks of robots that have none."""
+    rng = np.random.default_rng(seed)
+    every = list(trials(ROBOTS, HOUSE, tuple(kinds), range(3), 5))
+    return [every[k] for k in rng.choice(len(every), count, replace=False).tolist()]
+
+
+def assert_found(results: Iterable[TrialResult]) -> None:
+    assert [one for one in results if one.is_contact] == []
+    assert [one for one in results if one.named_s is None and one.is_driving] == []
+
+
+def summed_up(results: list[TrialResult]) -> str:
+    named = [one.named_s for one in results if one.named_s is not None]
+    contacts, driving = sum(one.is_contact for one in results), sum(one.is_driving for one in results)
+    return (
+        f"{len(results)} drives, {driving} of which moved on: {contacts} contacts above 0.05 m/s, "
+        f"{len(named)} named, after {np.median(named):.1f} s (median), at most {max(named):.1f} s"
+    )
+
+
+@promised
+def test_a_robot_with_a_wrong_clock_stops_by_name(measured: Callable[[str], None]) -> None:
+    results = measure(drawn(CLOCKS, 5, 1), lambda _: None)
+    assert_found(results)
+    assert max(one.named_s for one in results if one.named_s is not None) < 1.0
+    measured(summed_up(results))
+
+
+@promised
+@pytest.mark.promise("P24")
+def test_a_ring_that_lies_is_named_and_nothing_is_touched(measured: Callable[[str], None]) -> None:
+    results = measure(drawn(RING, 6, 2), lambda _: None)
+    assert_found(results)
+    measured(summed_up(results))
+
+
+@promised
+@pytest.mark.soak
+def test_lies_of_every_shipped_robot(measured: Callable[[str], None]) -> None:
+    results = measure(trials(ROBOTS, HOUSE, (*RING, *CLOCKS), range(1), 5), lambda _: None)
+    assert_found(results)
+    measured(summed_up(results))
+
+
+@promised
+@pytest.mark.soak
+def test_no_honest_drive_is_stopped(measured: Callable[[str], None]) -> None:
+    results = measure(honest(ROBOTS, HOUSE, range(14), 1), lambda _: None)
+    assert [one for one in results if one.named_s is not None] == []
+    measured(f"{len(results)} honest drives, {sum(one.drive_s for one in results) / 3600.0:.1f} h: 0 stops")
+
+
+def test_an_honest_drive_goes_on() -> None:
+    result = run_trial("p3dx", "furnished", None, 0, 0)
+    assert (result.named_s, result.contact_s, result.is_contact) == (None, None, False)
+    assert result.drive_s == pytest.approx(120.0, abs=0.1)
+
+
+def test_trials_and_their_table() -> None:
+    every = list(trials(("denning", "p3dx"), ("room",), ("frozen", "latched clock"), range(2), 1))
+    assert every == [
+        *(("denning", "room", kind, seed, 0) for seed, kind in product(range(2), ("frozen", "latched clock"))),
+        *(("p3dx", "room", "frozen", seed, 0) for seed in range(2)),
+    ]
+    result = TrialResult("p3dx", "room", "frozen", 0, 0, 9.0, 0.3, 0.2, 1.5, None, None, 12.0, 0.9)
+    table = lies_table([result])
+    assert [column.header for column in table.columns] == ["lie", "p3dx"]
+    assert list(table.columns[1].cells) == ["1 1/1"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_is_a_fault_that_begins_then(kind: str) -> None:
+    settings = load_settings("room")
+    lie = make_lie(kind, settings, 4.5)
+    assert lie.at_s == 4.5
+    assert getattr(lie, "range_m", 0.0) <= settings.ring.range_max_m
+
+
+def test_all_shipped_robots_are_driven() -> None:
+    assert all(load_robot(name).body.radius_m > 0.0 for name in ROBOTS)
+    assert len(ROBOTS) == 13
