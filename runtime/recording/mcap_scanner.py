@@ -43,6 +43,12 @@ INDEX_HEAD: Final = struct.Struct("<HI")
 """Of an index of a chunk's messages: channel and size of the list that follows."""
 INDEX_MAX: Final = INDEX_HEAD.size + 16 * RECORDS_MAX
 DATA_END_BYTES: Final = 4
+FRAME_HEAD_MAX: Final = 18
+BLOCK_HEAD: Final = 3
+CHECKSUM_BYTES: Final = 4
+REPEATED: Final = 1
+"""Of a Zstandard frame: its longest head, bytes before each block, its checksum, and the kind of a block that repeats
+one byte."""
 HEADER_MAX: Final = 4096
 SEARCH_BYTES: Final = 1 << 20
 """What is searched at a time for the next chunk: a file may be larger than the memory, and most of it a hole."""
@@ -68,6 +74,30 @@ class CorruptRegion:
 
     def __str__(self) -> str:
         return f"at byte {self.offset}: {self.description}"
+
+
+def frame_bytes(data: memoryview, at: int) -> int:
+    """Return the length of the Zstandard frame at a byte, by the heads of its blocks (RFC 8878); 0 if it has no end.
+
+    Parameters
+    ----------
+    data : memoryview
+        The file.
+    at : int
+        Where the frame begins.
+    """
+    try:
+        head = bytes(data[at : at + FRAME_HEAD_MAX])
+        end, is_last = at + zstandard.frame_header_size(head), False
+        while not is_last:
+            block = int.from_bytes(data[end : end + BLOCK_HEAD], "little")
+            is_last, kind, size = block & 1 == 1, block >> 1 & 3, block >> 3
+            end += BLOCK_HEAD + (1 if kind == REPEATED else size)
+            if end > len(data):
+                return 0
+        return end - at + (CHECKSUM_BYTES if zstandard.get_frame_parameters(head).has_checksum else 0)
+    except UNREADABLE:
+        return 0
 
 
 class McapScanner:
@@ -181,8 +211,8 @@ class McapScanner:
             start = found - ZSTD_AT
             if start < at or found + 16 > size:
                 continue
-            (length,) = struct.unpack_from("<Q", self._data, found + len(ZSTD))
-            whole = CHUNK_HEAD + length
+            # Not by the lengths in its head: where one of them is wrong, the chunks that follow would be skipped.
+            whole = CHUNK_HEAD + frame_bytes(self._data, start + RECORD_HEADER + CHUNK_HEAD)
             if start + RECORD_HEADER + whole <= size and (chunk := self._chunk(start, whole)) is not None:
                 wrong_head = "a chunk's kind or length is wrong; its messages are whole"
                 self._note(at, f"{start - at} bytes cannot be read" if start > at else wrong_head)
@@ -217,8 +247,10 @@ class McapScanner:
             return None
         try:
             begin_ns, end_ns, size, crc = struct.unpack_from("<QQQI", self._data, at + RECORD_HEADER)
-            compression, data_size = struct.unpack_from(f"<{len(ZSTD)}sQ", self._data, at + ZSTD_AT)
-            if compression != ZSTD or CHUNK_HEAD + data_size != length or not 0 < size < CONTENT_MAX or not crc:
+            compression = bytes(self._data[at + ZSTD_AT : at + ZSTD_AT + len(ZSTD)])
+            if compression != ZSTD or not 0 < size < CONTENT_MAX or not crc:
+                return None
+            if CHUNK_HEAD + frame_bytes(self._data, at + RECORD_HEADER + CHUNK_HEAD) != length:
                 return None
             # Not copied: a file of many chunks, each as long as the rest of it, would take forever.
             data = self._data[at + RECORD_HEADER + CHUNK_HEAD : at + RECORD_HEADER + length]
