@@ -10,6 +10,8 @@ import pytest
 
 from bench.lies import KINDS, ROBOTS, Plan, TrialResult, honest, lies_table, make_lie, measure, run_trial, trials
 from config.load import load_robot, load_settings
+from perception.ring_monitor import REASONS as RING_REASONS
+from runtime.cycle.modes import CLOCK_REASONS
 
 pytestmark = pytest.mark.compiled
 promised = pytest.mark.promise("P8")
@@ -66,10 +68,12 @@ def test_lies_of_every_shipped_robot(measured: Callable[[str], None]) -> None:
 
 @promised
 @pytest.mark.soak
-def test_no_honest_drive_is_stopped(measured: Callable[[str], None]) -> None:
+def test_no_honest_drive_is_stopped_as_for_a_lie(measured: Callable[[str], None]) -> None:
     results = measure(honest(ROBOTS, HOUSE, range(14), 1), lambda _: None)
-    assert [one for one in results if one.named_s is not None] == []
-    measured(f"{len(results)} honest drives, {sum(one.drive_s for one in results) / 3600.0:.1f} h: 0 stops")
+    lies = {*CLOCK_REASONS.values(), *RING_REASONS.values()} - {None}
+    assert [one for one in results if one.said in lies] == []
+    hours, others = sum(one.drive_s for one in results) / 3600.0, sum(one.named_s is not None for one in results)
+    measured(f"{len(results)} honest drives, {hours:.1f} h: 0 stops as for a lie, {others} for other reasons")
 
 
 def test_an_honest_drive_goes_on() -> None:
