@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from perception.bounds import PLACE, POSITIVE, Count, Flag, Place
+from perception.bounds import FINITE, PLACE, POSITIVE, Count, Flag, Place
 from perception.kernel import Floats
 from perception.records import Record
 
@@ -82,7 +82,7 @@ class RingTrace(Record):
     """Of the misses in that evidence, those without an echo, …"""
     elsewhere: Count
     """… and those with an echo elsewhere."""
-    turned_nat: Annotated[Floats, QUARTERS, POSITIVE]
+    turned_nat: Annotated[Floats, QUARTERS, FINITE]
     """Evidence that the ring is mounted turned by so many quarters, nat."""
     misses: Annotated[Floats, LOOK_KINDS, POSITIVE]
     """Looks of each kind that missed a known echo, …"""

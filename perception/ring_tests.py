@@ -52,7 +52,7 @@ FOLLOWS: Final = 0.7
 """Share of an honest ring's changes that follow the motion; the others come from surfaces that change places."""
 ALIKE: Final = 2.5
 """Changes in succession of one surface's range that count as one: oblique rough walls deceive all of them alike.
-With 1 an honest ring of 16 was taken for a turned one after 1.8 h between such walls."""
+Beams that overlap are counted apart."""
 LEAN_RAD: Final = 0.15
 """A wall that leans to the path by up to this changes the ranges of sensors that graze it as nothing else does."""
 
@@ -135,7 +135,8 @@ def weigh_change(
 
     A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
     the beam. A rough one that the beam grazes may change otherwise, hence `FOLLOWS`; a rough wall along the path
-    says nothing. Sensors whose beams overlap hear the same surface, and together count as one.
+    says nothing. Sensors whose beams overlap hear the same surface, and together count as one. How a ring is mounted
+    does not change on the way, so evidence for the robot file counts, too: this sum may fall below zero.
 
     Parameters
     ----------
@@ -172,7 +173,7 @@ def weigh_change(
             mounted = density
         else:
             evidence = math.log(density / mounted) / (ALIKE * max(1.0, len(echoes) * half_angle / math.pi))
-            all_of.turned_nat[quarter - 1] = max(0.0, all_of.turned_nat[quarter - 1] + evidence)
+            all_of.turned_nat[quarter - 1] = max(-EVIDENCE_NAT, all_of.turned_nat[quarter - 1] + evidence)
     mark(c.anchor, r, x, y, axis, all_of.path_m)
 
 
@@ -196,7 +197,8 @@ def begin_evidence(all_of: RingTrace) -> None:
     all_of.standstill += 1
     all_of.repeated_nat = 0.0
     all_of.missed_nat[:] = 0.0
-    all_of.turned_nat[:] = 0.0
+    for quarter in range(QUARTERS):
+        all_of.turned_nat[quarter] = min(0.0, all_of.turned_nat[quarter])
     all_of.silent = all_of.elsewhere = 0
 
 

@@ -54,7 +54,7 @@ def after(way_m: float) -> Ring:
 def test_an_honest_ring_has_no_evidence_against_it() -> None:
     ring = after(2.0)
     assert ring.memory["repeated_nat"][0] == ring.missed_nat == 0.0
-    assert ring.memory["turned_nat"].max() == 0.0
+    assert ring.memory["turned_nat"].max() < 0.0
 
 
 def test_equal_readings_on_the_way_are_repeats() -> None:
