@@ -3,7 +3,7 @@
 Each trial is a drive in virtual time through a room, the protocol included. At a random moment a lie begins; from
 then on the drive lasts until the robot stops by itself, at most for `LIE_S`. What the robot touches, and how fast, is
 the emulator's truth and not what the robot reports. A lie is named by a stop with a reason, by a sensor that is
-reported, or by a note of the driver, each of them a line of the log.
+reported, by a note of the driver, or by the reason why the robot drives slowly.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from drivers.registry import make_device, make_driver
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import prepared_state, unprepared_state
-from runtime.cycle.step import apply_command, step
+from runtime.cycle.step import LOST, apply_command, step
 from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
@@ -275,6 +275,8 @@ def run_trial(
                 texts += [note for note in inputs.received.notes if note not in known]
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
+            if kind is not None and state.hold_reason == LOST:
+                texts.append(LOST)
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]
         if contact_s is not None or state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}:

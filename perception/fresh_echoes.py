@@ -263,6 +263,11 @@ class FreshEchoes:
             echoes = np.concatenate([echoes, self.lost_points()])
         return Looks(fresh[:k], ages[:k], sensor_ages, echoes)
 
+    @property
+    def has_lost(self) -> bool:
+        """Whether steady echoes were lost since the ring last heard anything."""
+        return bool(self._is_lost.any())
+
     def lost_points(self) -> Floats:
         """Return a copy of the steady echoes that were lost since the ring last heard anything, shape (k, 2), m."""
         lost: Floats = self._lost[self._is_lost]

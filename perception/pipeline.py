@@ -289,6 +289,11 @@ class Perception:
         """Return those of the obstacles with which another look agrees: shape (k, 2), m."""
         return self._echoes.steady_points(robot_s, age_max_s)
 
+    @property
+    def has_lost(self) -> bool:
+        """Whether the ring hears nothing any more, and came nearer to what it heard last."""
+        return self._echoes.has_lost
+
     def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
         """Return how far ahead the robot comes near to what the ring lost, as `FreshEchoes.take_lost_ahead`."""
         return self._echoes.take_lost_ahead(pose, near_m, half_width_m)

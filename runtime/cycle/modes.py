@@ -166,8 +166,8 @@ def advance(
         if state.mode is Mode.SAFE_STOP:
             return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs))
         return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem, arming_run_s=None)
-    if state.mode is Mode.SAFE_STOP and (state.reason or "").startswith(WAITING):
-        state = replace(state, reason=RESTORED)
+    if state.mode is Mode.SAFE_STOP and state.reason is not None and state.reason.startswith(WAITING):
+        state = replace(state, reason=f"{RESTORED} (what was wrong: {state.reason.removeprefix(WAITING)})")
     if state.mode is Mode.CONNECTING:
         state = state.enter(Mode.READY, run_s)
     if movement in {Movement.UNCOMMANDED, Movement.UNSTOPPED}:

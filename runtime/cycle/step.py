@@ -69,6 +69,12 @@ __all__ = [
 
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
+LOST_SPEED_M_S: Final = 0.04
+"""Greatest speed while the ring hears nothing of what it heard a moment ago: a wall goes on beside its last echo."""
+LOST: Final = (
+    "the ring hears nothing any more, not even what it heard a moment ago: the robot drives slowly until it hears "
+    "something; check the ring's power and cables"
+)
 
 
 class Order(Enum):
@@ -356,7 +362,16 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
             state.hold_reason = result.decision.reason
             return Drive(STANDSTILL)
+    if isinstance(result.decision, Drive) and state.perception.has_lost:
+        state.hold_reason = state.hold_reason or LOST
+        return Drive(_slowed(result.decision.twist))
     return result.decision
+
+
+def _slowed(twist: Twist) -> Twist:
+    """Return a velocity on the same curve, of at most `LOST_SPEED_M_S`."""
+    share = min(1.0, LOST_SPEED_M_S / abs(twist.v)) if twist.v else 1.0
+    return Twist(share * twist.v, share * twist.w)
 
 
 def _edit(state: State, inputs: Inputs, problem: str | None) -> tuple[Refused, ...]:

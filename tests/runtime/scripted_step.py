@@ -50,6 +50,7 @@ class ScriptedRobot:
     robot_s: float = 7.0
     pose: Pose = HERE
     drive_request: DriveInput | None = None
+    trembles: float = 0.0
 
     def __post_init__(self) -> None:
         perception = Perceiving(self.settings.ring, self.settings.models, self.settings.perception)
@@ -76,7 +77,9 @@ class ScriptedRobot:
         self.run_s += PERIOD_S
         self.robot_s += PERIOD_S
         sensors = len(self.settings.ring.mounts)
-        firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
+        self.trembles = 1e-6 - self.trembles  # a ring that repeats its readings to the bit while it moves is frozen
+        ranges = np.full(sensors, 3.0 + self.trembles)
+        firings = (Firing(self.robot_s, self.pose, 0.0, ranges),) if firing else ()
         reported = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
         inputs = Inputs(
             self.run_s,

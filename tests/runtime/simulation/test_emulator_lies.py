@@ -165,7 +165,9 @@ def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: 
         assert run.driver.state is LineState.READY
         assert run.driver.problem is None
         assert len(run.firings) > firings + 20
-        assert run.state.mode == stopped, "motion never resumes by itself"
+        assert run.state.mode.mode is Mode.SAFE_STOP, "motion never resumes by itself"
+        assert run.state.mode.entered_run_s == stopped.entered_run_s
+        assert "noise on the line" in str(run.state.mode.reason)
     measured(f"{rate:g} bytes of noise a second: no stop for 0.3 s; SAFE_STOP after {latest_s:.2f} s, cause named")
 
 

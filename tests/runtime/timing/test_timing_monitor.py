@@ -279,7 +279,9 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
         began_us = machine.host_us
         t_s = 1.0 + 0.05 * cycle
         heard = Received(
-            (Firing(t_s, here, 0.0, np.full(24, 3.0)),),
+            (
+                Firing(t_s, here, 0.0, np.full(24, 3.0 + 1e-6 * (cycle % 2))),
+            ),  # the same readings would be a frozen ring
             Odometry(t_s, here, 0.0, Twist(0.0, 0.0), Flags.NONE, 0),
             rebooted=False,
         )
