@@ -24,6 +24,9 @@ async def test_a_download_is_the_file_and_needs_the_token(folder: Path) -> None:
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
         for token in ("", "wrong"):
             assert (await get(case, "/recording", file="run.mcap", token=token)).status == 403
-        for name in ("../secret.mcap", str(folder.parent / "secret.mcap"), "none.mcap", "", ".", "run", "a\0.mcap"):
+        for name in ("../secret.mcap", str(folder.parent / "secret.mcap"), "none.mcap", "", ".", "run"):
             answer = await get(case, "/recording", file=name)
             assert (answer.status, "there is no such file" in await answer.text()) == (404, True)
+        for name in ("a\0.mcap", "a" * 5000):
+            answer = await get(case, "/recording", file=name)
+            assert (answer.status, await answer.text()) == (400, "a name that no file can have")
