@@ -21,6 +21,7 @@ from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
+    correction,
     drift_bound,
     known_room,
     localization,
@@ -232,6 +233,7 @@ for command in (
     place_bound,
     navigation,
     beacons,
+    correction,
     nees,
     drift_bound,
     slips,

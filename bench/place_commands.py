@@ -181,6 +181,28 @@ def nees(*, json: str = "nees.json", drives: int = 100, first: int = 200) -> int
     )  # fmt: skip
 
 
+def correction(*, json: str = "correction.json", drives: int = 40, first: int = 1000) -> int:
+    """Compare replays with correction of drift and without, on logs with good and with drifting odometry.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    drives
+        Number of logs at each level of odometry's errors.
+    first
+        Seed of the first log.
+    """
+    use_kernel_cache()
+    from bench.correction import measure
+
+    seeds = range(first, first + max(1, drives))
+    return try_in_rooms(
+        lambda _, tell: measure(seeds, tell),
+        lambda rows: rows_table("correction of drift: what it changes, errors without it and with it", rows), json,
+    )  # fmt: skip
+
+
 def drift_bound(*, json: str = "drift-bound.json", drives: int = 100, first: int = 200) -> int:
     """Measure what any filter could know of the drums in the drives of `nees`: one that knows the rest, beside ours.
 

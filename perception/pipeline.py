@@ -37,7 +37,8 @@ from perception.edits import (
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
 from perception.localization.drift_correction import LocalizedPose
-from perception.localization.known_room import KnownRoom
+from perception.localization.equal_edit import edit_equally
+from perception.localization.known_room import KnownRoom, place_robot
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
 from perception.mapping.canyons import ENDS_M, CanyonMap
@@ -83,7 +84,10 @@ class Perception:
         self.ring_monitor = RingMonitor(ring)
         corrects = config.localization.correct_drift
         self.map_frame = MapFrame(ring, models) if corrects else None
-        """Corrects drift, where the settings say so; what `method` holds is in the filter's frame then."""
+        """Corrects drift, where the settings say so."""
+        self._other = make_method(ring, models, config) if corrects and method is None else None
+        """A second method, which enters firings at corrected poses; its objects are the landmarks. Once odometry is
+        refuted, it changes places with `method`, which stops."""
         self._ring = ring
         self.known_room: KnownRoom | None = None
         """Finds the robot in the room of the settings, where there is one."""
@@ -109,12 +113,12 @@ class Perception:
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return self.method.can_refine or self.canyon_map.is_due or self._can_localize
+        return any(one.can_refine for one in self._fed()) or self.canyon_map.is_due or self._can_localize
 
     @property
     def converged(self) -> bool:
         """Whether nothing is left to improve, now or with the next firing."""
-        return self.method.converged and not self.canyon_map.is_due and not self._can_localize
+        return all(one.converged for one in self._fed()) and not self.canyon_map.is_due and not self._can_localize
 
     @property
     def _can_localize(self) -> bool:
@@ -140,17 +144,27 @@ class Perception:
         self._echoes.update(possible)
         if self.known_room is not None:
             self.known_room.observe(trusted)
-        placed = trusted
-        if self.map_frame is not None:
-            placed = self.map_frame.follow(trusted, self.vacant.outside(self.method.near_objects()))
-            for number, dx, dy in self.map_frame.shifts():
-                self.method.shift_object(number, dx, dy)
+        placed = self._correct(trusted)
         made = self.method.observe(placed)
         if self.grid is not None:
             self.method.locate_echoes(self.grid.bearings)
             self.grid.observe(trusted)
         self.canyon_map.observe(trusted.pose)
         return made
+
+    def _correct(self, firing: Firing) -> Firing:
+        """Return a firing at the pose at which `method` enters it: by odometry, until that is refuted."""
+        if self.map_frame is None or self._other is None:
+            return firing
+        drift = self.map_frame.drift
+        was_corrected, corrected = drift.is_applied, self._fed()[-1]
+        placed = self.map_frame.follow(firing, self.vacant.outside(corrected.near_objects()), corrected.shift_object)
+        if not drift.is_applied:
+            self._other.observe(placed)
+            return firing
+        if not was_corrected:
+            self.method, self._other = self._other, self.method
+        return placed
 
     def refine(self) -> int:
         """Do one quantum of refinement and return its iterations, zero if nothing is left to improve.
@@ -163,10 +177,10 @@ class Perception:
             radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
             self.canyon_map.refine(self.labelled_objects(), radii_m)
             return 1
-        if self.known_room is None or not self.known_room.can_refine:
-            return 0
-        self.known_room.refine()
-        return 1
+        if self.known_room is not None and self._can_localize:
+            self.known_room.refine()
+            return 1
+        return next((one.refine() for one in self._fed()[1:] if one.can_refine), 0)
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
@@ -209,11 +223,7 @@ class Perception:
     def vacant_areas(self) -> tuple[VacantArea, ...]:
         """Return the areas in which nothing stands, in odometry's frame."""
         held = self.vacant.listed()
-        if self.map_frame is None or not held:
-            return held
-        to = self.map_frame.drift.odometry_from_filter()
-        places = [to.compose(Pose(area.x, area.y, 0.0)) for area in held]
-        return tuple(area._replace(x=at.x, y=at.y) for area, at in zip(held, places, strict=True))
+        return held if self.map_frame is None else self.map_frame.areas_in_odometry(held)
 
     def _in_odometry(self, seen: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return what the method holds in odometry's frame."""
@@ -227,9 +237,8 @@ class Perception:
     def segments(self) -> Segments:
         """Return copies of the outline segments with their numbers, times and pins."""
         held = self.method.segments()
-        if self.map_frame is None:
-            return held
-        return held._replace(geometry=self.map_frame.segments_in_odometry(held.geometry))
+        to = self.map_frame
+        return held if to is None else held._replace(geometry=to.segments_in_odometry(held.geometry))
 
     def edit(self, edit: Edit) -> str | None:
         """Apply an operator's edit; return None, or why it cannot be applied, as text for the operator.
@@ -237,7 +246,7 @@ class Perception:
         No edit changes the obstacles that the robot avoids: the fresh echoes stay.
         """
         if isinstance(edit, PlaceRobot):
-            return self._place_robot(edit)
+            return place_robot(self.known_room, edit)
         if isinstance(edit, RejectObject | MarkVacant | LiftArea):
             return self._edit_areas(edit)
         refused = invalid_number(edit)
@@ -248,6 +257,8 @@ class Perception:
         if refused is not None:
             return refused
         inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
+        for other in self._fed()[1:]:
+            edit_equally(inside, self.method, other)
         refused = self.method.edit(inside)
         if refused is None and isinstance(inside, PlaceModel | MoveObject):
             self.vacant.lift_at(inside.x, inside.y)
@@ -267,14 +278,6 @@ class Perception:
         model = next((m for m in self._models if m.name == found.model), None)
         reach_m = 0.0 if model is None else max(math.hypot(x, y) for x, y in model.vertices_m)
         return self.vacant.mark(found.x, found.y, radius_of(reach_m), edit.object)
-
-    def _place_robot(self, edit: PlaceRobot) -> str | None:
-        if self.known_room is None:
-            return "there is no known room: start with --map, or load a map"
-        refused = invalid_pose(edit.x, edit.y, edit.theta)
-        if refused is None:
-            self.known_room.assume(Pose(edit.x, edit.y, edit.theta))
-        return refused
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""
@@ -331,22 +334,19 @@ class Perception:
 
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
-        self.method.reset()
+        for part in (*self._methods(), self.map_frame, self.known_room, self.sensor_monitor, self.ring_monitor):
+            if part is not None:
+                part.reset()
         if self.grid is not None:
             self.grid.clear()
         self.vacant.clear()
         self.canyon_map.clear()
-        if self.map_frame is not None:
-            self.map_frame.reset()
-        if self.known_room is not None:
-            self.known_room.reset()
-        self.sensor_monitor.reset()
-        self.ring_monitor.reset()
         self._echoes.clear()
 
     def apply_settings(self, config: PerceptionConfig) -> None:
         """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
-        self.method.apply_settings(config)
+        for method in self._methods():
+            method.apply_settings(config)
         if config.localization.known_room != self.room:
             self._set_room(config.localization.known_room)
 
@@ -358,9 +358,16 @@ class Perception:
         """Recognise these models: the present ones, and possibly further ones after them."""
         if tuple(models) != self._models:
             self._models = tuple(models)
-            self.method.set_models(models)
-            if self.map_frame is not None:
-                self.map_frame.set_models(models)
+            for part in (*self._methods(), self.map_frame):
+                if part is not None:
+                    part.set_models(models)
+
+    def _methods(self) -> tuple[Method, ...]:
+        return (self.method,) if self._other is None else (self.method, self._other)
+
+    def _fed(self) -> tuple[Method, ...]:
+        """Return the methods that enter firings."""
+        return (self.method,) if self.map_frame is not None and self.map_frame.drift.is_applied else self._methods()
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""
@@ -385,9 +392,6 @@ class Perception:
             The snapshot was made with other settings.
         """
         put_back(self, snapshot)
-        self.method.drop_caches()
-        self.vacant.drop_caches()
-        if self.grid is not None:
-            self.grid.drop_caches()
-        if self.known_room is not None:
-            self.known_room.drop_caches()
+        for part in (*self._methods(), self.vacant, self.grid, self.known_room):
+            if part is not None:
+                part.drop_caches()

@@ -5,6 +5,9 @@ From then on each raw range of theirs corrects pose, landmarks and scales (`perc
 The first objects are recognised after a metre or two. Until then firings wait in a buffer, so that the filter can
 begin at the first one: otherwise the drift of that way would turn the map for good.
 
+Odometry is taken as exact until the readings refute that (`perception.localization.drift_evidence`). Until then
+poses, ranges and objects are left exactly as they are, while the filter runs beside them.
+
 What perception holds stays in the frame in which the filter began. The map frame is the filter's frame after
 the motion that `perception.localization.map_heading` finds once the map is known.
 """
@@ -22,6 +25,7 @@ from config.robot import RingConfig
 from drivers.messages import Firing, Pose
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
+from perception.localization.drift_evidence import DriftEvidence
 from perception.localization.landmark_filter import add_landmark, remove_landmark
 from perception.localization.landmark_state import FIRST, HEADING, OFFSET, EstimateRecord, X, Y
 from perception.localization.landmark_tracker import POSE, LandmarkTracker
@@ -107,6 +111,7 @@ class DriftCorrection:
 
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)
+        self._evidence = DriftEvidence(ring)
         self._map_heading = MapHeading(ring)
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self._half_angle = math.radians(ring.beam_half_angle_deg)
@@ -117,6 +122,7 @@ class DriftCorrection:
     def reset(self) -> None:
         """Start again with the next firing, whose odometry defines the map frame."""
         self._tracker.reset()
+        self._evidence.reset()
         self._map_heading.reset()
         self._arrived = 0
         self._has_started = False
@@ -134,6 +140,11 @@ class DriftCorrection:
     def covariance(self) -> Floats:
         """Covariance of the errors that `perception.localization.landmark_state` defines."""
         return self._tracker.covariance
+
+    @property
+    def is_applied(self) -> bool:
+        """Whether the readings have shown that odometry drifts; until then nothing is corrected."""
+        return self._evidence.is_refuted
 
     @property
     def heading_walk(self) -> float:
@@ -186,7 +197,8 @@ class DriftCorrection:
             moved = set()  # rather the robot slipped
         for i in range(len(numbers) - 1, -1, -1):
             if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
-                remove_landmark(self.e, self.covariance, i)
+                for tracker in self._trackers():
+                    remove_landmark(tracker.e, tracker.covariance, i)
         for number in sorted(objects.keys() - (set(numbers) - moved)):
             sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
             self._add(objects[number], sigma, moved=int(number in moved))
@@ -205,13 +217,15 @@ class DriftCorrection:
 
     def map_from_filter(self) -> Pose:
         """Return the pose of the filter's frame in the map frame: a turn about the first firing, and a shift."""
+        if not self.is_applied:
+            return Pose(0.0, 0.0, 0.0)
         turn, x, y = self._motion.tolist()
         start = Pose(self._map_heading.start_x, self._map_heading.start_y, 0.0)
         return Pose(start.x + x, start.y + y, turn).compose(start.inverse())
 
     def odometry_from_filter(self) -> Pose:
         """Return the pose of the filter's frame in odometry's frame, at the last firing."""
-        if self._arrived == 0:
+        if self._arrived == 0 or not self.is_applied:
             return Pose(0.0, 0.0, 0.0)
         x, y, theta, yaw = self._waiting[(self._arrived - 1) % WAITING_MAX, :POSE].tolist()
         here, here_yaw = self._pose_of(Pose(x, y, theta), yaw)
@@ -223,7 +237,7 @@ class DriftCorrection:
         if self._arrived == 0:
             return LocalizedPose(Pose(0.0, 0.0, 0.0), 0.0, np.zeros((3, 3)), "localizing", 1.0)
         x, y, theta, yaw = self._waiting[(self._arrived - 1) % WAITING_MAX, :POSE].tolist()
-        pose, ring_yaw = self._pose_of(Pose(x, y, theta), yaw)
+        pose, ring_yaw = self._pose_of(Pose(x, y, theta), yaw) if self.is_applied else (Pose(x, y, theta), yaw)
         to = np.zeros((3, FIRST))
         to[0, X] = to[1, Y] = to[2, HEADING] = to[2, OFFSET] = 1.0
         to[0, HEADING], to[1, HEADING] = -e.y, e.x
@@ -290,7 +304,8 @@ class DriftCorrection:
 
     def _enter_next(self) -> None:
         """Enter the oldest waiting firing."""
-        self._tracker.enter(self._waiting[self._tracker.entered % WAITING_MAX])
+        row = self._waiting[self._tracker.entered % WAITING_MAX]
+        self._evidence.enter(row, self._tracker)
 
     def _pose_of(self, pose: Pose, ring_yaw: float) -> tuple[Pose, float]:
         """Return pose and ring direction in the filter's frame for those by odometry, at a firing that may wait."""
@@ -319,12 +334,19 @@ class DriftCorrection:
 
     def _add(self, seen: SeenObject, sigma_m: float, moved: int) -> None:
         """Add a landmark that stands where perception sees it, relative to the ring, with this standard deviation."""
-        e = self.e[0]
-        c, s = math.cos(e.heading), math.sin(e.heading)
-        dx, dy = seen.x - e.x, seen.y - e.y
-        i = add_landmark(self.e, self.covariance, c * dx + s * dy, c * dy - s * dx, sigma_m**2, 0.0, sigma_m**2)
-        if i < 0:
-            return
-        landmark = e.landmarks[i]
-        landmark.radius, landmark.number, landmark.moved = seen.radius, seen.number, moved
-        landmark.anchor_x, landmark.anchor_y = seen.x, seen.y
+        trackers = self._trackers()
+        ring = self.e[0]
+        c, s = math.cos(ring.heading), math.sin(ring.heading)
+        dx, dy = seen.x - ring.x, seen.y - ring.y
+        for tracker in trackers:
+            e, covariance, variance = tracker.e, tracker.covariance, sigma_m**2
+            i = add_landmark(e, covariance, c * dx + s * dy, c * dy - s * dx, variance, 0.0, variance)
+            if i < 0:
+                return
+            landmark = e[0].landmarks[i]
+            landmark.radius, landmark.number, landmark.moved = seen.radius, seen.number, moved
+            landmark.anchor_x, landmark.anchor_y = seen.x, seen.y
+
+    def _trackers(self) -> tuple[LandmarkTracker, ...]:
+        """Return the filter with drift and, until odometry is refuted, the one that takes odometry as exact."""
+        return (self._tracker,) if self.is_applied else (self._tracker, self._evidence.exact)

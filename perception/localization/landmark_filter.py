@@ -265,6 +265,7 @@ def add_landmark(
     landmark.failures = 0
     landmark.hits = 0
     landmark.moved = 0
+    landmark.drift_nat = 0.0
     est.count += 1
     return i
 
@@ -290,6 +291,7 @@ def remove_landmark(e: EstimateRecord, covariance: Floats, i: int) -> None:
         target.number, target.failures, target.hits = source.number, source.failures, source.hits
         target.moved = source.moved
         target.anchor_x, target.anchor_y = source.anchor_x, source.anchor_y
+        target.drift_nat = source.drift_nat
         for axis in range(2):
             to, of = FIRST + 2 * i + axis, FIRST + 2 * last + axis
             for k in range(FIRST + 2 * last + 2):

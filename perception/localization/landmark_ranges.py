@@ -11,7 +11,7 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.localization.landmark_filter import correct, innovation_variance, rows_used
-from perception.localization.landmark_state import FIRST, STRAY_MAX, STRAY_MIN, EstimateRecord, X, Y
+from perception.localization.landmark_state import FIRST, STRAY_MAX, STRAY_MIN, EstimateRecord, LastUse, X, Y
 
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
@@ -57,6 +57,16 @@ BEHIND_M: Final = 0.3
 
 
 @kernel
+def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
+    """Return whether a sensor at (x, y) (m), axis (rad), has moved or turned enough since its last reading."""
+    return (
+        last.is_known == 0
+        or abs(axis - last.axis) >= FRESH_RAD
+        or math.hypot(x - last.x, y - last.y) >= FRESH_M
+    )  # fmt: skip
+
+
+@kernel
 def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor has moved or turned enough since its last reading that was used; note its place.
 
@@ -70,7 +80,7 @@ def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> boo
         Its place (m) and direction (rad) by odometry.
     """
     last = e[0].sensors[i]
-    if last.is_known == 1 and abs(axis - last.axis) < FRESH_RAD and math.hypot(x - last.x, y - last.y) < FRESH_M:
+    if not has_moved_since(last, x, y, axis):
         return False
     last.x, last.y, last.axis, last.is_known = x, y, axis, 1
     return True
@@ -99,6 +109,46 @@ def is_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
         ox, oy = other.x - x, other.y - y
         along = (ox * dx + oy * dy) / d
         if k != i and 0.0 < along < d and abs(ox * dy - oy * dx) < HIDING_RADII * other.radius * d:
+            return True
+    return False
+
+
+@kernel
+def may_answer_instead(
+    e: EstimateRecord, i: int, x: float, y: float, ax: float, ay: float, half_angle: float, r: float
+) -> bool:  # fmt: skip
+    """Return whether a range may be of another landmark than `i`, of which any visible part is in the beam.
+
+    Where drums answer with any part that is in the beam, the nearest point of one whose centre is outside is farther
+    than that of the drum, by up to the distance of its horizon.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        The mean.
+    i : int
+        The landmark.
+    x, y : float
+        The sensor's place, m.
+    ax, ay : float
+        Direction of its axis.
+    half_angle : float
+        Half the beam's width, rad.
+    r : float
+        Range, m.
+    """
+    est = e[0]
+    for k in range(est.count):
+        other = est.landmarks[k]
+        dx, dy = other.x - x, other.y - y
+        d = math.sqrt(dx * dx + dy * dy)
+        if k == i or d <= other.radius:
+            continue
+        off = abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy))
+        horizon = math.sqrt(d * d - other.radius * other.radius)
+        if off < half_angle + math.asin(other.radius / d) + MARGIN_RAD and (
+            d - other.radius - OWN_M < r / est.range_scale < horizon + OWN_M
+        ):
             return True
     return False
 
@@ -255,6 +305,12 @@ def update_with_range(
             best, best_nis = i, nis
         elif nis < second_nis:
             second, second_nis = i, nis
+    if (
+        is_expected
+        and best == NONE
+        and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
+    ):
+        is_expected = False
     if is_expected:
         est.fit_share += FIT_MEMORY * ((1.0 if best != NONE else 0.0) - est.fit_share)
     is_missed = first != NONE and first != best and r > nearest + BEHIND_M and nearest < range_max

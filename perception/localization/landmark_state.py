@@ -49,6 +49,8 @@ class Landmark(Record):
     anchor_x: Place
     anchor_y: Place
     """Its place when perception's track was last moved with it."""
+    drift_nat: Finite
+    """Evidence of its readings that odometry drifts, in the filter that takes odometry as exact."""
 
 
 class LastUse(Record):

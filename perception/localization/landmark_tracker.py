@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,9 @@ POSE: Final = 4
 TURNED_RAD: Final = 1e-9
 """A ring that turns otherwise than the wheels, by more than this, is one of a synchro drive."""
 
+Readings: TypeAlias = tuple[Floats, Floats, float, float, float, float, float, float, float, float]
+"""Mounts, ranges (m), the ring's pose by odometry (m, rad), and the numbers of `LandmarkTracker._ring`."""
+
 
 class LandmarkTracker:
     """The landmark filter of one drive.
@@ -75,6 +78,8 @@ class LandmarkTracker:
     ----------
     ring : RingConfig
         The sensors.
+    is_exact : bool
+        Whether odometry is taken as exact: only landmarks and the ranges' scale are found then.
 
     Attributes
     ----------
@@ -88,14 +93,15 @@ class LandmarkTracker:
         Odometry at the last of them.
     """
 
-    SCRATCH: Final = ("e",)
-    """A view of the same memory, left out of snapshots."""
+    SCRATCH: Final = ("e", "_is_exact")
+    """A view of the same memory, and a constant: left out of snapshots."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT, _ring=CONSTANT, estimate=Estimate.BOUNDS, covariance=FINITE, entered_at=PLACE,
         entered=COUNT, _window_m=FINITE, _window_variance=FINITE, _window_count=COUNT,
     )  # fmt: skip
 
-    def __init__(self, ring: RingConfig) -> None:
+    def __init__(self, ring: RingConfig, *, is_exact: bool = False) -> None:
+        self._is_exact = is_exact
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         half_step_m = 0.5 * ring.resolution_m
         self._ring = np.array([
@@ -115,7 +121,7 @@ class LandmarkTracker:
         self.estimate.view(np.uint8)[...] = 0
         self.covariance[...] = 0.0
         slow = (OFFSET, OFFSET_SIGMA_RAD), (ODOMETER, ODOMETER_SIGMA), (TURN, TURN_SIGMA), (RANGE, RANGE_SIGMA)
-        for row, sigma in slow:
+        for row, sigma in slow[-1:] if self._is_exact else slow:
             self.covariance[row, row] = sigma**2
         e = self.e[0]
         e.odometer_scale = e.range_scale = e.noise = e.fit_share = 1.0
@@ -148,16 +154,30 @@ class LandmarkTracker:
 
     def enter(self, row: Floats) -> None:
         """Move to a firing, the first of which gives the pose, and enter its ranges."""
+        self.move(row)
+        self.measure(row)
+
+    def move(self, row: Floats) -> None:
+        """Move to a firing, the first of which gives the pose."""
         x, y, theta, yaw = row[:POSE].tolist()
         e = self.e[0]
-        if self.entered == 0:
+        if self.entered == 0 or self._is_exact:
             e.x, e.y, e.heading = x, y, yaw
         else:
             self._move(x, y, theta, yaw)
         self.entered_at[:] = x, y, theta, yaw
         self.entered += 1
+
+    def measure(self, row: Floats) -> None:
+        """Enter the ranges of a firing to which the filter has moved."""
+        update_with_firing(self.e, self.covariance, *self.readings(row))
+
+    def readings(self, row: Floats) -> Readings:
+        """Return a firing as `perception.localization.landmark_ranges.update_with_firing` takes it."""
+        x, y, theta, yaw = row[:POSE].tolist()
         mounts = turned_mounts(self._mounts, self._turning, theta - yaw)
-        update_with_firing(self.e, self.covariance, mounts, row[POSE:], x, y, yaw, *self._ring.tolist())
+        var0, rel2, half_angle, range_min, range_max = self._ring.tolist()
+        return mounts, row[POSE:], x, y, yaw, var0, rel2, half_angle, range_min, range_max
 
     @property
     def is_doubtful(self) -> bool:

@@ -8,7 +8,7 @@ drives, stays continuous whatever is corrected: there, the objects move.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final, TypeAlias, TypeVar
 
@@ -22,6 +22,7 @@ from perception.detected_object import DetectedObject
 from perception.edits import Evidence, MapEdit, MarkVacant, MoveObject, PlaceModel, RestoreSegments
 from perception.kernel import Floats
 from perception.localization.drift_correction import DriftCorrection, LandmarkPlace, LocalizedPose, SeenObject
+from perception.vacant_areas import VacantArea
 
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
@@ -57,7 +58,9 @@ class MapFrame:
         """Start again: the next firing's odometry defines the map frame."""
         self.drift.reset()
 
-    def follow(self, firing: Firing, objects: Sequence[DetectedObject]) -> Firing:
+    def follow(
+        self, firing: Firing, objects: Sequence[DetectedObject], shift: Callable[[int, float, float], object]
+    ) -> Firing:  # fmt: skip
         """Return a firing at its pose in the filter's frame.
 
         Parameters
@@ -66,6 +69,8 @@ class MapFrame:
             With its pose by odometry.
         objects : sequence of DetectedObject
             Recognised near the robot before it, in the filter's frame.
+        shift : callable
+            Called with number and displacement (m) of the objects that are to move, because their landmarks moved.
         """
         self._near = {seen.number for seen in objects if seen.number is not None}
         self.drift.learn(
@@ -77,11 +82,9 @@ class MapFrame:
             and seen.number is not None
         )
         self.drift.observe(firing)
+        for number, dx, dy in self.drift.moved_landmarks(SHIFT_MIN_M, self._near):
+            shift(number, dx, dy)
         return self.drift.corrected(firing)
-
-    def shifts(self) -> list[tuple[int, float, float]]:
-        """Return number and displacement (m) of the objects that are to move, because their landmarks moved."""
-        return self.drift.moved_landmarks(SHIFT_MIN_M, self._near)
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing."""
@@ -89,6 +92,8 @@ class MapFrame:
 
     def in_map(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the filter's frame in the map frame."""
+        if not self.drift.is_applied:
+            return tuple(objects)
         to = self.drift.map_from_filter()
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
 
@@ -99,6 +104,8 @@ class MapFrame:
 
     def objects_in_odometry(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the filter's frame in odometry's frame."""
+        if not self.drift.is_applied:
+            return tuple(objects)
         to = self.drift.odometry_from_filter()
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
 
@@ -112,6 +119,12 @@ class MapFrame:
             turned[:, y] = to.y + s * geometry[:, x] + c * geometry[:, y]
         turned[:, 4] += to.theta
         return turned
+
+    def areas_in_odometry(self, areas: tuple[VacantArea, ...]) -> tuple[VacantArea, ...]:
+        """Return vacant areas of the filter's frame in odometry's frame."""
+        to = self.drift.odometry_from_filter()
+        places = [to.compose(Pose(area.x, area.y, 0.0)) for area in areas]
+        return tuple(area._replace(x=at.x, y=at.y) for area, at in zip(areas, places, strict=True))
 
     def evidence_in_odometry(self, evidence: Evidence | None) -> Evidence | None:
         """Return the evidence for an object of the filter's frame in odometry's frame."""

@@ -91,6 +91,7 @@ def test_the_first_landmarks_share_an_error_of_the_heading() -> None:
 @pytest.mark.compiled
 def test_scale_errors_of_the_odometer_are_found_and_corrected() -> None:
     drift = DriftCorrection(RING)
+    drift._evidence.is_refuted = True
     for k in range(150):
         drift.observe(firing(k, 1.03))
         if k >= 20:

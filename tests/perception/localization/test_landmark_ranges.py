@@ -76,8 +76,15 @@ def test_a_landmark_that_moved_fails_again_and_again() -> None:
 def test_the_share_of_expected_echoes_falls_while_they_fail_to_come() -> None:
     e, covariance = new_filter([(2.0, 0.0)])
     for _ in range(100):
-        enter(e, covariance, 0.6)
+        enter(e, covariance, 4.0)
     assert e[0].fit_share < 0.1
+
+
+def test_a_landmark_that_something_hides_is_not_expected() -> None:
+    e, covariance = new_filter([(2.0, 0.0)])
+    for _ in range(100):
+        enter(e, covariance, 0.6)
+    assert e[0].fit_share == 1.0
 
 
 @pytest.mark.parametrize(("is_heard", "side"), [(True, 1.0), (True, -1.0), (False, 1.0), (False, -1.0)])
