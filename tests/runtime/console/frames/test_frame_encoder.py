@@ -83,6 +83,7 @@ async def test_the_place_in_the_map_and_its_frame_are_shown_where_drift_is_corre
 
         frame = case.run.state.perception.map_frame
         assert frame is not None
+        frame.drift._evidence.is_refuted = True
         frame.drift.learn(SeenObject(k, 3.0 * math.cos(k), 3.0 * math.sin(k), 0.3) for k in (1, 2, 3))
         frame.drift.e[0].x += 0.5
         case.cycles()
