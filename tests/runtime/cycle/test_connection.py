@@ -101,10 +101,10 @@ def test_the_base_has_stopped_and_its_session_has_ended_before_the_line_is_close
             ends.append((loop.time(), robot.truth.twist.v))
             process.stop()
 
-        loop.call_later(4.0, end)
+        loop.call_later(5.0, end)
         loop.run_until_complete(process.run(arm=True, seconds=None))
         (asked_s, driven_m_s), (closed_s, v), *_ = ends
-        assert driven_m_s > 0.1, "it drove"
+        assert driven_m_s > 0.2, "it drove"
         assert v == 0.0
         assert robot.truth.flags & Flags.LATCHED
         assert closed_s - asked_s < HALT_MAX_S, "it was confirmed"
