@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import errno
 import json
 import os
 import re
@@ -14,6 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib.resources import files
+from io import FileIO
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -98,14 +100,14 @@ def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | N
     path = (Path() if named_by is None else named_by.base) / name
     shown = one_line(str(path))
     try:
-        data = _read(path)
+        data = read_file(path)
     except FileNotFoundError:
         by = "" if named_by is None else f"; named by {named_by.name}"
         raise ConfigError(f"{shown}: file not found{by}; {_known(kind)}") from None
     except IsADirectoryError:
         raise ConfigError(f"{shown}: is a directory, not a TOML file") from None
-    except TimeoutError:
-        raise ConfigError(f"{shown}: is a pipe from which nothing came for {PIPE_WAIT_S:g} s; give a file") from None
+    except TimeoutError as error:
+        raise ConfigError(f"{shown}: {error.strerror}") from None
     except OSError as error:
         raise ConfigError(f"{shown}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a NUL or a lone surrogate in the path
@@ -205,25 +207,53 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     return f"; did you mean {lower[near[0]]}?" if near else ""
 
 
-def _read(path: Path) -> bytes:
-    """Return the file's bytes, up to one more than allowed.
+def open_input(path: str | os.PathLike[str]) -> FileIO:
+    """Open a file, a pipe or a device for reading, unbuffered.
 
     Raises
     ------
+    TimeoutError
+        It is a pipe or a device from which nothing came for `PIPE_WAIT_S`.
     IsADirectoryError
         The path is a directory.
-    TimeoutError
-        The path is a pipe or a device that sends no data.
+    OSError
+        It cannot be read.
+    ValueError
+        The path holds a NUL or a lone surrogate.
     """
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK)
-    with os.fdopen(fd, "rb", buffering=0) as file:
-        kind = os.fstat(fd).st_mode
-        if stat.S_ISDIR(kind):
-            raise IsADirectoryError
+    try:
+        file = FileIO(fd)
+    except OSError:  # a directory
+        os.close(fd)
+        raise
+    try:
+        await_data(file)
+        os.set_blocking(fd, True)
+    except OSError:
+        file.close()
+        raise
+    return file
+
+
+def await_data(file: FileIO) -> None:
+    """Return when the next read of a file does not block: at once unless it is a pipe or a device.
+
+    Raises
+    ------
+    TimeoutError
+        Nothing came for `PIPE_WAIT_S`.
+    """
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode) and not select.select([file], [], [], PIPE_WAIT_S)[0]:
+        raise TimeoutError(errno.ETIMEDOUT, f"is a pipe from which nothing came for {PIPE_WAIT_S:g} s; give a file")
+
+
+def read_file(path: Path) -> bytes:
+    """Return a settings file's bytes, up to one more than allowed; raises as `open_input`."""
+    with open_input(path) as file:
         data, more = bytearray(), b" "
         while more and len(data) <= SIZE_MAX:
-            if not stat.S_ISREG(kind) and not select.select([fd], [], [], PIPE_WAIT_S)[0]:
-                raise TimeoutError
+            await_data(file)
             more = file.read(SIZE_MAX + 1 - len(data)) or b""
             data += more
     return bytes(data)

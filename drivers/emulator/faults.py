@@ -16,7 +16,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from config.files import SIZE_MAX, ConfigError, dotted, one_line, parse_document
+from config.files import ConfigError, dotted, one_line, parse_document, read_file
 from config.problems import shown as shown_value
 from config.strict import Strict, TomlList
 
@@ -281,8 +281,7 @@ def load_faults(path: str | Path) -> tuple[Fault, ...]:
     """
     shown = one_line(str(path))
     try:
-        with Path(path).open("rb") as file:
-            data = file.read(SIZE_MAX + 1)
+        data = read_file(Path(path))
     except OSError as error:
         raise ConfigError(f"{shown}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a NUL in the path

@@ -49,6 +49,8 @@ UNKNOWN: Final = Extent(None, None, is_complete=False)
 def recording_extent(path: Path) -> Extent:
     """Return how long a recording is; `UNKNOWN` for a file that is none, is empty, or cannot be read."""
     try:
+        if not path.is_file():
+            return UNKNOWN
         with path.open("rb") as file:
             info = os.fstat(file.fileno())
             complete = _of_statistics(file, info.st_size)

@@ -139,12 +139,12 @@ def cycle_head(message: RawMessage) -> tuple[int, float]:
 
 
 def is_recording(path: Path) -> bool:
-    """Return whether a file starts like an MCAP file or is named like one."""
-    try:
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC or path.suffix == ".mcap"
-    except OSError:
-        return path.suffix == ".mcap"
+    """Return whether a file starts like an MCAP file or is named like one; a pipe is not read."""
+    with contextlib.suppress(OSError, ValueError):
+        if path.is_file():
+            with path.open("rb") as file:
+                return file.read(len(MAGIC)) == MAGIC or path.suffix == ".mcap"
+    return path.suffix == ".mcap"
 
 
 def parse_settings(data: dict[str, Any]) -> Settings:
@@ -165,9 +165,11 @@ def map_file(path: Path) -> Iterator[memoryview]:
     Raises
     ------
     RecordingError
-        The file does not exist, cannot be read, or is empty.
+        The file does not exist, cannot be read, is empty, or is a pipe.
     """
     try:
+        if path.is_fifo() or path.is_char_device():
+            raise RecordingError(f"{path}: is a pipe or a device; a recording is read from a file")
         with path.open("rb") as file:
             is_empty = path.stat().st_size == 0
             data = None if is_empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)

@@ -11,12 +11,14 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO, Final, TextIO
 
 import numpy as np
 
 from config.errors import WRONG_CALL, UserError
+from config.files import open_input
 from drivers.messages import CrossPaths, Firing, Pose
 
 REQUIRED: Final = ("t", "x", "y", "theta")
@@ -56,7 +58,7 @@ def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
         The file cannot be read or is invalid; before the first firing if its header is, else at the invalid row.
     """
     try:
-        with path.open("rb") as file:
+        with BufferedReader(open_input(path)) as file:
             yield from _firings(_rows(file, path), path, sensors)
     except OSError as error:
         raise RingLogError(f"{path}: cannot be read: {error.strerror or error}; check the path") from error

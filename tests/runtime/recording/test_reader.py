@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import resource
 import sys
 from collections.abc import Iterator
@@ -15,6 +17,7 @@ from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode, encode
 from runtime.recording.reader import RecordingError, cycle_head, is_recording, open_recording
+from runtime.recording.ring_log import read_ring_log
 from runtime.recording.schema import FORMAT, Cycle, RunInfo
 from tests.recorded import entries_of, hall, rewrite, scanned
 
@@ -28,6 +31,13 @@ READING = {
     **{f"export --to {form}": ("export", "{file}", "--to", form, "--out", "{out}") for form in FORMS},
 }
 COMMANDS = {**READING, "recover": ("recover", "{file}", "--out", "{out}")}
+READING_MORE = {
+    **COMMANDS,
+    "stand": ("stand", "{file}"),
+    "map": ("map", "{file}", "--out", "{out}.toml"),
+    "calibrate": ("calibrate", "{file}", "--out", "{out}.toml"),
+    "emulate": ("emulate", "--faults", "{file}"),
+}
 
 
 def outcome_of(
@@ -152,6 +162,34 @@ def test_a_recording_is_recognised_by_its_first_bytes_or_its_name(run: Path, tmp
     assert is_recording(tmp_path / "absent.mcap")
     assert not is_recording(tmp_path / "log.csv")
     assert not is_recording(tmp_path / "absent.csv")
+
+
+@pytest.mark.promise("P14")
+@pytest.mark.parametrize("name", ["pipe", "pipe.mcap"])
+@pytest.mark.parametrize("command", READING_MORE.values(), ids=READING_MORE)
+def test_a_pipe_that_nobody_writes(
+    command: tuple[str, ...],
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("config.files.PIPE_WAIT_S", 0.05)
+    os.mkfifo(tmp_path / name)
+    code, line = outcome_of(command, tmp_path / name, tmp_path / "out", capsys)
+    assert code == WRONG_CALL
+    assert re.search(f"{name}: .*is a (pipe|ring log;)", line)
+
+
+def test_a_ring_log_from_a_pipe() -> None:
+    """A pipe gives its bytes once: finding out what it is takes none of them."""
+    read, write = os.pipe()
+    log = Path(f"/dev/fd/{read}")
+    assert not is_recording(log)
+    with os.fdopen(write, "wb") as file:
+        file.write(b"t,x,y,theta,r00,r01\n0,0,0,0,1.5,inf\n")
+    assert [firing.ranges_m[0] for firing in read_ring_log(log)] == [1.5]
+    os.close(read)
 
 
 def test_a_newer_file_is_recovered_unchanged_or_refused_as_newer(
