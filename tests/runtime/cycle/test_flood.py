@@ -36,13 +36,32 @@ FRAMES: dict[str, tuple[bytes, ...]] = {
 }  # fmt: skip
 
 
+RATES = (1e5, 5e5, 2e6)
+"""Bytes a second; a line of 115,200 baud carries 11,520."""
+
+
 @pytest.mark.parametrize("robot_file", FRAMES)
 def test_a_flood_of_valid_frames_ends_the_drive_with_bounded_work(
     robot_file: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rng, events = random.Random(robot_file), Events()
-    frame = rng.choice(FRAMES[robot_file])
-    bytes_s = 10.0 ** rng.uniform(5.7, 6.3)
+    rng = random.Random(robot_file)
+    check_flood(robot_file, rng.choice(FRAMES[robot_file]), 10.0 ** rng.uniform(5.7, 6.3), monkeypatch)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("bytes_s", RATES)
+@pytest.mark.parametrize(
+    ("robot_file", "number"), [(r, i) for r, frames in FRAMES.items() for i in range(len(frames))]
+)
+def test_a_flood_of_each_kind_and_rate(
+    robot_file: str, number: int, bytes_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    check_flood(robot_file, FRAMES[robot_file][number], bytes_s, monkeypatch)
+
+
+def check_flood(robot_file: str, frame: bytes, bytes_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Flood a driving robot with one frame, and check mode, work and log."""
+    events = Events()
     with in_virtual_time(monkeypatch, "perception.method=paper", robot_file=robot_file) as (loop, settings, _, links):
         work, last, modes = list[int](), [0], list[Mode]()
 

@@ -167,7 +167,7 @@ def test_a_recording_is_recognised_by_its_first_bytes_or_its_name(run: Path, tmp
 @pytest.mark.promise("P14")
 @pytest.mark.parametrize("name", ["pipe", "pipe.mcap"])
 @pytest.mark.parametrize("command", READING_MORE.values(), ids=READING_MORE)
-def test_a_pipe_that_nobody_writes(
+def test_a_pipe_that_without_a_writer(
     command: tuple[str, ...],
     name: str,
     tmp_path: Path,
