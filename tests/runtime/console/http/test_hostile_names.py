@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from runtime.console.files.recording_files import RecordingFiles
 from runtime.recording.folder_files import delete_recording, describe_recordings, pin_recording
 from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase
 from tests.runtime.console.files.files_case import with_files
+from tests.runtime.console.sample_messages import ALL
 
 pytestmark = pytest.mark.promise("P22")
 
@@ -80,6 +82,24 @@ async def test_no_name_in_a_command_on_recordings_is_an_error_of_the_program(nam
             await command
     assert (folder / "run.mcap").exists()
     assert (tmp_path / "secret.mcap").exists()
+
+
+async def test_no_text_in_a_command_over_a_websocket_is_left_without_an_answer(tmp_path: Path) -> None:
+    """Every text of every command, in escapes too: a lone surrogate is no JSON, and so is answered without an id."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    async with with_files(folder) as case:
+        page = await case.page()
+        for sample in ALL:
+            for key in (key for key, value in sample.items() if isinstance(value, str) and key != "type"):
+                for text in HOSTILE:
+                    message = {"id": 7, **sample, key: text}
+                    await page.socket.send_str(json.dumps(message))
+                    answer = await page.next("answer")
+                    assert answer["id"] in (7, None), (message, answer)
+                    assert "Traceback" not in str(answer["error"])
+                    case.clock[0] += 1.0
+        assert case.run.health.fault() is None
 
 
 def test_a_recording_whose_name_leaves_no_room_for_a_pin_is_listed_and_deleted(tmp_path: Path) -> None:
