@@ -89,7 +89,7 @@ class RflexDriver(Session[Measurements]):
         self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
         self._sample_s = self._echo_s = self._answer_s = self._driven_s = self._input_s = 0.0
         self._bad_at_sample = 0
-        self._brake, self._stall = Brake(config), StallMonitor()
+        self._brake, self._stall = Brake(config), StallMonitor(config)
         self._queue: deque[Frame] = deque()
         self._second_axis: Frame | None = None
         self._is_ending = self._is_moving = False

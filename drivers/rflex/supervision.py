@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from enum import Enum
 from typing import Final
 
@@ -22,7 +23,7 @@ _SEEN_S: Final = 0.02
 _STILL_M_S, _STILL_RAD_S = 5e-3, 0.01
 """A base stands below these speeds; the least speed that the hardware takes is one count per second."""
 _PUSHED_S: Final = 0.4
-"""A base must follow a command after this time, s."""
+"""A base must follow so long after a base within its limits would, s."""
 _PUSHED_M_S, _PUSHED_RAD_S = 0.05, 0.2
 """Commands below these speeds are too slow to judge by."""
 _FOLLOWS: Final = 0.2
@@ -152,39 +153,67 @@ class Brake:
 class StallMonitor:
     """Finds a base that does not follow its commands, as one whose motors have failed or that is blocked.
 
+    A model of the base follows the commands within the limits of its file. The base is stalled if it reports less
+    than a share of what the model has done for a while: a command that has just grown says nothing yet.
+
+    Parameters
+    ----------
+    config
+        The robot file.
+
     Attributes
     ----------
     is_stalled
         Whether the last sample shows that.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, config: RobotConfig) -> None:
         self.is_stalled = False
-        self._wanted = Twist(0.0, 0.0)
-        self._since_s: dict[str, float] = {}
+        self._limits = (config.body.speed_max_m_s, config.body.turn_max_rad_s)
+        self._rates = (config.body.acceleration_max_m_s2, config.body.turn_acceleration_max_rad_s2)
+        self._wanted = self._modelled = Twist(0.0, 0.0)
+        self._run_s = 0.0
+        self._history: deque[tuple[float, Twist]] = deque()
 
     def command(self, twist: Twist, run_s: float) -> None:
         """Take a velocity that is commanded."""
-        for axis, now, before, least in (
-            ("v", twist.v, self._wanted.v, _PUSHED_M_S), ("w", twist.w, self._wanted.w, _PUSHED_RAD_S),
-        ):  # fmt: skip
-            if abs(now) < least:
-                self._since_s.pop(axis, None)
-            elif axis not in self._since_s or now * before < 0.0:
-                self._since_s[axis] = run_s
+        self._model(run_s)
         self._wanted = twist
 
     def stop(self) -> None:
         """Take a stop."""
-        self.is_stalled, self._wanted = False, Twist(0.0, 0.0)
-        self._since_s.clear()
+        self.is_stalled = False
+        self._wanted = self._modelled = Twist(0.0, 0.0)
+        self._history.clear()
 
     def observe(self, twist: Twist, run_s: float) -> None:
         """Take the velocity that the base reports."""
-        pairs = {"v": (twist.v, self._wanted.v), "w": (twist.w, self._wanted.w)}
-        self.is_stalled = any(
-            run_s - since_s > _PUSHED_S and pairs[axis][0] < _FOLLOWS * pairs[axis][1]
-            if pairs[axis][1] > 0.0
-            else run_s - since_s > _PUSHED_S and pairs[axis][0] > _FOLLOWS * pairs[axis][1]
-            for axis, since_s in self._since_s.items()
+        self._model(run_s)
+        history = self._history
+        self.is_stalled = history[0][0] <= run_s - _PUSHED_S and (
+            _lags(twist.v, [model.v for _, model in history], _PUSHED_M_S)
+            or _lags(twist.w, [model.w for _, model in history], _PUSHED_RAD_S)
         )
+
+    def _model(self, run_s: float) -> None:
+        """Let the model obey until now, and keep its velocities of the last `_PUSHED_S`, and one before."""
+        lasted_s, self._run_s = max(0.0, run_s - self._run_s), run_s
+        v, w = (
+            before + max(-rate * lasted_s, min(rate * lasted_s, max(-limit, min(limit, wanted)) - before))
+            for before, wanted, limit, rate in zip(
+                (self._modelled.v, self._modelled.w), (self._wanted.v, self._wanted.w), self._limits, self._rates,
+                strict=True,
+            )
+        )  # fmt: skip
+        self._modelled = Twist(v, w)
+        self._history.append((run_s, self._modelled))
+        while len(self._history) > 1 and self._history[1][0] <= run_s - _PUSHED_S:
+            self._history.popleft()
+
+
+def _lags(reported: float, modelled: list[float], pushed: float) -> bool:
+    """Return whether a base is slower than a share of all that the model did; slower ones than `pushed` may stick."""
+    least, most = min(modelled), max(modelled)
+    if least >= pushed:
+        return reported < _FOLLOWS * least
+    return most <= -pushed and reported > _FOLLOWS * most

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
 from config.load import load_robot
-from drivers.messages import Twist
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from drivers.emulator.body import Body
+from drivers.emulator.scene import compile_scene
+from drivers.messages import Pose, Twist
 from drivers.rflex.codec import BRAKE_RELEASE, BRAKE_SET, MOTOR_SET_DIR, STATUS_REQUEST, Frame, direction_of
 from drivers.rflex.supervision import Brake, Mode, StallMonitor
 
@@ -70,20 +77,51 @@ def test_a_release_is_repeated_until_it_is_reported() -> None:
 
 
 def test_a_base_that_does_not_follow_is_stalled() -> None:
-    stall = StallMonitor()
+    stall = StallMonitor(B21R)
     stall.command(Twist(-0.3, 0.0), 0.0)
     stall.observe(STILL, 0.3)
     assert not stalled(stall), "it accelerates"
-    stall.observe(Twist(-0.2, 0.0), 0.5)
+    stall.observe(Twist(-0.2, 0.0), 0.8)
     assert not stalled(stall)
-    stall.observe(STILL, 0.6)
+    stall.observe(STILL, 1.1)
     assert stalled(stall)
     stall.stop()
     stall.observe(STILL, 2.0)
     assert not stalled(stall)
     stall.command(Twist(0.0, 0.5), 2.0)
-    stall.observe(STILL, 2.5)
+    for k in range(8):
+        stall.observe(STILL, 2.0 + 0.1 * k)
     assert stalled(stall)
-    stall.command(Twist(0.01, 0.1), 2.6)
-    stall.observe(STILL, 3.5)
+    stall.command(Twist(0.01, 0.1), 2.7)
+    for k in range(8):
+        stall.observe(STILL, 2.8 + 0.1 * k)
     assert not stalled(stall), "too slow to judge by"
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_base_that_obeys_within_its_limits_is_never_stalled_and_one_that_fails_is(seed: int) -> None:
+    """Commands of all lengths, that grow, leap, stop and reverse; then the wheels do not turn."""
+    rng = np.random.default_rng(seed)
+    config = replace_limits(B21R, *rng.uniform((0.15, 0.3), (2.0, 4.0)).tolist())
+    world = compile_scene(WorldConfig())
+    body = Body(config.body, world, Pose(0.0, 0.0, 0.0), WorldConfig().odometry, rng)
+    stall, wanted = StallMonitor(config), STILL
+    for k in range(4000):
+        if rng.random() < rng.choice((0.02, 0.5)):
+            grows = Twist(wanted.v + rng.normal(0.0, 0.03), wanted.w + rng.normal(0.0, 0.1))
+            leaps = Twist(rng.uniform(-0.5, 0.5), rng.uniform(-1.0, 1.0))
+            wanted = (grows, leaps, STILL)[rng.integers(3)]
+        stall.command(wanted, 0.05 * k)
+        reported = body.twist
+        body.step(0.05, wanted)
+        stall.observe(reported if k % 2 else body.twist, 0.05 * (k + 1))
+        assert not stalled(stall), f"after {0.05 * k:.2f} s: {wanted} wanted, {reported} reported"
+    for k in range(4000, 4080):
+        stall.command(Twist(0.3, 0.0), 0.05 * k)
+        stall.observe(STILL, 0.05 * (k + 1))
+    assert stalled(stall)
+
+
+def replace_limits(config: RobotConfig, acceleration: float, turn_acceleration: float) -> RobotConfig:
+    limits = {"acceleration_max_m_s2": acceleration, "turn_acceleration_max_rad_s2": turn_acceleration}
+    return config.model_copy(update={"body": config.body.model_copy(update=limits)})
