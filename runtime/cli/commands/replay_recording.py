@@ -250,6 +250,7 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
 
     settings, console = recording.settings, EscapingConsole(stderr=True)
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
+    say = console.print if view is None else view.print
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)
     last_run_s: float | None = None
@@ -269,8 +270,7 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
         else:
             gap_s = run_s - last_run_s
             if gap_s > GAP_MAX_S:
-                console.print(f"no cycle for {gap_s:.0f} s before cycle {found.replayed.cycle}: "
-                              f"shown as {GAP_MAX_S:g} s")  # fmt: skip
+                say(f"no cycle for {gap_s:.0f} s before cycle {found.replayed.cycle}: shown as {GAP_MAX_S:g} s")
             due_s += min(max(gap_s, 0.0), GAP_MAX_S) / speed
         last_run_s = run_s
         if due_s > host_s:

@@ -274,8 +274,9 @@ async def run_process(
     reload : callable
         Reads the settings again.
     """
+    from runtime.cli.terminal.keys import keys
     from runtime.cli.terminal.time_keys import TimeKeys
-    from runtime.cli.terminal.view import View, keys
+    from runtime.cli.terminal.view import View
     from runtime.cycle.process import RobotProcess
     from runtime.cycle.reloader import Reloader
     from runtime.support.kernel_loader import KernelLoader

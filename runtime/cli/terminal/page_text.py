@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from decimal import ROUND_HALF_UP, Decimal
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from config.units import FOOT_M
 from drivers.messages import Pose
-from perception.bayes.object_report import worst_sigma
 from perception.detected_object import DetectedObject
-from perception.localization.drift_correction import LocalizedPose
 from runtime.support.length_format import Units
+
+if TYPE_CHECKING:
+    from perception.localization.drift_correction import LocalizedPose
 
 BEHIND_M: Final = 0.1
 """An object in front of a wall may touch it."""
@@ -110,6 +111,8 @@ def twist(v: float, w: float, units: Units) -> str:
 
 def localized_place(here: LocalizedPose, units: Units) -> str:
     """Return the robot's place in the map frame, with the standard errors of its worst direction and its heading."""
+    from perception.bayes.object_report import worst_sigma
+
     said = f"{here.status} {math.floor(100.0 * here.probability + 0.5)} %"
     covariance = here.covariance
     if not math.isfinite(float(covariance.sum())):

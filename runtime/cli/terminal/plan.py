@@ -9,7 +9,7 @@ from typing import Final
 from rich.text import Text
 
 from drivers.messages import Floats, Pose
-from perception.pipeline import DetectedObject
+from perception.detected_object import DetectedObject
 
 ARROWS: Final = "→↗↑↖←↙↓↘"
 CELL_ASPECT: Final = 2.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, MutableMapping
@@ -36,6 +35,7 @@ from runtime.support.kernel_loader import KernelLoader
 from runtime.support.logs import LogStatus
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.cycle_stats import CycleStats
+from tests.runtime.cli.terminal.test_view import EMPTY
 from tests.runtime.virtual_time import VirtualLoop, in_virtual_time
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P10")]
@@ -264,21 +264,19 @@ def test_the_views_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     with (tmp_path / "screen").open("w") as screen:
         view = View(hall(), Console(file=screen, force_terminal=True), "m")
 
-        def fail(_snapshot: object) -> None:
+        def fail() -> bool:
             raise ZeroDivisionError("planted")
 
-        monkeypatch.setattr(view, "picture", fail)
-        interval_s = sys.getswitchinterval()
+        view.is_paused = fail
         with view.shown():
 
             def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:
-                view._slot = object()  # type: ignore[assignment]
-                view._wake.set()
+                view._slot = EMPTY
+                view.draw_again()
                 wait_for_end(view.probe)
 
             run = Watched(plant, monkeypatch)
             summary = run.run(lambda process: process.health.watch("view", view.probe))
-        assert sys.getswitchinterval() == interval_s
     run.assert_stopped_because(summary, "the part `view` of this program has ended (ZeroDivisionError: planted")
 
 

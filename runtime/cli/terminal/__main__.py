@@ -1,0 +1,42 @@
+"""Draw the live view: `python -m runtime.cli.terminal` shows on standard output what standard input asks for.
+
+Standard input takes pickles: a `Scale` first, then a `Snapshot` for each picture, and text for a line above it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import pickle
+import signal
+import sys
+from collections.abc import Iterator
+
+from rich.live import Live
+
+from runtime.cli.terminal.escaping_console import EscapingConsole
+from runtime.cli.terminal.picture import Picture, Scale, Snapshot
+
+
+def received() -> Iterator[Scale | Snapshot | str]:
+    """Yield what the parent process sends, until it closes the pipe or ends."""
+    with contextlib.suppress(EOFError, pickle.UnpicklingError):  # it may end within a message
+        while True:
+            yield pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent process only
+
+
+def main() -> None:
+    """Draw until standard input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent process, too, which ends this one
+    console, picture = EscapingConsole(), None
+    with Live(console=console, auto_refresh=False, screen=False) as live:
+        for message in received():
+            if isinstance(message, Scale):
+                picture = Picture(console, message)
+            elif isinstance(message, Snapshot) and picture is not None:
+                live.update(picture.draw(message), refresh=True)
+            elif isinstance(message, str):
+                live.console.print(message)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Tests of the keys of the terminal."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import pty
+import signal
+import sys
+import termios
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from runtime.cli.terminal.keys import keys
+from runtime.cycle.inputs import Request
+
+
+@pytest.fixture
+def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    master, slave = pty.openpty()
+    with contextlib.ExitStack() as stack:
+        stack.callback(os.close, master)
+        monkeypatch.setattr(sys, "stdin", stack.enter_context(os.fdopen(slave, "r")))
+        yield master
+
+
+async def test_keys_arm_halt_and_quit_and_leave_the_terminal_as_it_was(keyboard: int) -> None:
+    before = termios.tcgetattr(sys.stdin.fileno())
+    asked: list[Request] = []
+    quits = asyncio.Event()
+    with keys(asked.append, quits.set):
+        os.write(keyboard, b"ax h")
+        async with asyncio.timeout(60.0):
+            while len(asked) < 3:  # keys that came together are all taken at once
+                await asyncio.sleep(0.01)
+        os.write(keyboard, b"q")
+        await asyncio.wait_for(quits.wait(), 60.0)
+    assert asked == [Request.ARM, Request.HALT, Request.HALT]
+    assert termios.tcgetattr(sys.stdin.fileno()) == before
+
+
+async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
+    keyboard: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shell sets its own mode of the terminal while the program is stopped."""
+    fd = sys.stdin.fileno()
+    line_mode, is_in_front = termios.tcgetattr(fd), False
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _fd: os.getpgrp() if is_in_front else -1)
+    asked: list[Request] = []
+    with keys(asked.append, lambda: None):
+        termios.tcsetattr(fd, termios.TCSANOW, line_mode)
+        os.kill(os.getpid(), signal.SIGCONT)
+        await asyncio.sleep(0.05)
+        assert termios.tcgetattr(fd)[3] & termios.ICANON
+        is_in_front = True
+        os.kill(os.getpid(), signal.SIGCONT)
+        os.write(keyboard, b" ")
+        async with asyncio.timeout(60.0):
+            while not asked:
+                await asyncio.sleep(0.01)
+    assert asked == [Request.HALT]
+    assert termios.tcgetattr(fd) == line_mode
+
+
+async def test_without_a_terminal_there_are_no_keys(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "in").write_text("qqq")
+    with (tmp_path / "in").open() as file:
+        monkeypatch.setattr(sys, "stdin", file)
+        asked: list[Request] = []
+        with keys(asked.append, lambda: asked.append(Request.HALT)):
+            await asyncio.sleep(0)
+        assert asked == []
