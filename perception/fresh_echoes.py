@@ -5,6 +5,9 @@ removes it. So a reading at maximum range leaves no obstacle, and neighbours do 
 that turns keeps what it heard in other directions. A sensor that reports a fault, or whose reading is not believed,
 has not looked: its last echo ages.
 
+A look whose echo is replaced still counts as a look. Neighbours whose beams just touch fire one after the other:
+while the ring turns, only the looks before close the gap that the turn leaves between their newest ones.
+
 While no sensor hears anything, steady echoes that fall silent as the robot comes nearer stay obstacles, and do not
 age: a ring that has failed hears nothing either, and the robot must not drive at what it heard before. What falls
 silent before a robot that stands has left.
@@ -25,6 +28,11 @@ from perception.sensor_mounts import mounts_at
 
 LOOKS: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
+SAME_MAX: Final = 4
+"""Looks of a sensor in one direction that are kept: the newest ones, which close gaps although a reading of either
+neighbour fails, and the oldest, as the beams of those between lie within its own and the newest."""
+EQUAL_RAD: Final = 1e-6
+"""A look replaces an older one whose direction differs by less, which rounding does."""
 STEADY_M: Final = 0.3
 STEADY_S: Final = 1.5
 """An echo is steady if another look, by the same sensor or another one, put one this near no longer ago than this."""
@@ -57,6 +65,46 @@ def is_steady(points: Floats, times: Floats, heard: NDArray[np.bool_], px: float
 
 
 @kernel
+def angle_between(a: float, b: float) -> float:
+    """Return the angle between two directions, within [0, π], rad."""
+    turned = a - b
+    return abs(turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5))
+
+
+@kernel
+def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, heard: NDArray[np.bool_]) -> int:
+    """Forget the echoes of a sensor that a new look replaces, and return which of its looks is the least use.
+
+    Parameters
+    ----------
+    bearing, same
+        Direction of the new look, and the angle up to which others are in the same one, rad.
+    bearings, times, heard : (looks,)
+        As in `record_echoes`, of this sensor. Updated.
+    """
+    oldest = 0  # of all
+    first = -1  # the oldest in the same direction, and the one after it
+    second = -1
+    in_direction = 0
+    for k in range(times.shape[0]):
+        turned = angle_between(bearing, bearings[k])
+        if times[k] > -math.inf and turned <= same:
+            heard[k] = False
+            if turned <= EQUAL_RAD:
+                times[k] = -math.inf
+            else:
+                in_direction += 1
+                if first < 0 or times[k] < times[first]:
+                    second = first
+                    first = k
+                elif second < 0 or times[k] < times[second]:
+                    second = k
+        if times[k] < times[oldest]:
+            oldest = k
+    return second if in_direction >= SAME_MAX else oldest
+
+
+@kernel
 def record_echoes(
     ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, reach: float,
     points: Floats, bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
@@ -73,7 +121,7 @@ def record_echoes(
     x, y, yaw, t : float
         Place (m) and direction (rad) of the ring, time of the firing (s).
     same : float
-        Angle up to which a new look replaces an older one of the same sensor, rad.
+        Angle up to which a new look replaces the echo of an older one of the same sensor, rad.
     reach : float
         Range up to which the ring listens, m; a reading there is a silence to `lost`.
     points : (n, looks, 2) float
@@ -110,25 +158,20 @@ def record_echoes(
         hears = hears or r < reach
         silences[0] += 1
         agrees = is_echo and is_steady(points, times, heard, px, py, t)
-        oldest = 0
-        for k in range(times.shape[1]):
-            turned = bearing - bearings[i, k]
-            if abs(turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5)) <= same:
-                if r >= reach and heard[i, k] and steady[i, k]:
+        if r >= reach:
+            for k in range(times.shape[1]):
+                if heard[i, k] and steady[i, k] and angle_between(bearing, bearings[i, k]) <= same:
                     came = math.hypot(points[i, k, 0] - last[0], points[i, k, 1] - last[1])
                     if math.hypot(points[i, k, 0] - x, points[i, k, 1] - y) < came - NEARER_M:
                         lost[i, 0], lost[i, 1], is_lost[i] = points[i, k, 0], points[i, k, 1], True
-                times[i, k] = -math.inf
-                heard[i, k] = False
-            if times[i, k] < times[i, oldest]:
-                oldest = k
-        bearings[i, oldest] = bearing
-        times[i, oldest] = t
-        heard[i, oldest] = is_echo
-        steady[i, oldest] = agrees
+        k = forget_look(bearing, same, bearings[i], times[i], heard[i])
+        bearings[i, k] = bearing
+        times[i, k] = t
+        heard[i, k] = is_echo
+        steady[i, k] = agrees
         if is_echo:
-            points[i, oldest, 0] = px
-            points[i, oldest, 1] = py
+            points[i, k, 0] = px
+            points[i, k, 1] = py
     last[0], last[1] = x, y
     if hears:
         is_lost[:] = False

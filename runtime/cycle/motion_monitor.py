@@ -6,8 +6,11 @@ there on it falls by the base's deceleration: the base brakes. What the odometry
 velocity plus `NOISE` is summed up, never below zero, and reported above `EXCESS`. A base that brakes, that is a
 quarter too fast, or whose odometry trembles or leaps once therefore moves as commanded.
 
-**Not at all.** While the odometry has not moved by `MOVED`, commands are summed up; to and fro cancels out. The base
-does not move if they reach `ASKED` and `STALL_S` has passed. Commands below `CRAWL` do not count: wheels may stick.
+**Not at all.** A model of the base follows the commands within the limits of its file. While the odometry has not
+moved by `MOVED`, the model's motion in the direction of the command is summed up. The base does not move if that
+reaches `ASKED` and the command has lasted for `STALL_S`. Velocities below `CRAWL` do not count, as wheels may stick:
+pulses that are too short for the base's acceleration move no base. A command below it, or in the opposite direction,
+starts the sum anew.
 
 A base that moves without a command may be pushed by hand. Odometry cannot tell that from a base that runs away,
 unless the base was commanded to move and has not stood since: then it was never stopped.
@@ -51,11 +54,11 @@ STOOD_S: Final = 0.3
 STALL_S: Final = 1.0
 """Least time in which a base moves, s."""
 ASKED: Final = Amount(0.02, 0.05)
-"""Least commanded motion after which a base has moved."""
+"""Least motion of the model after which a base has moved."""
 MOVED: Final = Amount(0.005, 0.01)
 """Motion of the odometry that counts as such."""
 CRAWL: Final = Amount(0.03, 0.05)
-"""Commanded velocities below which real wheels may stick."""
+"""Velocities below which real wheels may stick."""
 
 
 DIRECTIONS: Final = 4
@@ -112,9 +115,15 @@ class MotionMonitor:
     has_stood: bool = True
     """Whether the base has stood since it was last commanded to move."""
     asked_s: float = 0.0
-    """For how long the base has been commanded to move without having moved, and …"""
+    """For how long the base has been commanded to drive one way without having moved, …"""
     asked: Amount = NOTHING
-    """… by how much."""
+    """… how far the model has moved meanwhile, …"""
+    asked_turn_s: float = 0.0
+    """… and for how long to turn one way, s."""
+    modelled: Twist = STANDSTILL
+    """Velocity of a base that obeys within the limits of its file, and …"""
+    modelled_run_s: float | None = None
+    """… when it had that, by the run's clock; None before the first cycle."""
 
     def observe(self, odometry: Odometry | None, run_s: float, body: BodyConfig) -> MotionMonitor:
         """Return the monitor after the newest odometry.
@@ -132,11 +141,16 @@ class MotionMonitor:
         while len(commands) > 1 and run_s - commands[0].run_s > AGE_S:
             commands = commands[1:]
         last, fine = self.odometry, Movement.AS_COMMANDED
+        modelled, lasted_s = self._model(run_s, body)
+        asked_s, asked_turn_s, asked = self._ask(modelled, lasted_s)
         if odometry is None:
-            return replace(self, movement=fine, commands=commands)
+            seen = replace(self, movement=fine, commands=commands, modelled=modelled, modelled_run_s=run_s)
+            return replace(seen, asked_s=asked_s, asked_turn_s=asked_turn_s, asked=asked)
         if last is None:  # it may be moving by commands of before
             limits = (body.speed_max_m_s,) * 2 + (body.turn_max_rad_s,) * 2
-            return replace(self, commands=commands, odometry=odometry, directions=tuple(map(Direction, limits)))
+            directions = tuple(map(Direction, limits))
+            seen = replace(self, commands=commands, odometry=odometry, directions=directions)
+            return replace(seen, modelled=modelled, modelled_run_s=run_s)
         passed_s, (along, turned) = odometry.robot_s - last.robot_s, _between(last.pose, odometry.pose)
         has_leapt = (
             abs(along) >= GAIN * body.speed_max_m_s * passed_s + LEAP.along
@@ -144,21 +158,27 @@ class MotionMonitor:
         )
         if has_leapt or not 0.0 < passed_s <= GAP_MAX_S:
             seen = replace(self, movement=fine, commands=commands, odometry=odometry)
-            return replace(seen, still=None, still_s=0.0, asked_s=0.0, asked=NOTHING)
+            seen = replace(seen, modelled=modelled, modelled_run_s=run_s)
+            return replace(seen, still=None, still_s=0.0, asked_s=0.0, asked_turn_s=0.0, asked=NOTHING)
         directions, is_excessive = self._explain(commands, along, turned, passed_s, body)
         is_still = self.still is not None and not _reaches(_between(self.still, odometry.pose), MOVED)
         still_s = self.still_s + passed_s if is_still else 0.0
         has_stood = self.has_stood or still_s >= STOOD_S
-        asked_s, asked = self._ask(run_s) if is_still else (0.0, NOTHING)
-        is_stalled = asked_s >= STALL_S and _reaches((asked.along, asked.turned), ASKED)
-        if is_stalled:
-            asked_s, asked = 0.0, NOTHING
+        is_stalled = is_still and (
+            (asked_s >= STALL_S and abs(asked.along) >= ASKED.along)
+            or (asked_turn_s >= STALL_S and abs(asked.turned) >= ASKED.turned)
+        )
+        if is_stalled or not is_still:
+            asked_s, asked_turn_s, asked = 0.0, 0.0, NOTHING
         if is_excessive:
             movement = Movement.UNCOMMANDED if has_stood else Movement.UNSTOPPED
         else:
             movement = Movement.MISSING if is_stalled else fine
         still = self.still if is_still else odometry.pose
-        return MotionMonitor(movement, commands, odometry, directions, still, still_s, has_stood, asked_s, asked)
+        return MotionMonitor(
+            movement, commands, odometry, directions, still, still_s, has_stood, asked_s, asked, asked_turn_s,
+            modelled, run_s,
+        )  # fmt: skip
 
     def command(self, twist: Twist | None, run_s: float) -> MotionMonitor:
         """Return the monitor after a command that reached the base; None commands no velocity: it ends any motion."""
@@ -167,7 +187,8 @@ class MotionMonitor:
         # As `replace` does, in a fifth of its time: this is called in each cycle.
         return MotionMonitor(
             self.movement, (*self.commands, Command(run_s, twist)), self.odometry, self.directions, self.still,
-            self.still_s, has_stood, self.asked_s, self.asked,
+            self.still_s, has_stood, self.asked_s, self.asked, self.asked_turn_s,
+            self.modelled, self.modelled_run_s,
         )  # fmt: skip
 
     def _explain(
@@ -200,15 +221,44 @@ class MotionMonitor:
         )  # fmt: skip
         return tuple(Direction(d.explained) for d in directions) if is_excessive else directions, is_excessive
 
-    def _ask(self, run_s: float) -> tuple[float, Amount]:
-        """Return for how long a base that stands has been commanded to move, and by how much."""
-        command = self.commands[-1] if self.commands else None
-        if command is None or command.twist == STANDSTILL:
-            return 0.0, NOTHING
-        twist, lasted_s = command.twist, run_s - command.run_s
-        along = self.asked.along + (lasted_s * twist.v if abs(twist.v) >= CRAWL.along else 0.0)
-        turned = self.asked.turned + (lasted_s * twist.w if abs(twist.w) >= CRAWL.turned else 0.0)
-        return self.asked_s + lasted_s, Amount(along, turned)
+    def _model(self, run_s: float, body: BodyConfig) -> tuple[Twist, float]:
+        """Return the velocity of a base that obeys within its limits, and how long it has had to reach it, s."""
+        if self.modelled_run_s is None or not self.commands:
+            return self.modelled, 0.0
+        before, target = self.modelled, self.commands[-1].twist
+        lasted_s = min(max(0.0, run_s - self.modelled_run_s), GAP_MAX_S)
+        if before == target:
+            return before, lasted_s
+        v = _approach(before.v, target.v, body.acceleration_max_m_s2 * lasted_s)
+        w = _approach(before.w, target.w, body.turn_acceleration_max_rad_s2 * lasted_s)
+        return Twist(v, w), lasted_s
+
+    def _ask(self, modelled: Twist, lasted_s: float) -> tuple[float, float, Amount]:
+        """Return for how long a base that stands has been commanded to drive and to turn, and the model's motion."""
+        if not self.commands:
+            return 0.0, 0.0, NOTHING
+        now, before = self.commands[-1].twist, self.commands[-2 if len(self.commands) > 1 else -1].twist
+        drive_s = 0.0 if now.v * before.v < 0.0 else self.asked_s
+        turn_s = 0.0 if now.w * before.w < 0.0 else self.asked_turn_s
+        along_s, along = _asked(drive_s, self.asked.along, lasted_s, modelled.v, now.v, CRAWL.along)
+        turn_s, turned = _asked(turn_s, self.asked.turned, lasted_s, modelled.w, now.w, CRAWL.turned)
+        return along_s, turn_s, Amount(along, turned)
+
+
+def _asked(
+    before_s: float, before: float, lasted_s: float, modelled: float, commanded: float, crawl: float
+) -> tuple[float, float]:
+    """Return for how long a motion has been commanded, and how far the model has moved, after `lasted_s` more."""
+    if abs(commanded) < crawl:
+        return 0.0, 0.0
+    if before * commanded < 0.0 or before_s == 0.0:
+        before_s, before = 0.0, 0.0
+    moves = abs(modelled) >= crawl and modelled * commanded > 0.0
+    return before_s + lasted_s, before + (lasted_s * modelled if moves else 0.0)
+
+
+def _approach(before: float, target: float, most: float) -> float:
+    return max(before - most, min(before + most, target))
 
 
 def _direction(

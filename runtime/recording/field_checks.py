@@ -127,8 +127,11 @@ def _motion(what: str, monitor: MotionMonitor) -> None:
         _pose(f"{what}.still", monitor.still)
     _time(f"{what}.still_s", monitor.still_s)
     _time(f"{what}.asked_s", monitor.asked_s)
+    _time(f"{what}.asked_turn_s", monitor.asked_turn_s)
     _bounded(f"{what}.asked.along", monitor.asked.along, PLACE_MAX_M)
     _bounded(f"{what}.asked.turned", monitor.asked.turned, PLACE_MAX_M)
+    _twist(f"{what}.modelled", monitor.modelled)
+    _time(f"{what}.modelled_run_s", monitor.modelled_run_s)
 
 
 def _detour(what: str, detour: Detour) -> None:

@@ -75,9 +75,9 @@ def test_a_ring_that_turns_keeps_what_it_heard_in_other_directions() -> None:
         echoes.update(at(float(k), turn, 1.0))
     bearings, ages, *_ = echoes.looks(4.0, 60.0)
     kept = sorted(zip(ages.tolist(), np.remainder(bearings, 2.0 * math.pi).tolist(), strict=True))
-    assert [age for age, _ in kept] == [0.0, 1.0, 3.0], "a look replaces those within half of a beam's half width"
-    assert [bearing for _, bearing in kept] == pytest.approx([0.4, 0.2, 0.09])
-    assert len(echoes.points(4.0, math.inf)) == 3
+    assert [age for age, _ in kept] == [0.0, 1.0, 3.0, 4.0], "a look replaces those in the very same direction"
+    assert [bearing for _, bearing in kept] == pytest.approx([0.4, 0.2, 0.09, 0.0])
+    assert len(echoes.points(4.0, math.inf)) == 3, "and the echoes within half of a beam's half width"
     echoes.update(at(5.0, 0.05, math.inf))
     assert len(echoes.points(5.0, math.inf)) == 2, "a silence removes the echo that it would have repeated"
 
@@ -88,6 +88,23 @@ def test_where_more_directions_are_heard_than_kept_the_oldest_goes() -> None:
         echoes.update(at(float(k), 0.2 * k, 1.0))
     _, ages, *_ = echoes.looks(LOOKS + 2.0, 60.0)
     assert sorted(ages.tolist()) == list(range(LOOKS))
+
+
+@pytest.mark.parametrize("turn_rad", [1e-5, 1e-3, 0.02, 0.08])
+def test_looks_before_close_the_gaps_between_beams_that_just_touch(turn_rad: float) -> None:
+    """Neighbours fire in turn while the ring turns; one reading in ten fails."""
+    rng = np.random.default_rng(5)
+    half_angle = math.pi / 4
+    echoes = FreshEchoes(np.array([[0.1, 0.0, math.pi / 2 * k] for k in range(4)]), half_angle)
+    for k in range(200):
+        fired = [math.nan] * 4
+        fired[k % 4] = math.nan if rng.random() < 0.1 else math.inf
+        echoes.update(at(0.03 * k, turn_rad * k, *fired))
+        if k < 16:
+            continue
+        bearings, *_ = echoes.looks(0.03 * k, 1.5)
+        off = np.abs(np.remainder(np.linspace(0.0, math.tau, 3000)[:, None] - bearings + math.pi, math.tau) - math.pi)
+        assert (off <= half_angle + 1e-9).any(axis=1).all(), k
 
 
 def test_an_echo_is_steady_where_another_look_agrees() -> None:

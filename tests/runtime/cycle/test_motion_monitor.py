@@ -251,6 +251,74 @@ def test_commands_that_need_not_move_it(command: Callable[[int], Twist]) -> None
     assert base.found == []
 
 
+def random_base(seed: int) -> tuple[Base, random.Random]:
+    """Return a base with limits of its own, which obeys within them, late and not exactly."""
+    rng = random.Random(seed)
+    limits = {
+        "speed_max_m_s": rng.uniform(0.1, 1.5), "turn_max_rad_s": rng.uniform(0.3, 4.0),
+        "acceleration_max_m_s2": 10.0 ** rng.uniform(-1.3, 1.0),
+        "turn_acceleration_max_rad_s2": 10.0 ** rng.uniform(-0.5, 1.3),
+    }  # fmt: skip
+    base = Base(
+        BODY.model_copy(update=limits), rng.choice((0.025, 0.05, 0.1)), rng.uniform(0.0, 0.1),
+        braking=rng.uniform(0.8, 1.2), gain=rng.uniform(0.85, 1.1),
+    )  # fmt: skip
+    return base, rng
+
+
+def command_at_random(base: Base, rng: random.Random, seconds: float) -> None:
+    """Command in every manner: pulses of one cycle, creeping, to and fro, trembling about standstill, full stick."""
+    fastest, turn = base.body.speed_max_m_s, base.body.turn_max_rad_s
+    while base.now_s < seconds:
+        v, w = rng.uniform(-fastest, fastest), rng.uniform(-turn, turn)
+        creep = Twist(rng.choice((0.0, 4e-4, -0.01)), rng.choice((0.0, 1e-3, -0.02)))
+        pattern = rng.choice((
+            (Twist(v, 0.0), STANDSTILL, STANDSTILL), (Twist(v, w), creep, STANDSTILL, creep), (creep,),
+            (Twist(v, w),), (Twist(0.0, w), Twist(0.0, -w)), (Twist(v, 0.0), creep), (HALTED,),
+        ))  # fmt: skip
+        for k in range(rng.choice((3, 20, 80))):
+            base.cycle(pattern[k % len(pattern)], odometry=rng.random() < 0.9)
+
+
+def assert_obedient(seeds: range, seconds: float) -> str:
+    for seed in seeds:
+        base, rng = random_base(seed)
+        command_at_random(base, rng, seconds)
+        missing = [at_s for at_s, movement in base.found if movement is Movement.MISSING]
+        assert missing == [], f"seed {seed}"
+    return f"{len(seeds)} random bases, {len(seeds) * seconds / 3600.0:.2f} h: none is said not to move"
+
+
+def test_no_base_that_obeys_within_its_limits_is_said_not_to_move(measured: Callable[[str], None]) -> None:
+    measured(assert_obedient(range(12), 30.0))
+
+
+@pytest.mark.soak
+def test_no_base_that_obeys_is_said_not_to_move_in_ten_hours(measured: Callable[[str], None]) -> None:
+    measured(assert_obedient(range(100, 220), 300.0))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_any_base_with_blocked_wheels_is_reported(seed: int) -> None:
+    """Once a base with its limits would have moved, and after a second at least."""
+    base, rng = random_base(seed)
+    command_at_random(base, rng, 5.0)
+    base.run(STANDSTILL, 1.0 + base.body.speed_max_m_s / base.body.acceleration_max_m_s2 * 1.3)
+    base.blocked, base.found = True, []
+    base.run(STANDSTILL, 1.0)
+    movement, after_s = base.until_found(Twist(rng.choice((-1.0, 1.0)) * base.body.speed_max_m_s, 0.0), 10.0)
+    assert movement is Movement.MISSING
+    assert STALL_S <= after_s <= STALL_S + 2.1 * base.cycle_s + 0.03 / base.body.acceleration_max_m_s2
+
+
+def test_full_stick_after_a_creep_has_its_own_second() -> None:
+    """A creep of .4 mm/s moves no base by an amount that shows, and says nothing of what follows."""
+    base = Base(blocked=True).run(STANDSTILL, 1.0).run(Twist(4e-4, 0.0), 20.0)
+    movement, after_s = base.until_found(Twist(0.5, 0.0), 3.0)
+    assert movement is Movement.MISSING
+    assert after_s >= STALL_S
+
+
 @pytest.mark.parametrize("gap_s", [0.39, 0.9, 1.5, 5.0])
 def test_odometry_that_is_missing_for_a_while_says_nothing_of_what_lies_between(gap_s: float) -> None:
     base = driving(Base())
