@@ -15,6 +15,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, Final, NamedTuple, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class Bound(NamedTuple):
     """The values that a number may have."""
@@ -90,3 +93,22 @@ def relaxed(bound: Bound | Fields) -> Bound | Fields:
     if isinstance(bound, Bound):
         return bound._replace(nan=True)
     return {name: relaxed(inner) for name, inner in bound.items()}
+
+
+def check_values(name: str, values: NDArray[Any], bound: Bound) -> None:
+    """Check all values of one number.
+
+    Raises
+    ------
+    ValueError
+        A value is out of its bound.
+    """
+    if values.dtype.kind == "b":
+        values = values.view(np.uint8)  # any other byte than 0 and 1 misleads numpy
+    if bound.nan:
+        values = values[~np.isnan(values)]
+    if bound.infinite:
+        values = values[~np.isinf(values)]
+    if values.size and not (values.min() >= bound.low and values.max() <= bound.high):  # also refuses NaN
+        wrong = values.max() if values.min() >= bound.low else values.min()
+        raise ValueError(f"{name} is {wrong}, expected {bound.low:g} to {bound.high:g}")

@@ -12,6 +12,20 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 from perception.kernel import Floats, Ints
 
 
+class ObjectRow(NamedTuple):
+    """An object as it was before an edit."""
+
+    number: int
+    x: float
+    """m, odometry's frame"""
+    y: float
+    theta: float
+    """rad"""
+    confirmed: bool
+    kept: str
+    """What the method keeps of it, as `perception.method.Method.kept` returns it."""
+
+
 @dataclass(frozen=True, slots=True)
 class DeleteSegments:
     """Delete outline segments from the map."""
@@ -62,6 +76,22 @@ class MoveObject:
 
 
 @dataclass(frozen=True, slots=True)
+class WithdrawPlacement:
+    """Take a placed object away as if it had never been placed; readings may find one in its place."""
+
+    object: int
+    kind: Literal["withdraw_placement"] = "withdraw_placement"
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreObjects:
+    """Put objects back as they were before an edit, with their numbers and the readings kept for them."""
+
+    rows: tuple[ObjectRow, ...]
+    kind: Literal["restore_objects"] = "restore_objects"
+
+
+@dataclass(frozen=True, slots=True)
 class RemoveObject:
     """Remove an object; readings taken so far do not bring it back."""
 
@@ -93,6 +123,21 @@ class LiftArea:
 
     area: int
     kind: Literal["lift_area"] = "lift_area"
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreArea:
+    """Put a vacant area back that was lifted, with its number."""
+
+    area: int
+    x: float
+    """m, odometry's frame."""
+    y: float
+    radius: float
+    """m"""
+    object: int
+    """Number of the object that was rejected there, 0 if none was."""
+    kind: Literal["restore_area"] = "restore_area"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,20 +174,27 @@ class PlaceRobot:
     kind: Literal["place_robot"] = "place_robot"
 
 
-MapEdit: TypeAlias = (
+MemoryEdit: TypeAlias = (
     DeleteSegments
     | PinSegments
     | RestoreSegments
     | PlaceModel
+    | WithdrawPlacement
     | MoveObject
     | RemoveObject
     | ConfirmObject
     | WithdrawConfirmation
     | ClearMap
 )
+"""An edit of what a method has recognised, by its plain numbers."""
+
+MapEdit: TypeAlias = MemoryEdit | RestoreObjects
 """An edit of what a method has recognised."""
 
-Edit: TypeAlias = MapEdit | RejectObject | MarkVacant | LiftArea | PlaceRobot
+AreaEdit: TypeAlias = RejectObject | MarkVacant | LiftArea | RestoreArea
+"""An edit of the vacant areas."""
+
+Edit: TypeAlias = MapEdit | AreaEdit | PlaceRobot
 
 NUMBER_MAX: Final = 2**53
 """Numbers of objects and segments are below this: a browser stores them as floats."""
@@ -251,16 +303,30 @@ def invalid_number(edit: MapEdit | RejectObject) -> str | None:
             named: tuple[int, ...] = tuple(numbers)
         case (
             MoveObject(number)
+            | WithdrawPlacement(number)
             | RemoveObject(number)
             | RejectObject(number)
             | ConfirmObject(number)
             | WithdrawConfirmation(number)
         ):
             named = (number,)
+        case RestoreObjects(rows):
+            named = tuple(row.number for row in rows)
         case PlaceModel() | ClearMap() | RestoreSegments():
             return None
     wrong = next((n for n in named if not 0 < n < NUMBER_MAX), None)
     return None if wrong is None else f"invalid number {wrong}: expected an integer above 0 and below 2^53"
+
+
+def invalid_objects(edit: RestoreObjects) -> str | None:
+    """Return why objects cannot be put back, None if each row has a valid number and pose."""
+    poses = (invalid_pose(row.x, row.y, row.theta) for row in edit.rows)
+    return invalid_number(edit) or next((refused for refused in poses if refused is not None), None)
+
+
+def not_restorable(number: int) -> str:
+    """Return the error for an object of which nothing valid was kept."""
+    return f"object {number} cannot be put back: nothing valid was kept of it"
 
 
 def no_such_object(number: int) -> str:

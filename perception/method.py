@@ -81,6 +81,13 @@ class Method(Protocol):
         """Apply an operator's edit; return None, or why it cannot be applied."""
         ...
 
+    def kept(self, number: int) -> str | None:
+        """Return what is kept of an object as text, from which `edits.RestoreObjects` makes it again.
+
+        None if no object has this number, or if nothing but readings makes it, as for a wall.
+        """
+        ...
+
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""
         ...

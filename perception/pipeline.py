@@ -15,10 +15,11 @@ from config.robot import PASSAGE_M, RingConfig
 from config.settings import PerceptionConfig
 from config.world import WorldConfig
 from drivers.messages import Firing, Pose
+from perception.area_edits import edit_areas, rejected
 from perception.bounds import CONSTANT, bounds
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
-    COORDINATE_MAX_M,
+    ConfirmObject,
     Edit,
     Evidence,
     LiftArea,
@@ -27,12 +28,16 @@ from perception.edits import (
     PlaceModel,
     PlaceRobot,
     RejectObject,
+    RemoveObject,
+    RestoreArea,
+    RestoreObjects,
     RestoreSegments,
     Segments,
+    WithdrawConfirmation,
     invalid_number,
+    invalid_objects,
     invalid_pose,
     invalid_rows,
-    no_such_object,
 )
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
@@ -50,7 +55,7 @@ from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
-from perception.vacant_areas import VacantArea, VacantAreas, invalid_area, radius_of
+from perception.vacant_areas import VacantArea, VacantAreas
 
 __all__ = ["DetectedObject", "Perception"]
 
@@ -247,13 +252,18 @@ class Perception:
         """
         if isinstance(edit, PlaceRobot):
             return place_robot(self.known_room, edit)
-        if isinstance(edit, RejectObject | MarkVacant | LiftArea):
-            return self._edit_areas(edit)
+        if isinstance(edit, RejectObject | MarkVacant | LiftArea | RestoreArea):
+            placed = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
+            return edit_areas(self.vacant, placed, self._known, self._models)
         refused = invalid_number(edit)
+        if isinstance(edit, ConfirmObject | WithdrawConfirmation | RemoveObject):
+            refused = refused or rejected(self.vacant, edit.object, self._known())
         if isinstance(edit, PlaceModel | MoveObject):
             refused = refused or invalid_pose(edit.x, edit.y, edit.theta)
         if isinstance(edit, RestoreSegments):
             refused = invalid_rows(edit)
+        if isinstance(edit, RestoreObjects):
+            refused = invalid_objects(edit)
         if refused is not None:
             return refused
         inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
@@ -264,20 +274,13 @@ class Perception:
             self.vacant.lift_at(inside.x, inside.y)
         return refused
 
-    def _edit_areas(self, edit: RejectObject | MarkVacant | LiftArea) -> str | None:
-        if isinstance(edit, LiftArea):
-            return None if self.vacant.lift(edit.area) else f"no vacant area {edit.area}: look at the list again"
-        if isinstance(edit, MarkVacant):
-            refused = invalid_area(edit.x, edit.y, edit.radius, COORDINATE_MAX_M)
-            inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
-            return refused or self.vacant.mark(inside.x, inside.y, inside.radius)
-        known = (*self.method.labelled_objects(), *self.method.archived_objects())
-        found = next((o for o in known if o.number == edit.object and not self.vacant.hides(o)), None)
-        if found is None:
-            return invalid_number(edit) or no_such_object(edit.object)
-        model = next((m for m in self._models if m.name == found.model), None)
-        reach_m = 0.0 if model is None else max(math.hypot(x, y) for x, y in model.vertices_m)
-        return self.vacant.mark(found.x, found.y, radius_of(reach_m), edit.object)
+    def _known(self) -> tuple[DetectedObject, ...]:
+        """Return all objects in the method's frame, those that a vacant area hides included."""
+        return (*self.method.labelled_objects(), *self.method.archived_objects())
+
+    def known_objects(self) -> tuple[DetectedObject, ...]:
+        """Return all objects in odometry's frame, those that a vacant area hides included."""
+        return self._in_odometry(self._known())
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""

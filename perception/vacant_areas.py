@@ -20,6 +20,7 @@ RADIUS_MIN_M: Final = 0.3
 """Least radius of an area around a rejected object: another fit of the same readings lies a decimetre beside it."""
 RADIUS_MAX_M: Final = 10.0
 NO_OBJECT: Final = 0
+NO_ROOM: Final = f"{AREAS_MAX} areas are marked as vacant, the most there is room for: lift one first"
 
 AREA: Final = np.dtype(
     [("x", np.float64), ("y", np.float64), ("radius", np.float64), ("number", np.int64), ("object", np.int64)]
@@ -38,6 +39,8 @@ class VacantArea(NamedTuple):
     """m"""
     radius: float
     """m"""
+    object: int = NO_OBJECT
+    """Number of the object that was rejected there, or `NO_OBJECT`."""
 
 
 class VacantAreas:
@@ -75,11 +78,22 @@ class VacantAreas:
             Number of the object that was rejected: it stays hidden although its place is refined.
         """
         if self.count == AREAS_MAX:
-            return f"{AREAS_MAX} areas are marked as vacant, the most there is room for: lift one first"
+            return NO_ROOM
         self.last += 1
         self.rows[self.count] = (x, y, radius, self.last, detected)
         self.count += 1
         self.drop_caches()
+        return None
+
+    def restore(self, area: VacantArea) -> str | None:
+        """Put back an area that was lifted; return None, or why that is impossible."""
+        if not 0 < area.number <= self.last or area.number in self.rows["number"][: self.count]:
+            return f"area {area.number} was not lifted"
+        if self.count == AREAS_MAX:
+            return NO_ROOM
+        self.rows[self.count] = (area.x, area.y, area.radius, area.number, area.object)
+        self.count += 1
+        self._keep(np.argsort(self.rows["number"][: self.count]))
         return None
 
     def lift(self, number: int) -> bool:
@@ -94,7 +108,8 @@ class VacantAreas:
 
     def listed(self) -> tuple[VacantArea, ...]:
         """Return the areas, oldest first."""
-        return tuple(VacantArea(number, x, y, radius) for x, y, radius, number, _ in self.rows[: self.count].tolist())
+        rows = self.rows[: self.count].tolist()
+        return tuple(VacantArea(number, x, y, radius, rejected) for x, y, radius, number, rejected in rows)
 
     def containing(self, x: float, y: float) -> tuple[VacantArea, ...]:
         """Return the areas that contain a place, m."""

@@ -20,6 +20,7 @@ from perception.bayes.echo_sources import locate_echoes
 from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.evidence import evidence_of
 from perception.bayes.job_records import NO_JOB, REFINEMENT
+from perception.bayes.kept_tracks import kept_track, restore_track
 from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
 from perception.bayes.map_edits import edit_memory, row_of
 from perception.bayes.naming import Reported, report_circles, sure_polygons
@@ -51,14 +52,18 @@ from perception.edits import (
     Evidence,
     MapEdit,
     MoveObject,
+    ObjectRow,
     PlaceModel,
     RemoveObject,
+    RestoreObjects,
     Segments,
     WithdrawConfirmation,
+    WithdrawPlacement,
 )
 from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array, mounts_at
+from perception.snapshot import bounds_of
 
 
 def _polygon_model(owner: BayesPerception) -> Bound:
@@ -261,7 +266,16 @@ class BayesPerception:
         """Apply a user's edit; return None, or the reason why it cannot be done."""
         self._objects = self._archived = self._archived_labels = None
         match edit:
-            case MoveObject(number) | ConfirmObject(number) | WithdrawConfirmation(number) | RemoveObject(number):
+            case RestoreObjects(rows):
+                refusals = [self._restore(row) for row in rows]
+                return next((refused for refused in refusals if refused is not None), None)
+            case (
+                MoveObject(number)
+                | ConfirmObject(number)
+                | WithdrawConfirmation(number)
+                | WithdrawPlacement(number)
+                | RemoveObject(number)
+            ):
                 self._archive.take_up(self.memory, self.settings, self._sure_polygon, number)
             case PlaceModel(name) if name in {*self._round, *self._outlines}:
                 self._archive.make_room(self.memory, self.settings, self._sure_polygon)
@@ -270,6 +284,18 @@ class BayesPerception:
         refused = edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
         count_again(self.memory)
         return refused
+
+    def _restore(self, row: ObjectRow) -> str | None:
+        self._archive.take_up(self.memory, self.settings, self._sure_polygon, row.number)
+        if row_of(self.memory, row.number) is None:
+            self._archive.make_room(self.memory, self.settings, self._sure_polygon)
+        return restore_track(self.memory, row, bounds_of(self))
+
+    def kept(self, number: int) -> str | None:
+        """Return an object's track as text; None for an unknown number."""
+        with self._archive.borrowed(self.memory, self.settings, number):
+            row = row_of(self.memory, number)
+            return None if row is None else kept_track(self.memory, row)
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence of each reading kept for an object; None for an unknown number."""

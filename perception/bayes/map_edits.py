@@ -22,13 +22,14 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
-    MapEdit,
+    MemoryEdit,
     MoveObject,
     PinSegments,
     PlaceModel,
     RemoveObject,
     RestoreSegments,
     WithdrawConfirmation,
+    WithdrawPlacement,
     no_such_object,
     no_such_segments,
 )
@@ -42,7 +43,7 @@ def row_of(memory: Memory, number: int) -> int | None:
 
 
 def edit_memory(
-    memory: Memory, p: SettingsRecord, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: MapEdit
+    memory: Memory, p: SettingsRecord, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: MemoryEdit
 ) -> str | None:
     """Apply a user's edit; return None, or the reason why it cannot be done.
 
@@ -52,7 +53,7 @@ def edit_memory(
         Memory, updated, and settings.
     rounds, outlines : sequence of str
         Names of the round models and of the polygons, in the order of their numbers.
-    edit : MapEdit
+    edit : MemoryEdit
         The edit.
     """
     match edit:
@@ -87,6 +88,11 @@ def edit_memory(
             (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] &= ~CONFIRMED
         case RemoveObject():
             _reject(memory, p, row)
+        case WithdrawPlacement():
+            if t >= 0:
+                leave_job(memory.s, t)
+            for field in ("status", "marks"):
+                (memory.circles if t < 0 else memory.polygons)[field][row if t < 0 else t] = 0
     return None
 
 

@@ -19,14 +19,25 @@ from config.robot import RingConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.object_report import worst_sigma
 from perception.detected_object import DetectedObject
-from perception.edits import Evidence, MapEdit, MarkVacant, MoveObject, PlaceModel, RestoreSegments
+from perception.edits import (
+    AreaEdit,
+    Evidence,
+    MapEdit,
+    MarkVacant,
+    MoveObject,
+    ObjectRow,
+    PlaceModel,
+    RestoreArea,
+    RestoreObjects,
+    RestoreSegments,
+)
 from perception.kernel import Floats
 from perception.localization.drift_correction import DriftCorrection, LandmarkPlace, LocalizedPose, SeenObject
 from perception.vacant_areas import VacantArea
 
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
-AnyEdit = TypeVar("AnyEdit", bound=MapEdit | MarkVacant)
+AnyEdit = TypeVar("AnyEdit", bound=MapEdit | AreaEdit)
 
 
 class MapFrame:
@@ -150,7 +161,9 @@ class MapFrame:
         to = self.drift.odometry_from_filter().inverse()
         if isinstance(edit, RestoreSegments):
             return replace(edit, rows=tuple(_turned_row(to, row) for row in edit.rows))
-        if isinstance(edit, MarkVacant):
+        if isinstance(edit, RestoreObjects):
+            return replace(edit, rows=tuple(_placed_row(to, row) for row in edit.rows))
+        if isinstance(edit, MarkVacant | RestoreArea):
             centre = to.compose(Pose(edit.x, edit.y, 0.0))
             return replace(edit, x=centre.x, y=centre.y)
         if not isinstance(edit, PlaceModel | MoveObject):
@@ -174,6 +187,12 @@ def _turned_row(to: Pose, row: SegmentRow) -> SegmentRow:
     number, x1, y1, x2, y2, normal, time_s, pinned = row
     a, b = to.compose(Pose(x1, y1, normal)), to.compose(Pose(x2, y2, normal))
     return number, a.x, a.y, b.x, b.y, a.theta, time_s, pinned
+
+
+def _placed_row(to: Pose, row: ObjectRow) -> ObjectRow:
+    """Return an object's row in another frame, in which the present origin lies at `to`."""
+    at = to.compose(Pose(row.x, row.y, row.theta))
+    return row._replace(x=at.x, y=at.y, theta=at.theta)
 
 
 def _placed(seen: DetectedObject, place: LandmarkPlace | None) -> DetectedObject:

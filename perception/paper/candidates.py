@@ -211,6 +211,23 @@ class Candidates:
         """Give a candidate a new number: another object has taken over its own."""
         self.rows["number"][j, m] = self._numbers.next()
 
+    def restore(self, number: int, m: int, pose: tuple[float, float, float]) -> bool:
+        """Give the candidate nearest to a pose (m, rad) that pose and a number; return whether there is one.
+
+        Parameters
+        ----------
+        number, m
+            The object's number and the index of its model.
+        pose : (float, float, float)
+            Where it had come to rest.
+        """
+        used = np.flatnonzero(self.rows["number"][: self._count, m] > 0)
+        if not len(used):
+            return False
+        off = np.hypot(*(self.rows["pose"][used, m, :2] - pose[:2]).T)
+        self.rows[used[off.argmin()], m] = (pose, 0, 1, number)
+        return True
+
     def clear(self) -> None:
         """Remove every candidate."""
         self._count = 0

@@ -26,14 +26,18 @@ from perception.edits import (
     Line,
     MapEdit,
     MoveObject,
+    ObjectRow,
     PinSegments,
     PlaceModel,
     RemoveObject,
+    RestoreObjects,
     RestoreSegments,
     Segments,
     WithdrawConfirmation,
+    WithdrawPlacement,
     no_such_object,
     no_such_segments,
+    not_restorable,
 )
 from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
@@ -45,6 +49,10 @@ from perception.paper.parameters import PLACEMENTS_MAX
 from perception.paper.recognition import goodness_of_fit
 from perception.paper.segments import SegmentExtractor
 from perception.sensor_mounts import mounts_array
+
+PLACEMENT: Final = "placement"
+CANDIDATE: Final = "candidate"
+"""What an object is, as text that is kept of it."""
 
 
 class PaperPerception:
@@ -218,11 +226,43 @@ class PaperPerception:
                 return self._make_placement(number, None, confirmed=False)
             case RemoveObject(number):
                 return self._reject(number)
+            case WithdrawPlacement(number):
+                k = self.placements.find(number)
+                if k is None:
+                    return no_such_object(number)
+                self.placements.remove(k)
+                return None
+            case RestoreObjects(rows):
+                refusals = [self._restore(row) for row in rows]
+                return next((refused for refused in refusals if refused is not None), None)
             case ClearMap():
                 self.reset()
                 return None
         self._follow_map()
         return no_such_segments(missing) if missing else None
+
+    def kept(self, number: int) -> str | None:
+        """Return whether an object is a placement or a candidate, and its model; None for an unknown number."""
+        k = self.placements.find(number)
+        if k is not None:
+            return f"{PLACEMENT}:{self.placements.rows['model'][k]}"
+        found = self.candidates.find(number)
+        return None if found is None else f"{CANDIDATE}:{found[1]}"
+
+    def _restore(self, row: ObjectRow) -> str | None:
+        """Make an object again what it was, where it was."""
+        kind, _, model = row.kept.partition(":")
+        m = int(model) if model.isdecimal() and len(model) < 5 else len(self._models)
+        if kind not in {PLACEMENT, CANDIDATE} or m >= len(self._models) or row.number > self._numbers.last:
+            return not_restorable(row.number)
+        pose = (row.x, row.y, row.theta)
+        if kind == PLACEMENT:
+            return self._put(row.number, m, pose, confirmed=row.confirmed)
+        k = self.placements.find(row.number)
+        if k is not None:
+            self.placements.remove(k)
+        is_back = self.candidates.restore(row.number, m, pose)
+        return None if is_back else f"no segments are left on which object {row.number} was recognised"
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the segments around an object and which of them lie on it, None if no object has this number."""

@@ -154,7 +154,8 @@ class Console:
                 self._commands.history.clear()
             if record.inputs.edits:
                 refused = {one.edit: one.why for one in record.refused}
-                self.dispatcher.edits_done([refused.get(k) for k in range(len(record.inputs.edits))])
+                undos = state.undos or ((),) * len(record.inputs.edits)
+                self.dispatcher.edits_done([(refused.get(k), undo) for k, undo in enumerate(undos)])
             if self._publisher.is_first_cycle and self.hub.clients:
                 self.hub.begin_session(self._session())  # now the robot's name is known
             self._publisher.take(record, state, stats, driver)
@@ -276,6 +277,7 @@ class Console:
         before, self._shown = self._shown, _in_session(settings)
         self._publisher.adopt(settings)
         if self._shown != before:
+            self._commands.history.clear()  # what was kept of objects refers to the models there were
             self.hub.begin_session(self._session())
         else:
             self.hub.broadcast({"type": "parameters", "parameters": parameters(settings)})

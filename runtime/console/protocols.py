@@ -35,8 +35,8 @@ class Robot(Protocol):
     def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = ..., /) -> None:
         """Pass a drive request to the next cycle, which drops it if it is not valid any more; the newest counts."""
 
-    def edit(self, edit: Edit) -> bool:
-        """Pass an edit of the map to the next cycle; return False if too many are queued."""
+    def edit(self, *edits: Edit) -> bool:
+        """Pass edits of the map to the next cycles; return False, and pass none, if too many are queued."""
 
     def evidence(self, number: int) -> Evidence | None:
         """Return what supports and opposes an object, None if there is no such object."""

@@ -80,6 +80,10 @@ class NoMethod:
         """Return why no edit is possible."""
         return REFUSED
 
+    def kept(self, _number: int) -> str | None:
+        """Return None: there are no objects."""
+        return None
+
     def evidence(self, number: int) -> Evidence | None:  # noqa: ARG002
         """Return None: there are no objects."""
         return None

@@ -164,11 +164,11 @@ class RobotProcess:
         """Pass a drive request to the next cycle, which drops it if `is_valid` is False; a later one replaces it."""
         self._drive_inputs.put(drive_request, is_valid)
 
-    def edit(self, edit: Edit) -> bool:
-        """Pass an edit of the map to the next cycle; return False where too many wait already."""
-        if len(self._edits) >= EDITS_MAX:
+    def edit(self, *edits: Edit) -> bool:
+        """Pass edits of the map to the next cycles; return False, and pass none, where too many wait already."""
+        if len(self._edits) + len(edits) > EDITS_MAX:
             return False
-        self._edits.append(edit)
+        self._edits.extend(edits)
         return True
 
     def evidence(self, number: int) -> Evidence | None:

@@ -23,6 +23,7 @@ from drivers.messages import Flags, Odometry, Pose, Twist
 from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
+from perception.undo import Undo, edit_with_undo
 from runtime.cycle.clock_monitor import ClockMonitor
 from runtime.cycle.drive_requests import (
     NO_MAP,
@@ -65,7 +66,6 @@ __all__ = [
     "apply_settings",
     "step",
 ]
-
 
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
@@ -135,6 +135,8 @@ class State:
     """Why the readings of the newest firings cannot be true; None if they can. Made anew each cycle, not recorded."""
     percept: Percept | None = None
     """What the last cycle decided on; None if it did not drive. It is made anew each cycle and not recorded."""
+    undos: tuple[Undo, ...] = ()
+    """What takes each of the last cycle's edits back. Made anew each cycle and not recorded."""
     step_settings: StepSettings | None = None
     """Of the mission's step; None without one. They follow from mission and settings and are not recorded."""
 
@@ -376,12 +378,10 @@ def _slowed(twist: Twist) -> Twist:
 
 def _edit(state: State, inputs: Inputs, problem: str | None) -> tuple[Refused, ...]:
     """Apply the operator's edits of the map; return what was refused, the drive request included."""
-    refused = [] if problem is None else [Refused(None, problem)]
-    for i, edit in enumerate(inputs.edits):
-        problem = state.perception.edit(edit)
-        if problem is not None:
-            refused.append(Refused(i, problem))
-    return tuple(refused)
+    outcomes = [edit_with_undo(edit, state.perception) for edit in inputs.edits]
+    state.undos = tuple(undo for _, undo in outcomes)
+    refused = (Refused(i, why) for i, (why, _) in enumerate(outcomes) if why is not None)
+    return (*(() if problem is None else (Refused(None, problem),)), *refused)
 
 
 def _refine(state: State, settings: Settings, may_refine: Callable[[int], bool]) -> tuple[int, int, StopCause]:

@@ -193,7 +193,9 @@ class ObjectList(TimedPayload):
 
 
 _HINTS: Final = get_type_hints(State)
-_CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in {"perception", "percept", "step_settings"})
+_CARRIED: Final = tuple(
+    f.name for f in fields(State) if f.name not in {"perception", "percept", "step_settings", "undos"}
+)
 _ADDED: Final = MappingProxyType(
     {
         "motion_monitor": MotionMonitor(),

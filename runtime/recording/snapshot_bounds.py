@@ -6,11 +6,10 @@ The bounds stand beside the numbers, in perception; see `perception.bounds`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from perception.bounds import Bound
+from perception.bounds import Bound, check_values
 from perception.snapshot import Snapshot, is_scratch, numbers_of
 
 
@@ -41,17 +40,4 @@ def check_snapshot(snapshot: Snapshot, fresh: Snapshot, bounds: Mapping[str, Bou
             if not np.allclose(values, at_start, rtol=1e-9, atol=1e-9):
                 raise ValueError(f"{name} is not what the settings give")
         else:
-            _check(name, values, bound)
-
-
-def _check(name: str, values: np.ndarray[Any, Any], bound: Bound) -> None:
-    """Check the values of one number."""
-    if values.dtype.kind == "b":
-        values = values.view(np.uint8)  # any other byte than 0 and 1 misleads numpy
-    if bound.nan:
-        values = values[~np.isnan(values)]
-    if bound.infinite:
-        values = values[~np.isinf(values)]
-    if values.size and not (values.min() >= bound.low and values.max() <= bound.high):  # also refuses NaN
-        wrong = values.max() if values.min() >= bound.low else values.min()
-        raise ValueError(f"{name} is {wrong}, expected {bound.low:g} to {bound.high:g}")
+            check_values(name, values, bound)

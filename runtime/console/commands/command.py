@@ -12,7 +12,7 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 from perception.edits import Edit
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
-from runtime.console.commands.edit_history import EditHistory, Undo
+from runtime.console.commands.edit_history import EditHistory
 from runtime.console.commands.tuning import Tuning
 from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run
 from runtime.timing.time_control import TimeControl
@@ -41,8 +41,8 @@ class PendingEdit(NamedTuple):
     """None for the first edits of an undo: its last one is answered."""
     data: object = None
     """Of the answer."""
-    undo: Callable[[], Undo] | None = None
-    """Returns, once it is done, what takes it back; None where the edit is an undo itself."""
+    is_undo: bool = False
+    """Whether it takes another one back, so that it cannot be undone itself."""
 
 
 @dataclass(slots=True)

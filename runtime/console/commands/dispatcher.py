@@ -7,6 +7,7 @@ from inspect import iscoroutinefunction
 from typing import Any, Final, Protocol
 
 from behaviors.teleoperation import TELEOPERATION_ENDED
+from perception.undo import Undo
 from runtime.console.clients.client import Client
 from runtime.console.commands.command import ANSWERED_LATER, Call, Command, CommandContext, Permission
 from runtime.console.commands.command_error import CommandError
@@ -61,23 +62,24 @@ class CommandDispatcher:
             if data is not ANSWERED_LATER:
                 _answer(client, message.id, data)
 
-    def edits_done(self, outcomes: Sequence[str | None]) -> None:
+    def edits_done(self, outcomes: Sequence[tuple[str | None, Undo]]) -> None:
         """Answer the edits that a cycle carried out.
 
         Parameters
         ----------
-        outcomes : sequence of str or None
-            For each edit, in the order in which they were queued: why it failed, None if it is done.
+        outcomes : sequence of (str or None, Undo)
+            For each edit, in the order in which they were queued: why it failed, None if it is done; and what takes
+            back what was done of it.
         """
-        for reason in outcomes:
+        for reason, undo in outcomes:
             if not self._context.pending_edits:
                 return
             done = self._context.pending_edits.popleft()
+            if not done.is_undo:
+                self._context.history.add(done.edit, undo)
             if reason is not None:
                 self._refuse(done.client, done.id, CommandError(reason))
                 continue
-            if done.undo is not None:
-                self._context.history.add(done.edit, done.undo())
             if done.id is not None:
                 _answer(done.client, done.id, done.data)
 

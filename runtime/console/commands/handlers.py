@@ -22,7 +22,6 @@ from config.route import mission_text, route_config, waypoints_of
 from perception.edits import Edit
 from runtime.console.commands.command import ANSWERED_LATER, Call, CommandContext, PendingEdit
 from runtime.console.commands.command_error import CommandError
-from runtime.console.commands.edit_history import prepare_undo
 from runtime.console.commands.messages import (
     GetEvidence,
     GrantControl,
@@ -224,8 +223,7 @@ def edit(call: Call, edit: Edit) -> object:
     CommandError
         Too many edits are queued.
     """
-    undo = prepare_undo(edit, call.context.robot.state.perception)
-    _queue(call, edit, PendingEdit(edit, call.client, call.id, undo=undo))
+    _queue(call, PendingEdit(edit, call.client, call.id))
     return ANSWERED_LATER
 
 
@@ -235,22 +233,24 @@ def undo_edit(call: Call, _: NoArguments) -> object:
     Raises
     ------
     CommandError
-        There is none, or too many edits are queued.
+        There is none, a newer edit waits for the next cycle, or too many edits are queued.
     """
-    newest = call.context.history.take()
-    if newest is None:
+    history = call.context.history
+    if any(not pending.is_undo for pending in call.context.pending_edits):
+        raise CommandError("an edit waits for the next cycle: undo it once it is done; resume or step a paused run")
+    if history.newest is None:
         raise CommandError("there is no edit of the map to undo")
-    edited, undo = newest
-    for edit in undo[:-1]:
-        _queue(call, edit, PendingEdit(edit, call.client, None))
-    _queue(call, undo[-1], PendingEdit(undo[-1], call.client, call.id, edited.kind))
+    edited, undo = history.newest
+    first = (PendingEdit(edit, call.client, None, is_undo=True) for edit in undo[:-1])
+    _queue(call, *first, PendingEdit(undo[-1], call.client, call.id, edited.kind, is_undo=True))
+    history.drop_newest()
     return ANSWERED_LATER
 
 
-def _queue(call: Call, edit: Edit, pending: PendingEdit) -> None:
-    if not call.context.robot.edit(edit):
+def _queue(call: Call, *pending: PendingEdit) -> None:
+    if not call.context.robot.edit(*(one.edit for one in pending)):
         raise CommandError("too many edits are waiting for the next cycle: try again")
-    call.context.pending_edits.append(pending)
+    call.context.pending_edits.extend(pending)
 
 
 def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
-    MapEdit,
+    MemoryEdit,
     MoveObject,
     PinSegments,
     PlaceModel,
@@ -37,7 +37,7 @@ from tests.perception.bayes.tracks import (
 )
 
 
-def edit(memory: Memory, change: MapEdit, pins: Pins | None = None) -> str | None:
+def edit(memory: Memory, change: MemoryEdit, pins: Pins | None = None) -> str | None:
     """Apply an edit with the drum and the box as models."""
     settings = box_readings.P
     return edit_memory(memory, settings, pins or Pins(), ["semicircle"], ["box"], change)
@@ -86,7 +86,7 @@ def test_a_rejection_keeps_the_evidence_within_bounds(evidence_nat: float, kept_
 
 def test_what_cannot_be_edited_is_refused_with_a_reason() -> None:
     memory = new_memory()
-    refused: dict[str, MapEdit] = {
+    refused: dict[str, MemoryEdit] = {
         "no model is called keg": PlaceModel("keg", 0.0, 0.0, 0.0),
         "7": RemoveObject(7),
         "9": DeleteSegments((9,)),

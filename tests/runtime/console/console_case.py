@@ -79,10 +79,10 @@ class StubRun:
         self.asked.append(drive_request)
         self.validity.append(is_valid)
 
-    def edit(self, edit: Edit) -> bool:
+    def edit(self, *edits: Edit) -> bool:
         if self.edits_max == 0:
             return False
-        self.asked.append(edit)
+        self.asked.extend(edits)
         return True
 
     def evidence(self, number: int) -> Evidence | None:

@@ -59,17 +59,20 @@ class Operator:
         elif cycle == 170:
             yield PlaceModel("drum", 0.4, 0.1, 0.5)
             yield PlaceModel("box", -0.4, 0.2, 0.5)
+        elif cycle in {171, 241, 341}:
+            yield from state.undos[-1]
         elif cycle in {240, 320} and objects:
             first = objects[0]
             yield MoveObject(first.number or 0, first.x + 0.05, first.y - 0.05, first.theta + 0.1)
             yield ConfirmObject(objects[-1].number or 0)
+            yield MoveObject(first.number or 0, first.x - 0.05, first.y, first.theta)
         elif cycle == 330 and len(objects) > 1:
             yield RejectObject(objects[1].number or 0)
             yield PinSegments(tuple(numbers[:2]), pinned=False)
             yield RejectObject(999_999)
         elif cycle == 340 and seen.vacant_areas():
-            yield LiftArea(seen.vacant_areas()[0].number)
             yield MarkVacant(3.0, 0.0, 0.5)
+            yield LiftArea(seen.vacant_areas()[0].number)
         elif cycle == 345:
             listed = zip(numbers[:4], seen.segments().geometry[:4].tolist(), strict=True)
             yield RestoreSegments(tuple((float(n), *ends, 1.0, 0.0) for n, ends in listed))
@@ -91,6 +94,7 @@ def record_edited(path: Path, method: str) -> None:
     assert status.dropped == 0
     kinds = (
         "delete_segments pin_segments restore_segments place_model move_object remove_object reject_object "
-        "mark_vacant lift_area confirm_object withdraw_confirmation clear_map"
+        "mark_vacant lift_area restore_area confirm_object withdraw_confirmation withdraw_placement restore_objects "
+        "clear_map"
     )
     assert set(person.done) == set(kinds.split()), "every kind of edit was tried"

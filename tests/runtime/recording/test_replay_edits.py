@@ -23,8 +23,11 @@ from perception.edits import (
     PlaceModel,
     RejectObject,
     RemoveObject,
+    RestoreArea,
+    RestoreObjects,
     RestoreSegments,
     WithdrawConfirmation,
+    WithdrawPlacement,
 )
 from runtime.cli.app import run_command
 from runtime.cycle.modes import Mode
@@ -64,7 +67,7 @@ def test_the_record_holds_what_was_done_and_what_was_refused(edited: Path) -> No
     done = {type(edit) for r, i, edit in asked if (r.cycle, i) not in refused}
     assert done == {
         DeleteSegments, PinSegments, RestoreSegments, PlaceModel, MoveObject, RemoveObject, RejectObject, MarkVacant,
-        LiftArea, ConfirmObject, WithdrawConfirmation, ClearMap,
+        LiftArea, RestoreArea, ConfirmObject, WithdrawConfirmation, WithdrawPlacement, RestoreObjects, ClearMap,
     }  # fmt: skip
     assert "no object 999999" in refused[330, 2]
     assert "invalid goal" in refused[460, None]

@@ -1,105 +1,36 @@
-"""Undo of map edits: each edit is taken back by ordinary edits, and the map is as before."""
+"""The history of edits, and undo as a page asks for it."""
 
 from __future__ import annotations
 
-from typing import Any
+from perception.edits import ConfirmObject, DeleteSegments, Edit, LiftArea, MarkVacant, MoveObject, RestoreArea
+from perception.undo import edit_with_undo
+from runtime.console.commands.edit_history import KEPT, EditHistory
+from tests.runtime.console.console_case import ConsoleCase, open_console
 
-import numpy as np
-import pytest
-
-from perception.edits import (
-    ClearMap,
-    ConfirmObject,
-    DeleteSegments,
-    Edit,
-    LiftArea,
-    MarkVacant,
-    MoveObject,
-    PinSegments,
-    PlaceModel,
-    PlaceRobot,
-    RejectObject,
-)
-from perception.paper.paper_method import PaperPerception
-from perception.pipeline import Perception
-from runtime.console.commands.edit_history import KEPT, EditHistory, prepare_undo
-from tests.perception.edited import fresh, number_of
-from tests.runtime.console.console_case import open_console
-
-PLACED = 3
-"""Number of the placed object: the segments' cluster took two before it."""
 AREA = MarkVacant(4.0, 4.0, 0.5)
+BACK = RestoreArea(1, 4.0, 4.0, 0.5, 0)
 
 
-@pytest.fixture
-def seen() -> Perception:
-    """A map of twelve segments, two of them pinned, with a placed object and a vacant area."""
-    perception = fresh("paper")
-    assert isinstance(perception.method, PaperPerception)
-    ends = np.array([[0.1 * k, 1.0, 0.1 * k + 0.1, 1.0, np.pi / 2] for k in range(12)])
-    perception.method.outline.add(ends, 3.0)
-    for edit in (PinSegments((2, 3), pinned=True), PlaceModel("drum", 1.0, 1.0, 0.2), AREA):
-        assert perception.edit(edit) is None
-    return perception
-
-
-def state_of(perception: Perception) -> dict[str, Any]:
-    """Return what an operator sees, without the numbers of areas, which are never given twice."""
-    held = perception.segments()
-    order = np.argsort(held.numbers)
-    return {
-        "segments": [column[order].tolist() for column in held],
-        "objects": [(o.number, o.x, o.y, o.theta, o.confirmed, o.placed) for o in perception.labelled_objects()],
-        "areas": [(a.x, a.y, a.radius) for a in perception.vacant_areas()],
-    }
-
-
-@pytest.mark.promise("P31")
-@pytest.mark.parametrize(
-    "edit",
-    [DeleteSegments((1, 2, 5)), PinSegments((2, 7), pinned=True), PinSegments((2, 7), pinned=False),
-     PlaceModel("drum", 4.1, 4.0, 0.0), MoveObject(PLACED, 2.0, 2.0, 1.0), ConfirmObject(PLACED),
-     RejectObject(PLACED), MarkVacant(0.0, 0.0, 1.0), LiftArea(1)],
-    ids=lambda edit: edit.kind,
-)  # fmt: skip
-def test_an_edit_is_taken_back(seen: Perception, edit: Edit) -> None:
-    before = state_of(seen)
-    undo = prepare_undo(edit, seen)
-    assert seen.edit(edit) is None
-    assert state_of(seen) != before
-    for back in undo():
-        assert seen.edit(back) is None
-    assert state_of(seen) == before
-
-
-def test_a_cleared_map_has_its_segments_again(seen: Perception) -> None:
-    before = state_of(seen)
-    undo = prepare_undo(ClearMap(), seen)
-    assert seen.edit(ClearMap()) is None
-    for back in undo():
-        assert seen.edit(back) is None
-    assert state_of(seen) == before | {"objects": []}
-    assert seen.edit(undo()[0]) is None, "a segment that is in the map stays as it is"
-    assert state_of(seen)["segments"] == before["segments"]
-
-
-def test_what_changes_nothing_is_not_kept(seen: Perception) -> None:
+def test_only_the_newest_edits_are_kept() -> None:
     history = EditHistory()
-    assert seen.edit(ConfirmObject(number_of(seen.objects()[0]))) is None
-    for edit in (
-        ConfirmObject(PLACED),
-        PinSegments((2,), pinned=True),
-        DeleteSegments((99,)),
-        PlaceRobot(0.0, 0.0, 0.0),
-    ):
-        history.add(edit, prepare_undo(edit, seen)())
-    assert history.take() is None
+    history.add(ConfirmObject(1), ())  # it changed nothing
     for k in range(KEPT + 5):
         history.add(MoveObject(k, 0.0, 0.0, 0.0), (MoveObject(k, 1.0, 0.0, 0.0),))
-    newest = history.take()
+    newest = history.newest
     assert newest is not None
     assert newest[0] == MoveObject(KEPT + 4, 0.0, 0.0, 0.0)
-    assert sum(history.take() is not None for _ in range(KEPT)) == KEPT - 1
+    for _ in range(KEPT - 1):
+        history.drop_newest()
+    oldest = history.newest
+    assert oldest is not None
+    assert oldest[0] == MoveObject(5, 0.0, 0.0, 0.0)
+
+
+def carry_out(case: ConsoleCase, *edits: Edit) -> None:
+    """Run a cycle that carries these edits out."""
+    done = [edit_with_undo(edit, case.run.state.perception) for edit in edits]
+    case.run.state.undos = tuple(undo for _, undo in done)
+    case.cycles(edits=edits, outcomes=tuple(refused for refused, _ in done))
 
 
 async def test_a_page_takes_the_newest_edit_back_once() -> None:
@@ -109,11 +40,32 @@ async def test_a_page_takes_the_newest_edit_back_once() -> None:
         case.run.state.perception.edit(AREA)
         number = await page.send(type="lift_area", area=1)
         await case.settled(lambda: case.run.asked == [LiftArea(1)], "the edit")
-        case.run.state.perception.edit(LiftArea(1))
-        case.cycles(edits=(LiftArea(1),))
+        assert "waits for the next cycle" in (await page.ask(type="undo_edit"))["error"]
+        carry_out(case, LiftArea(1))
         assert (await page.answer(number))["ok"]
+        case.run.edits_max = 0
+        assert "too many edits" in (await page.ask(type="undo_edit"))["error"]
+        case.run.edits_max = 8
         number = await page.send(type="undo_edit")
-        await case.settled(lambda: case.run.asked == [LiftArea(1), AREA], "what takes it back")
-        case.cycles(edits=(AREA,))
+        await case.settled(lambda: case.run.asked == [LiftArea(1), BACK], "what takes it back")
+        carry_out(case, BACK)
         assert (await page.answer(number))["data"] == "lift_area"
         assert not (await page.ask(type="undo_edit"))["ok"], "an undo is no edit to undo"
+
+
+async def test_an_edit_that_was_refused_in_part_is_taken_back() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        case.cycles(40)
+        numbers = case.run.state.perception.segments().numbers.tolist()
+        assert numbers, "the firings made segments"
+        edit = DeleteSegments((numbers[0], 999_999))
+        number = await page.send(type="delete_segments", numbers=list(edit.numbers))
+        await case.settled(lambda: case.run.asked == [edit], "the edit")
+        carry_out(case, edit)
+        assert "999999" in (await page.answer(number))["error"]
+        number = await page.send(type="undo_edit")
+        await case.settled(lambda: len(case.run.asked) == 2, "what takes it back")
+        carry_out(case, case.run.asked[1])  # type: ignore[arg-type]  # the stub keeps whatever it is asked
+        assert (await page.answer(number))["data"] == "delete_segments"
+        assert numbers[0] in case.run.state.perception.segments().numbers
