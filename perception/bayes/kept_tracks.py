@@ -10,6 +10,7 @@ import base64
 import binascii
 import zlib
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +24,7 @@ from perception.snapshot import numbers_of
 
 CIRCLE: Final = "circle"
 POLYGON: Final = "polygon"
-BOUNDED: Final = {CIRCLE: "memory.circles", POLYGON: "memory.state.polygons"}
+BOUNDED: Final = MappingProxyType({CIRCLE: "memory.circles", POLYGON: "memory.state.polygons"})
 """The names by which the numbers of a track have their bounds."""
 
 
