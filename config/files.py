@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from io import FileIO
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
 from config.layers import Source
@@ -35,7 +35,9 @@ DEPTH_MAX = 12
 """Deepest nesting of tables and lists; the schema needs six."""
 
 
-_FILES_READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
+_DOCUMENTS_READ: ContextVar[dict[DocumentRead, None] | None] = ContextVar("documents_read", default=None)
+
+_IN_PLACE: ContextVar[tuple[Path, bytes] | None] = ContextVar("in_place", default=None)
 
 _KEY = r"""(?:(?<![A-Za-z0-9_-])[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.){0,256}+"|'[^'\n]{0,256}+')"""
 _LONG_KEY = re.compile(rf"{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{31}}")
@@ -68,6 +70,16 @@ class Document:
 
     table: dict[str, Any]
     source: Source
+
+
+class DocumentRead(NamedTuple):
+    """A settings file that was read."""
+
+    kind: Kind
+    name: str
+    """As errors name it."""
+    path: Path | None
+    """Absolute; None if it is shipped."""
 
 
 def list_shipped(kind: Kind) -> tuple[str, ...]:
@@ -112,24 +124,28 @@ def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | N
         raise ConfigError(f"{shown}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a NUL or a lone surrogate in the path
         raise ConfigError(f"{shown}: not a path: {one_line(str(error))}") from None
-    if (read := _FILES_READ.get()) is not None:
-        read.add(Path.cwd() / path)
+    _note(DocumentRead(kind, shown, Path.cwd() / path))
     return Document(parse_document(data, shown), Source(shown, path.parent))
 
 
 @contextlib.contextmanager
 def noting_files_read() -> Iterator[None]:
-    """Note during the block which files are read, for `files_read`."""
-    token = _FILES_READ.set(set())
+    """Note during the block which files are read, for `documents_read` and `files_read`."""
+    token = _DOCUMENTS_READ.set({})
     try:
         yield
     finally:
-        _FILES_READ.reset(token)
+        _DOCUMENTS_READ.reset(token)
+
+
+def documents_read() -> tuple[DocumentRead, ...]:
+    """Return the settings files that this command has read, shipped ones too, each once, in order."""
+    return tuple(_DOCUMENTS_READ.get() or ())
 
 
 def files_read() -> frozenset[Path]:
     """Return the paths of the files that this command has read, besides shipped ones: no output may be one."""
-    return frozenset(_FILES_READ.get() or ())
+    return frozenset(read.path for read in documents_read() if read.path is not None)
 
 
 def parse_document(data: bytes, shown: str) -> dict[str, Any]:
@@ -248,8 +264,29 @@ def await_data(file: FileIO) -> None:
         raise TimeoutError(errno.ETIMEDOUT, f"is a pipe from which nothing came for {PIPE_WAIT_S:g} s; give a file")
 
 
+@contextlib.contextmanager
+def in_place_of(path: Path, data: bytes) -> Iterator[None]:
+    """Read other bytes in place of a settings file during the block, to find out what a change would mean.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute.
+    data : bytes
+        What the file is taken to hold.
+    """
+    token = _IN_PLACE.set((path, data))
+    try:
+        yield
+    finally:
+        _IN_PLACE.reset(token)
+
+
 def read_file(path: Path) -> bytes:
     """Return a settings file's bytes, up to one more than allowed; raises as `open_input`."""
+    changed = _IN_PLACE.get()
+    if changed is not None and Path.cwd() / path == changed[0]:
+        return changed[1][: SIZE_MAX + 1]
     with open_input(path) as file:
         data, more = bytearray(), b" "
         while more and len(data) <= SIZE_MAX:
@@ -259,12 +296,18 @@ def read_file(path: Path) -> bytes:
     return bytes(data)
 
 
+def _note(read: DocumentRead) -> None:
+    if (noted := _DOCUMENTS_READ.get()) is not None:
+        noted[read] = None
+
+
 def _read_shipped(kind: Kind, name: str, named_by: Source | None) -> Document:
     """Return the shipped file of a bare name."""
     known = list_shipped(kind)
     if name in known:
         data = (files("config") / kind / f"{name}.toml").read_bytes()
         shown = f"{kind}/{name}.toml"
+        _note(DocumentRead(kind, shown, None))
         return Document(parse_document(data, shown), Source(shown))
     what = "study" if kind == "studies" else kind.removesuffix("s")
     shown = f'{what} "{one_line(name)[:80]}"'

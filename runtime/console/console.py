@@ -30,7 +30,7 @@ from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import listen
 from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
-from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run
+from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run, SettingsFileControl
 from runtime.console.timed_coroutine import timed_coroutine
 from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
 from runtime.cycle.inputs import Request
@@ -39,6 +39,7 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.kept_token import kept_token
 from runtime.support.length_format import Units
+from runtime.support.restart import console_before
 from runtime.support.user_folders import state_folder
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.time_control import TimeControl
@@ -70,6 +71,8 @@ class Console:
         Shows recordings.
     files : FileControl, optional
         Names, keeps and deletes recordings, and makes files of them.
+    settings_files : SettingsFileControl, optional
+        Reads and writes the settings files of the run, and starts it again.
     limits : Limits, optional
         What clients may cost.
     clock : callable
@@ -79,6 +82,8 @@ class Console:
     ----------
     url
         The start URL with the token; empty before the console is open.
+    token
+        What the start URL carries; empty before the console is open.
     listening
         The address and the port on which the console listens; None before it is open.
     tunnel
@@ -97,6 +102,7 @@ class Console:
         recording: RecordingControl | None = None,
         replay: ReplayControl | None = None,
         files: FileControl | None = None,
+        settings_files: SettingsFileControl | None = None,
         limits: Limits | None = None,
         clock: Callable[[], float] = host_time.monotonic,
     ) -> None:
@@ -115,7 +121,9 @@ class Console:
         self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
-        self._commands = CommandContext(run, self.hub, self.tuning, clock, time, recording, replay, files)
+        self._commands = CommandContext(
+            run, self.hub, self.tuning, clock, time, recording, replay, files, settings_files
+        )
         if files is not None:
             files.jobs.tell = self.hub.broadcast
         self.dispatcher = CommandDispatcher(self._commands, self._console_log, self._start_task)
@@ -125,7 +133,7 @@ class Console:
         self._mode = run.state.mode
         self._tasks: set[asyncio.Task[None]] = set()
         self._server: Server | None = None
-        self.url = ""
+        self.url, self.token = "", ""
         self.listening: tuple[str, int] | None = None
         self._robots: Sequence[Mapping[str, Any]] = ()
         self.tunnel: str | None = None
@@ -178,9 +186,11 @@ class Console:
             The console cannot listen, or its page is not installed.
         """
         files = page_files()
-        listening = await listen(self._config)
+        before = console_before()
+        listening = await listen(self._config, None if before is None else before.port)
         address, port = self.listening = listening.getsockname()[:2]
-        token, host = self._token(), self._config.host
+        host = self._config.host
+        self.token = token = self._token() if before is None else before.token
         own_names = (socket.gethostname(), f"{socket.gethostname()}.local")
         names = (host,) if is_loopback(address) else (host, *own_names)
         self.hub.bind(asyncio.get_running_loop())

@@ -5,7 +5,7 @@ Recording, replay and files are optional: commands that need a part which this r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
 
@@ -47,6 +47,9 @@ class Run(Robot, Protocol):
 
     health: Health
     live_settings: LiveSettings
+
+    def stop(self) -> None:
+        """End the run in order: the robot halts first."""
 
     @property
     def timing_monitor(self) -> TimingMonitor:
@@ -133,6 +136,25 @@ class JobControl(Protocol):
 
     def path_of(self, number: int, name: str, /) -> Path | None:
         """Return the path of a file that a job made, None if it made none of this name."""
+
+
+class SettingsFileControl(Protocol):
+    """The files of this run's settings; a CommandError of any call is the client's answer."""
+
+    def listed(self) -> Sequence[Mapping[str, Any]]:
+        """Return the files."""
+
+    async def read(self, number: int, /) -> Mapping[str, Any]:
+        """Return text and digest of a file, by its number in the list."""
+
+    async def check(self, number: int, text: str, /) -> Mapping[str, Any]:
+        """Return problems and warnings of a text in place of a file, and its difference from the file."""
+
+    async def save(self, number: int, text: str, digest: str, /) -> Mapping[str, Any]:
+        """Write a text in place of a file, if that still has the digest; return it as `read` would."""
+
+    async def restart(self) -> None:
+        """End the run and start it again with the same command."""
 
 
 class FileControl(Protocol):

@@ -31,6 +31,7 @@ from runtime.support.kernel_loader import KernelPreparation, begin_preparation
 from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, log_path, open_log
+from runtime.support.restart import Restart, restart_refusal
 from runtime.support.sd_notify import SdNotifier
 from runtime.support.user_folders import state_folder
 from runtime.timing.run_clock import RunClock, ScaledClock
@@ -125,13 +126,14 @@ def run_robot(
     )
     console = EscapingConsole(stderr=True)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
+    was_chosen = False
     plugged = [] if (port or settings.link.port) is not None else plugged_in()
     if plugged and live and sys.stdin.isatty() and not emulator.is_chosen:
         from runtime.cli.commands.offer import ask_for_robot
 
         found = ask_for_robot(plugged, None if config is None and robot is None else settings, console, sys.stdin)
         if found is not None:
-            port, robot, arm = found.port, found.robot or robot, False
+            port, robot, arm, was_chosen = found.port, found.robot or robot, False, True
             settings = settings_of_files(
                 config, sets, emulator.world, robot, map_file, mission, goal=goal, no_console=no_console
             )
@@ -139,6 +141,7 @@ def run_robot(
     if port is not None:
         settings = with_port(settings, port)
     own_files = {"--record": record, "--json": json_file}
+    restart = Restart(restart_refusal({**own_files, "--trace": emulator.trace}, force=force, was_chosen=was_chosen))
     check_outputs(
         {**own_files, "--trace": emulator.trace}, (emulator.faults, port), force=force,
         appended={"log.file": log_path(settings.log)},
@@ -189,7 +192,8 @@ def run_robot(
                 return await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
-                    foxglove=foxglove, emulated=port is None, preparation=preparation, line_messages=line_messages,
+                    foxglove=foxglove, restart=restart, emulated=port is None, preparation=preparation,
+                    line_messages=line_messages,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
                         robot=robot, map_file=map_file, mission=mission, goal=goal, no_console=no_console,
@@ -218,6 +222,7 @@ def run_robot(
             f"{log_status.lost} lines of the log are missing: {log_status.last_error}; make room or choose another "
             "log.file"
         )
+    restart.if_requested()
     if summary["mode"] == "FAULT":
         raise UserError(summary["stop_reasons"][-1], FAILED)
     recording.raise_if_incomplete()
@@ -238,6 +243,7 @@ async def run_process(
     arm: bool,
     seconds: float | None,
     foxglove: bool,
+    restart: Restart,
     emulated: bool,
     preparation: KernelPreparation | None,
     line_messages: LineMessages,
@@ -265,6 +271,8 @@ async def run_process(
         As of `runtime.cycle.process.RobotProcess.run`.
     foxglove : bool
         Whether the run is served to Foxglove.
+    restart : Restart
+        Is asked to start the run again.
     emulated : bool
         Whether the robot is emulated.
     preparation : KernelPreparation, optional
@@ -312,9 +320,10 @@ async def run_process(
 
             page = await stack.enter_async_context(
                 serve_console(
-                    process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units
+                    process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units,
+                    reload=reload, restart=restart,
                 )
-            )
+            )  # fmt: skip
             log_status.listeners.append(page.hub.on_log)
             stack.callback(log_status.listeners.remove, page.hub.on_log)
             listeners.append(page.on_cycle)

@@ -14,7 +14,7 @@ from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.edit_history import EditHistory
 from runtime.console.commands.tuning import Tuning
-from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run
+from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run, SettingsFileControl
 from runtime.timing.time_control import TimeControl
 
 Arguments = TypeVar("Arguments")
@@ -58,6 +58,7 @@ class CommandContext:
     recording: RecordingControl | None = None
     replay: ReplayControl | None = None
     files: FileControl | None = None
+    settings_files: SettingsFileControl | None = None
     pending_edits: deque[PendingEdit] = field(default_factory=deque)
     """In the order in which the cycle carries them out."""
     history: EditHistory = field(default_factory=EditHistory)

@@ -17,7 +17,7 @@ from perception.edits import (
     PlaceRobot,
     RejectObject,
 )
-from runtime.console.commands import async_commands, file_commands, handlers, robot_commands
+from runtime.console.commands import async_commands, file_commands, handlers, robot_commands, settings_commands
 from runtime.console.commands import messages as arguments
 from runtime.console.commands.command import Command, Permission, always
 from runtime.console.commands.messages import MessageReader, NoArguments
@@ -66,6 +66,11 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("load_map", arguments.LoadMap, CONTROL, async_commands.load_map, always, survives_stop=True),
     Command("set_parameter", arguments.SetParameter, CONTROL, handlers.set_parameter, always, survives_stop=True),
     Command("undo_parameter", NoArguments, CONTROL, handlers.undo_parameter, always, survives_stop=True),
+    Command("list_settings", NoArguments, TOKEN, settings_commands.list_settings),
+    Command("read_settings", settings_commands.ReadSettings, TOKEN, settings_commands.read_settings),
+    Command("check_settings", settings_commands.CheckSettings, TOKEN, settings_commands.check_settings),
+    Command("save_settings", settings_commands.SaveSettings, CONTROL, settings_commands.save_settings),
+    Command("restart_run", NoArguments, CONTROL, settings_commands.restart_run, always),
     Command("save_toml", NoArguments, TOKEN, handlers.save_toml),
     Command("pause", NoArguments, CONTROL, async_commands.pause),
     Command("resume", NoArguments, CONTROL, async_commands.resume, always),

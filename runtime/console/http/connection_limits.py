@@ -33,8 +33,15 @@ CONNECTIONS_BURST: Final = 600.0
 """A page is half a hundred files, each fetched by its own connection."""
 
 
-async def listen(config: ConsoleConfig) -> socket.socket:
+async def listen(config: ConsoleConfig, before: int | None = None) -> socket.socket:
     """Return a socket that listens on the configured host and port, or on the next free port.
+
+    Parameters
+    ----------
+    config : ConsoleConfig
+        Of the console.
+    before : int, optional
+        The port before a restart, which is tried first.
 
     Raises
     ------
@@ -53,7 +60,7 @@ async def listen(config: ConsoleConfig) -> socket.socket:
     family, _, _, _, address = found[0]
     problem = ""
     wanted = range(config.port, min(config.port + PORTS_TRIED, PORT_MAX + 1)) if config.port else ()
-    for port in (*wanted, ANY_FREE_PORT):
+    for port in (*(() if before is None else (before,)), *wanted, ANY_FREE_PORT):
         listening = socket.socket(family, socket.SOCK_STREAM)
         try:
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -25,6 +25,7 @@ import { RobotForm } from "./robot_form.js";
 import { Robots } from "./robots.js";
 import { Scene } from "./scene.js";
 import { Selection } from "./selection.js";
+import { SettingsFiles } from "./settings_files.js";
 import { watchSplitters } from "./splitters.js";
 import { Status } from "./status.js";
 import { Tabs } from "./tabs.js";
@@ -111,6 +112,7 @@ const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot"
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
 const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
+new SettingsFiles({ run, connection, notifications });
 new RobotForm({ run, connection, notifications });
 new Robots({ run, connection });
 new MapFile({ run, units, connection, notifications, tools });

@@ -24,7 +24,7 @@ from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
-from runtime.console.protocols import FileControl, RecordingControl, ReplayControl
+from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, SettingsFileControl
 from runtime.cycle.callbacks import CALLBACKS
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Request
@@ -70,6 +70,9 @@ class StubRun:
         self.stats = CycleStats(0.005)
         self.timing_monitor = TimingMonitor(self.stats, ClockSampler().read, callbacks=CALLBACKS)
         self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
+
+    def stop(self) -> None:
+        self.asked.append("stop")
 
     def request(self, request: Request, is_valid: Callable[[], bool] = lambda: True) -> None:
         self.asked.append(request)
@@ -221,6 +224,7 @@ async def open_console(
     recording: RecordingControl | None = None,
     replay: ReplayControl | None = None,
     files: FileControl | None = None,
+    settings_files: SettingsFileControl | None = None,
     limits: Limits | None = None,
     emulated: bool = True,
     idle_period_s: float = NO_IDLE_FRAMES_S,
@@ -242,7 +246,8 @@ async def open_console(
     run = StubRun(settings, log)
     console = Console(
         run, log, KernelLoader(log), emulated=emulated, time=time,
-        recording=recording, replay=replay, files=files, limits=limits, clock=lambda: clock[0],
+        recording=recording, replay=replay, files=files, settings_files=settings_files, limits=limits,
+        clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()
     with (

@@ -99,6 +99,11 @@ OTHERS: list[dict[str, Any]] = [
     {"type": "undo_parameter"},
     {"type": "undo_edit"},
     {"type": "save_toml"},
+    {"type": "list_settings"},
+    {"type": "read_settings", "file": 0},
+    {"type": "check_settings", "file": 0, "toml": "robot = 1"},
+    {"type": "save_settings", "file": 0, "toml": "robot = 1", "digest": "0" * 64},
+    {"type": "restart_run"},
 ]
 ALL: list[dict[str, Any]] = [
     *(message for table in (ROBOT_REQUESTS, EDITS, ASYNC_COMMANDS) for message, _ in table),

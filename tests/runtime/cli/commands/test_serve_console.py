@@ -13,6 +13,7 @@ from runtime.cli.commands.run_recording import open_run_recording
 from runtime.cli.commands.serve_console import REPLAY_PROGRAM, serve_console
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.support.kernel_loader import KernelLoader
+from runtime.support.restart import Restart
 from runtime.timing.time_control import NoTimeControl
 from tests.runtime.console.console_case import StubRun
 
@@ -38,7 +39,7 @@ async def test_the_page_is_served_while_the_run_lasts(tmp_path: Path, monkeypatc
         with open_run_recording(settings, None, no_record=True, emulated=False) as recording:
             async with serve_console(
                 StubRun(settings, log), settings, log, KernelLoader(log), recording, NoTimeControl(),
-                emulated=False, units="m",
+                emulated=False, units="m", reload=lambda: settings, restart=Restart(None),
             ) as console:  # fmt: skip
                 async with session.get(console.url) as answer:
                     assert answer.status == 200

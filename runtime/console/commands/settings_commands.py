@@ -1,0 +1,82 @@
+"""Handlers of the commands on the settings files of the run, and of its restart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Final
+
+from pydantic import Field
+
+from runtime.console.commands.command import Call
+from runtime.console.commands.command_error import CommandError
+from runtime.console.commands.messages import NoArguments, Number
+from runtime.console.protocols import NOT_AVAILABLE, SettingsFileControl
+from runtime.cycle.modes import Mode
+
+STOP_FIRST: Final = "the robot drives: halt or disarm it before the run is started again"
+SETTINGS_MAX: Final = 48 * 1024
+"""Characters of a settings file that is edited; the longest shipped one has a fifth of that."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadSettings:
+    """Ask for the text of a settings file, by its number in the list."""
+
+    file: Number
+
+
+@dataclass(frozen=True, slots=True)
+class CheckSettings:
+    """Ask what another text in place of a settings file would mean."""
+
+    file: Number
+    toml: Annotated[str, Field(max_length=SETTINGS_MAX)]
+
+
+@dataclass(frozen=True, slots=True)
+class SaveSettings:
+    """Write another text in place of a settings file; `digest` is of the text that was changed."""
+
+    file: Number
+    toml: Annotated[str, Field(max_length=SETTINGS_MAX)]
+    digest: Annotated[str, Field(min_length=64, max_length=64)]
+
+
+def list_settings(call: Call, _: NoArguments) -> Sequence[Mapping[str, Any]]:
+    """Return the settings files of the run."""
+    return _files(call).listed()
+
+
+async def read_settings(call: Call, given: ReadSettings) -> Mapping[str, Any]:
+    """Return the text of a file."""
+    return await _files(call).read(given.file)
+
+
+async def check_settings(call: Call, given: CheckSettings) -> Mapping[str, Any]:
+    """Return what a changed text would mean."""
+    return await _files(call).check(given.file, given.toml)
+
+
+async def save_settings(call: Call, given: SaveSettings) -> Mapping[str, Any]:
+    """Write a changed text in place of a file."""
+    return await _files(call).save(given.file, given.toml, given.digest)
+
+
+async def restart_run(call: Call, _: NoArguments) -> None:
+    """End the run and start it again.
+
+    Raises
+    ------
+    CommandError
+        The robot drives, the settings are wrong, or this run cannot be started again.
+    """
+    if call.context.robot.state.mode.mode is Mode.DRIVE:
+        raise CommandError(STOP_FIRST)
+    await _files(call).restart()
+
+
+def _files(call: Call) -> SettingsFileControl:
+    if call.context.settings_files is None:
+        raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
+    return call.context.settings_files

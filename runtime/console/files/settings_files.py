@@ -1,0 +1,187 @@
+"""The files of this run's settings: their text, what is wrong with a changed one, its difference, and saving it."""
+
+from __future__ import annotations
+
+import asyncio
+import difflib
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final, TypedDict
+
+from config.errors import UserError
+from config.files import ConfigError, DocumentRead, in_place_of, read_file
+from config.settings import Settings
+from config.toml_lines import located
+from runtime.console.commands.command_error import CommandError
+from runtime.support.config_lint import lint_settings
+
+KINDS: Final = MappingProxyType(
+    {"runs": "run", "robots": "robot", "worlds": "world", "models": "model", "missions": "mission"}
+)
+"""Kinds of files as the page names them."""
+
+
+class SettingsRow(TypedDict):
+    """A file in the list."""
+
+    kind: str
+    name: str
+    shipped: bool
+    """Whether it comes with the program, and so is not changed."""
+
+
+class SettingsText(TypedDict):
+    """The text of a file."""
+
+    text: str
+    digest: str
+    """Of the text; a change is saved only over the text that it was made from."""
+
+
+class ProblemRow(TypedDict):
+    """A problem of a text."""
+
+    line: int | None
+    text: str
+
+
+class SettingsCheck(TypedDict):
+    """What a changed text would mean."""
+
+    problems: list[ProblemRow]
+    """A text that has any is not saved."""
+    warnings: list[str]
+    difference: str
+    """From the file to the text, as `diff -u` writes it; empty where they are equal."""
+
+
+class SettingsFiles:
+    """The files that the settings of this run were read from.
+
+    Parameters
+    ----------
+    documents : sequence of DocumentRead
+        The files.
+    reload : callable
+        Reads the settings of the whole run again; raises ConfigError where they are wrong.
+    restart : callable
+        Ends the run and starts it again with the same command; returns why it cannot, None if it will.
+    """
+
+    def __init__(
+        self, documents: Sequence[DocumentRead], reload: Callable[[], Settings], restart: Callable[[], str | None]
+    ) -> None:
+        self._documents = [one for one in documents if one.kind in KINDS]
+        self._reload = reload
+        self._restart = restart
+
+    def listed(self) -> list[SettingsRow]:
+        """Return the files, in the order in which they were read."""
+        return [{"kind": KINDS[d.kind], "name": d.name, "shipped": d.path is None} for d in self._documents]
+
+    async def read(self, number: int) -> SettingsText:
+        """Return the text of a file by its number in the list.
+
+        Raises
+        ------
+        CommandError
+            There is no such file, or it cannot be read.
+        """
+        return await asyncio.to_thread(self._read, self._document(number))
+
+    async def check(self, number: int, text: str) -> SettingsCheck:
+        """Return what the run's settings would be like with this text in place of a file; raises as `read`."""
+        return await asyncio.to_thread(self._check, self._document(number), text)
+
+    async def save(self, number: int, text: str, digest: str) -> SettingsText:
+        """Write a text in place of a file, whole or not at all; return it as `read` would.
+
+        Raises
+        ------
+        CommandError
+            The file is shipped, has been changed since, or cannot be written; or the text is wrong.
+        """
+        return await asyncio.to_thread(self._save, self._document(number), text, digest)
+
+    async def restart(self) -> None:
+        """End the run and start it again with the same command.
+
+        Raises
+        ------
+        CommandError
+            The settings are wrong, or this run cannot be started again.
+        """
+        try:
+            await asyncio.to_thread(self._reload)
+        except UserError as error:
+            raise CommandError(f"the settings are wrong, and the run goes on: {error}") from None
+        if (why := self._restart()) is not None:
+            raise CommandError(why)
+
+    def _document(self, number: int) -> DocumentRead:
+        if number >= len(self._documents):
+            raise CommandError(f"there is no settings file {number}")
+        return self._documents[number]
+
+    def _read(self, document: DocumentRead) -> SettingsText:
+        try:
+            shipped = files("config") / document.name
+            data = shipped.read_bytes() if document.path is None else read_file(document.path)
+            text = data.decode("utf-8-sig")
+        except (OSError, ValueError) as error:
+            raise CommandError(f"{document.name}: cannot be read: {error}") from None
+        return {"text": text, "digest": hashlib.sha256(data).hexdigest()}
+
+    def _check(self, document: DocumentRead, text: str) -> SettingsCheck:
+        before = self._read(document)["text"]
+        diff = difflib.unified_diff(
+            before.splitlines(), text.splitlines(), document.name, f"{document.name}, changed", lineterm=""
+        )
+        problems: list[ProblemRow] = []
+        warnings: list[str] = []
+        if document.path is not None:
+            try:
+                with in_place_of(document.path, text.encode("utf-8", "surrogatepass")):
+                    warnings = list(lint_settings(self._reload()))
+            except ConfigError as error:
+                found = [located(line, document.name, text) for line in error.problems]
+                problems = [{"line": line, "text": said} for line, said in found]
+            except UserError as error:
+                problems = [{"line": None, "text": str(error)}]
+        return {"problems": problems, "warnings": warnings, "difference": "\n".join(diff)}
+
+    def _save(self, document: DocumentRead, text: str, digest: str) -> SettingsText:
+        if document.path is None:
+            raise CommandError(f"{document.name} comes with the program: download a copy, and name it in the command")
+        before = self._read(document)
+        if before["digest"] != digest:
+            raise CommandError(f"{document.name} has been changed by another program since: open it again")
+        if problems := self._check(document, text)["problems"]:
+            raise CommandError(f"{document.name} is not saved: {problems[0]['text']}")
+        if "\r\n" in before["text"]:  # a page has plain line ends
+            text = "\r\n".join(text.splitlines()) + "\r\n"
+        try:
+            _write(document.path.resolve(), text)
+        except OSError as error:
+            raise CommandError(f"{document.name}: cannot be written: {error.strerror or error}") from None
+        return self._read(document)
+
+
+def _write(path: Path, text: str) -> None:
+    """Replace a file by one with this text and the same permissions."""
+    fd, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(fd, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fchmod(fd, path.stat().st_mode & 0o7777)
+            os.fsync(fd)
+        os.replace(temporary, path)  # noqa: PTH105 - beside os.fdopen
+    except BaseException:
+        os.unlink(temporary)  # noqa: PTH108 - beside os.fdopen
+        raise

@@ -1,0 +1,156 @@
+// The files of the run's settings: their text with what is wrong beside its lines, the difference, saving, and a restart.
+
+import { byId, download, el, setText } from "./dom.js";
+
+const CHECK_AFTER_MS = 400;
+
+export class SettingsFiles {
+  #rows = [];
+  #at = 0;
+  #held = null; // text and digest of the file, as it was opened
+  #asked = 0;
+  #timer = null;
+  #good = false;
+
+  constructor({ run, connection, notifications }) {
+    Object.assign(this, { run, connection, notifications });
+    const on = (id, act) => byId(id).addEventListener("click", act);
+    on("settings-open", () => void this.open());
+    on("settings-close", () => this.#close());
+    on("settings-save", () => void this.#save());
+    on("settings-copy", () => download(this.#rows[this.#at].name.split("/").at(-1), new Blob([byId("settings-text").value], { type: "application/toml" })));
+    on("settings-restart", () => this.#restart());
+    byId("settings-file").addEventListener("change", () => this.#leave(() => void this.#show(Number(byId("settings-file").value))));
+    const text = byId("settings-text");
+    text.addEventListener("input", () => this.#changed());
+    text.addEventListener("scroll", () => { byId("settings-lines").scrollTop = text.scrollTop; });
+    byId("settings").addEventListener("keydown", (event) => event.key === "Escape" && this.#close());
+    run.on("state", () => this.#refresh());
+  }
+
+  async open() {
+    try {
+      this.#rows = await this.connection.request({ type: "list_settings" });
+    } catch (error) {
+      this.notifications.showError(error);
+      return;
+    }
+    byId("settings-file").replaceChildren(...this.#rows.map(({ kind, name, shipped }, i) => el("option", { value: i }, `${kind}: ${name}${shipped ? " (comes with the program)" : ""}`)));
+    if (!byId("settings").open) byId("settings").show();
+    await this.#show(Math.max(0, this.#rows.findIndex(({ shipped }) => !shipped)));
+  }
+
+  get #isChanged() {
+    return this.#held !== null && byId("settings-text").value !== this.#held.text;
+  }
+
+  async #show(number) {
+    this.#at = number;
+    byId("settings-file").value = String(number);
+    try {
+      this.#hold(await this.connection.request({ type: "read_settings", file: number }));
+    } catch (error) {
+      setText(byId("settings-state"), error.message);
+    }
+  }
+
+  #hold(held) {
+    this.#held = { ...held, text: held.text.replaceAll("\r\n", "\n") };
+    const text = byId("settings-text");
+    text.value = this.#held.text;
+    text.readOnly = this.#rows[this.#at].shipped;
+    this.#list({ problems: [], warnings: [], difference: "" });
+    setText(byId("settings-state"), text.readOnly ? "It comes with the program and is not changed: download a copy, change that, and name it in the command." : "");
+    this.#refresh();
+  }
+
+  // Runs an action, after a question where it would lose a change.
+  #leave(act) {
+    if (!this.#isChanged) {
+      act();
+      return;
+    }
+    byId("settings-file").value = String(this.#at);
+    this.notifications.confirm("Leave the change unsaved?", el("p", {}, `${this.#rows[this.#at].name} is changed and not saved.`), [["Go on changing it", null], ["Leave it unsaved", act]]);
+  }
+
+  #close() {
+    this.#leave(() => {
+      byId("settings").close();
+      this.#held = null;
+      byId("settings-open").focus();
+    });
+  }
+
+  #changed() {
+    this.#good = false;
+    this.#refresh();
+    this.#number([]);
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => void this.#check(), CHECK_AFTER_MS);
+  }
+
+  async #check() {
+    const asked = ++this.#asked, toml = byId("settings-text").value;
+    try {
+      const found = await this.connection.request({ type: "check_settings", file: this.#at, toml });
+      if (asked !== this.#asked || toml !== byId("settings-text").value) return; // another check follows
+      this.#good = found.problems.length === 0;
+      this.#list(found);
+    } catch (error) {
+      setText(byId("settings-state"), error.message);
+    }
+    this.#refresh();
+  }
+
+  #list({ problems, warnings, difference }) {
+    this.#number(problems.map(({ line }) => line));
+    byId("settings-problems").replaceChildren(
+      ...problems.map(({ line, text }) => el("li", { class: "bad" }, line === null ? text : el("button", { type: "button", class: "small", onclick: () => this.#goTo(line) }, `line ${line}: ${text}`))),
+      ...warnings.map((text) => el("li", {}, text)),
+    );
+    byId("settings-difference").replaceChildren(...difference.split("\n").filter(Boolean).map((line) => el("div", { class: /^\+(?!\+\+ )/.test(line) ? "added" : /^-(?!-- )/.test(line) ? "removed" : "" }, line)));
+    byId("settings-difference").hidden = difference === "";
+    if (this.#isChanged) setText(byId("settings-state"), problems.length > 0 ? `${problems.length === 1 ? "One problem" : `${problems.length} problems`}: it is not saved like this.` : "Good. The difference is below.");
+  }
+
+  #number(bad) {
+    const count = byId("settings-text").value.split("\n").length;
+    byId("settings-lines").replaceChildren(...Array.from({ length: count }, (_, i) => (bad.includes(i + 1) ? el("b", { title: "there is a problem in this line" }, `✗ ${i + 1}\n`) : `${i + 1}\n`)));
+    byId("settings-lines").scrollTop = byId("settings-text").scrollTop;
+  }
+
+  #goTo(line) {
+    const text = byId("settings-text"), lines = text.value.split("\n");
+    const from = lines.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+    text.focus();
+    text.setSelectionRange(from, from + lines[line - 1].length);
+    text.scrollTop = (text.scrollHeight * Math.max(0, line - 5)) / lines.length;
+  }
+
+  #refresh() {
+    const { controller } = this.run.state;
+    byId("settings-save").disabled = !controller || !this.#isChanged || !this.#good;
+    byId("settings-restart").disabled = !controller || this.run.robot?.mode === "DRIVE";
+    byId("settings-restart").title = this.run.robot?.mode === "DRIVE" ? "Disarm the robot first" : controller ? "" : "Ask for control first";
+  }
+
+  async #save() {
+    try {
+      this.#hold(await this.connection.request({ type: "save_settings", file: this.#at, toml: byId("settings-text").value, digest: this.#held.digest }));
+      setText(byId("settings-state"), "Saved. It counts once the run is started again.");
+    } catch (error) {
+      setText(byId("settings-state"), error.message);
+    }
+  }
+
+  #restart() {
+    this.#leave(() => this.notifications.confirm("Start the run again?", el("p", {}, "The run ends and begins anew with the files as they are now; its map starts empty. A real robot stays disarmed. This page comes back by itself."), [
+      ["Go on with this run", null],
+      ["Start it again", () => void this.connection.request({ type: "restart_run" }).then(() => {
+        byId("settings").close();
+        this.notifications.toast("The run is starting again");
+      }, (error) => setText(byId("settings-state"), error.message))],
+    ]));
+  }
+}

@@ -1,0 +1,78 @@
+"""The settings files in the page: problems beside lines, the difference, saving, and a restart."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.async_api import expect
+
+from tests.browser.fake_server import FakeServer
+from tests.browser.open_page import Opener
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+TEXT = "[ring]\ncount = 24\n"
+
+
+async def test_a_file_is_changed_checked_and_saved(server: FakeServer, opener: Opener) -> None:
+    server.data |= {
+        "list_settings": [{"kind": "world", "name": "worlds/a.toml", "shipped": True},
+                          {"kind": "robot", "name": "my.toml", "shipped": False}],
+        "read_settings": {"text": TEXT, "digest": "a" * 64},
+        "check_settings": {"problems": [{"line": 2, "text": "ring.count = 1: <b>too few</b>"}], "warnings": [],
+                           "difference": "--- my.toml\n+++ my.toml, changed\n-count = 24\n+count = 1"},
+        "save_settings": {"text": "changed", "digest": "b" * 64},
+    }  # fmt: skip
+    opened = await opener.open(server.url)
+    page = opened.page
+    await page.click("#tab-tune")
+    await page.click("#settings-open")
+    text, save = page.locator("#settings-text"), page.locator("#settings-save")
+    await expect(page.locator("#settings-file")).to_have_value("1")
+    await expect(text).to_have_value(TEXT)
+    await expect(save).to_be_disabled()
+    await text.fill("[ring]\ncount = 1\n")
+    await opened.run_for(500)
+    await expect(page.locator("#settings-problems li")).to_have_text("line 2: ring.count = 1: <b>too few</b>")
+    await expect(page.locator("#settings-lines b")).to_have_text("✗ 2")
+    await expect(page.locator("#settings-difference .added")).to_have_text("+count = 1")
+    await expect(save).to_be_disabled()
+    await page.locator("#settings-problems button").click()
+    assert await text.evaluate("area => area.value.slice(area.selectionStart, area.selectionEnd)") == "count = 1"
+    server.data["check_settings"] = {"problems": [], "warnings": ["slow"], "difference": "+count = 23"}
+    await text.fill("[ring]\ncount = 23\n")
+    await opened.run_for(500)
+    await expect(save).to_be_enabled()
+    await save.click()
+    sent = await server.wait("save_settings")
+    assert sent == {"file": 1, "toml": "[ring]\ncount = 23\n", "digest": "a" * 64}
+    await expect(page.locator("#settings-state")).to_contain_text("Saved")
+    await page.keyboard.press("Escape")
+    await expect(page.locator("#settings")).to_be_hidden()
+
+
+async def test_a_change_is_not_lost_and_a_restart_waits_for_a_robot_that_stands(
+    server: FakeServer, opener: Opener
+) -> None:
+    server.data |= {
+        "list_settings": [{"kind": "robot", "name": "my.toml", "shipped": False}],
+        "read_settings": {"text": TEXT, "digest": "a" * 64},
+        "check_settings": {"problems": [], "warnings": [], "difference": "+x"},
+    }
+    opened = await opener.open(server.url)
+    page = opened.page
+    await page.click("#tab-tune")
+    await page.click("#settings-open")
+    await page.locator("#settings-text").fill("changed")
+    await page.click("#settings-close")
+    await page.get_by_role("button", name="Go on changing it").click()
+    await expect(page.locator("#settings")).to_be_visible()
+    await page.click("#settings-close")
+    await page.get_by_role("button", name="Leave it unsaved").click()
+    await expect(page.locator("#settings")).to_be_hidden()
+    await page.click("#settings-open")
+    await expect(page.locator("#settings-restart")).to_be_disabled()
+    server.mode = "READY"
+    await expect(page.locator("#settings-restart")).to_be_enabled()
+    await page.click("#settings-restart")
+    await page.get_by_role("button", name="Start it again").click()
+    await server.wait("restart_run")

@@ -1,0 +1,111 @@
+"""The settings files of a run on the page: read, checked, saved, and the run started again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from config.files import documents_read, noting_files_read
+from config.load import load_settings
+from config.settings import Settings
+from runtime.console.commands.command_error import CommandError
+from runtime.console.files.settings_files import SettingsFiles
+
+ROBOT = Path(__file__).parents[4] / "config" / "robots" / "denning.toml"
+
+
+class Run:
+    """A run started in a folder with files of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.robot = folder / "mine.toml"
+        self.robot.write_bytes(ROBOT.read_bytes())
+        self.config = folder / "run.toml"
+        self.config.write_text('robot = "./mine.toml"\nworld = "hallway"\n')
+        self.restarts = 0
+        self.refusal: str | None = None
+        with noting_files_read():
+            self.load()
+            self.files = SettingsFiles(documents_read(), self.load, self._restart)
+
+    def load(self) -> Settings:
+        return load_settings(self.config)
+
+    def _restart(self) -> str | None:
+        self.restarts += self.refusal is None
+        return self.refusal
+
+    def number(self, name: str) -> int:
+        return next(n for n, row in enumerate(self.files.listed()) if row["name"].endswith(name))
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    return Run(tmp_path)
+
+
+async def test_the_files_are_those_of_the_run(run: Run) -> None:
+    assert [(row["kind"], Path(row["name"]).name, row["shipped"]) for row in run.files.listed()] == [
+        ("run", "run.toml", False), ("robot", "mine.toml", False), ("world", "hallway.toml", True),
+        ("model", "semicircle.toml", True),
+    ]  # fmt: skip
+    for number in range(4):
+        assert (await run.files.read(number))["text"]
+    with pytest.raises(CommandError):
+        await run.files.read(4)
+
+
+async def test_a_change_is_checked_with_the_whole_run_and_saved(run: Run) -> None:
+    number = run.number("mine.toml")
+    held = await run.files.read(number)
+    wrong = held["text"].replace("count = 24", "count = 1")
+    found = await run.files.check(number, wrong)
+    assert [problem["line"] for problem in found["problems"]] == [wrong.splitlines().index("count = 1") + 1]
+    assert "-count = 24\n+count = 1" in found["difference"]
+    assert run.robot.read_text() == held["text"], "a check writes nothing"
+    with pytest.raises(CommandError, match="not saved"):
+        await run.files.save(number, wrong, held["digest"])
+    good = held["text"].replace("speed_max_m_s = 0.5", "speed_max_m_s = 0.4")
+    assert (await run.files.check(number, good))["problems"] == []
+    run.robot.chmod(0o640)
+    saved = await run.files.save(number, good, held["digest"])
+    assert saved["text"] == run.robot.read_text() == good
+    assert run.robot.stat().st_mode & 0o777 == 0o640
+    assert run.load().body.speed_max_m_s == 0.4
+    assert sorted(path.name for path in run.robot.parent.iterdir()) == ["mine.toml", "run.toml"]
+    with pytest.raises(CommandError, match="another program"):
+        await run.files.save(number, held["text"], held["digest"])
+
+
+async def test_a_shipped_file_is_not_changed_and_a_link_stays_one(run: Run) -> None:
+    with pytest.raises(CommandError, match="comes with the program"):
+        await run.files.save(run.number("hallway.toml"), "", "0" * 64)
+    real = run.robot.with_name("real.toml")
+    run.robot.rename(real)
+    run.robot.symlink_to(real)
+    number = run.number("mine.toml")
+    held = await run.files.read(number)
+    await run.files.save(number, "# mine\n" + held["text"], held["digest"])
+    assert run.robot.is_symlink()
+    assert real.read_text().startswith("# mine\n")
+
+
+async def test_line_ends_of_another_system_are_kept(run: Run) -> None:
+    run.robot.write_bytes(run.robot.read_bytes().replace(b"\n", b"\r\n"))
+    number = run.number("mine.toml")
+    held = await run.files.read(number)
+    await run.files.save(number, "# mine\n" + held["text"].replace("\r\n", "\n"), held["digest"])
+    assert run.robot.read_bytes().count(b"\r\n") == run.robot.read_bytes().count(b"\n") > 20
+
+
+async def test_a_run_is_started_again_only_with_settings_that_are_right(run: Run) -> None:
+    await run.files.restart()
+    assert run.restarts == 1
+    run.refusal = "not this one"
+    with pytest.raises(CommandError, match="not this one"):
+        await run.files.restart()
+    run.config.write_text("robot = 7\n")
+    with pytest.raises(CommandError, match="the run goes on"):
+        await run.files.restart()
+    assert run.restarts == 1
