@@ -19,11 +19,11 @@ from runtime.analysis.timeline import BookmarkEntry, LogEntry, ModeEntry, Timeli
 from runtime.analysis.timeline_builder import FIRST_INTERVAL_S, TimelineBuilder
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, KEYFRAME, LOG, SERIAL, SUMMARY, RawMessage, decode
+from runtime.recording.conventions.options import AUTO, RingLogOptions
+from runtime.recording.conventions.reading import open_ring_log
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
 from runtime.recording.replayer import KeyframeError, Replayer, ReplayStep, keyframe_cycle
-from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer
-from runtime.recording.ring_log_units import plausible_firings
 from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
 from runtime.recording.verification import Verifier, refused_lines
 
@@ -48,6 +48,8 @@ class TimelineSource:
     models: Sequence[str] = ()
     world: str | None = None
     """The true world, instead of the one in a recording; the start of a log is then at the world's start."""
+    log: RingLogOptions = AUTO
+    """The conventions of a ring log."""
 
     @property
     def inputs(self) -> tuple[str | None, ...]:
@@ -89,6 +91,7 @@ def load_timeline(
             f"{path}: is a recording and contains its settings; --set, --robot and --model are for ring logs",
             WRONG_CALL,
         )
+    source.log.refuse_for(source.file)
     with open_recording(path) as recording:
         prepare(recording.settings)
         skimmed = between_keyframes(recording) if skim else range(0)
@@ -213,10 +216,12 @@ def _of_ring_log(
     path: Path, source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress
 ) -> Timeline:
     settings = load_settings(None, source.sets, robot=source.robot, models=source.models)
-    firings = plausible_firings(read_ring_log(path, sensors=len(settings.ring.mounts)), path, settings)
+    found: list[str] = []
+    firings = open_ring_log(path, settings, source.log, found.append)
     first = next(firings)  # reports an invalid file before kernels are compiled
     prepare(settings)
     timeline = Timeline(path, settings, None if source.world is None else load_world(source.world))
+    timeline.notes += found
     builder = TimelineBuilder(timeline)
     replayer = FiringReplayer(settings, itertools.chain((first,), firings))
     for firing in replayer:

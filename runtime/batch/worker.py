@@ -129,10 +129,9 @@ def recording_figures(settings: Settings, run: Run) -> Row:
     from runtime.analysis.comparison import run_under
     from runtime.analysis.export.ring_log_export import recorded_firings
     from runtime.analysis.prediction import predicted_nat, withhold
+    from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.reader import is_recording, open_recording
-    from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings
-    from runtime.recording.ring_log_units import plausible_firings
 
     path = Path(run.subject)
     world = None if run.truth is None else WorldConfig.model_validate_json(run.truth)
@@ -149,8 +148,7 @@ def recording_figures(settings: Settings, run: Run) -> Row:
                 objects, cycle_us = outcome.objects, cycle_stats.cycle_us()
                 figures["stops"] = len(outcome.stops)
     else:
-        logged = read_ring_log(path, sensors=len(settings.ring.mounts))
-        firings = plausible_firings(logged, path, settings)
+        firings = open_ring_log(path, settings)
     if firings is not None:
         if run.predicts:
             firings, withheld = withhold(firings)

@@ -9,10 +9,12 @@ from cyclopts import Parameter
 
 from config.errors import WRONG_CALL, UserError
 from runtime.cli.options import Flag, Force, JsonFile, ModelFiles, RobotFile, Sets, UnitsOption
+from runtime.recording.conventions.options import AUTO, RingLogOptions
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline_sources import TimelineSource
 
+LogOptions = Annotated[RingLogOptions, Parameter(name="*", negative="", show_default=False)]
 File = Annotated[str, Parameter(help="Recording (MCAP) or ring log (CSV).")]
 
 
@@ -34,12 +36,13 @@ class SourceOptions:
             help="Ring logs: object model, file or name of a shipped one; may be repeated.",
         ),
     ] = ()
+    log: LogOptions = AUTO
 
     def timeline_source(self, file: str, sets: tuple[str, ...]) -> TimelineSource:
         """Return the file together with these options, as the analysis takes them."""
         from runtime.analysis.timeline_sources import TimelineSource
 
-        return TimelineSource(file, sets, self.robot, self.models, self.world)
+        return TimelineSource(file, sets, self.robot, self.models, self.world, self.log)
 
 
 NO_OPTIONS: Final = SourceOptions()
@@ -62,6 +65,7 @@ def replay(
     json: JsonFile = None,
     force: Force = False,
     units: UnitsOption = "m",
+    options: LogOptions = AUTO,
     sets: Sets = (),
 ) -> int:
     """Replay a recording cycle by cycle, or run perception over a ring log.
@@ -98,6 +102,8 @@ def replay(
         Overwrite files that exist already.
     units
         Units of the printed tables.
+    options
+        The conventions of a ring log.
     sets
         Single settings, each `path=value`, that differ from the recorded or default ones.
 
@@ -117,6 +123,7 @@ def replay(
     if localize and is_recording(Path(log)):
         raise UserError(f"{log}: is a recording; --localize applies to ring logs only", WRONG_CALL)
     if is_recording(Path(log)):
+        options.refuse_for(log)
         from runtime.cli.commands.replay_recording import Span, replay_recording
 
         return replay_recording(
@@ -132,7 +139,7 @@ def replay(
 
     return replay_log(
         log, sets, robot=robot, models=model, json_file=json, force=force, units=units, localize=localize,
-        trajectory=trajectory, map_file=map_file,
+        trajectory=trajectory, map_file=map_file, options=options,
     )  # fmt: skip
 
 
@@ -299,6 +306,7 @@ def calibrate(
     drum: Annotated[tuple[float, ...], Parameter(negative="", show_default=False)] = (),
     force: Force = False,
     robot: RobotFile = None,
+    options: LogOptions = AUTO,
 ) -> int:
     """Find a robot's mounts, beams and scales from a drive by a wall and a drum, and write them as a robot file.
 
@@ -319,10 +327,12 @@ def calibrate(
         Recording or ring log of the drive.
     robot
         Ring logs: the nominal robot, file or name of a shipped one; None for the default.
+    options
+        The conventions of a ring log.
     """
     from runtime.cli.commands.calibrate import calibrate_robot
 
-    return calibrate_robot(file, out, way_m=way, radii_m=drum, robot=robot, force=force)
+    return calibrate_robot(file, out, way_m=way, radii_m=drum, robot=robot, force=force, options=options)
 
 
 def stand(
@@ -334,6 +344,7 @@ def stand(
     json: JsonFile = None,
     force: Force = False,
     units: UnitsOption = "m",
+    options: LogOptions = AUTO,
 ) -> int:
     """List what a robot heard where it stood: kind, place and bearing of each surface, odds of the kinds.
 
@@ -354,7 +365,9 @@ def stand(
         Overwrite it if it exists already.
     units
         Units of the table.
+    options
+        The conventions of a ring log.
     """
     from runtime.cli.commands.stand import show_stand
 
-    return show_stand(file, at, robot=robot, json_file=json, force=force, units=units)
+    return show_stand(file, at, robot=robot, json_file=json, force=force, units=units, options=options)

@@ -42,7 +42,7 @@ class RingLogError(UserError):
     exit_code = WRONG_CALL
 
 
-def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
+def read_ring_log(path: Path, sensors: int | None = None, *, is_strict: bool = True) -> Iterator[Firing]:
     """Yield the firings of a ring log, one for each row, reading only as far as the caller iterates.
 
     Parameters
@@ -51,6 +51,8 @@ def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
         CSV in UTF-8, with or without a byte order mark, LF or CRLF; blank lines are skipped.
     sensors : int, optional
         Number of sensors that the log must have.
+    is_strict : bool
+        Whether a negative range and the text nan are errors; otherwise they are given as the number and as −inf.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
     """
     try:
         with BufferedReader(open_input(path)) as file:
-            yield from _firings(_rows(file, path), path, sensors)
+            yield from _firings(_rows(file, path), path, sensors, _range if is_strict else _any_range)
     except OSError as error:
         raise RingLogError(f"{path}: cannot be read: {error.strerror or error}; check the path") from error
 
@@ -128,7 +130,9 @@ def _rows(file: BinaryIO, path: Path) -> Iterator[tuple[int, list[str]]]:
             yield row, cells
 
 
-def _firings(rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | None) -> Iterator[Firing]:
+def _firings(
+    rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | None, parse: Callable[[str], float]
+) -> Iterator[Firing]:
     header_row, header = next(rows, (1, None))
     if header is None:
         raise RingLogError(f"{path}: is empty; {_FORM}")
@@ -146,10 +150,10 @@ def _firings(rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | N
             raise _error(path, row, f"has {len(cells)} cells where the header has {len(names)}", _cells_hint(cells))
         try:
             stamp = [_finite(cell) for cell in cells[:first_range]]
-            ranges = np.array([_range(cell) for cell in cells[first_range:first_cross]], dtype=np.float64)
+            ranges = np.array([parse(cell) for cell in cells[first_range:first_cross]], dtype=np.float64)
             heard = _cross_paths(pairs, cells[first_cross:]) if pairs else None
         except ValueError as error:
-            raise _cell_error(path, row, names, cells, first_range) from error
+            raise _cell_error(path, row, names, cells, first_range, parse) from error
         t, x, y, theta = stamp[:4]
         if t < last_t:
             hint = "t never decreases; sort the rows by t, or split the file where the clock restarted"
@@ -236,6 +240,14 @@ def _range(cell: str) -> float:
     return value
 
 
+def _any_range(cell: str) -> float:
+    """Return a range in any convention: negative ones as they are, and −inf for the text nan."""
+    value = _number(cell) if cell else math.nan
+    if value == -math.inf or (value == math.inf and _SPELT_INF.fullmatch(cell) is None):
+        raise ValueError(cell)
+    return -math.inf if cell and math.isnan(value) else value
+
+
 def _is_refused(parse: Callable[[str], float], cell: str) -> bool:
     try:
         parse(cell)
@@ -244,9 +256,14 @@ def _is_refused(parse: Callable[[str], float], cell: str) -> bool:
     return False
 
 
-def _cell_error(path: Path, row: int, names: Sequence[str], cells: Sequence[str], first_range: int) -> RingLogError:
+def _cell_error(
+    path: Path, row: int, names: Sequence[str], cells: Sequence[str], first_range: int, parse: Callable[[str], float]
+) -> RingLogError:
     """Return the error for the first invalid cell of a row that has one."""
-    column = next(i for i, cell in enumerate(cells) if _is_refused(_finite if i < first_range else _range, cell))
+    parsers = (
+        (_finite if i < first_range else _range if names[i].startswith("x") else parse) for i in range(len(cells))
+    )
+    column = next(i for i, (of, cell) in enumerate(zip(parsers, cells, strict=True)) if _is_refused(of, cell))
     allowed = _FINITE if column < first_range else _RANGE
     found = f"is {_shown(cells[column])}" if cells[column] else "is empty"
     return _error(path, row, f"column {names[column]!r} {found}", f"allowed is {allowed}; correct or delete the row")

@@ -14,6 +14,7 @@ from config.files import utf8
 from config.load import load_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.recording.conventions.options import AUTO, RingLogOptions
 
 if TYPE_CHECKING:
     from config.settings import Settings
@@ -25,13 +26,14 @@ FIRINGS_MIN: Final = 100
 
 
 def calibrate_robot(
-    file: str, out: str, *, way_m: float | None, radii_m: Sequence[float], robot: str | None, force: bool
-) -> int:
+    file: str, out: str, *, way_m: float | None, radii_m: Sequence[float], robot: str | None, force: bool,
+    options: RingLogOptions = AUTO,
+) -> int:  # fmt: skip
     """Calibrate a robot from a drive, print what was found and return the exit code.
 
     Parameters
     ----------
-    file, out, way_m, radii_m, robot, force
+    file, out, way_m, radii_m, robot, force, options
         As of `runtime.cli.recording_commands.calibrate`.
 
     Raises
@@ -44,7 +46,9 @@ def calibrate_robot(
     for option, value in (*(("--drum", radius) for radius in radii_m), ("--way", way_m)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise UserError(f"{option} {value}: must be a length above 0, in metres", WRONG_CALL)
-    settings, firings = read_firings(file, robot, lambda: check_outputs({"--out": out}, (file,), force=force))
+    settings, firings = read_firings(
+        file, robot, lambda: check_outputs({"--out": out}, (file,), force=force), options
+    )
     if len(firings) < FIRINGS_MIN:
         raise UserError(f"{file}: holds only {len(firings)} firings; record the whole drive and try again", FAILED)
     if settings.ring.turning:
@@ -174,7 +178,9 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
     return "\n".join([*head, *tomli_w.dumps(tables).splitlines(), ""])
 
 
-def read_firings(file: str, robot: str | None, check: Callable[[], None]) -> tuple[Settings, list[Firing]]:
+def read_firings(
+    file: str, robot: str | None, check: Callable[[], None], options: RingLogOptions = AUTO
+) -> tuple[Settings, list[Firing]]:
     """Return the settings and the firings of a recording or ring log; `check` is called between the two.
 
     Parameters
@@ -185,6 +191,8 @@ def read_firings(file: str, robot: str | None, check: Callable[[], None]) -> tup
         Of a ring log: robot file, or the name of a shipped one.
     check : callable
         Raises an error if outputs cannot be written.
+    options : RingLogOptions
+        Conventions of a ring log. What is found in the data is printed.
 
     Raises
     ------
@@ -192,16 +200,18 @@ def read_firings(file: str, robot: str | None, check: Callable[[], None]) -> tup
         The file cannot be read.
     """
     from runtime.analysis.export.ring_log_export import recorded_firings
+    from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.reader import is_recording, open_recording
-    from runtime.recording.ring_log import read_ring_log
-    from runtime.recording.ring_log_units import plausible_firings
 
     path = Path(file)
     if not is_recording(path):
         settings = load_settings(None, (), robot=robot)
         check()
-        rows = read_ring_log(path, sensors=len(settings.ring.mounts))
-        return settings, list(plausible_firings(rows, path, settings))
+        console = plain_console(stderr=True)
+        return settings, list(
+            open_ring_log(path, settings, options, lambda text: console.print(f"echolocate: {text}"))
+        )
+    options.refuse_for(file)
     if robot is not None:
         raise UserError(f"{file}: is a recording and contains its robot; --robot is for ring logs", WRONG_CALL)
     with open_recording(path) as recording:

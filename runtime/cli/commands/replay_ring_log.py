@@ -12,6 +12,7 @@ from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.cli.tables import objects_table, pose_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import write_json
+from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts
 from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
@@ -36,12 +37,13 @@ def replay_log(
     localize: bool = False,
     trajectory: str | None = None,
     map_file: str | None = None,
+    options: RingLogOptions = AUTO,
 ) -> int:
     """Run perception over a ring log, print the objects and return the exit code.
 
     Parameters
     ----------
-    log, sets, robot, models, json_file, force, units, localize, trajectory, map_file
+    log, sets, robot, models, json_file, force, units, localize, trajectory, map_file, options
         As of `runtime.cli.recording_commands.replay`.
     """
     settings = load_settings(None, sets, robot=robot, models=models)
@@ -51,9 +53,8 @@ def replay_log(
     check_outputs({"--json": json_file, "--trajectory": trajectory}, (log,), force=force)
     corrects_drift = localize and map_file is None
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
-    from runtime.recording.ring_log import read_ring_log
+    from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
-    from runtime.recording.ring_log_units import plausible_firings
 
     rows: list[str] = []
     warnings: list[str] = []
@@ -62,8 +63,7 @@ def replay_log(
         rows.append(trajectory_row(t, here))
 
     with progress(console, "replaying") as step:
-        logged = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
-        firings = _each(plausible_firings(logged, Path(log), settings, warnings.append), step)
+        firings = _each(open_ring_log(Path(log), settings, options, warnings.append), step)
         if map_file is not None:
             summary = replay_in_known_room(settings, firings, on_pose)
         elif corrects_drift:

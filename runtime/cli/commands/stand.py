@@ -12,6 +12,7 @@ from runtime.cli.commands.calibrate import read_firings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cycle.summary import write_json
+from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.support.length_format import Units, format_length, format_point
 
 if TYPE_CHECKING:
@@ -20,13 +21,14 @@ if TYPE_CHECKING:
 
 
 def show_stand(
-    file: str, at_s: float | None, *, robot: str | None, json_file: str | None, force: bool, units: Units
-) -> int:
+    file: str, at_s: float | None, *, robot: str | None, json_file: str | None, force: bool, units: Units,
+    options: RingLogOptions = AUTO,
+) -> int:  # fmt: skip
     """Print the surfaces around a robot that stood, and return the exit code.
 
     Parameters
     ----------
-    file, at_s, robot, json_file, force, units
+    file, at_s, robot, json_file, force, units, options
         As of `runtime.cli.recording_commands.stand`.
 
     Raises
@@ -37,7 +39,9 @@ def show_stand(
     from drivers.messages import Pose
     from perception.stand import stand_of, surfaces_of_stand
 
-    settings, firings = read_firings(file, robot, lambda: check_outputs({"--json": json_file}, (file,), force=force))
+    settings, firings = read_firings(
+        file, robot, lambda: check_outputs({"--json": json_file}, (file,), force=force), options
+    )
     stand = stand_of(firings, math.inf if at_s is None else at_s)
     if not stand:
         first = f" the first firing is at {firings[0].robot_s:.2f} s" if firings else " it holds no firing"

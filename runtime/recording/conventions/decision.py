@@ -1,0 +1,210 @@
+"""The conventions of a ring log as one decision: what the options say, and from the data what they leave open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RingConfig, RobotConfig
+from drivers.firing_pattern import firing_pattern, sensors
+from drivers.latched_ranges import RepeatDetector, RepeatFilter
+from drivers.messages import CrossPaths, Firing, Floats, Pose
+from runtime.recording.conventions.headings import (
+    NEAR_NAT,
+    SURE,
+    Angles,
+    echo_scores,
+    motion_scores,
+    sureness,
+)
+from runtime.recording.conventions.options import RingLogOptions
+from runtime.recording.conventions.silence import Silence, find_silence
+from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
+from runtime.recording.conventions.units import Units, find_units, way_ratios
+from runtime.recording.ring_log import RingLogError
+
+MIRROR_M: Final = 0.02
+"""How far a sensor's mirror image may lie from the sensor that takes its column, m and rad."""
+
+
+_NO_SILENCE: Final = Silence()
+_SI: Final = Units()
+_RADIANS: Final = Angles()
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """How the rows of a log become firings.
+
+    Attributes
+    ----------
+    columns : (sensors,) int, optional
+        The column of each sensor where the file's order is mirrored.
+    is_latched : bool
+        Whether only changes are readings.
+    said : tuple of str
+        What was found in the data, and the option that sets it; empty for a log in the form's own conventions.
+    """
+
+    silence: Silence = _NO_SILENCE
+    units: Units = _SI
+    angles: Angles = _RADIANS
+    columns: NDArray[np.int64] | None = None
+    is_latched: bool = False
+    said: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether firings pass as they are."""
+        return self.columns is None and (self.silence, self.units, self.angles) == (_NO_SILENCE, _SI, _RADIANS)
+
+    def converted(self, firing: Firing) -> Firing:
+        """Return a firing in metres, radians and seconds; repeats are still in it."""
+        rule, unit = HEADINGS[self.angles.heading], ANGLES[self.angles.unit]
+        length, reach = LENGTHS[self.units.length], LENGTHS[self.units.range_]
+        ranges, heard = self.silence.applied(firing.ranges_m) * reach, firing.cross_paths
+        if heard is not None:
+            listeners, transmitters = heard.listeners, heard.transmitters
+            if self.columns is not None:
+                listeners, transmitters = self.columns[listeners], self.columns[transmitters]
+            heard = CrossPaths(transmitters, listeners, self.silence.applied(heard.half_paths_m) * reach)
+        theta, yaw = rule.angles(unit * np.array([firing.pose.theta, firing.ring_yaw])).tolist()
+        return Firing(
+            firing.robot_s * TIMES[self.units.time],
+            Pose(firing.pose.x * length, rule.hand * firing.pose.y * length, theta), yaw,
+            ranges if self.columns is None else ranges[self.columns], heard,
+        )  # fmt: skip
+
+
+def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Conventions:
+    """Return the conventions of a log.
+
+    Parameters
+    ----------
+    table : Table
+        Its first part, as the file has it.
+    robot : RobotConfig
+        The robot that the log is said to be of.
+    options : RingLogOptions
+        What is known.
+
+    Raises
+    ------
+    RingLogError
+        The log fits no conventions, or several; the text names the options that settle it.
+    """
+    columns = mirrored_columns(robot.ring) if options.sensor_order == "mirrored" else None
+    said = []
+    set_size = max(len(sensors(mask)) for mask in firing_pattern(robot.ring).masks)
+    silence = find_silence(table, options.silence, set_size)
+    if silence.words:
+        said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
+    ranges = np.array([silence.applied(row) for row in table.ranges])
+    if (ranges < 0.0).any():
+        raise RingLogError(f"has ranges below 0, as {float(np.nanmin(ranges)):g}; correct them, or say --silence -1")
+    table = table._replace(ranges=ranges if columns is None else ranges[:, columns])
+    period = _repeats(table.ranges) if options.latched == "auto" else 1
+    is_latched = options.latched == "yes" or period > 1
+    if is_latched:
+        table = table._replace(ranges=_without_repeats(table.ranges))
+        if period > 1:
+            said.append((
+                f"each value is repeated, for {period} rows mostly, until its sensor fires again: only changes are "
+                "readings", "--latched yes, or no if all are fresh",
+            ))  # fmt: skip
+    motion, is_related = motion_scores(table, options)
+    likely = max(motion, key=motion.__getitem__)
+    units = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
+    given = (options.time_unit, options.length_unit, options.range_unit)
+    if any(g == "auto" and u != plain for g, u, plain in zip(given, units, Units(), strict=True)):
+        said.append((units.words, units.options))
+    angles = _find_angles(table, robot, options, units, motion, is_related=is_related)
+    asked = Angles(
+        "ccw" if options.heading == "auto" else options.heading,
+        "rad" if options.angle_unit == "auto" else options.angle_unit,
+    )
+    if angles != asked:
+        said.append((angles.words, angles.options))
+    return Conventions(silence, units, angles, columns, is_latched, tuple(said))
+
+
+def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
+    """Return for each sensor the one at its mirror image.
+
+    Raises
+    ------
+    RingLogError
+        The ring is not its own mirror image.
+    """
+    mounts = np.array(ring.mounts)
+    image = mounts * [1.0, -1.0, -1.0]
+    off = np.hypot(*(mounts[:, None, :2] - image[None, :, :2]).transpose(2, 0, 1))
+    off += np.abs(np.angle(np.exp(1j * (mounts[:, None, 2] - image[None, :, 2]))))
+    columns: NDArray[np.int64] = off.argmin(axis=0)
+    if float(off.min(axis=0).max()) > MIRROR_M:
+        raise RingLogError(
+            "--sensor-order mirrored: this ring is not its own mirror image; name the robot's own file"
+        )
+    return columns
+
+
+def _repeats(ranges: Floats) -> int:
+    detector = RepeatDetector(ranges.shape[1])
+    for row in ranges:
+        detector.add(row)
+    return detector.period
+
+
+def _without_repeats(ranges: Floats) -> Floats:
+    still = Pose(0.0, 0.0, 0.0)
+    changes = RepeatFilter(ranges.shape[1])
+    return np.array([changes.fresh(Firing(0.0, still, 0.0, row)).ranges_m for row in ranges])
+
+
+def _ratios(table: Table, robot: RobotConfig, likely: Angles) -> Floats:
+    """Return the ratios of ranges to ways under the likely convention or its mirror image, whichever agree better."""
+    best, least = np.empty(0), np.inf
+    for hand in (1, -1):
+        ratios = way_ratios(table, robot, hand * HEADINGS[likely.heading].hand * likely.yaw(table.pose[:, 3]), hand)
+        spread = float(np.median(np.abs(np.log(ratios / np.median(ratios))))) if len(ratios) else np.inf
+        if spread < 0.98 * least:
+            best, least = ratios, spread
+    return best
+
+
+def _find_angles(
+    table: Table, robot: RobotConfig, options: RingLogOptions, units: Units, motion: dict[Angles, float], *,
+    is_related: bool,
+) -> Angles:  # fmt: skip
+    """Return how headings are counted: the form's own way unless motion or ranges contradict it."""
+    if len(motion) == 1:
+        return next(iter(motion))
+    default = next(one for one in motion)  # ccw and rad come first, or what is given
+    most = max(motion.values())
+    near = [one for one in motion if not is_related or motion[one] > most - NEAR_NAT]
+    reach, length = LENGTHS[units.range_], LENGTHS[units.length]
+    echoes = echo_scores(table, robot, list(dict.fromkeys([default, *near])), reach, length / reach)
+    clearest = max(echoes, key=lambda one: float(echoes[one].mean()))
+    left = [one for one in echoes if sureness(echoes[clearest], echoes[one]) < SURE]
+    fits = [one for one in left if one in near]
+    if default in left and (default in near or not fits):
+        return default
+    if default in left:
+        is_alike = all(sureness(echoes[default], echoes[one]) == 0.0 for one in fits)
+        if not is_alike:
+            fits = [default, *fits]
+    plain = [one for one in fits if one.heading == "ccw"]
+    if plain and default not in fits:
+        fits = plain
+    is_mirrored = options.sensor_order == "auto" and any(one.heading == "left-handed" for one in fits)
+    if len(fits) == 1 and not is_mirrored:
+        return fits[0]
+    names = [f"{one.words} ({one.options})" for one in fits[:4] or left[:4]]
+    if is_mirrored:
+        names.append("the sensors are numbered the other way round (--sensor-order mirrored)")
+    raise RingLogError(
+        f"the robot's motion and the ranges leave open how headings are counted: {', or '.join(names)}"
+    )

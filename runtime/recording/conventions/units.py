@@ -1,0 +1,261 @@
+"""The units of a ring log's times, positions and ranges, by what the robot can do and its ring can hear.
+
+Each combination of units has a log-likelihood: the firing period, the speed and the turning rate against the robot's,
+the ranges against the ring's reach and resolution, and, where the robot drove towards something, how much a range
+changes with the distance driven. The last knows no scale but measures the ratio of the two units.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from config.robot import RobotConfig
+from drivers.messages import Floats
+from runtime.recording.conventions.options import RingLogOptions
+from runtime.recording.conventions.silence import Silence
+from runtime.recording.conventions.table import ANGLES, LENGTHS, TIMES, Table
+from runtime.recording.ring_log import RingLogError
+
+SURE_NAT: Final = 12.0
+"""By how much other units than metres and seconds must be more likely. An honest log of a robot that crawls, or rests
+between its firings, is a few nats less likely than one in feet."""
+APART_NAT: Final = 4.0
+"""By how much the second best units must be less likely than the best."""
+METRES_NAT: Final = 6.0
+"""Odds on positions and ranges in metres, as most logs have them, where t is in another unit."""
+IMPOSSIBLE_NAT: Final = -60.0
+PERIOD_LN, SPEED_LN, REACH_LN = 1.5, 1.0, 0.8
+"""Spreads of the logarithms of the row's period, the speed and the farthest echo, over the robot's."""
+FAST, TURNS_FAST = 3.0, 5.0
+"""A median speed or turning rate over the robot's greatest by this is impossible: odometry leaps, but not always."""
+FAR, FAR_SHARE = 1.2, 0.1
+"""Ranges beyond the ring's by this factor are impossible; so many may be glitches."""
+PAIR_ALONG: Final = 0.85
+PAIR_LN: Final = 0.12
+"""Least cosine between the way and the beam where a range's change is compared with the way, and the spread of the
+logarithm of their ratio."""
+PAIRS_WEIGHT, PAIRS_MAX = 0.2, 150
+"""Neighbouring pairs share an echo: each counts a fifth, and all together no more than so many."""
+
+
+class Units(NamedTuple):
+    """A combination of units by name: t, x and y, ranges."""
+
+    time: str = "s"
+    length: str = "m"
+    range_: str = "m"
+
+    @property
+    def words(self) -> str:
+        """What is in which unit, and the options that say so."""
+        return f"t in {self.time}, x and y in {self.length}, ranges in {self.range_}"
+
+    @property
+    def options(self) -> str:
+        """The options that set them."""
+        return f"--time-unit {self.time} --length-unit {self.length} --range-unit {self.range_}"
+
+
+def find_units(
+    table: Table, silence: Silence, robot: RobotConfig, options: RingLogOptions, angle: str, ratios: Floats
+) -> Units:
+    """Return the units of times, positions and ranges.
+
+    Parameters
+    ----------
+    table : Table
+        With NaN and inf where nothing was heard.
+    silence : Silence
+        Of the ranges.
+    robot : RobotConfig
+        The robot that the log is said to be of.
+    options : RingLogOptions
+        What is known.
+    angle : str
+        Unit of the angles.
+    ratios : (k,) float
+        Of `way_ratios`.
+
+    Raises
+    ------
+    RingLogError
+        No combination fits the robot, or several do.
+    """
+    choices = [
+        Units(t, length, range_)
+        for t, length, range_ in itertools.product(
+            _choice(options.time_unit, TIMES), _choice(options.length_unit, LENGTHS),
+            _choice(options.range_unit, LENGTHS),
+        )
+    ]  # fmt: skip
+    if len(choices) == 1:
+        return choices[0]
+    facts = _Facts.of(table, silence, angle)
+    scores = {units: _score(units, facts, robot, ratios) for units in choices}
+    best = max(scores, key=scores.__getitem__)
+    default = Units(*(given if given != "auto" else plain for given, plain in zip(
+        (options.time_unit, options.length_unit, options.range_unit), Units(), strict=True)))  # fmt: skip
+    if scores[default] > scores[best] - SURE_NAT:
+        return default
+    if _contradictions(best, facts, robot):
+        raise RingLogError(_impossible(facts, robot))
+    rivals = [units for units in choices if units != best and scores[units] > scores[best] - APART_NAT]
+    rivals = [units for units in rivals if not _is_same(units, best, facts)]
+    if rivals:
+        names = " or ".join(f"{units.words} ({units.options})" for units in [best, *rivals[:2]])
+        raise RingLogError(f"cannot be in metres and seconds ({_impossible(facts, robot)}); it may have {names}")
+    return best
+
+
+def _choice(given: str, known: object) -> list[str]:
+    return [given] if given != "auto" else list(known)  # type: ignore[call-overload]  # a mapping's names
+
+
+class _Facts(NamedTuple):
+    period: float
+    """Median time between rows."""
+    speed: float
+    """Median of the speeds where it moved; 0 if it did not."""
+    rate: float
+    """Median turning rate where it turned, rad per unit of time."""
+    echoes: Floats
+    ceiling: float | None
+
+    @staticmethod
+    def of(table: Table, silence: Silence, angle: str) -> _Facts:
+        dt = np.diff(table.t)
+        gaps = dt[dt > 0.0]
+        period = float(np.median(gaps)) if len(gaps) else 0.0
+        step = np.maximum(dt, 1e-12)
+        moved = np.hypot(*np.diff(table.pose[:, :2], axis=0).T)
+        turned = np.abs(np.diff(table.pose[:, 2])) * ANGLES[angle]
+        turned = np.abs((turned + math.pi) % (2.0 * math.pi) - math.pi)
+        rows = (dt > 0.0) & (moved > 0.0)
+        speed = float(np.median(moved[rows] / step[rows])) if rows.sum() >= STEPS_MIN else 0.0
+        turns = (dt > 0.0) & (turned > 1e-6)
+        rate = float(np.median(turned[turns] / step[turns])) if turns.sum() >= STEPS_MIN else 0.0
+        ceiling = silence.low if silence.is_top and silence.low == silence.high else None
+        return _Facts(period, speed, rate, table.ranges[np.isfinite(table.ranges)], ceiling)
+
+
+STEPS_MIN: Final = 30
+"""Steps on which a speed or a rate rests."""
+ECHOES_MIN: Final = 50
+
+
+def _score(units: Units, facts: _Facts, robot: RobotConfig, ratios: Floats) -> float:
+    """Return the log-likelihood of units."""
+    body, ring = robot.body, robot.ring
+    t, length, range_ = TIMES[units.time], LENGTHS[units.length], LENGTHS[units.range_]
+    score = METRES_NAT * (units.length == units.range_ == "m") + IMPOSSIBLE_NAT * _contradictions(units, facts, robot)
+    if facts.period > 0.0:
+        score += _ln_normal(facts.period * t / ring.firing.step_period_s, PERIOD_LN)
+    if facts.speed > 0.0:
+        speed = facts.speed * length / t / body.speed_max_m_s
+        score += _ln_normal(speed / 0.4, SPEED_LN)
+    if len(facts.echoes) >= ECHOES_MIN:
+        score += _range_score(facts, range_, robot)
+    if len(ratios):
+        off = np.log(ratios) - math.log(length / range_)
+        fits = np.exp(-0.5 * (off / PAIR_LN) ** 2) / (PAIR_LN * math.sqrt(2.0 * math.pi))
+        weight = min(PAIRS_WEIGHT, PAIRS_MAX / len(ratios))
+        score += weight * float(np.log(0.3 * fits + 0.7 * 0.1).sum())
+    return score
+
+
+def _contradictions(units: Units, facts: _Facts, robot: RobotConfig) -> int:
+    """Return how many of speed, turning rate and ranges the robot cannot have in these units."""
+    body, ring = robot.body, robot.ring
+    t, echoes = TIMES[units.time], LENGTHS[units.range_] * facts.echoes
+    count = int(facts.speed * LENGTHS[units.length] / t > FAST * body.speed_max_m_s)
+    count += facts.rate / t > TURNS_FAST * body.turn_max_rad_s
+    if len(echoes) >= ECHOES_MIN:
+        count += float((echoes > FAR * ring.range_max_m).mean()) > FAR_SHARE
+        count += float((echoes < 0.5 * ring.range_min_m).mean()) > 0.5
+    return int(count)
+
+
+def _range_score(facts: _Facts, unit: float, robot: RobotConfig) -> float:
+    ring = robot.ring
+    echoes = unit * facts.echoes
+    far = float((echoes > FAR * ring.range_max_m).mean())
+    score = -20.0 * far + _ln_normal(float(np.quantile(echoes, 0.95)) / (0.6 * ring.range_max_m), REACH_LN)
+    if facts.ceiling is not None and abs(unit * facts.ceiling / ring.range_max_m - 1.0) < 0.01:
+        score += SURE_NAT + APART_NAT
+    if ring.resolution_m >= 0.01:  # finer ones are lost among the file's decimals
+        steps = echoes / ring.resolution_m
+        off = float(np.sqrt(np.mean((steps - np.round(steps)) ** 2)))
+        score += (SURE_NAT + APART_NAT) * (off < 0.1)
+    return score
+
+
+def _ln_normal(ratio: float, spread: float) -> float:
+    return -0.5 * (math.log(ratio) / spread) ** 2 if ratio > 0.0 else 0.0
+
+
+def _is_same(one: Units, other: Units, facts: _Facts) -> bool:
+    """Return whether units differ only in what the file does not show."""
+    return (
+        (one.time == other.time or facts.period == 0.0)
+        and (one.length == other.length or facts.speed == 0.0)
+        and (one.range_ == other.range_ or len(facts.echoes) == 0)
+    )
+
+
+def _impossible(facts: _Facts, robot: RobotConfig) -> str:
+    """Return the first fact that contradicts the robot in metres and seconds."""
+    body, ring = robot.body, robot.ring
+    share = float((facts.echoes > FAR * ring.range_max_m).mean()) if len(facts.echoes) else 0.0
+    if share > FAR_SHARE:
+        return (
+            f"{100 * share:.0f} % of the ranges are beyond ring.range_max_m {ring.range_max_m:g}, the greatest is "
+            f"{float(facts.echoes.max()):g}"
+        )
+    if facts.speed > FAST * body.speed_max_m_s:
+        return f"x and y move at {facts.speed:.3g} m/s, and this robot's body.speed_max_m_s is {body.speed_max_m_s:g}"
+    if facts.rate > TURNS_FAST * body.turn_max_rad_s:
+        return (
+            f"theta turns at {facts.rate:.3g} rad/s, and this robot's body.turn_max_rad_s is {body.turn_max_rad_s:g}"
+        )
+    return f"the firings are {facts.period:.3g} s apart, and this robot's are {ring.firing.step_period_s:g}"
+
+
+def way_ratios(table: Table, robot: RobotConfig, yaw: Floats, hand: int) -> Floats:
+    """Return how much ranges changed for each unit of way along the beam, where the robot drove along one.
+
+    Parameters
+    ----------
+    table : Table
+        In the file's units.
+    robot : RobotConfig
+        Its ring.
+    yaw : (n,) float
+        Direction of the ring, rad counter-clockwise in the frame of x and hand · y.
+    hand : int
+        As `HeadingRule.hand`.
+    """
+    x, y = table.pose[:, 0], hand * table.pose[:, 1]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    least = way[-1] / 300.0
+    found: list[Floats] = []
+    for sensor, mount in enumerate(robot.ring.mounts):
+        rows = np.flatnonzero(np.isfinite(table.ranges[:, sensor]))
+        if len(rows) < 3 or least <= 0.0:
+            continue
+        later = np.searchsorted(way[rows], way[rows] + least)
+        begin = np.flatnonzero(later < len(rows))
+        a, b = rows[begin], rows[later[begin]]
+        dx, dy = x[b] - x[a], y[b] - y[a]
+        far = np.hypot(dx, dy)
+        turned = np.abs(np.angle(np.exp(1j * (yaw[b] - yaw[a]))))
+        along = (dx * np.cos(yaw[a] + mount.angle_rad) + dy * np.sin(yaw[a] + mount.angle_rad)) / np.maximum(
+            far, 1e-300
+        )
+        good = (np.abs(along) > PAIR_ALONG) & (turned < 0.1) & (far < 3.0 * least)
+        change = (table.ranges[a[good], sensor] - table.ranges[b[good], sensor]) / (far * along)[good]
+        found.append(change[change > 0.0])
+    return np.concatenate(found) if found else np.empty(0)

@@ -1,0 +1,96 @@
+"""Repeats are found in sources that give last values, and in no honest one; what repeats did not fire."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivers.driver import Received
+from drivers.latched_ranges import NOTE, FreshDriver, RepeatDetector, RepeatFilter
+from drivers.messages import Firing, Floats, Pose
+
+SENSORS = 8
+
+
+def fresh_rows(count: int, step_m: float, noise_m: float, seed: int) -> Floats:
+    """Return rows of a ring of which every sensor fires: slow waves, quantised."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(count)[:, None]
+    waves = 2.0 + np.sin(0.002 * t * (1.0 + np.arange(SENSORS)) + np.arange(SENSORS))
+    rows: Floats = np.round((waves + noise_m * rng.standard_normal(waves.shape)) / step_m) * step_m
+    return rows
+
+
+def held(rows: Floats, every: int) -> Floats:
+    """Return rows in which sensor j takes a new value where (row + j) is divisible by `every`."""
+    out = rows.copy()
+    for k in range(1, len(rows)):
+        fires = (k + np.arange(SENSORS)) % every == 0
+        out[k] = np.where(fires, rows[k], out[k - 1])
+    return out
+
+
+def period(rows: Floats) -> int:
+    detector = RepeatDetector(SENSORS)
+    for row in rows:
+        detector.add(row)
+    return detector.period
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("step_m", [0.001, 0.01, 0.03048])
+@pytest.mark.parametrize("noise_m", [0.0, 0.005, 0.03])
+def test_no_honest_ring_is_taken_for_latched(step_m: float, noise_m: float, seed: int) -> None:
+    rows = fresh_rows(2000, step_m, noise_m, seed)
+    assert period(rows) == 1
+    assert period(np.repeat(rows[:1], 500, axis=0)) == 1, "a robot at rest, or a frozen ring"
+    in_turn = np.where((np.arange(2000)[:, None] + np.arange(SENSORS)) % 4 == 0, rows, np.nan)
+    assert period(in_turn) == 1
+
+
+@pytest.mark.parametrize("every", [2, 3, 7, 20])
+def test_last_values_are_found(every: int) -> None:
+    assert period(held(fresh_rows(4000, 0.001, 0.01, 1), every)) == every
+
+
+def at(t: float, ranges: Floats) -> Firing:
+    return Firing(t, Pose(0.0, 0.0, 0.0), 0.0, ranges)
+
+
+def test_only_changes_remain() -> None:
+    changes = RepeatFilter(2)
+    got = [
+        changes.fresh(at(0.0, np.array(row))).ranges_m
+        for row in ([1.0, np.inf], [1.0, 2.0], [np.nan, 2.0], [1.5, 2.0])
+    ]
+    nan = np.nan
+    np.testing.assert_array_equal(got, [[nan, nan], [nan, 2.0], [nan, nan], [1.5, nan]])
+
+
+class Scripted:
+    """A driver that has one firing at a time."""
+
+    def __init__(self, rows: Floats) -> None:
+        self._rows = iter(rows)
+
+    def take_received(self) -> Received:
+        return Received((at(0.0, next(self._rows)),), None, rebooted=False)
+
+
+def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fired() -> None:
+    rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
+    frozen = np.repeat(rows[-1:], 50, axis=0)
+    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS)  # type: ignore[arg-type]  # only what is used
+    received = [driver.take_received() for _ in range(2050)]
+    assert [note for one in received for note in one.notes] == [NOTE]
+    late = np.array([one.firings[0].ranges_m for one in received])
+    assert np.isfinite(late[1000:2000]).mean() == pytest.approx(1 / 3, abs=0.02)
+    assert np.isnan(late[2000:]).all(), "nothing usable: the robot must not drive on"
+
+
+def test_a_frozen_ring_that_was_fresh_is_passed_on_for_the_monitor() -> None:
+    rows = fresh_rows(1000, 0.001, 0.01, 3)
+    frozen = np.repeat(rows[-1:], 500, axis=0)
+    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS)  # type: ignore[arg-type]  # only what is used
+    got = np.array([driver.take_received().firings[0].ranges_m for _ in range(1500)])
+    np.testing.assert_array_equal(got, np.concatenate([rows, frozen]))

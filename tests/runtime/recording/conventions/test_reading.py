@@ -1,0 +1,175 @@
+"""Tables in any convention give the firings of the clean table, or are refused with the option that settles it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from drivers.messages import Firing
+from runtime.recording.conventions.options import RingLogOptions
+from runtime.recording.conventions.reading import open_ring_log
+from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.recording.ring_log_replay import replay_firings
+from tests.recordings import DATA, recording
+from tests.runtime.recording.conventions.tables import (
+    MODELS,
+    ROBOTS,
+    WORLDS,
+    Case,
+    Convention,
+    Drive,
+    draw,
+    latched,
+    make_drive,
+    written,
+)
+
+DRUM_M = 0.06
+"""How far a drum may lie from where the clean table has it."""
+
+
+def right_options(how: Convention) -> RingLogOptions:
+    """Return the options that describe a table."""
+    is_mirrored = how.heading == "sensors-cw"
+    silence = {"zero": "0", "noisy-max": "max", "glitch-max": "max"}.get(how.silence, how.silence)
+    return RingLogOptions(
+        latched="yes" if how.latched else "no", heading="ccw" if is_mirrored else how.heading,  # type: ignore[arg-type]
+        sensor_order="mirrored" if is_mirrored else "file", angle_unit=how.angle, time_unit=how.time,  # type: ignore[arg-type]
+        length_unit=how.position, range_unit=how.range_, silence="auto" if silence == "max" else silence,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def check_right(got: list[Firing], drive: Drive, how: Convention) -> None:
+    """Fail unless firings are those of the drive."""
+    want = latched(drive) if how.latched else drive
+    poses = np.array([(f.pose.x, f.pose.y, f.pose.theta, f.ring_yaw) for f in got])
+    assert np.abs(poses[:, :2] - want.pose[:, :2]).max() < 0.01
+    assert np.abs(np.angle(np.exp(1j * (poses[:, 2:] - want.pose[:, 2:])))).max() < 0.01
+    assert np.abs(np.array([f.robot_s for f in got]) - want.t).max() < 0.01
+    ranges = np.array([f.ranges_m for f in got])
+    both = np.isfinite(ranges) & np.isfinite(want.ranges)
+    assert both.any()
+    assert np.abs(ranges - want.ranges)[both].max() < 0.01
+    if not how.latched:
+        silent = np.isposinf(want.ranges)
+        assert (np.isposinf(ranges) == silent).mean() > 0.995
+        assert np.array_equal(np.isnan(ranges), np.isnan(want.ranges))
+
+
+def try_case(case: Case, path: Path) -> str:
+    """Return what became of a table: right, or the option that its refusal names; fail if it is neither."""
+    drive = make_drive(case.seed, case.robot, case.world, case.model)
+    written(drive, case.how, np.random.default_rng(case.seed), path)
+    outcome = "right"
+    refusal = ""
+    try:
+        got = list(open_ring_log(path, drive.settings))
+    except RingLogError as error:
+        refusal = str(error)
+    if refusal:
+        outcome = "refused: headings" if "--heading" in refusal else "refused: units"
+        named = "--sensor-order mirrored" if case.how.heading == "sensors-cw" else f"--heading {case.how.heading} "
+        assert (named if "--heading" in refusal else f"--length-unit {case.how.position} ") in refusal
+        got = list(open_ring_log(path, drive.settings, right_options(case.how)))
+    check_right(got, drive, case.how)
+    return outcome
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_table_in_any_convention(seed: int, tmp_path: Path) -> None:
+    try_case(draw(seed), tmp_path / "table.csv")
+
+
+@pytest.mark.soak
+def test_many_tables_in_any_convention(tmp_path: Path) -> None:
+    outcomes = Counter(try_case(draw(seed), tmp_path / "table.csv") for seed in range(200))
+    assert outcomes["right"] > 100
+
+
+def check_unchanged(path: Path, robot: str) -> None:
+    said: list[str] = []
+    got = list(open_ring_log(path, load_settings(robot=robot), warn=said.append))
+    want = list(read_ring_log(path))
+    assert not said
+    for one, other in zip(got, want, strict=True):
+        assert (one.robot_s, one.pose, one.ring_yaw) == (other.robot_s, other.pose, other.ring_yaw)
+        assert np.array_equal(one.ranges_m, other.ranges_m, equal_nan=True)
+
+
+def good_tables(seed: int) -> list[Drive]:
+    """Return drives that are right: whole ones, parts, without silence, standing, sideways."""
+    rng = np.random.default_rng([seed, 5])
+    robot, world, model = (str(rng.choice(np.array(of))) for of in (ROBOTS, WORLDS, MODELS))
+    drive = make_drive(seed + 10_000, robot, world, model)
+    count, at = int(rng.integers(30, len(drive.t))), int(rng.integers(len(drive.t) - 30))
+    closed = np.where(np.isinf(drive.ranges), np.nan, drive.ranges)
+    rows = slice(at, at + int(rng.integers(5, 200)))
+    standing = np.repeat(drive.pose[at : at + 1], len(drive.t[rows]), 0)
+    sideways = drive.pose.copy()
+    sideways[:, 2] = sideways[:, 3]
+    return [
+        drive,
+        replace(drive, t=drive.t[:count], pose=drive.pose[:count], ranges=closed[:count]),
+        replace(drive, t=drive.t[rows], pose=standing, ranges=drive.ranges[rows]),
+        replace(drive, pose=sideways),
+    ]
+
+
+@pytest.mark.parametrize("name", ["corridor", "ring24"])
+def test_a_recording_in_the_forms_own_conventions_passes_to_the_bit(name: str) -> None:
+    check_unchanged(DATA / f"{name}.csv", str(DATA / f"{name}.toml"))
+    assert recording(name)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_good_table_passes_to_the_bit(seed: int, tmp_path: Path) -> None:
+    for drive in good_tables(seed):
+        path = written(drive, Convention(), np.random.default_rng(seed), tmp_path / "table.csv")
+        check_unchanged(path, drive.robot)
+
+
+@pytest.mark.soak
+def test_many_good_tables_pass_to_the_bit(tmp_path: Path) -> None:
+    for seed in range(100):
+        for drive in good_tables(seed):
+            path = written(drive, Convention(), np.random.default_rng(seed), tmp_path / "table.csv")
+            check_unchanged(path, drive.robot)
+
+
+def drums(drive: Drive, firings: list[Firing]) -> list[tuple[float, float]]:
+    """Return where drums are reported."""
+    found = replay_firings(drive.settings, firings)["objects"]
+    return sorted((one["x"], one["y"]) for one in found if one["model"] == "drum" and one["score"] > 0.95)
+
+
+def test_a_latched_table_has_the_clean_ones_drums(tmp_path: Path) -> None:
+    drive = make_drive(7, "p3dx", "hall", "cone")
+    clean = written(drive, Convention(), np.random.default_rng(7), tmp_path / "clean.csv")
+    how = Convention(heading="cw", angle="deg", silence="zero", latched=True)
+    table = written(drive, how, np.random.default_rng(7), tmp_path / "latched.csv")
+    said: list[str] = []
+    want = drums(drive, list(open_ring_log(clean, drive.settings)))
+    got = drums(drive, list(open_ring_log(table, drive.settings, warn=said.append)))
+    assert len(got) == len(want)
+    assert all(math.dist(a, b) < DRUM_M for a, b in zip(got, want, strict=True))
+    (text,) = said
+    for option in ("--latched", "--heading cw --angle-unit deg", "--silence 0"):
+        assert option in text
+
+
+@pytest.mark.parametrize(("silence", "is_good"), [("auto", True), ("0", True), ("-1", True), ("none", False)])
+def test_only_a_number_or_a_word_stands_for_silence(silence: str, is_good: bool) -> None:
+    from config.errors import UserError
+
+    options = RingLogOptions(silence=silence)
+    if is_good:
+        options.check()
+        return
+    with pytest.raises(UserError, match="give auto, inf, nan, max or a number"):
+        options.check()
