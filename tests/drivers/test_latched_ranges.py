@@ -88,6 +88,14 @@ def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fire
     assert np.isnan(late[2000:]).all(), "nothing usable: the robot must not drive on"
 
 
+def test_repeated_silence_of_a_live_source_is_passed_on() -> None:
+    rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
+    silent = np.full((50, SENSORS), np.inf)
+    driver = FreshDriver(Scripted(np.concatenate([rows, silent])), SENSORS)  # type: ignore[arg-type]  # only what is used
+    got = np.array([driver.take_received().firings[0].ranges_m for _ in range(2050)])
+    assert np.isposinf(got[2000:]).all()
+
+
 def test_a_frozen_ring_that_was_fresh_is_passed_on_for_the_monitor() -> None:
     rows = fresh_rows(1000, 0.001, 0.01, 3)
     frozen = np.repeat(rows[-1:], 500, axis=0)

@@ -33,7 +33,7 @@ BLOCKS: Final = 20
 KERNEL_M: Final = 0.15
 """Width of an echo's density, m: what a beam leaves open at a metre or two."""
 SURE: Final = 4.5
-"""Standard errors by which a convention must explain the echoes better. Over 800 clean drives, the mirrored one was
+"""Standard errors by which a convention must explain the echoes better. Over 20 clean drives, the mirrored one was
 worse by 8 at least."""
 
 
