@@ -1,6 +1,6 @@
 """Whether a source repeats each sensor's last value until the sensor fires again, and the firings without repeats.
 
-Many programs (RosAria, Player, most loggers) give all sensors in every row, each with the last value it had. Taken
+Many programs (RosAria, most loggers) give all sensors in every row, each with the last value it had. Taken
 for firings, old ranges count again, at poses where nothing was measured.
 
 A latched sensor changes when it fires: its changes are a cycle apart, and between them its value is equal to the bit.
@@ -94,15 +94,21 @@ class RepeatDetector:
 class RepeatFilter:
     """Removes repeats from firings: what did not change since the last one did not fire.
 
+    Silence repeats to the bit when a sensor fires again and hears nothing. It counts once in each cycle of the ring.
+
     Parameters
     ----------
     sensors : int
         Number of sensors.
+    cycle_s : float
+        Time in which each sensor fires once, in the firings' unit of time.
     """
 
-    def __init__(self, sensors: int) -> None:
+    def __init__(self, sensors: int, cycle_s: float) -> None:
+        self._cycle_s = cycle_s
         self._last: Floats = np.full(sensors, np.nan)
-        self._is_first = True
+        self._read_s: Floats = np.full(sensors, np.inf)
+        """When each sensor last fired; inf before the first firing, of which nothing is known to be new."""
 
     def fresh(self, firing: Firing) -> Firing:
         """Return the firing with NaN for each repeated value; of the first firing, nothing is known to be new.
@@ -112,19 +118,20 @@ class RepeatFilter:
         firing : Firing
             The next one.
         """
-        ranges = firing.ranges_m
+        ranges, is_first = firing.ranges_m, bool(np.isposinf(self._read_s).all())
         has = ~np.isnan(ranges)
-        is_repeat = has & ((ranges == self._last) | self._is_first)
+        is_due = np.isposinf(ranges) & (firing.robot_s - self._read_s >= 0.999 * self._cycle_s)
+        is_new = has & ((ranges != self._last) | is_due) & (not is_first)
         self._last = np.where(has, ranges, self._last)
-        self._is_first = False
-        return replace(firing, ranges_m=np.where(is_repeat, np.nan, ranges))
+        self._read_s = np.where(is_new | is_first, firing.robot_s, self._read_s)
+        return replace(firing, ranges_m=np.where(is_new, ranges, np.nan))
 
 
 class FreshDriver:
     """A `drivers.driver.RobotDriver` around another one: removes the repeats of a robot that sends last values.
 
-    A ring whose values never change again then has not fired: the robot, which must not drive blind, stops. Repeated
-    silence is passed on: in an open hall a sensor that fires gives it each time.
+    A ring whose values never change again then has not fired: the robot, which must not drive blind, stops. Silence
+    is passed on once a cycle: in an open hall a sensor that fires gives it each time.
 
     Parameters
     ----------
@@ -132,12 +139,14 @@ class FreshDriver:
         The robot's own driver.
     sensors
         Number of sensors.
+    cycle_s
+        Time in which each sensor fires once.
     """
 
-    def __init__(self, driver: RobotDriver, sensors: int) -> None:
+    def __init__(self, driver: RobotDriver, sensors: int, cycle_s: float) -> None:
         self._driver = driver
         self._detector = RepeatDetector(sensors)
-        self._filter = RepeatFilter(sensors)
+        self._filter = RepeatFilter(sensors, cycle_s)
         self._is_latched = False
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - all other members are the driver's, as they are
@@ -150,8 +159,6 @@ class FreshDriver:
         fresh = []
         for firing in received.firings:
             without = self._filter.fresh(firing)
-            ranges = np.where(np.isposinf(firing.ranges_m), np.inf, without.ranges_m)
-            without = replace(without, ranges_m=ranges)
             if not self._is_latched:
                 self._detector.add(firing.ranges_m)
                 self._is_latched = self._detector.period > 1

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Final, Protocol, TypedDict, cast
 from config.robot import CalibrationConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import DriverError
-from drivers.latched_ranges import FreshDriver
 from drivers.serial_port import OpenPort
 
 if TYPE_CHECKING:
@@ -70,10 +69,6 @@ class DriverFamily(Protocol):
         """
 
 
-FIRES_ARE_FRESH: Final = ("denning", "arcos", "rflex")
-"""Drivers whose protocol gives what fired and nothing else; others may repeat last values."""
-
-
 def known_drivers() -> dict[str, EntryPoint]:
     """Return all installed drivers by name; a shipped driver takes precedence over another of its name."""
     return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **SHIPPED}
@@ -90,8 +85,6 @@ def make_driver(config: RobotConfig) -> RobotDriver:
         The robot or its protocol cannot carry out the firing pattern of `config`.
     """
     driver = _family(config.robot.driver).make_driver(config)
-    if config.robot.driver not in FIRES_ARE_FRESH:
-        driver = cast("RobotDriver", FreshDriver(driver, len(config.ring.mounts)))
     if config.calibration == CalibrationConfig():
         return driver
     return cast("RobotDriver", CalibratedDriver(driver, config.calibration, synchro=config.body.synchro))

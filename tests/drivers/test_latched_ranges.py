@@ -58,13 +58,16 @@ def at(t: float, ranges: Floats) -> Firing:
 
 
 def test_only_changes_remain() -> None:
-    changes = RepeatFilter(2)
-    got = [
-        changes.fresh(at(0.0, np.array(row))).ranges_m
-        for row in ([1.0, np.inf], [1.0, 2.0], [np.nan, 2.0], [1.5, 2.0])
-    ]
-    nan = np.nan
+    changes, nan, inf = RepeatFilter(2, 0.3), np.nan, np.inf
+    rows = ([1.0, inf], [1.0, 2.0], [nan, 2.0], [1.5, 2.0])
+    got = [changes.fresh(at(0.1 * k, np.array(row))).ranges_m for k, row in enumerate(rows)]
     np.testing.assert_array_equal(got, [[nan, nan], [nan, 2.0], [nan, nan], [1.5, nan]])
+
+
+def test_silence_counts_once_a_cycle() -> None:
+    changes = RepeatFilter(1, 0.3)
+    got = [changes.fresh(at(0.1 * k, np.array([1.0 if k == 0 else np.inf]))).ranges_m[0] for k in range(9)]
+    assert np.flatnonzero(np.isposinf(got)).tolist() == [1, 4, 7]
 
 
 class Scripted:
@@ -80,7 +83,7 @@ class Scripted:
 def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fired() -> None:
     rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
     frozen = np.repeat(rows[-1:], 50, axis=0)
-    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS)  # type: ignore[arg-type]  # only what is used
+    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
     received = [driver.take_received() for _ in range(2050)]
     assert [note for one in received for note in one.notes] == [NOTE]
     late = np.array([one.firings[0].ranges_m for one in received])
@@ -88,10 +91,10 @@ def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fire
     assert np.isnan(late[2000:]).all(), "nothing usable: the robot must not drive on"
 
 
-def test_repeated_silence_of_a_live_source_is_passed_on() -> None:
+def test_silence_of_a_live_source_is_passed_on() -> None:
     rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
     silent = np.full((50, SENSORS), np.inf)
-    driver = FreshDriver(Scripted(np.concatenate([rows, silent])), SENSORS)  # type: ignore[arg-type]  # only what is used
+    driver = FreshDriver(Scripted(np.concatenate([rows, silent])), SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
     got = np.array([driver.take_received().firings[0].ranges_m for _ in range(2050)])
     assert np.isposinf(got[2000:]).all()
 
@@ -99,6 +102,6 @@ def test_repeated_silence_of_a_live_source_is_passed_on() -> None:
 def test_a_frozen_ring_that_was_fresh_is_passed_on_for_the_monitor() -> None:
     rows = fresh_rows(1000, 0.001, 0.01, 3)
     frozen = np.repeat(rows[-1:], 500, axis=0)
-    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS)  # type: ignore[arg-type]  # only what is used
+    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
     got = np.array([driver.take_received().firings[0].ranges_m for _ in range(1500)])
     np.testing.assert_array_equal(got, np.concatenate([rows, frozen]))

@@ -43,8 +43,8 @@ class Conventions:
     ----------
     columns : (sensors,) int, optional
         The column of each sensor where the file's order is mirrored.
-    is_latched : bool
-        Whether only changes are readings.
+    cycle_s : float, optional
+        Of a log of last values, of which only changes are readings: time in which each sensor fires once.
     said : tuple of str
         What was found in the data, and the option that sets it; empty for a log in the form's own conventions.
     """
@@ -53,7 +53,7 @@ class Conventions:
     units: Units = _SI
     angles: Angles = _RADIANS
     columns: NDArray[np.int64] | None = None
-    is_latched: bool = False
+    cycle_s: float | None = None
     said: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -98,7 +98,8 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     """
     columns = mirrored_columns(robot.ring) if options.sensor_order == "mirrored" else None
     said = []
-    set_size = max(len(sensors(mask)) for mask in firing_pattern(robot.ring).masks)
+    pattern = firing_pattern(robot.ring)
+    set_size = max(len(sensors(mask)) for mask in pattern.masks)
     silence = find_silence(table, options.silence, set_size)
     if silence.words:
         said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
@@ -106,11 +107,11 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if (ranges < 0.0).any():
         raise RingLogError(f"has ranges below 0, as {float(np.nanmin(ranges)):g}; correct them, or say --silence -1")
     table = table._replace(ranges=ranges if columns is None else ranges[:, columns])
-    period = _repeats(table.ranges) if options.latched == "auto" else 1
+    period = 1 if options.latched == "no" else _repeats(table.ranges)
     is_latched = options.latched == "yes" or period > 1
     if is_latched:
         table = table._replace(ranges=_without_repeats(table.ranges))
-        if period > 1:
+        if options.latched == "auto":
             said.append((
                 f"each value is repeated, for {period} rows mostly, until its sensor fires again: only changes are "
                 "readings", "--latched yes, or no if all are fresh",
@@ -128,7 +129,11 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     )
     if angles != asked:
         said.append((angles.words, angles.options))
-    return Conventions(silence, units, angles, columns, is_latched, tuple(said))
+    cycle_s = None
+    if is_latched:
+        row_s = TIMES[units.time] * float(np.median(np.diff(table.t))) if len(table.t) > 1 else 0.0
+        cycle_s = max(len(pattern.masks) * pattern.step_period_s, period * row_s if period > 1 else 0.0)
+    return Conventions(silence, units, angles, columns, cycle_s, tuple(said))
 
 
 def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
@@ -160,7 +165,7 @@ def _repeats(ranges: Floats) -> int:
 
 def _without_repeats(ranges: Floats) -> Floats:
     still = Pose(0.0, 0.0, 0.0)
-    changes = RepeatFilter(ranges.shape[1])
+    changes = RepeatFilter(ranges.shape[1], np.inf)
     return np.array([changes.fresh(Firing(0.0, still, 0.0, row)).ranges_m for row in ranges])
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
 
@@ -36,8 +36,8 @@ class RingLogOptions:
     range_unit
         Ring logs: unit of the ranges.
     silence
-        Ring logs: what stands for a sensor that fired and heard nothing: inf alone, nan, 0, -1, max, or a number at
-        and above which a range is silence.
+        Ring logs: what stands for a sensor that fired and heard nothing: inf alone, nan, exactly a number as 0, -1 or
+        7.6, or max, the narrow band at the top of the ranges. Numbers are in the file's unit.
     """
 
     latched: Literal["auto", "yes", "no"] = "auto"
@@ -48,6 +48,11 @@ class RingLogOptions:
     length_unit: LengthUnit = "auto"
     range_unit: LengthUnit = "auto"
     silence: str = "auto"
+
+    def settled(self) -> RingLogOptions:
+        """Return the options with the form's own conventions for what is left at auto."""
+        given: dict[str, Any] = {name: value for name, value in vars(self).items() if value != "auto"}
+        return replace(PLAIN, **given)
 
     def check(self) -> None:
         """Raise an error if `silence` is neither a word nor a number.
@@ -82,3 +87,5 @@ class RingLogOptions:
 
 
 AUTO: Final = RingLogOptions()
+PLAIN: Final = RingLogOptions("no", "ccw", "file", "rad", "s", "m", "m", "inf")
+"""The form's own conventions."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -11,14 +12,17 @@ import numpy as np
 
 from config.robot import RobotConfig
 from drivers.latched_ranges import RepeatFilter
-from drivers.messages import Firing
+from drivers.messages import Firing, Pose, wrap_angle
 from runtime.recording.conventions.decision import decide
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.recording.ring_log_units import plausible_firings
 
 FIRST: Final = 20_000
 """Rows on which the decision rests: a quarter of an hour at the rate of most rings, 20 MB."""
+FIRST_OF_PIPE: Final = 400
+"""Rows of a pipe, whose reader waits for the first firing: less than half a minute of most rings."""
 
 
 def open_ring_log(
@@ -45,8 +49,10 @@ def open_ring_log(
         The file cannot be read, is invalid, or its conventions are ambiguous; the text names the option to give.
     """
     options.check()
-    rows = read_ring_log(path, sensors=len(robot.ring.mounts), is_strict=False)
-    yield from converted_firings(rows, path, robot, options, warn)
+    is_strict = options.silence in {"auto", "inf"}
+    rows = read_ring_log(path, sensors=len(robot.ring.mounts), is_strict=is_strict)
+    firings = rows if options == AUTO else converted_firings(rows, path, robot, options.settled(), warn)
+    yield from plausible_firings(firings, path, robot, warn)
 
 
 def converted_firings(
@@ -67,7 +73,7 @@ def converted_firings(
         As of `open_ring_log`.
     """
     rows = iter(rows)
-    first = list(itertools.islice(rows, FIRST))
+    first = list(itertools.islice(rows, FIRST if path.is_file() else FIRST_OF_PIPE))
     if not first:
         return
     try:
@@ -77,14 +83,45 @@ def converted_firings(
     if found.said:
         what = "; ".join(words for words, _ in found.said)
         warn(f"{path}: {what}. To settle it: {'; '.join(option for _, option in found.said)}")
-    changes = RepeatFilter(len(robot.ring.mounts)) if found.is_latched else None
-    for firing in itertools.chain(first, rows):
-        one = firing if found.is_plain else found.converted(firing)
-        if (one.ranges_m < 0.0).any():
+    firings: Iterator[Firing] = (
+        one if found.is_plain else found.converted(one) for one in itertools.chain(first, rows)
+    )
+    if found.cycle_s is not None:
+        firings = _changes(firings, len(robot.ring.mounts), found.cycle_s)
+    yield from _checked(firings, path)
+
+
+def _changes(firings: Iterable[Firing], sensors: int, cycle_s: float) -> Iterator[Firing]:
+    """Yield the firings of a log of last values without repeats, from where the robot was when they were fired.
+
+    A value that is new in a row was fired between the row before and this one: half way on average, or half a cycle
+    before this row where the rows are further apart.
+    """
+    changes = RepeatFilter(sensors, cycle_s)
+    last: Firing | None = None
+    for firing in firings:
+        fresh = changes.fresh(firing)
+        if last is not None:
+            dt = firing.robot_s - last.robot_s
+            back = 0.5 * min(1.0, cycle_s / dt) if dt > 0.0 else 0.5
+            here, was = firing.pose, last.pose
+            pose = Pose(
+                here.x + back * (was.x - here.x), here.y + back * (was.y - here.y),
+                here.theta + back * wrap_angle(was.theta - here.theta),
+            )  # fmt: skip
+            ring_yaw = firing.ring_yaw + back * wrap_angle(last.ring_yaw - firing.ring_yaw)
+            fresh = replace(fresh, pose=pose, ring_yaw=ring_yaw)
+        last = firing
+        yield fresh
+
+
+def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
+    for firing in firings:
+        if (firing.ranges_m < 0.0).any():
             raise RingLogError(
                 f"{path}: at t = {firing.robot_s!r}, a range is below 0 or nan; correct or delete the row"
             )
-        yield one if changes is None else changes.fresh(one)
+        yield firing
 
 
 def _table(firings: list[Firing]) -> Table:

@@ -86,8 +86,8 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
     is_nan, finite = np.isneginf(ranges), ranges[np.isfinite(ranges)]
     if wanted not in {"auto", "nan", "max", "inf"}:
         number = float(wanted)
-        low, high = (number, np.inf) if number > 0.0 else (-np.inf, number)
-        return Silence(low if low > 0.0 else -1e308, high, is_top=number > 0.0, option=wanted)
+        above = int(np.count_nonzero(finite > number))
+        return Silence(number, number, is_top=number > 0.0 and above <= GLITCHES * len(finite), option=wanted)
     if wanted == "nan":
         return Silence(nan_is_silence=True, option="nan")
     if wanted == "auto" and is_nan.any() and _nan_is_silence(ranges, set_size):
@@ -138,10 +138,9 @@ def _nan_is_silence(ranges: Floats, set_size: int) -> bool:
 def _one_value(value: float, finite: Floats) -> Silence:
     share = np.count_nonzero(finite == value) / len(finite)
     is_top = value > 0.0 and float(np.count_nonzero(finite > value)) < GLITCHES * len(finite)
-    option = f"{value:g}"
     # Ranges above a greatest value are glitches: they stay what they are.
     return Silence(
-        value, value, is_top=is_top, option=option,
+        value, value, is_top=is_top, option=f"{value:.10g}",
         words=f"{100 * share:.0f} % of the ranges are exactly {value:g}, which is taken for silence (inf)",
     )  # fmt: skip
 
@@ -168,9 +167,8 @@ def _top(finite: Floats) -> Silence | None:
     if inside < max(least, TOP_SHARE * len(finite), 10):
         return None
     low, high = centre - width, centre + width
-    option = f"{low:.4g}"
     return Silence(
-        low, high, is_top=True, option=option,
+        low, high, is_top=True, option="max",
         words=f"{100 * inside / len(finite):.0f} % of the ranges are {centre:.4g} ± {width:.2g} wherever it is, "
         "which is taken for silence (inf)",
     )  # fmt: skip
