@@ -1,0 +1,52 @@
+"""What stands for silence is found where it is said, and in tables that show it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.messages import Floats
+from runtime.recording.conventions.silence import find_silence
+from runtime.recording.conventions.table import Table
+
+ROWS, SENSORS = 600, 4
+
+
+def table(silent: Floats, share: float = 0.3) -> tuple[Table, NDArray[np.bool_]]:
+    """Return a moving robot's table with values for silence in it, and where they are."""
+    rng = np.random.default_rng(1)
+    t: Floats = np.arange(ROWS) * 0.1
+    pose: Floats = np.column_stack([0.02 * t, 0.0 * t, 0.0 * t, 0.0 * t])
+    ranges: Floats = np.round(rng.uniform(0.3, 4.0, (ROWS, SENSORS)), 3)
+    is_silent = rng.random(ranges.shape) < share
+    ranges[is_silent] = np.resize(silent, int(is_silent.sum()))
+    return Table(t, pose, ranges), is_silent
+
+
+NOISY = np.round(7.6 + 0.05 * np.random.default_rng(2).standard_normal(1000), 3)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "silent"),
+    [
+        ("0", [0.0]),
+        ("-1", [-1.0]),
+        ("7.6", [7.6]),
+        ("max", [7.6]),
+        ("max", NOISY),
+        ("nan", [-np.inf]),
+        ("inf", [np.inf]),
+    ],
+)
+def test_what_is_said_is_silence(wanted: str, silent: Floats) -> None:
+    rows, is_silent = table(np.array(silent))
+    got = find_silence(rows, wanted, 1).applied(rows.ranges)
+    assert (np.isposinf(got) == is_silent).mean() > 0.999
+    np.testing.assert_array_equal(got[~is_silent], rows.ranges[~is_silent])
+
+
+def test_a_number_is_exact_and_leaves_glitches_above_it() -> None:
+    rows, _ = table(np.array([7.6]))
+    rows.ranges[5, 0] = 34.0
+    assert find_silence(rows, "7.6", 1).applied(rows.ranges)[5, 0] == 34.0
