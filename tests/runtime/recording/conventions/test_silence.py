@@ -16,7 +16,7 @@ ROWS, SENSORS = 600, 4
 def table(silent: Floats, share: float = 0.3) -> tuple[Table, NDArray[np.bool_]]:
     """Return a moving robot's table with values for silence in it, and where they are."""
     rng = np.random.default_rng(1)
-    t: Floats = np.arange(ROWS) * 0.1
+    t: Floats = 0.1 * np.arange(ROWS, dtype=np.float64)
     pose: Floats = np.column_stack([0.02 * t, 0.0 * t, 0.0 * t, 0.0 * t])
     ranges: Floats = np.round(rng.uniform(0.3, 4.0, (ROWS, SENSORS)), 3)
     is_silent = rng.random(ranges.shape) < share
