@@ -31,7 +31,8 @@ from drivers.registry import make_device, make_driver
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import prepared_state, unprepared_state
-from runtime.cycle.step import LOST, apply_command, step
+from runtime.cycle.step import apply_command, step
+from runtime.cycle.unheard_limit import LOST, UNHEARD
 from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
@@ -275,8 +276,8 @@ def run_trial(
                 texts += [note for note in inputs.received.notes if note not in known]
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
-            if kind is not None and state.hold_reason == LOST:
-                texts.append(LOST)
+            if kind is not None and state.hold_reason in {LOST, UNHEARD}:
+                texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]
         if contact_s is not None or state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}:

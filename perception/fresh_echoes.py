@@ -8,9 +8,8 @@ has not looked: its last echo ages.
 A look whose echo is replaced still counts as a look. Neighbours whose beams just touch fire one after the other:
 while the ring turns, only the looks before close the gap that the turn leaves between their newest ones.
 
-While no sensor hears anything, steady echoes that fall silent as the robot comes nearer stay obstacles, and do not
-age: a ring that has failed hears nothing either, and the robot must not drive at what it heard before. What falls
-silent before a robot that stands has left.
+Steady echoes that fall silent as the robot comes nearer are kept apart (`perception.unheard_echoes`). While no sensor
+hears anything, they stay obstacles and do not age.
 """
 
 from __future__ import annotations
@@ -22,9 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
-from perception.bounds import CONSTANT, COUNT, PLACE, bounds
-from perception.kernel import Floats, Ints, kernel
+from perception.bounds import CONSTANT, PLACE, bounds
+from perception.kernel import Floats, kernel
+from perception.records import Records
 from perception.sensor_mounts import mounts_at
+from perception.unheard_echoes import ALONE, UnheardEcho, UnheardEchoes, contradict_echoes, lose_echo
 
 LOOKS: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
@@ -37,10 +38,6 @@ STEADY_M: Final = 0.3
 STEADY_S: Final = 1.5
 """An echo is steady if another look, by the same sensor or another one, put one this near no longer ago than this."""
 
-SILENT_ROUNDS: Final = 4
-"""A ring has fallen silent if it has heard nothing for so many looks of each sensor."""
-NEARER_M: Final = 1e-3
-"""A robot that has come nearer by this since the last firing drives, m."""
 TOLERANCE_M: Final = 0.005
 """A reading within this of the ring's reach is a silence: so some rings report it, m."""
 
@@ -108,7 +105,7 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
 def record_echoes(
     ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, reach: float,
     points: Floats, bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
-    last: Floats, lost: Floats, is_lost: NDArray[np.bool_], silences: Ints,
+    agreed: NDArray[np.bool_], unheard: Records[UnheardEcho],
 ) -> None:  # fmt: skip
     """Enter the readings of a firing.
 
@@ -123,7 +120,7 @@ def record_echoes(
     same : float
         Angle up to which a new look replaces the echo of an older one of the same sensor, rad.
     reach : float
-        Range up to which the ring listens, m; a reading there is a silence to `lost`.
+        Range up to which the ring listens, m; a reading there is a silence to `unheard`.
     points : (n, looks, 2) float
         Places of each sensor's echoes, m. Updated.
     bearings : (n, looks) float
@@ -134,20 +131,16 @@ def record_echoes(
         Whether it heard an echo then. Updated.
     steady : (n, looks) bool
         Whether another look agreed with that echo. Updated.
-    last : (2,) float
-        Place of the ring at the last firing, m. Updated.
-    lost : (n, 2) float
-        Places of the last steady echoes that a silence removed, m. Updated.
-    is_lost : (n,) bool
-        Whether the ring has heard nothing since, and came nearer to that place when it was lost. Updated.
-    silences : (1,) int
-        Looks since the ring last heard anything. Updated.
+    agreed : (n,) bool
+        Whether another look agrees with the echo of this firing. Overwritten.
+    unheard : (n,) records
+        The echoes that a silence removed. Updated.
     """
-    hears = False
     c = math.cos(yaw)
     s = math.sin(yaw)
     for i in range(ranges.shape[0]):
         r = ranges[i]
+        agreed[i] = False
         if math.isnan(r):
             continue
         bearing = yaw + mounts[i, 2]
@@ -155,27 +148,19 @@ def record_echoes(
         away = r if is_echo else 0.0
         px = x + c * mounts[i, 0] - s * mounts[i, 1] + away * math.cos(bearing)
         py = y + s * mounts[i, 0] + c * mounts[i, 1] + away * math.sin(bearing)
-        hears = hears or r < reach
-        silences[0] += 1
-        agrees = is_echo and is_steady(points, times, heard, px, py, t)
+        agreed[i] = is_echo and is_steady(points, times, heard, px, py, t)
         if r >= reach:
             for k in range(times.shape[1]):
                 if heard[i, k] and steady[i, k] and angle_between(bearing, bearings[i, k]) <= same:
-                    came = math.hypot(points[i, k, 0] - last[0], points[i, k, 1] - last[1])
-                    if math.hypot(points[i, k, 0] - x, points[i, k, 1] - y) < came - NEARER_M:
-                        lost[i, 0], lost[i, 1], is_lost[i] = points[i, k, 0], points[i, k, 1], True
+                    lose_echo(unheard[i], points[i, k, 0], points[i, k, 1], x, y)
         k = forget_look(bearing, same, bearings[i], times[i], heard[i])
         bearings[i, k] = bearing
         times[i, k] = t
         heard[i, k] = is_echo
-        steady[i, k] = agrees
+        steady[i, k] = agreed[i]
         if is_echo:
             points[i, k, 0] = px
             points[i, k, 1] = py
-    last[0], last[1] = x, y
-    if hears:
-        is_lost[:] = False
-        silences[0] = 0
 
 
 @kernel
@@ -251,9 +236,11 @@ class FreshEchoes:
         Range up to which the ring listens, m.
     """
 
+    SCRATCH: Final = ("_agreed",)
+    """Not part of a snapshot: overwritten before each use."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT, _half_angle=CONSTANT, _points=PLACE, _bearings=PLACE, _times=PLACE._replace(infinite=True),
-        _last=PLACE, _lost=PLACE, _silences=COUNT, _heard_reach_m=CONSTANT,
+        _heard_reach_m=CONSTANT, _radius_m=CONSTANT,
     )  # fmt: skip
 
     def __init__(
@@ -267,20 +254,23 @@ class FreshEchoes:
         self._times = np.full((len(mounts), LOOKS), -math.inf)
         self._heard = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
         self._steady = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
-        self._last = np.zeros(2)
-        self._silences = np.zeros(1, np.int64)
-        self._lost = np.zeros((len(mounts), 2))
-        self._is_lost = np.zeros(len(mounts), dtype=np.bool_)
+        self._agreed = np.zeros(len(mounts), dtype=np.bool_)
+        self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
+        self.unheard = UnheardEchoes(mounts)
+        """What the ring has lost."""
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
         pose = firing.pose
         mounts = mounts_at(firing, self._mounts, self._turning)
+        x, y, yaw, core = float(pose.x), float(pose.y), float(firing.ring_yaw), 0.5 * self._half_angle
         record_echoes(
-            firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
-            float(firing.robot_s), 0.5 * self._half_angle, self._heard_reach_m, self._points, self._bearings,
-            self._times, self._heard, self._steady, self._last, self._lost, self._is_lost,
-            self._silences,
+            firing.ranges_m, mounts, x, y, yaw, float(firing.robot_s), core, self._heard_reach_m, self._points,
+            self._bearings, self._times, self._heard, self._steady, self._agreed, self.unheard.records,
+        )  # fmt: skip
+        contradict_echoes(
+            firing.ranges_m, mounts, x, y, yaw, core, self._heard_reach_m, self._radius_m, self._agreed,
+            self.unheard.records, self.unheard.silences,
         )  # fmt: skip
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
@@ -302,19 +292,9 @@ class FreshEchoes:
             sensor_ages, points,
         )  # fmt: skip
         echoes = points[:h]
-        if self._is_lost.any():
-            echoes = np.concatenate([echoes, self.lost_points()])
+        if self.unheard.is_ring_silent:
+            echoes = np.concatenate([echoes, self.unheard.points(ALONE)])
         return Looks(fresh[:k], ages[:k], sensor_ages, echoes)
-
-    @property
-    def has_lost(self) -> bool:
-        """Whether steady echoes were lost since the ring last heard anything."""
-        return bool(self._is_lost.any())
-
-    def lost_points(self) -> Floats:
-        """Return a copy of the steady echoes that were lost since the ring last heard anything, shape (k, 2), m."""
-        lost: Floats = self._lost[self._is_lost]
-        return lost
 
     def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
         """Return how far ahead the nearest of these stands, m; all are then forgotten, as the robot stops for it.
@@ -328,20 +308,20 @@ class FreshEchoes:
         near_m, half_width_m : float
             Length and half the width of the way ahead, m.
         """
-        if self._silences[0] < SILENT_ROUNDS * len(self._mounts) or not self._is_lost.any():
+        if not (self.unheard.has_been_silent and self.unheard.is_ring_silent):
             return None
-        dx, dy = (self.lost_points() - (pose.x, pose.y)).T
+        dx, dy = (self.unheard.points(ALONE) - (pose.x, pose.y)).T
         c, s = math.cos(pose.theta), math.sin(pose.theta)
         ahead, across = c * dx + s * dy, c * dy - s * dx
         near = ahead[(ahead > 0.0) & (ahead < near_m) & (np.abs(across) < half_width_m)]
         if not len(near):
             return None
-        self._is_lost[:] = False
+        self.unheard.clear()
         return float(near.min())
 
     def clear(self) -> None:
         """Remove all readings."""
         self._heard[:] = False
         self._steady[:] = False
-        self._is_lost[:] = False
+        self.unheard.clear()
         self._times[:] = -math.inf

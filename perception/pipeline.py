@@ -298,7 +298,11 @@ class Perception:
     @property
     def has_lost(self) -> bool:
         """Whether the ring hears nothing any more, and came nearer to what it heard last."""
-        return self._echoes.has_lost
+        return self._echoes.unheard.is_ring_silent
+
+    def unheard_obstacles(self) -> Floats:
+        """Return the places of steady echoes that fell silent as the robot came nearer: shape (k, 2), m."""
+        return self._echoes.unheard.points()
 
     def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
         """Return how far ahead the robot comes near to what the ring lost, as `FreshEchoes.take_lost_ahead`."""

@@ -38,7 +38,8 @@ LIMITS: Sequence[str] = (
     "most such silences are named at once, and some are not before a contact.",
     "Ranges that are all too long, or too short, by the same length: they change as the robot's motion says. A "
     "map of the room contradicts them; without one, only a bumper stops the robot.",
-    "Sensors that do not hear what is near, where they have heard nothing of it from farther away.",
+    "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "
+    "which the robot drives goes on, and one that turns into it has never heard that part.",
     "Echoes of an earlier drive that fit the present one, as replays in a corridor along its walls do.",
     "A ring that is mounted turned by a small angle, or two sensors exchanged, until the objects that result are "
     "seen to be wrong: measure it with `echolocate calibrate`.",

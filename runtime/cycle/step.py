@@ -47,6 +47,7 @@ from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
+from runtime.cycle.unheard_limit import limit_unheard
 from runtime.timing.phases import Phase, ignore_phase
 
 __all__ = [
@@ -69,12 +70,6 @@ __all__ = [
 
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
-LOST_SPEED_M_S: Final = 0.04
-"""Greatest speed while the ring hears nothing of what it heard a moment ago: a wall goes on beside its last echo."""
-LOST: Final = (
-    "the ring hears nothing any more, not even what it heard a moment ago: the robot drives slowly until it hears "
-    "something; check the ring's power and cables"
-)
 
 
 class Order(Enum):
@@ -364,16 +359,12 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
             state.hold_reason = result.decision.reason
             return Drive(STANDSTILL)
-    if isinstance(result.decision, Drive) and state.perception.has_lost:
-        state.hold_reason = state.hold_reason or LOST
-        return Drive(_slowed(result.decision.twist))
-    return result.decision
-
-
-def _slowed(twist: Twist) -> Twist:
-    """Return a velocity on the same curve, of at most `LOST_SPEED_M_S`."""
-    share = min(1.0, LOST_SPEED_M_S / abs(twist.v)) if twist.v else 1.0
-    return Twist(share * twist.v, share * twist.w)
+    if not isinstance(result.decision, Drive):
+        return result.decision
+    unheard, is_ring_silent = state.perception.unheard_obstacles(), state.perception.has_lost
+    twist, reason = limit_unheard(result.decision.twist, percept, unheard, settings, is_ring_silent=is_ring_silent)
+    state.hold_reason = state.hold_reason or reason
+    return Drive(twist)
 
 
 def _edit(state: State, inputs: Inputs, problem: str | None) -> tuple[Refused, ...]:

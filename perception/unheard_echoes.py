@@ -1,0 +1,167 @@
+"""Echoes that fell silent as the robot came nearer: they stay obstacles until something contradicts them.
+
+What a sensor heard stands where it was heard, and comes nearer as the robot does. A mirror may leave the beam, and a
+sensor may have failed, or not hear what is near: the robot must not drive fast at what it heard before. One such echo
+of each sensor is kept, the nearest. It is dropped when a sensor that looks there hears it again, or something behind
+it; when the robot is farther from it than where it was lost, so that it could have heard it again; and when the ring
+stands on it. Echoes of the same surface in other directions contradict nothing. What falls silent before a robot that
+stands has left, and is not kept.
+
+While no sensor hears anything, the ring itself may have failed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.bounds import COUNT, Place, bounds, index_of
+from perception.kernel import Floats, Ints, kernel
+from perception.records import Record, Records, records, zeros
+
+NEARER_M: Final = 1e-3
+"""A robot that has come nearer by this since a sensor looked last has moved, m."""
+SPREAD_M: Final = 0.3
+"""An echo that is nearer by less than this comes from the same place, m; as `fresh_echoes.STEADY_M`."""
+AWAY_M: Final = 0.1
+"""A robot that is farther from an echo by this than where it was lost has had the chance to hear it again, m."""
+SILENT_ROUNDS: Final = 4
+"""A ring has fallen silent if it has heard nothing for so many looks of each sensor."""
+
+NONE, KEPT, ALONE = range(3)
+"""Of an echo that is kept: there is none; there is one; and the whole ring has heard nothing since."""
+
+
+class UnheardEcho(Record):
+    """What is remembered of one sensor."""
+
+    ring_x: Place
+    """Place of the ring when the sensor looked last, m."""
+    ring_y: Place
+    state: Annotated[int, index_of(3)]
+    """`NONE`, `KEPT` or `ALONE`."""
+    x: Place
+    """Place of the echo, m."""
+    y: Place
+    lost_m: Place
+    """How far the ring was from it when it was lost, m."""
+
+
+@kernel
+def lose_echo(c: UnheardEcho, px: float, py: float, x: float, y: float) -> None:
+    """Keep a steady echo at a place if the sensor hears nothing there from a ring that has come nearer to it.
+
+    Parameters
+    ----------
+    c : record
+        What is remembered of the sensor. Updated.
+    px, py : float
+        Place of the echo, m.
+    x, y : float
+        Place of the ring, m.
+    """
+    now = math.hypot(px - x, py - y)
+    if now < math.hypot(px - c.ring_x, py - c.ring_y) - NEARER_M and (
+        c.state == NONE or now < math.hypot(c.x - x, c.y - y)
+    ):
+        c.state, c.x, c.y, c.lost_m = ALONE, px, py, now
+
+
+@kernel
+def contradict_echoes(
+    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, core: float, reach: float, radius: float,
+    agreed: NDArray[np.bool_], echoes: Records[UnheardEcho], silences: Ints,
+) -> None:  # fmt: skip
+    """Drop the echoes that a firing contradicts, after `lose_echo`.
+
+    Parameters
+    ----------
+    ranges, mounts, x, y, yaw, reach
+        As in `fresh_echoes.record_echoes`.
+    core : float
+        A sensor whose axis is this near to the direction of a place would have heard it, rad.
+    radius : float
+        The ring's, m.
+    agreed : (n,) bool
+        Whether another look agrees with the sensor's echo in this firing: a random one contradicts nothing.
+    echoes : (n,) records
+        What is remembered of each sensor. Updated.
+    silences : (1,) int
+        Looks since the ring last heard anything. Updated.
+    """
+    c, s = math.cos(yaw), math.sin(yaw)
+    kept = 0
+    hears = False
+    for i in range(ranges.shape[0]):
+        if not math.isnan(ranges[i]):
+            silences[0] += 1
+            hears = hears or ranges[i] < reach
+            echoes[i].ring_x, echoes[i].ring_y = x, y
+        kept += echoes[i].state != NONE
+    if hears:
+        silences[0] = 0
+    if kept == 0:
+        return
+    for k in range(ranges.shape[0]):
+        one = echoes[k]
+        if one.state == NONE:
+            continue
+        away = math.hypot(one.x - x, one.y - y)
+        if away > one.lost_m + AWAY_M or away < radius:
+            one.state = NONE
+            continue
+        if not hears:
+            continue
+        one.state = KEPT
+        for i in range(ranges.shape[0]):
+            r = ranges[i]
+            if not (r < reach and agreed[i]):
+                continue
+            axis = yaw + mounts[i, 2]
+            own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
+            dx, dy = one.x - own_x, one.y - own_y
+            ahead, across = dx * math.cos(axis) + dy * math.sin(axis), abs(dy * math.cos(axis) - dx * math.sin(axis))
+            if 0.0 < ahead < r + SPREAD_M and across < ahead * math.tan(core):
+                one.state = NONE
+                break
+
+
+class UnheardEchoes:
+    """The echo of each sensor that it lost and that nothing has contradicted since.
+
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    """
+
+    SCRATCH: Final = ("records",)
+    """Not part of a snapshot: a view of an array that is."""
+    BOUNDS: Final = bounds(_echoes=UnheardEcho.BOUNDS, silences=COUNT)
+
+    def __init__(self, mounts: Floats) -> None:
+        self._echoes = zeros(UnheardEcho, len(mounts))
+        self.records = records(UnheardEcho, self._echoes)
+        self.silences = np.zeros(1, np.int64)
+
+    @property
+    def is_ring_silent(self) -> bool:
+        """Whether echoes were lost since the ring last heard anything, and half of its sensors have looked since."""
+        return 2 * int(self.silences[0]) >= len(self._echoes) and bool((self._echoes["state"] == ALONE).any())
+
+    @property
+    def has_been_silent(self) -> bool:
+        """Whether the ring has heard nothing for `SILENT_ROUNDS`."""
+        return int(self.silences[0]) >= SILENT_ROUNDS * len(self._echoes)
+
+    def points(self, least: int = KEPT) -> Floats:
+        """Return the places of what is kept, or with `ALONE` of what was lost since the ring heard: (k, 2), m."""
+        found = self._echoes[self._echoes["state"] >= least]
+        return np.stack([found["x"], found["y"]], axis=1)
+
+    def clear(self) -> None:
+        """Forget all echoes."""
+        self._echoes["state"] = NONE

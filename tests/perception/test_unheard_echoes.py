@@ -1,0 +1,115 @@
+"""What fell silent as the robot came nearer stays an obstacle until a look contradicts it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from config.load import load_robot
+from drivers.messages import Firing, Floats, Pose
+from perception.fresh_echoes import FreshEchoes
+from perception.sensor_mounts import mounts_array
+from perception.unheard_echoes import AWAY_M
+
+MOUNTS = np.array([[0.4, 0.0, 0.0], [0.0, 0.4, math.pi / 2]])
+BEAM = math.radians(12.0)
+WALL_M, REACH_M = 3.0, 5.0
+ROBOTS = ("amigo", "b21r", "denning", "ears", "magellan", "p3dx", "powerbot")
+
+
+def heard(mounts: Floats, x: float, yaw: float, half_angle: float) -> Floats:
+    """Return what a ring hears of a rough wall across the x axis: the nearest place in each beam."""
+    axes = yaw + mounts[:, 2]
+    own_x = x + mounts[:, 0] * math.cos(yaw) - mounts[:, 1] * math.sin(yaw)
+    off = np.maximum(0.0, np.abs(np.remainder(axes + math.pi, 2.0 * math.pi) - math.pi) - half_angle)
+    ranges = np.where(np.cos(off) > 0.05, (WALL_M - own_x) / np.maximum(np.cos(off), 0.05), math.inf)
+    return np.where(ranges < REACH_M, ranges, math.inf)
+
+
+def approach(to: Callable[[float, Floats], Floats], ring: FreshEchoes, mounts: Floats, until_m: float) -> None:
+    """Drive at the wall, with what the ring reports in place of what it hears."""
+    for k in range(round(until_m / 0.03)):
+        x = 0.03 * k
+        ring.update(Firing(0.1 * k, Pose(x, 0.0, 0.0), 0.0, to(x, heard(mounts, x, 0.0, BEAM))))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_wall_that_is_too_near_to_be_heard_stays_where_it_was_heard(robot: str, seed: int) -> None:
+    """The least range, the noise and lost readings are drawn."""
+    rng = np.random.default_rng([seed, 7])
+    blind_m, mounts = float(rng.uniform(0.3, 0.8)), mounts_array(load_robot(robot).ring.mounts)
+    ring = FreshEchoes(mounts, BEAM, (), REACH_M)
+
+    def reported(_: float, ranges: Floats) -> Floats:
+        noisy = ranges + rng.normal(0.0, 0.01, len(ranges))
+        noisy[rng.random(len(ranges)) < 0.05] = math.nan
+        return np.where(noisy < blind_m, math.inf, noisy)
+
+    rim_m = float(mounts[:, 0].max())
+    approach(reported, ring, mounts, WALL_M - rim_m - 0.15)
+    kept = ring.unheard.points()
+    assert len(kept)
+    ahead = kept[np.abs(kept[:, 1]) < 0.3]
+    assert np.abs(ahead[:, 0] - WALL_M).min() < 0.1
+
+
+def test_a_ring_that_hears_the_wall_keeps_nothing() -> None:
+    mounts = mounts_array(load_robot("denning").ring.mounts)
+    ring = FreshEchoes(mounts, BEAM, (), REACH_M)
+    approach(lambda _, ranges: ranges, ring, mounts, 2.4)
+    assert len(ring.unheard.points()) == 0
+
+
+def lost(echo_of: int = 1) -> FreshEchoes:
+    """Return a ring that lost the wall .9 m before it, while another sensor hears something."""
+    ring = FreshEchoes(MOUNTS, BEAM, (), REACH_M)
+    for k in range(56):
+        ranges = np.full(2, math.inf)
+        ranges[0] = WALL_M - 0.03 * k - 0.4 if k < 54 else math.inf
+        ranges[echo_of] = 2.0 if echo_of else ranges[0]
+        ring.update(Firing(0.1 * k, Pose(0.03 * k, 0.0, 0.0), 0.0, ranges))
+    assert ring.unheard.points() == pytest.approx(np.array([[WALL_M, 0.0]]))
+    assert not ring.unheard.is_ring_silent
+    return ring
+
+
+def look(ring: FreshEchoes, x: float, first: float, t: float, yaw: float = 0.0) -> int:
+    """Return how many echoes are kept after a firing."""
+    ring.update(Firing(t, Pose(x, 0.0, 0.0), yaw, np.array([first, 2.0])))
+    return len(ring.unheard.points())
+
+
+def test_silence_and_a_random_echo_contradict_nothing() -> None:
+    ring = lost()
+    assert look(ring, 1.65, math.inf, 5.7) == 1
+    assert look(ring, 1.65, 2.4, 5.8) == 1, "behind it, but no other look agrees"
+    assert look(ring, 1.65, math.inf, 60.0) == 1, "however long the robot stands"
+
+
+def test_it_is_gone_if_it_is_heard_again_or_something_behind_it() -> None:
+    for range_m in (0.95, 2.4):
+        ring = lost()
+        look(ring, 1.65, range_m, 5.7)
+        assert look(ring, 1.65, range_m, 5.8) == 0
+
+
+def test_an_echo_beside_it_or_before_it_contradicts_nothing() -> None:
+    ring = lost()
+    for t in (5.7, 5.8):
+        assert look(ring, 1.65, 0.3, t) == 1
+    for t in (5.9, 6.0):
+        assert look(ring, 1.65, 2.4, t, yaw=math.radians(20.0)) == 1
+
+
+def test_it_is_gone_where_the_robot_could_have_heard_it_again_or_stands_on_it() -> None:
+    ring = lost()
+    assert look(ring, 1.65 - 0.5 * AWAY_M, math.inf, 5.7) == 1
+    assert look(ring, 1.65 - 2.0 * AWAY_M, math.inf, 5.8) == 0
+    assert look(lost(), WALL_M - 0.3, math.inf, 5.7) == 0
+    ring = lost()
+    ring.clear()
+    assert len(ring.unheard.points()) == 0

@@ -1,0 +1,54 @@
+"""The robot creeps where it drives at what its ring has lost, and nowhere else."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from behaviors.clearance import stoppable_speed_m_s
+from config.load import load_settings
+from drivers.messages import Twist
+from perception.percept import Percept, Pose
+from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard
+from tests.behaviors.views import EVERYWHERE
+
+SETTINGS = load_settings("room", robot="denning")
+RIM_M = SETTINGS.body.radius_m
+
+
+def limited(twist: Twist, *places: tuple[float, float], silent: bool = False) -> tuple[Twist, str | None]:
+    percept = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
+    unheard = np.array([(1.0 + x, y) for x, y in places]).reshape(-1, 2)
+    return limit_unheard(twist, percept, unheard, SETTINGS, is_ring_silent=silent)
+
+
+@pytest.mark.parametrize("v", [0.3, -0.3])
+def test_at_what_was_lost_it_creeps_on_the_same_curve(v: float) -> None:
+    ahead = math.copysign(RIM_M + 0.1, v)
+    twist, reason = limited(Twist(v, 0.6), (ahead, 0.0))
+    assert twist.v == pytest.approx(math.copysign(CREEP_M_S, v))
+    assert twist.w / twist.v == pytest.approx(0.6 / v)
+    assert reason == UNHEARD
+    assert limited(Twist(v, 0.6), (-ahead, 0.0)) == (Twist(v, 0.6), None)
+    assert limited(Twist(v, 0.6), (ahead, 1.0)) == (Twist(v, 0.6), None)
+    assert limited(Twist(v, 0.6)) == (Twist(v, 0.6), None)
+
+
+def test_farther_away_it_can_still_stop() -> None:
+    place = (RIM_M + 0.2, 0.0)
+    twist, _ = limited(Twist(0.3, 0.0), place)
+    percept = Percept(Pose(0.0, 0.0, 0.0), np.array([place]), EVERYWHERE)
+    arbiter = SETTINGS.behaviors.arbiter
+    assert twist.v == pytest.approx(
+        stoppable_speed_m_s(percept, SETTINGS.body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
+    )
+    assert limited(Twist(0.3, 0.0), (3.0, 0.0)) == (Twist(0.3, 0.0), None)
+
+
+def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() -> None:
+    twist, reason = limited(Twist(0.3, 0.0), (3.0, 2.0), silent=True)
+    assert twist.v == pytest.approx(CREEP_M_S)
+    assert reason == LOST
+    assert limited(Twist(0.0, 1.0), (0.5, 0.0), silent=True) == (Twist(0.0, 1.0), None)
