@@ -25,7 +25,7 @@ from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.sensor_mounts import mounts_at
-from perception.unheard_echoes import ALONE, UnheardEcho, UnheardEchoes, contradict_echoes, lose_echo
+from perception.unheard_echoes import ALONE, UnheardEcho, UnheardEchoes, contradict_echoes, keep_sudden, lose_echo
 
 LOOKS: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
@@ -151,8 +151,8 @@ def record_echoes(
         agreed[i] = is_echo and is_steady(points, times, heard, px, py, t)
         if r >= reach:
             for k in range(times.shape[1]):
-                if heard[i, k] and steady[i, k] and angle_between(bearing, bearings[i, k]) <= same:
-                    lose_echo(unheard[i], points[i, k, 0], points[i, k, 1], x, y)
+                if heard[i, k] and angle_between(bearing, bearings[i, k]) <= same:
+                    lose_echo(unheard[i], points[i, k, 0], points[i, k, 1], steady[i, k], x, y)
         k = forget_look(bearing, same, bearings[i], times[i], heard[i])
         bearings[i, k] = bearing
         times[i, k] = t
@@ -272,6 +272,9 @@ class FreshEchoes:
             firing.ranges_m, mounts, x, y, yaw, core, self._heard_reach_m, self._radius_m, self._agreed,
             self.unheard.records, self.unheard.silences,
         )  # fmt: skip
+        if self.unheard.falls_silent:
+            since = float(firing.robot_s) - STEADY_S
+            keep_sudden(self._points, self._times, self._heard, since, x, y, self.unheard.records)
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
         """Return a copy of the echoes no older than `age_max_s` at the robot's time `robot_s`: shape (k, 2), m."""

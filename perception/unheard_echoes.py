@@ -7,7 +7,8 @@ it; when the robot is farther from it than where it was lost, so that it could h
 stands on it. Echoes of the same surface in other directions contradict nothing. What falls silent before a robot that
 stands has left, and is not kept.
 
-While no sensor hears anything, the ring itself may have failed.
+While no sensor hears anything, the ring itself may have failed: several echoes that are lost in such a silence are
+kept, even if the robot stood or turned on the spot.
 """
 
 from __future__ import annotations
@@ -31,8 +32,12 @@ AWAY_M: Final = 0.1
 SILENT_ROUNDS: Final = 4
 """A ring has fallen silent if it has heard nothing for so many looks of each sensor."""
 
-NONE, KEPT, ALONE = range(3)
-"""Of an echo that is kept: there is none; there is one; and the whole ring has heard nothing since."""
+SUDDEN_MIN: Final = 3
+"""So many sensors do not lose their echoes between two echoes of the whole ring, unless it has failed."""
+
+NONE, LEFT, KEPT, ALONE = range(4)
+"""Of a sensor's echo: none is kept; one was lost that was random or before which the robot stood, and the ring has
+heard nothing since; one is kept; and one is kept and the ring has heard nothing since."""
 
 
 class UnheardEcho(Record):
@@ -41,8 +46,8 @@ class UnheardEcho(Record):
     ring_x: Place
     """Place of the ring when the sensor looked last, m."""
     ring_y: Place
-    state: Annotated[int, index_of(3)]
-    """`NONE`, `KEPT` or `ALONE`."""
+    state: Annotated[int, index_of(4)]
+    """`NONE`, `LEFT`, `KEPT` or `ALONE`."""
     x: Place
     """Place of the echo, m."""
     y: Place
@@ -51,8 +56,8 @@ class UnheardEcho(Record):
 
 
 @kernel
-def lose_echo(c: UnheardEcho, px: float, py: float, x: float, y: float) -> None:
-    """Keep a steady echo at a place if the sensor hears nothing there from a ring that has come nearer to it.
+def lose_echo(c: UnheardEcho, px: float, py: float, is_steady: bool, x: float, y: float) -> None:
+    """Keep an echo at a place where the sensor hears nothing, for good if it was steady and the ring came nearer.
 
     Parameters
     ----------
@@ -60,14 +65,15 @@ def lose_echo(c: UnheardEcho, px: float, py: float, x: float, y: float) -> None:
         What is remembered of the sensor. Updated.
     px, py : float
         Place of the echo, m.
+    is_steady : bool
+        Whether another look agreed with it.
     x, y : float
         Place of the ring, m.
     """
     now = math.hypot(px - x, py - y)
-    if now < math.hypot(px - c.ring_x, py - c.ring_y) - NEARER_M and (
-        c.state == NONE or now < math.hypot(c.x - x, c.y - y)
-    ):
-        c.state, c.x, c.y, c.lost_m = ALONE, px, py, now
+    state = ALONE if is_steady and now < math.hypot(px - c.ring_x, py - c.ring_y) - NEARER_M else LEFT
+    if c.state < KEPT or (state == ALONE and now < math.hypot(c.x - x, c.y - y)):
+        c.state, c.x, c.y, c.lost_m = state, px, py, now
 
 
 @kernel
@@ -115,7 +121,7 @@ def contradict_echoes(
             continue
         if not hears:
             continue
-        one.state = KEPT
+        one.state = KEPT if one.state >= KEPT else NONE
         for i in range(ranges.shape[0]):
             r = ranges[i]
             if not (r < reach and agreed[i]):
@@ -127,6 +133,45 @@ def contradict_echoes(
             if 0.0 < ahead < r + SPREAD_M and across < ahead * math.tan(core):
                 one.state = NONE
                 break
+
+
+@kernel
+def keep_sudden(
+    points: Floats, times: Floats, heard: NDArray[np.bool_], since: float, x: float, y: float,
+    echoes: Records[UnheardEcho],
+) -> None:  # fmt: skip
+    """Keep what a ring that hears nothing heard a moment ago, if that is too much to have left at once.
+
+    Parameters
+    ----------
+    points, times : (n, looks, 2), (n, looks) float
+        As in `fresh_echoes.record_echoes`.
+    heard : (n, looks) bool
+        Whether it is an echo that no look has removed.
+    since : float
+        Older looks do not count, s.
+    x, y : float
+        Place of the ring, m.
+    echoes : (n,) records
+        What is remembered of each sensor. Updated.
+    """
+    sudden = 0
+    for turn in range(2):
+        for i in range(len(echoes)):
+            one = echoes[i]
+            is_young = False
+            for k in range(times.shape[1]):
+                if heard[i, k] and times[i, k] >= since:
+                    is_young = True
+                    px, py = points[i, k, 0], points[i, k, 1]
+                    away = math.hypot(px - x, py - y)
+                    if turn == 1 and (one.state < KEPT or away < math.hypot(one.x - x, one.y - y)):
+                        one.state, one.x, one.y, one.lost_m = ALONE, px, py, away
+            if turn == 1 and one.state == LEFT:
+                one.state = ALONE
+            sudden += is_young or one.state == LEFT or one.state == ALONE
+        if sudden < SUDDEN_MIN:
+            return
 
 
 class UnheardEchoes:
@@ -146,6 +191,11 @@ class UnheardEchoes:
         self._echoes = zeros(UnheardEcho, len(mounts))
         self.records = records(UnheardEcho, self._echoes)
         self.silences = np.zeros(1, np.int64)
+
+    @property
+    def falls_silent(self) -> bool:
+        """Whether half of the ring's sensors have looked since it last heard anything, and not yet all twice."""
+        return len(self._echoes) <= 2 * int(self.silences[0]) <= 4 * len(self._echoes)
 
     @property
     def is_ring_silent(self) -> bool:

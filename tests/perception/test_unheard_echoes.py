@@ -105,6 +105,26 @@ def test_an_echo_beside_it_or_before_it_contradicts_nothing() -> None:
         assert look(ring, 1.65, 2.4, t, yaw=math.radians(20.0)) == 1
 
 
+@pytest.mark.parametrize(("sensors", "is_kept"), [(2, False), (3, True)])
+def test_a_ring_that_loses_several_echoes_at_once_keeps_them_although_it_only_turns(
+    sensors: int, is_kept: bool
+) -> None:
+    mounts = np.array(
+        [[0.4 * math.cos(a), 0.4 * math.sin(a), a] for a in np.radians(30.0 * np.arange(12.0)).tolist()]
+    )
+    ring = FreshEchoes(mounts, BEAM, (), REACH_M)
+    for k in range(10):
+        ranges = np.full(12, math.inf)
+        if k < 8:
+            ranges[:sensors] = 2.0
+        ring.update(Firing(0.1 * k, Pose(0.0, 0.0, 0.0), 0.02 * k, ranges))
+    assert ring.unheard.is_ring_silent == is_kept
+    assert len(ring.unheard.points()) == (sensors if is_kept else 0)
+    ranges[11] = 3.0
+    ring.update(Firing(1.0, Pose(0.0, 0.0, 0.0), 0.2, ranges))
+    assert not ring.unheard.is_ring_silent
+
+
 def test_it_is_gone_where_the_robot_could_have_heard_it_again_or_stands_on_it() -> None:
     ring = lost()
     assert look(ring, 1.65 - 0.5 * AWAY_M, math.inf, 5.7) == 1
