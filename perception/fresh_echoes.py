@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.messages import Firing, Pose
+from drivers.messages import Firing
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
 from perception.records import Records
@@ -298,29 +298,6 @@ class FreshEchoes:
         if self.unheard.is_ring_silent:
             echoes = np.concatenate([echoes, self.unheard.points(ALONE)])
         return Looks(fresh[:k], ages[:k], sensor_ages, echoes)
-
-    def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
-        """Return how far ahead the nearest of these stands, m; all are then forgotten, as the robot stops for it.
-
-        None if there is none in the robot's way so near, or if the ring has not fallen silent.
-
-        Parameters
-        ----------
-        pose : Pose
-            The robot's, in odometry's frame.
-        near_m, half_width_m : float
-            Length and half the width of the way ahead, m.
-        """
-        if not (self.unheard.has_been_silent and self.unheard.is_ring_silent):
-            return None
-        dx, dy = (self.unheard.points(ALONE) - (pose.x, pose.y)).T
-        c, s = math.cos(pose.theta), math.sin(pose.theta)
-        ahead, across = c * dx + s * dy, c * dy - s * dx
-        near = ahead[(ahead > 0.0) & (ahead < near_m) & (np.abs(across) < half_width_m)]
-        if not len(near):
-            return None
-        self.unheard.clear()
-        return float(near.min())
 
     def clear(self) -> None:
         """Remove all readings."""

@@ -55,6 +55,7 @@ from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
+from perception.unheard_echoes import UnheardEchoes
 from perception.vacant_areas import VacantArea, VacantAreas
 
 __all__ = ["DetectedObject", "Perception"]
@@ -296,17 +297,9 @@ class Perception:
         return self._echoes.steady_points(robot_s, age_max_s)
 
     @property
-    def has_lost(self) -> bool:
-        """Whether the ring hears nothing any more, and came nearer to what it heard last."""
-        return self._echoes.unheard.is_ring_silent
-
-    def unheard_obstacles(self) -> Floats:
-        """Return the places of steady echoes that fell silent as the robot came nearer: shape (k, 2), m."""
-        return self._echoes.unheard.points()
-
-    def take_lost_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
-        """Return how far ahead the robot comes near to what the ring lost, as `FreshEchoes.take_lost_ahead`."""
-        return self._echoes.take_lost_ahead(pose, near_m, half_width_m)
+    def unheard(self) -> UnheardEchoes:
+        """The echoes that fell silent as the robot came nearer."""
+        return self._echoes.unheard
 
     def surroundings(
         self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float

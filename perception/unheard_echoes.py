@@ -19,6 +19,7 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.messages import Pose
 from perception.bounds import COUNT, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Record, Records, records, zeros
@@ -211,6 +212,29 @@ class UnheardEchoes:
         """Return the places of what is kept, or with `ALONE` of what was lost since the ring heard: (k, 2), m."""
         found = self._echoes[self._echoes["state"] >= least]
         return np.stack([found["x"], found["y"]], axis=1)
+
+    def take_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
+        """Return how far ahead the nearest one of a silent ring stands, m; all are then forgotten: the robot stops.
+
+        None if there is none in the robot's way so near, or if the ring has not been silent for `SILENT_ROUNDS`.
+
+        Parameters
+        ----------
+        pose : Pose
+            The robot's, in odometry's frame.
+        near_m, half_width_m : float
+            Length and half the width of the way ahead, m.
+        """
+        if not (self.has_been_silent and self.is_ring_silent):
+            return None
+        dx, dy = (self.points(ALONE) - (pose.x, pose.y)).T
+        c, s = math.cos(pose.theta), math.sin(pose.theta)
+        ahead, across = c * dx + s * dy, c * dy - s * dx
+        near = ahead[(ahead > 0.0) & (ahead < near_m) & (np.abs(across) < half_width_m)]
+        if not len(near):
+            return None
+        self.clear()
+        return float(near.min())
 
     def clear(self) -> None:
         """Forget all echoes."""

@@ -330,7 +330,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             f"report faults: {likely}, then re-arm"
         )
     clear_m = settings.body.radius_m + behaviors.arbiter.clearance_m
-    lost_m = state.perception.take_lost_ahead(odometry.pose, clear_m + LOST_AHEAD_M, clear_m)
+    lost_m = state.perception.unheard.take_ahead(odometry.pose, clear_m + LOST_AHEAD_M, clear_m)
     if lost_m is not None:
         return Stop(
             f"the ring hears nothing any more, not even what stood {lost_m:.1f} m ahead: unless that is gone, check "
@@ -361,8 +361,10 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             return Drive(STANDSTILL)
     if not isinstance(result.decision, Drive):
         return result.decision
-    unheard, is_ring_silent = state.perception.unheard_obstacles(), state.perception.has_lost
-    twist, reason = limit_unheard(result.decision.twist, percept, unheard, settings, is_ring_silent=is_ring_silent)
+    unheard = state.perception.unheard
+    twist, reason = limit_unheard(
+        result.decision.twist, percept, unheard.points(), settings, is_ring_silent=unheard.is_ring_silent
+    )
     state.hold_reason = state.hold_reason or reason
     return Drive(twist)
 

@@ -136,18 +136,18 @@ def approach(silent_from: float, echo_of: int | None = None) -> FreshEchoes:
 def test_in_a_ring_that_falls_silent_what_stood_ahead_stays_and_is_reported_once() -> None:
     echoes = approach(0.9)
     assert echoes.points(20.0, 1.5)[:, 0] == pytest.approx([3.0])
-    assert echoes.take_lost_ahead(Pose(1.5, 0.0, 0.0), 1.0, 0.5) is None, "it is farther ahead"
-    assert echoes.take_lost_ahead(Pose(2.5, 0.0, math.pi), 1.0, 0.5) is None, "it is behind"
-    assert echoes.take_lost_ahead(Pose(2.5, 1.0, 0.0), 1.0, 0.5) is None, "it is beside the way"
-    assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) == pytest.approx(0.5)
-    assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
+    assert echoes.unheard.take_ahead(Pose(1.5, 0.0, 0.0), 1.0, 0.5) is None, "it is farther ahead"
+    assert echoes.unheard.take_ahead(Pose(2.5, 0.0, math.pi), 1.0, 0.5) is None, "it is behind"
+    assert echoes.unheard.take_ahead(Pose(2.5, 1.0, 0.0), 1.0, 0.5) is None, "it is beside the way"
+    assert echoes.unheard.take_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) == pytest.approx(0.5)
+    assert echoes.unheard.take_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
     assert len(echoes.points(20.0, 1.5)) == 0
-    assert approach(1.35).take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None, "it may hear something next"
+    assert approach(1.35).unheard.take_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None, "it may hear something next"
 
 
 def test_what_is_gone_is_forgotten_as_soon_as_the_ring_hears_anything() -> None:
     echoes = approach(0.9, echo_of=1)
-    assert echoes.take_lost_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
+    assert echoes.unheard.take_ahead(Pose(2.5, 0.0, 0.0), 1.0, 0.5) is None
 
 
 def test_what_leaves_a_robot_that_stands_is_gone() -> None:
