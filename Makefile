@@ -1,7 +1,10 @@
 # `make run` starts the robot with the emulator, `make test` runs all checks and tests, `make check` the quick ones.
 # `make bench` measures accuracy and timing, `make soak` runs the long forms of the tests, `make docs` builds the site.
 
-PYTHON ?= python3.11
+PYTHONS := python3.11 python3.12 python3.13
+ifndef PYTHON
+PYTHON := $(firstword $(foreach one,$(PYTHONS),$(if $(shell command -v $(one)),$(one))) python3.11)
+endif
 VENV   := .venv
 BIN    := $(VENV)/bin
 UV     := $(shell command -v uv)
@@ -123,9 +126,12 @@ endef
 # With uv where it is installed, which also finds or fetches the Python.
 $(VENV)/bin/python:
 ifneq ($(UV),)
+	@echo "using $(PYTHON) of those that uv finds or fetches"
 	uv venv -q --python $(PYTHON) $(VENV)
 else
-	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found: install it, or choose another: make PYTHON=python3.12"; exit 1; }
+	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found, nor another of $(PYTHONS): install one of them, or name one: make PYTHON=/path/to/python3"; exit 1; }
+	@$(PYTHON) -c "import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))" || { echo "make: $$($(PYTHON) --version) does not do: echolocate needs Python 3.11, 3.12 or 3.13; make PYTHON=/path/to/one"; exit 1; }
+	@echo "using $$($(PYTHON) --version) at $$(command -v $(PYTHON))"
 	@$(PYTHON) -c "import ensurepip" 2>/dev/null || { echo "installing $(PYTHON)-venv, which Debian's Python needs for virtual environments"; \
 		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y $(PYTHON)-venv"; }
 	$(PYTHON) -m venv $(VENV)

@@ -101,6 +101,8 @@ class RunSnapshot:
     """What the evidence grid holds; None where the settings keep none."""
     place: MapPlace | None = None
     """Where the robot is in a map; None where that is not known."""
+    corners: tuple[DetectedObject, ...] = ()
+    """The inside corners and the edges of walls recognised."""
 
 
 @dataclass(frozen=True, slots=True)

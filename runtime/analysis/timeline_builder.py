@@ -32,6 +32,8 @@ from runtime.analysis.timeline import (
     Timeline,
 )
 
+CORNERS: Final = frozenset({"inside corner", "edge"})
+"""The labels of the points at which walls end."""
 SNAPSHOTS_MAX: Final = 240
 """Snapshots kept. At this number every second one is dropped and the interval doubles."""
 FIRST_INTERVAL_S: Final = 0.25
@@ -183,7 +185,7 @@ class TimelineBuilder:
             RunSnapshot(
                 t_s, self._pose, self._yaw, self._row_count, rows[:, :4], self._clusters_of(rows),
                 perception.objects(), walls_of(perception), None if window is None else known_cells(window),
-                _place_of(perception),
+                _place_of(perception), corners_of(perception),
             )
         )  # fmt: skip
 
@@ -214,6 +216,11 @@ def _place_of(perception: Perception) -> MapPlace | None:
 def walls_of(perception: Perception) -> tuple[DetectedObject, ...]:
     """Return the walls that perception reports."""
     return tuple(seen for seen in perception.labelled_objects() if seen.ends is not None)
+
+
+def corners_of(perception: Perception) -> tuple[DetectedObject, ...]:
+    """Return the inside corners and edges that perception reports."""
+    return tuple(seen for seen in perception.labelled_objects() if seen.model in CORNERS)
 
 
 def wall_ends(walls: Sequence[DetectedObject]) -> Floats:

@@ -137,6 +137,8 @@ class Console:
         self.listening: tuple[str, int] | None = None
         self._robots: Sequence[Mapping[str, Any]] = ()
         self.tunnel: str | None = None
+        self._replaced_port: int | None = None
+        """The port of the settings, where another program has it."""
 
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Take in a cycle; its frame is encoded later.
@@ -201,6 +203,9 @@ class Console:
         self.url = f"{address_url}?token={token}"
         self.tunnel = f"ssh -L {port}:127.0.0.1:{port} {own_names[0]}" if is_loopback(address) else None
         remote = {} if self.tunnel is None else {"from_elsewhere": self.tunnel}
+        if self._config.port not in {0, port}:
+            self._replaced_port = self._config.port
+            self._log.warning(f"console.port {self._config.port} is in use, so the console has port {port}")
         self._log.info("console", url=address_url, start_url=self.url, **remote)
         if self.tunnel is None:
             self._log.warning(
@@ -222,6 +227,8 @@ class Console:
     def hints(self) -> list[str]:
         """Return lines for the terminal: where the page is, and how to reach it from another machine."""
         lines = [f"console: {self.url}"]
+        if self._replaced_port is not None:
+            lines.append(f"console.port {self._replaced_port} is in use by another program")
         if self.tunnel is not None:
             lines.append(f"from another machine: {self.tunnel}, then the same address there")
         return lines

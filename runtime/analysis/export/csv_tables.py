@@ -78,8 +78,8 @@ def _segments(timeline: Timeline) -> Table:
 
 
 def _objects(timeline: Timeline) -> Table:
-    """Return one row for each object at each snapshot."""
-    seen = [(m.t_s, o) for m in timeline.snapshots for o in m.objects]
+    """Return one row for each object at each snapshot, corners and edges of walls included."""
+    seen = [(m.t_s, o) for m in timeline.snapshots for o in (*m.objects, *m.corners)]
     return {
         "t_s": [t for t, _ in seen],
         "number": [o.number for _, o in seen],

@@ -12,7 +12,7 @@ import orjson
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.files import one_line
-from config.load import load_any
+from config.load import list_shipped, load_any, load_model, load_world
 from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
 from drivers.firing_pattern import FiringError
@@ -51,9 +51,13 @@ class Questions:
         """Return a number from `low` to `high`; another answer is asked for again, another option refused."""
 
         def parse(answer: str) -> float:
-            value = float(answer.replace(",", "."))
+            problem = f"expected a number from {low:g} to {high:g}"
+            try:
+                value = float(answer.replace(",", "."))
+            except ValueError:
+                raise ValueError(problem) from None
             if not low <= value <= high:
-                raise ValueError(f"expected a number from {low:g} to {high:g}")
+                raise ValueError(problem)
             return value
 
         return self._answer(name, question, default, parse)
@@ -62,9 +66,13 @@ class Questions:
         """Return a whole number from `low` to `high`."""
 
         def parse(answer: str) -> int:
-            value = int(answer)
+            problem = f"expected a whole number from {low} to {high}"
+            try:
+                value = int(answer)
+            except ValueError:
+                raise ValueError(problem) from None
             if not low <= value <= high:
-                raise ValueError(f"expected a whole number from {low} to {high}")
+                raise ValueError(problem)
             return value
 
         return self._answer(name, question, default, parse)
@@ -203,15 +211,36 @@ def write_run(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     robot = ask.text("robot", "Robot file, or the name of a shipped one", "denning")
     world = ask.text("world", "World file for the emulator, or the name of a shipped one", "hallway")
-    models = [one.strip() for one in ask.text("models", "Models, separated by commas", "semicircle").split(",")]
+    fitting, note = models_for(world)
+    models = [one.strip() for one in ask.text("models", f"Models, separated by commas{note}", fitting).split(",")]
     mission = ask.text("mission", "Mission file or name (-: none)", "-")
     text = f"""# A run of your own. `echolocate run` drives the emulated robot; with --port, the real one.
 robot = {_json(robot)}
 world = {_json(world)}  # for the emulator only
-models = {_json(models)}
+models = {_json(models)}{f"  #{note}" if note and models == [fitting] else ""}
 {"# mission = " + _json("patrol") + "  # what to do once armed" if mission == "-" else "mission = " + _json(mission)}
 """
     return _write(file, text, force=force)
+
+
+def models_for(world: str) -> tuple[str, str]:
+    """Return the shipped model that a world's drums have, and a note where they have another size than any.
+
+    Raises
+    ------
+    UserError
+        The world cannot be read.
+    """
+    radii = {drum.radius_m for drum in load_world(world).drum}
+    shipped = {name: load_model(name).arc_radius_m for name in list_shipped("models")}
+    sizes = {name: radius for name, radius in shipped.items() if radius is not None}
+    for name, size in sorted(sizes.items(), reverse=True):  # the paper's half drum before the whole one
+        if any(math.isclose(size, radius, rel_tol=0.02) for radius in radii):
+            return name, ""
+    if not radii:
+        return "drum", " (the world has no drums: put your own model here, from echolocate init model)"
+    said = ", ".join(f"{radius:g} m" for radius in sorted(radii))
+    return "drum", f" (the world's drums have the radius {said}: put your own model here, from echolocate init model)"
 
 
 def _questions(file: str, given: Given, *, yes: bool, force: bool) -> Questions:

@@ -131,7 +131,7 @@ class CommandDispatcher:
         return ANSWERED_LATER
 
     def _refuse(self, client: Client, number: int | None, error: CommandError) -> None:
-        self._log.refuse(str(error), client.name)
+        self._log.answer_refusal(str(error), client.name)
         _send_answer(client, number, None, error)
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 LOG_LINES_PER_S: Final = 1.0
 LOG_LINES_BURST: Final = 10.0
+OLD_PAGES_PER_S: Final = 1.0 / 600.0
+"""Lines about pages with a wrong token: a page of an earlier run that was left open asks again for hours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,21 +67,33 @@ class ConsoleLog:
         self._clock = clock
         self._limits: dict[str, LineLimit] = {}
         """By event, of which there are few."""
+        self._old_pages = LineLimit(OLD_PAGES_PER_S, 1.0)
         self.refusals = 0
+
+    def answer_refusal(self, reason: str, client: str) -> None:
+        """Log that a client was told why a command was refused: its operator knows, so it is no warning."""
+        self.refusals += 1
+        self._write("info", "console refused", self._limit("answered"), reason=reason, client=client)
+
+    def refuse_token(self, reason: str, client: str) -> None:
+        """Log that a page has a wrong token, or none."""
+        self.refusals += 1
+        self._write("warning", "console refused", self._old_pages, reason=reason, client=client)
 
     def refuse(self, reason: str, client: str) -> None:
         """Log that something was refused to a client."""
         self.refusals += 1
-        self._write("warning", "console refused", reason=reason, client=client)
+        self._write("warning", "console refused", self._limit("console refused"), reason=reason, client=client)
 
     def note(self, event: str, **fields: object) -> None:
         """Log what a client did."""
-        self._write("info", event, **fields)
+        self._write("info", event, self._limit(event), **fields)
 
-    def _write(self, level: str, event: str, **fields: object) -> None:
-        if event not in self._limits:
-            self._limits[event] = LineLimit(LOG_LINES_PER_S, LOG_LINES_BURST)
-        suppressed = self._limits[event].take(self._clock())
+    def _limit(self, event: str) -> LineLimit:
+        return self._limits.setdefault(event, LineLimit(LOG_LINES_PER_S, LOG_LINES_BURST))
+
+    def _write(self, level: str, event: str, limit: LineLimit, **fields: object) -> None:
+        suppressed = limit.take(self._clock())
         if suppressed is None:
             return
         more = {"suppressed_before": suppressed} if suppressed else {}

@@ -330,7 +330,8 @@ class Server:
         return token is not None and self._context.auth.accepts(token)
 
     def _refuse(self, request: web.BaseRequest, status: HTTPStatus, reason: str) -> web.Response:
-        self._context.log.refuse(reason, str(request.remote))
+        log = self._context.log
+        (log.refuse_token if reason == WRONG_TOKEN else log.refuse)(reason, str(request.remote))
         return web.Response(status=status, text=reason)
 
 

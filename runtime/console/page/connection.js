@@ -4,6 +4,7 @@ import { Emitter } from "./emitter.js";
 
 const RETRY_FIRST_MS = 250;
 const RETRY_MAX_MS = 4000;
+const RETRY_REFUSED_MS = 60_000; // a page whose token is wrong: only a new run with the same one would take it
 const ANSWER_MAX_MS = 10_000;
 const SILENCE_MAX_MS = 10_000;
 // A HALT without an answer for this long is reported as not confirmed, and sent again over a new connection.
@@ -14,6 +15,10 @@ const MESSAGE_MAX = 65_536;
 const LIVE_ONLY = new Set([
   "arm", "legs", "goal", "teleoperate", "start_mission", "run_mission", "set_route", "resume_mission", "skip_step", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
   "confirm_object", "lift_area", "undo_edit", "clear_map", "evidence", "place_robot", "load_map",
+]);
+// Carried out by a cycle, so that in a paused run they wait for the next one, however long that takes.
+const EDITS = new Set([
+  "delete_segments", "pin_segments", "place_model", "move_object", "confirm_object", "reject_object", "lift_area", "undo_edit", "clear_map", "place_robot",
 ]);
 // With more than this unsent the network is stalled: a command sent now would move the robot too late.
 const CONGESTED_BYTES = 4096;
@@ -39,6 +44,7 @@ export class Connection extends Emitter {
   #unconfirmed = null;
   #probing = false;
   showsRecording = () => false;
+  isPaused = () => false;
 
   constructor(address) {
     super();
@@ -80,6 +86,7 @@ export class Connection extends Emitter {
       refuse(new RequestError("the connection was lost before an answer came", { answered: false }));
     }
     this.#pending.clear();
+    this.#countWaiting();
     this.emit("closed", { opened, reason, code });
     this.#timer = setTimeout(() => this.connect(), this.#retry_ms);
     this.#retry_ms = Math.min(2 * this.#retry_ms, RETRY_MAX_MS);
@@ -91,12 +98,18 @@ export class Connection extends Emitter {
     return new Promise((resolve, refuse) => {
       const id = this.#transmit(message, refuse);
       if (id === null) return;
-      const timer = setTimeout(() => {
+      const waits = EDITS.has(message.type) && this.isPaused();
+      const timer = waits ? undefined : setTimeout(() => {
         this.#pending.delete(id);
         refuse(new RequestError(`no answer to "${message.type}" in ${timeout_ms / 1000} s`, { answered: false }));
       }, timeout_ms);
-      this.#pending.set(id, { resolve, refuse, timer });
+      this.#pending.set(id, { resolve, refuse, timer, waits });
+      if (waits) this.#countWaiting();
     });
+  }
+
+  #countWaiting() {
+    this.emit("waiting", [...this.#pending.values()].filter(({ waits }) => waits).length);
   }
 
   // Sends a message without waiting for its answer; returns whether it was sent.
@@ -124,6 +137,12 @@ export class Connection extends Emitter {
     clearTimeout(this.#unconfirmed);
     this.#halting = false;
     this.emit("halt", true);
+  }
+
+  // Ask less often from now on, until a connection opens.
+  retryLater() {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.connect(), RETRY_REFUSED_MS);
   }
 
   // The HTTP status of a plain request to the same address; null without an answer.
@@ -176,6 +195,7 @@ export class Connection extends Emitter {
     }
     this.#pending.delete(id);
     clearTimeout(pending.timer);
+    if (pending.waits) this.#countWaiting();
     if (ok) pending.resolve(data ?? null);
     else pending.refuse(new RequestError(error ?? "refused", { field }));
   }

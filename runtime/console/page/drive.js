@@ -5,8 +5,8 @@ import { inMap } from "./map_frame.js";
 import { watchGamepad, watchKeys, watchPad } from "./drive_inputs.js";
 
 export class Drive {
-  constructor({ run, units, connection, notifications, teleoperation, tools }) {
-    Object.assign(this, { run, units, connection, notifications, teleoperation, tools });
+  constructor({ run, units, connection, notifications, teleoperation, tools, askForToken }) {
+    Object.assign(this, { run, units, connection, notifications, teleoperation, tools, askForToken });
     const asks = {
       arm: () => this.arm(), disarm: { type: "disarm" }, "take-control": { type: "take_control" },
       "give-control": { type: "release_control" }, "drive-request-legs": { type: "legs" },
@@ -85,9 +85,9 @@ export class Drive {
     if (this.controller !== controller) {
       this.controller = controller;
       if (!controller) this.teleoperation.stop("another client controls");
-      this.notifications.banner("watching", controller ? null : "You are watching.", { buttons: [
-        ["Ask for control", () => this.#ask({ type: "take_control" })], ["Just watch", () => this.notifications.banner("watching", null)],
-      ] });
+      const mayAct = this.run.session?.has_token ?? true, justWatch = ["Just watch", () => this.notifications.banner("watching", null)];
+      this.notifications.banner("watching", controller ? null : mayAct ? "You are watching." : "This page has no token, so it only watches; HALT does nothing here.",
+        { buttons: [mayAct ? ["Ask for control", () => this.#ask({ type: "take_control" })] : ["Enter the token", this.askForToken], justWatch] });
       if (controller) this.notifications.banner("asked", null);
     }
     byId("arm").disabled = !enabled || mode === "DRIVE" || mode === "FAULT";

@@ -3,7 +3,6 @@
 
 import { byId, el, setText } from "./dom.js";
 
-const OPEN_MAX_MS = 600_000;
 const LONG = { report: "Report", map: "Map" };
 
 export const base = (file) => String(file ?? "").split("/").at(-1);
@@ -110,11 +109,9 @@ export class Files {
   async #play() {
     this.#showProblem(null);
     setText(byId("file-opening"), "Opening …");
-    byId("file-play").disabled = true;
     try {
-      await this.play(this.#chosen, OPEN_MAX_MS);
+      await this.play(this.#chosen);
     } finally {
-      byId("file-play").disabled = false;
       setText(byId("file-opening"), "");
     }
   }
@@ -156,14 +153,41 @@ export class Files {
   }
 
   // Begins to make a report or a map; what becomes of it comes as messages.
-  make(kind, file) {
-    return this.connection.request({ type: "make_files", kind, file }).catch(this.notifications.showError);
+  async make(kind, file) {
+    this.#showJob({ text: `${LONG[kind]} of ${base(file)}: asked for` });
+    try {
+      await this.connection.request({ type: "make_files", kind, file });
+    } catch (error) {
+      this.notifications.showError(error);
+      this.#showRunning();
+    }
+  }
+
+  #showJob({ text, share = 0, cancel = null }) {
+    byId("job").hidden = false;
+    setText(byId("job-text"), text);
+    if (share > 0) byId("job-share").value = share;
+    else byId("job-share").removeAttribute("value");
+    byId("job-cancel").disabled = cancel === null;
+    byId("job-cancel").onclick = cancel;
+  }
+
+  #showRunning() {
+    const running = [...this.#jobs.values()].find(({ over }) => !over);
+    byId("job").hidden = running === undefined;
+    if (running === undefined) return;
+    this.#showJob({
+      text: `${LONG[running.kind]} of ${base(running.file)}: ${running.what}${running.share > 0 ? `, ${Math.round(100 * running.share)} %` : ""}`, share: running.share,
+      cancel: () => this.connection.request({ type: "cancel_job", job: running.job }).catch(this.notifications.showError),
+    });
   }
 
   // Returns whether there is a recording of this run.
   async #makeOfRun(kind) {
+    if (![...this.#jobs.values()].some(({ over }) => !over)) this.#showJob({ text: `${LONG[kind]} of this run: looking for its recording` });
     await this.list(this.notifications.showError);
     const live = this.#rows.find((row) => row.live);
+    if (!live) this.#showRunning();
     if (live) await this.make(kind, live.file);
     else this.notifications.toast(`This run is not being recorded, and its ${kind} is made from the recording: press Record in the tab Time`);
     return live !== undefined;
@@ -172,14 +196,7 @@ export class Files {
   #follow(job, { quiet = false } = {}) {
     const was = this.#jobs.get(job.job);
     this.#jobs.set(job.job, job);
-    const running = [...this.#jobs.values()].find(({ over }) => !over);
-    byId("job").hidden = running === undefined;
-    if (running) {
-      setText(byId("job-text"), `${LONG[running.kind]} of ${base(running.file)}: ${running.what}${running.share > 0 ? `, ${Math.round(100 * running.share)} %` : ""}`);
-      if (running.share > 0) byId("job-share").value = running.share;
-      else byId("job-share").removeAttribute("value");
-      byId("job-cancel").onclick = () => this.connection.request({ type: "cancel_job", job: running.job }).catch(this.notifications.showError);
-    }
+    this.#showRunning();
     if (!job.over || was?.over) return;
     byId("made").replaceChildren(...[...this.#jobs.values()].filter(({ made }) => made.length > 0).reverse().map((done) => this.#made(done)));
     byId("made-part").hidden = byId("made").children.length === 0;

@@ -6,8 +6,29 @@ const LEVELS = ["debug", "info", "warning", "error"];
 const SHOWN_MAX = 300;
 const MARKS = { debug: "·", info: "○", warning: "▲", error: "■" };
 
-const formatFields = (fields) => Object.entries(fields ?? {}).map(([key, value]) =>
-  `${key}=${typeof value === "object" ? JSON.stringify(value) : value}`).join(" ").slice(0, 600);
+const DETAILS_MAX = 600;
+const UNITS = [["us", "µs"], ["ms", "ms"], ["s", "s"], ["m", "m"], ["rad", "rad"], ["bytes", "bytes"], ["hz", "Hz"]];
+
+// A line of the log as a sentence: what happened, why, and in brackets what else is known of it.
+export function sentence(event, fields) {
+  const known = Object.fromEntries(Object.entries(fields ?? {}).filter(([, value]) => !["", "None", "null"].includes(String(value))));
+  const { reason, [event]: what, ...others } = known; // an event named as a field, as "mode", is told by that field
+  const head = what === undefined ? event : `${event} ${what}`;
+  const text = `${head.charAt(0).toUpperCase()}${head.slice(1)}${reason === undefined ? "" : `: ${reason}`}`;
+  const details = Object.entries(others).map(([key, value]) => detail(key, value)).join(", ");
+  return [/[.!?]$/.test(text) || details !== "" ? text : `${text}.`, details === "" ? "" : `(${details.slice(0, DETAILS_MAX)})`];
+}
+
+// "took_s", 1.5 as "took 1.5 s"; a flag is named alone.
+function detail(key, value) {
+  const shown = typeof value === "object" ? JSON.stringify(value) : String(value);
+  const [, unit] = UNITS.find(([end]) => key.endsWith(`_${end}`)) ?? [];
+  const words = (unit === undefined ? key : key.slice(0, key.lastIndexOf("_"))).replaceAll("_", " ");
+  if (shown === "True" || shown === "true") return words;
+  if (shown === "False" || shown === "false") return `not ${words}`;
+  if (shown.startsWith(`${words} `)) return shown;
+  return `${words} ${shown}${unit === undefined ? "" : ` ${unit}`}`;
+}
 
 // Seconds of the run, or the time of day of a log time stamp.
 function when(t) {
@@ -34,7 +55,7 @@ export class Log {
   #matches({ level, event, fields }) {
     const found = LEVELS.indexOf(level), least = LEVELS.indexOf(this.#level.value);
     const text = this.#filter.value.trim().toLowerCase();
-    return (found < 0 || found >= least) && (text === "" || `${event} ${formatFields(fields)}`.toLowerCase().includes(text));
+    return (found < 0 || found >= least) && (text === "" || sentence(event, fields).join(" ").toLowerCase().includes(text));
   }
 
   #add(entry) {
@@ -49,9 +70,10 @@ export class Log {
   }
 
   #line({ timestamp, level, event, fields }) {
+    const [text, details] = sentence(event, fields);
     return el("li", { "data-level": level },
       el("span", {}, when(timestamp)),
       el("span", { class: "level" }, `${MARKS[level] ?? "○"} ${level}`),
-      el("span", {}, `${event} `, el("span", { class: "more" }, formatFields(fields))));
+      el("span", {}, `${text} `, el("span", { class: "more" }, details)));
   }
 }

@@ -32,6 +32,7 @@ import { Tabs } from "./tabs.js";
 import { Teleoperation } from "./teleoperation.js";
 import { Theme } from "./theme.js";
 import { screenshot, Time } from "./time.js";
+import { askForToken, takeToken } from "./token.js";
 import { hereTool, moveTool, placeTool } from "./tool_objects.js";
 import { Route } from "./route.js";
 import { RoutePanel } from "./route_panel.js";
@@ -47,21 +48,12 @@ import { RunState } from "./run_state.js";
 const DESCRIPTION_EVERY_MS = 5000;
 const ROOM_M = 0.6;
 
-// Remove the token from the address bar, where a projector would show it; session storage keeps it for a reload.
-function takeToken() {
-  const given = new URLSearchParams(location.search).get("token");
-  if (given !== null) {
-    sessionStorage.setItem("token", given);
-    history.replaceState(null, "", location.pathname);
-  }
-  return given ?? sessionStorage.getItem("token") ?? "";
-}
-
 const token = takeToken();
 const query = token === "" ? "" : `?token=${encodeURIComponent(token)}`;
 const connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${query}`);
 const run = new RunState(), view = new View(), units = new Units(), notifications = new Notifications();
 connection.showsRecording = () => run.watchesRecording;
+connection.isPaused = () => run.robot.paused;
 const selection = new Selection(run);
 const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
@@ -96,12 +88,12 @@ scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools
 watchPointers(front, view, () => tools.current);
 
 const teleoperation = new Teleoperation({ connection, run });
-drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools });
+drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools, askForToken: () => askForToken(notifications) });
 new MissionPanel({ run, units, connection, notifications });
 new RoutePanel({ route, run, units, connection, notifications, tools });
 route.on("changed", redraw);
 const alerts = new Alerts({ run, connection, seen: () => byId("log").offsetParent !== null });
-const status = new Status({ run, units, connection, notifications, alerts });
+const status = new Status({ run, units, connection, notifications, alerts, askForToken: () => askForToken(notifications) });
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
 const parameters = new Parameters({ run, connection, notifications });
 const log = new Log(run);
@@ -111,7 +103,7 @@ const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: 
 const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot" });
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
-const files = new Files({ run, connection, notifications, address, play: (file, timeout_ms) => time.openFile(file, timeout_ms).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
+const files = new Files({ run, connection, notifications, address, play: (file) => time.openFile(file).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
 new SettingsFiles({ run, connection, notifications });
 new RobotForm({ run, connection, notifications });
 new Robots({ run, connection });
@@ -229,7 +221,7 @@ connection.on("evidence", (message) => objects.showEvidence(message));
 connection.on("parameters", (message) => parameters.show(message.parameters));
 connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
-byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings the segments back, and vacant areas stay."), [
+byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings segments and objects back, walls are recognised anew, and vacant areas stay."), [
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
@@ -238,6 +230,8 @@ connection.connect();
 tabs.restore(preferred("tab", ""));
 tools.restore(preferred("tool", ""));
 new DriveMode({ teleoperation, changed: () => drawInstruments() });
-new Tour().beginOnce();
+const tour = new Tour({ mayAct: () => run.session?.has_token ?? token !== "" });
+run.on("session", () => tour.refresh());
+tour.beginOnce();
 
 export { connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };

@@ -5,7 +5,7 @@ import { byId, el, setText } from "./dom.js";
 const DONE = {
   delete_segments: "The deleted segments are back", pin_segments: "The pins are as before", place_model: "The placed object is gone",
   move_object: "The object is back where it was", confirm_object: "The object is not confirmed any more", reject_object: "The object is reported again",
-  lift_area: "The area is vacant again", clear_map: "The segments are back; objects are recognised anew",
+  lift_area: "The area is vacant again", clear_map: "Segments and objects are back; walls are recognised anew",
 };
 const SETTLED_MS = 1500; // by then the readings have moved an object that was placed badly
 const STRAYED_M = 0.03;
@@ -17,8 +17,14 @@ export class MapEdits {
   constructor({ run, units, connection, notifications }) {
     Object.assign(this, { run, units, connection, notifications });
     byId("undo-edit").addEventListener("click", () => this.undo());
+    connection.on("waiting", (count) => notifications.banner("waiting", count === 0 ? null : `Paused: ${count} edit${count === 1 ? " of the map waits" : "s of the map wait"} for the next cycle.`,
+      { buttons: [["One cycle", () => this.#ask("single_step")], ["Resume", () => this.#ask("resume")]] }));
     run.on("state", () => this.#refresh());
     units.on("changed", () => this.#refresh());
+  }
+
+  #ask(type) {
+    this.connection.request({ type }).catch(this.notifications.showError);
   }
 
   undo() {

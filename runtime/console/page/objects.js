@@ -24,7 +24,10 @@ export class Objects {
     this.#list.addEventListener("keydown", (event) => this.#key(event));
     const act = (type, done) => () => {
       const { object } = selection;
-      connection.request({ type, object }).then(() => notifications.toast(`Object ${object}: ${done}`), notifications.showError);
+      connection.request({ type, object }).then(() => {
+        if (type === "reject_object" && selection.object === object) selection.pick(null);
+        notifications.toast(`Object ${object}: ${done}`);
+      }, notifications.showError);
     };
     byId("object-confirm").addEventListener("click", act("confirm_object", "confirmed; it is reported whatever the readings say"));
     byId("object-reject").addEventListener("click", act("reject_object", "rejected; nothing is reported there until you lift the area"));

@@ -140,8 +140,7 @@ export class Plots {
     const [, unit = "", factor = 1] = RULES.find(([pattern]) => pattern.test(path)) ?? [];
     const times = unit === "length" ? 1 / this.units.metres : factor;
     const name = (unit === "length" ? this.units.name : unit) + (PER_SECOND.has(path) ? "/s" : "");
-    // No echo is −1 on the wire.
-    return { name, isAngle: unit === "°" && !PER_SECOND.has(path), scaled: (value) => (value === null || (path.startsWith("ranges.") && value < 0) ? null : value * times) };
+    return { name, isAngle: unit === "°" && !PER_SECOND.has(path), scaled: (value) => (value === null || isSilence(path, value) ? null : value * times) };
   }
 
   #drawLane(path, { canvas, value }, { from, to, now }, read) {
@@ -195,10 +194,15 @@ export class Plots {
   #save() {
     const { from, to } = this.#span, paths = [...this.#lanes.keys()];
     const columns = paths.map((path) => this.#history.series(path, from, to));
-    const rows = (columns[0] ?? []).map(([t], i) => [t, ...columns.map((column) => column[i][1] ?? "")].join());
+    const rows = (columns[0] ?? []).map(([t], i) => [t, ...columns.map((column, k) => inTable(paths[k], column[i][1]))].join());
     download("echolocate-plot.csv", new Blob([[["robot_s", ...paths].join(), ...rows, ""].join("\n")], { type: "text/csv" }));
   }
 }
+
+// No echo is −1 on the wire; in a table it is an empty cell, like all that is not known.
+const inTable = (path, value) => (value === null || isSilence(path, value) ? "" : value);
+
+const isSilence = (path, value) => path.startsWith("ranges.") && value < 0;
 
 function linePath(points, x, y, isAngle) {
   const path = new Path2D();

@@ -24,11 +24,13 @@ export class Status {
   #was_open = false;
   #counts = new Map();
 
-  constructor({ run, units, connection, notifications, alerts }) {
+  constructor({ run, units, connection, notifications, alerts, askForToken }) {
+    this.askForToken = askForToken;
     [this.#run, this.#units, this.#connection, this.#notifications, this.#alerts] = [run, units, connection, notifications, alerts];
     alerts.on("changed", () => this.#show());
     run.on("session", (session) => {
       setText(byId("robot-name"), session.name || "echolocate");
+      setAttribute(byId("robot-name"), "title", session.name || "echolocate"); // a long name is cut
       // The page's own files are those of the program that served it.
       this.#version ??= session.version;
       notifications.banner("version", session.version === this.#version ? null : "The robot's program was replaced by another version.",
@@ -159,7 +161,8 @@ export class Status {
     if (this.#connection.open) return;
     if (status === 401 || status === 403) {
       const why = this.#was_open ? "The run was started again with another token" : "The token is missing or wrong";
-      this.#notifications.banner("connection", `${why}: open the address that the run printed when it started.`, { bad: true });
+      this.#notifications.banner("connection", `${why}: open the address that the run printed when it started, or enter its token.`, { bad: true, buttons: [["Enter the token", this.askForToken]] });
+      this.#connection.retryLater();
       this.#trouble = "token missing or wrong";
       this.#show();
     } else this.#notifications.banner("connection", lost, { bad: true });

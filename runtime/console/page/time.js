@@ -4,12 +4,16 @@ import { byId, download, el, setAttribute, setText } from "./dom.js";
 import { Pace, paceText } from "./pace.js";
 import { countObjects } from "./walls.js";
 
+const OPEN_MAX_MS = 600_000;
+const DOUBLE_MS = 600; // the second press of a double click comes within this
+
 const clock = (s) => `${s.toFixed(1)} s`;
 
 export class Time {
   #file = null; // the recording that is open
   #liveSession = null; // the live run's greeting meanwhile
   #scrubbing = false;
+  #marked_ms = -Infinity;
   #pace = new Pace(); // of the emulator
   #playPace = new Pace();
 
@@ -36,6 +40,7 @@ export class Time {
     connection.on("session", (session) => {
       if (this.#liveSession !== null) this.#liveSession = session;
     });
+    connection.on("opening", ({ share }) => this.notifications.updateBanner("opening", `Opening the recording: ${Math.round(100 * share)} %`));
     connection.on("closed", () => this.#discard()); // a new connection shows the live run
   }
 
@@ -121,17 +126,23 @@ export class Time {
       this.notifications.toast("There is no recording to open");
       return;
     }
-    await this.openFile(file);
+    await this.openFile(file, OPEN_MAX_MS);
   }
 
   // Shows a recording in place of the live run; returns whether it is open.
-  async openFile(file, timeout_ms = undefined) {
+  async openFile(file, timeout_ms = OPEN_MAX_MS) {
     let data;
+    const busy = ["open", "file-play"].map(byId);
+    this.notifications.banner("opening", `Opening ${name(file)} …`);
+    for (const button of busy) button.disabled = true;
     try {
       data = await this.connection.request({ type: "open_recording", file }, timeout_ms);
     } catch (error) {
       this.notifications.showError(error);
       return false;
+    } finally {
+      this.notifications.banner("opening", null);
+      for (const button of busy) button.disabled = false;
     }
     this.#file = file;
     byId("playback").hidden = false;
@@ -165,7 +176,9 @@ export class Time {
 
   #bookmark(event) {
     event.preventDefault();
-    const input = byId("bookmark-text");
+    const input = byId("bookmark-text"), now = performance.now();
+    if (now - this.#marked_ms < DOUBLE_MS) return;
+    this.#marked_ms = now;
     const text = input.value.trim() || `cycle ${this.run.state.cycle}`;
     this.connection.request({ type: "bookmark", text }).then(() => {
       input.value = "";

@@ -6,11 +6,11 @@ import { prefer, preferred } from "./preferences.js";
 
 const SEEN = "tour seen";
 const STEPS = [
-  ["halt", "HALT", "Stops the robot at once; so does the space bar. It stands until you arm it again."],
+  ["halt", "HALT", (mayAct) => mayAct ? "Stops the robot at once; so does the space bar. It stands until you arm it again." : "This page has no token, so it only watches: HALT does nothing here. Use the robot's own stop, or open the address with its token."],
   ["mode", "One state", "What the robot does now, and why. NO DATA, grey and dashed, means that what you see is old."],
   ["map-front", "The map", "What the ring hears and what was recognised. Drag to move it, turn the wheel to zoom. The tools at its edge select, measure, place objects and set goals."],
   ["tabs", "Panels", "The objects with their evidence, layers, settings, recordings, plots, the log. A number on Log counts new warnings."],
-  ["tab-drive", "To drive", "Open Drive, press Arm and hold the pad. Let go, and the robot stops. The key ? lists all keys."],
+  ["tab-drive", "To drive", (mayAct) => mayAct ? "Open Drive, press Arm and hold the pad. Let go, and the robot stops. The key ? lists all keys." : "Only a page with the run's token drives. The key ? lists all keys."],
 ];
 
 export class Tour {
@@ -18,7 +18,9 @@ export class Tour {
   #step = 0;
   #marked = null;
 
-  constructor() {
+  // `mayAct` says whether the page has the run's token.
+  constructor({ mayAct }) {
+    this.mayAct = mayAct;
     byId("tour-next").addEventListener("click", () => (this.#step + 1 < STEPS.length ? this.#show(this.#step + 1) : this.end()));
     byId("tour-back").addEventListener("click", () => this.#show(this.#step - 1));
     byId("tour-skip").addEventListener("click", () => this.end());
@@ -48,12 +50,17 @@ export class Tour {
     this.#step = step;
     const [target, title, text] = STEPS[step];
     setText(byId("tour-title"), title);
-    setText(byId("tour-text"), text);
+    setText(byId("tour-text"), typeof text === "function" ? text(this.mayAct()) : text);
     setText(byId("tour-count"), `${step + 1} of ${STEPS.length}`);
     setText(byId("tour-next"), step + 1 < STEPS.length ? "Next" : "Done");
     byId("tour-back").disabled = step === 0;
     this.#mark(byId(target));
     this.#place();
+  }
+
+  // What a step says depends on what the page may do, which it is told once it is connected.
+  refresh() {
+    if (!this.#card.hidden) this.#show(this.#step);
   }
 
   #mark(element) {

@@ -188,7 +188,9 @@ class ReplayCursor:
                     self.bookmarks.append((s, mark.text))
                 elif message.topic == MODE and first_run_s is not None:
                     change = decode(ModeChange, message.data)
-                    self.modes.append((change.run_s - first_run_s, change.mode))
+                    last = self.modes[-1][1] if self.modes else None
+                    if last is None or (last.mode, last.reason) != (change.mode.mode, change.mode.reason):
+                        self.modes.append((change.run_s - first_run_s, change.mode))
 
     def _nearest(self, position: int) -> int:
         """Return the last position with a known state that is far enough before `position`."""
