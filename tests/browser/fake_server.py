@@ -85,6 +85,9 @@ class FakeServer:
     """Accept no connection."""
     deaf: bool = False
     """Answer nothing, like a connection that died without being closed."""
+    holds: set[str] = field(default_factory=set)
+    """Kinds of commands that are answered only by `release`."""
+    held: list[tuple[Client, dict[str, Any]]] = field(default_factory=list)
     connections: int = 0
     """Connections so far, with those that were refused."""
     port: int = 0
@@ -133,6 +136,13 @@ class FakeServer:
         for client in list(self.clients):
             with contextlib.suppress(ConnectionError):
                 await client.socket.send_str(json.dumps(message))
+
+    async def release(self) -> None:
+        """Answer the commands that were held back."""
+        self.holds.clear()
+        held, self.held = self.held, []
+        for client, answer in held:
+            await client.socket.send_str(json.dumps(answer))
 
     async def drop(self) -> None:
         """Close every connection."""
@@ -239,6 +249,9 @@ class FakeServer:
             "field": at,
             "data": data,
         }
+        if kind in self.holds:
+            self.held.append((client, answer))
+            return
         if kind == SYNC:
             await self.send_states()
         await client.socket.send_str(json.dumps(answer))
@@ -282,7 +295,7 @@ class FakeServer:
                 return {"path": self.changed.pop()[0], "value": 1.0} if self.changed else None
             case "save_toml":
                 return TOML
-            case "list_recordings":
+            case "list_recordings" if kind not in self.data:
                 return [
                     {
                         "file": "now.mcap",
