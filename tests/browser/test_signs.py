@@ -1,4 +1,4 @@
-"""What the page does not leave an operator to guess: what waits, what has begun, what it may not do, and why."""
+"""What the page does not leave an operator to guess: what waits, what has started, what it may not do, and why."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.browser.synthetic_run import greeting
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 LAPTOP = (1024, 768)
-LONG = "a-robot-whose-name-somebody-made-as-long-as-the-file-would-take-it"
+LONG = "a-robot-with-a-name-as-long-as-the-file-would-take-it"
 
 
 async def test_edits_of_a_paused_run_say_that_they_wait(server: FakeServer, opener: Opener) -> None:
@@ -48,10 +48,10 @@ async def test_a_rejected_object_leaves_its_card(server: FakeServer, opener: Ope
 async def test_a_double_click_makes_one_bookmark(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.tab("Time")
-    await opened.page.locator("#bookmark-text").fill("the door")
+    await opened.page.locator("#bookmark-text").fill("the cupboard")
     await opened.page.get_by_role("button", name="Bookmark").dblclick()
     await opened.sync()
-    assert [message["text"] for message in server.of("bookmark")] == ["the door"]
+    assert [message["text"] for message in server.of("bookmark")] == ["the cupboard"]
     await opened.run_for(1000)
     await opened.page.get_by_role("button", name="Bookmark").click()
     await server.wait("bookmark", 2)
@@ -73,7 +73,7 @@ async def test_lines_of_the_log_are_sentences(server: FakeServer, opener: Opener
     await opened.save_screenshot("log")
 
 
-async def test_what_takes_long_shows_at_once_that_it_has_begun(server: FakeServer, opener: Opener) -> None:
+async def test_what_takes_long_shows_at_once_that_it_has_started(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     page = opened.page
     await opened.tab("Files")
@@ -84,7 +84,7 @@ async def test_what_takes_long_shows_at_once_that_it_has_begun(server: FakeServe
     await server.release()
     server.holds = {"make_files"}
     await opened.says("#job-text", "Map of now.mcap: asked for")
-    await opened.save_screenshot("map-begun")
+    await opened.save_screenshot("map-started")
     await server.release()
 
     server.holds = {"open_recording"}

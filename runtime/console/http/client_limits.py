@@ -71,7 +71,7 @@ class ConsoleLog:
         self.refusals = 0
 
     def answer_refusal(self, reason: str, client: str) -> None:
-        """Log that a client was told why a command was refused: its operator knows, so it is no warning."""
+        """Log that a command was refused with an answer: its operator knows, so it is no warning."""
         self.refusals += 1
         self._write("info", "console refused", self._limit("answered"), reason=reason, client=client)
 

@@ -12,7 +12,7 @@ const UNITS = [["us", "µs"], ["ms", "ms"], ["s", "s"], ["m", "m"], ["rad", "rad
 // A line of the log as a sentence: what happened, why, and in brackets what else is known of it.
 export function sentence(event, fields) {
   const known = Object.fromEntries(Object.entries(fields ?? {}).filter(([, value]) => !["", "None", "null"].includes(String(value))));
-  const { reason, [event]: what, ...others } = known; // an event named as a field, as "mode", is told by that field
+  const { reason, [event]: what, ...others } = known; // an event named as a field, as "mode", is described by that field
   const head = what === undefined ? event : `${event} ${what}`;
   const text = `${head.charAt(0).toUpperCase()}${head.slice(1)}${reason === undefined ? "" : `: ${reason}`}`;
   const details = Object.entries(others).map(([key, value]) => detail(key, value)).join(", ");

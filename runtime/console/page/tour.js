@@ -58,7 +58,7 @@ export class Tour {
     this.#place();
   }
 
-  // What a step says depends on what the page may do, which it is told once it is connected.
+  // What a step says depends on what the page may do, which is known once it is connected.
   refresh() {
     if (!this.#card.hidden) this.#show(this.#step);
   }
