@@ -17,10 +17,12 @@ from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from config.behaviors import BehaviorsConfig
 from config.mission_step import Frame
+from config.places import PlacesConfig
 from config.robot import BodyConfig
 from perception.percept import Percept, Pose
 
 ODOM_FRAME: Final = Pose(0.0, 0.0, 0.0)
+NO_PLACES: Final = PlacesConfig()
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,10 @@ class Scene:
     """Radius about an object's position that holds its outline, by model, m."""
     run_s: float = 0.0
     """Now, by the run's clock, s."""
+    places: PlacesConfig = NO_PLACES
+    """The named places of the map."""
+    places_frame: Frame = "odom"
+    """In which they lie."""
     way_rad: float | None = None
     """Where the schemas lead that lead somewhere, in odometry's frame; None for those schemas themselves."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
@@ -34,6 +35,7 @@ from config.mission_step import (
     NoiseUse,
     SwirlUse,
 )
+from config.places import no_such_place
 
 Schema: TypeAlias = Callable[[Scene, Memory, Any], Answer]
 """A schema: what it sees, what it has kept, and its settings in the step, of the type that has its name."""
@@ -70,9 +72,11 @@ def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
     use
         The place, its frame, the final heading and the gain.
     """
-    frame, still = scene.frame(use.frame), Response(TO_GOAL, 0.0, 0.0)
-    before = GoalPlace(memory.x, memory.y) if memory.is_set else None
-    goal = Goal(use.x_m, use.y_m, frame=use.frame, reached=memory.index == 1)
+    still, before = Response(TO_GOAL, 0.0, 0.0), GoalPlace(memory.x, memory.y) if memory.is_set else None
+    asked = _goal_of(use, scene)
+    if asked is None:
+        return Answer(still, Memory(memory.index), waits_for=no_such_place(use.place or "", scene.places))
+    frame, goal = scene.frame(asked.frame), replace(asked, reached=memory.index == 1)
     place = goal_place(goal, before, frame, scene.cycle_s)
     if frame is None or place is None:
         return Answer(still, Memory(memory.index), waits_for=UNKNOWN_FRAME)
@@ -84,10 +88,24 @@ def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
     if not is_there:
         vector = Response(TO_GOAL, use.gain * response.x, use.gain * response.y)
         return Answer(vector, memory, remaining_m=remaining_m, goal=Goal(place.x, place.y))
-    if use.heading_deg is None:
+    if goal.heading is None:
         return Answer(still, memory, has_arrived=True, remaining_m=0.0)
-    direction = frame.theta + math.radians(use.heading_deg)
+    direction = frame.theta + goal.heading
     return Answer(still, memory, is_aligned(scene.percept.pose, direction), 0.0, direction)
+
+
+def _goal_of(use: MoveToGoalUse, scene: Scene) -> Goal | None:
+    """Return the goal of a step in its frame; None if it names a place that there is not."""
+    if use.point is not None:
+        (x, y), frame = use.point, use.frame
+        heading_rad = None if use.heading_deg is None else math.radians(use.heading_deg)
+    else:
+        place = scene.places.named(use.place or "")
+        if place is None:
+            return None
+        x, y, frame = place.x_m, place.y_m, scene.places_frame
+        heading_rad = place.heading_rad if use.heading_deg is None else math.radians(use.heading_deg)
+    return Goal(x, y, frame=frame, heading=heading_rad)
 
 
 def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveCanyonUse) -> Answer:

@@ -18,6 +18,7 @@ from config.layers import Layers, Location, PathError, Source
 from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.overrides import apply_overrides, parse_override
+from config.places import check_places
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
 from config.settings import GoalConfig, Settings
@@ -44,18 +45,14 @@ __all__ = [
     "with_value",
 ]
 
-DEFAULT_RUN = "hallway"
-DEFAULT_WORLD = "hallway"
+DEFAULT_RUN = DEFAULT_WORLD = "hallway"
 DEFAULT_MODEL = "semicircle"
 """The paper's experiment: defaults of a run whose file does not name them."""
-
 MODELS_MAX = 64
 """Largest number of model files of one run."""
-
 COMMAND_LINE = Source("command line")
 NAMES = ("robot", "world", "models", "mission")
 """Keys of a run file that name other files; `robot` may also be a section."""
-
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -224,14 +221,16 @@ def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -
 
 
 def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) -> Settings:
-    """Return the settings with the surfaces of a world as the known room.
+    """Return the settings with the surfaces of a world as the known room, and with its places if it has any.
 
     Raises
     ------
     ConfigError
         The world cannot be read, is invalid, or has no surface; or drift is to be corrected otherwise.
     """
-    return with_room(settings, load_world(name_or_path), f"map {os.fspath(name_or_path)}")
+    room, name = load_world(name_or_path), f"map {os.fspath(name_or_path)}"
+    places = room.places() if room.has_any else settings.places
+    return with_room(settings.model_copy(update={"places": places}), room, name)
 
 
 def with_room(settings: Settings, room: WorldConfig | None, name: str) -> Settings:
@@ -273,9 +272,10 @@ def with_mission(settings: Settings, mission: MissionConfig) -> Settings:
     Raises
     ------
     ConfigError
-        It looks for an object that these settings do not recognise.
+        It looks for an object that these settings do not recognise, or drives to a place that they do not name.
     """
     free = settings.model_copy(update={"goal": None, "mission": None})
+    check_places(mission, settings.places)
     return with_value(free, f"mission {mission.name}", ("mission",), mission.model_dump(mode="json"))
 
 

@@ -133,6 +133,10 @@ class MissionConfig(Strict):
         """Whether a schema or a condition looks for an object."""
         return bool(self.objects())
 
+    def places(self) -> set[str]:
+        """Return the names of all places to which steps drive."""
+        return {step.goal.place for step in self.step if step.goal is not None and step.goal.place is not None}
+
     def objects(self) -> set[str]:
         """Return the names of all objects that schemas and conditions look for."""
         parts = [part for step in self.step for part in (*step.schemas, *step.until)]

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from config.strict import Coordinate, Point, Strict, TomlList
+from config.strict import Point, Strict, TomlList
 
 STEPS_MAX: Final = 64
 """Most steps of a mission, and most waypoints of a route."""
@@ -70,12 +70,28 @@ class MoveToGoalUse(Strict):
     name: Literal["move_to_goal"]
     """Of the schema."""
     gain: Gain = 1.0
-    x_m: Coordinate
-    y_m: Coordinate
+    place: Name | None = None
+    """Name of a place of the map, in place of coordinates and frame; its heading counts if the step gives none."""
+    x_m: float | None = Field(default=None, ge=-10_000.0, le=10_000.0)
+    y_m: float | None = Field(default=None, ge=-10_000.0, le=10_000.0)
     """The place, m."""
     frame: Frame = "odom"
     heading_deg: float | None = Field(default=None, ge=-360.0, le=360.0)
     """Heading at the goal, in its frame, degrees counter-clockwise from x."""
+
+    @model_validator(mode="after")
+    def _has_one_goal(self) -> MoveToGoalUse:
+        given = [self.x_m is not None, self.y_m is not None]
+        if self.place is None and not all(given):
+            raise ValueError("move_to_goal needs a goal: give it x_m and y_m, or the name of a place")
+        if self.place is not None and any(given):
+            raise ValueError(f"the goal is the place {self.place}, which has its own x_m and y_m: leave them out")
+        return self
+
+    @property
+    def point(self) -> tuple[float, float] | None:
+        """The goal x, y, m; None where it is a named place."""
+        return None if self.x_m is None or self.y_m is None else (self.x_m, self.y_m)
 
 
 class TurnUse(Strict):

@@ -34,6 +34,7 @@ LIVE_SETTINGS: Final = frozenset(
         "perception.recognition",
         "perception.relaxation",
         "perception.segments",
+        "places",
         "ring.firing",
     }
 )

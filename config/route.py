@@ -46,9 +46,9 @@ def waypoints_of(mission: MissionConfig) -> tuple[tuple[Waypoint, ...], Frame] |
     """Return the waypoints of a mission and their frame; None if it is more than a route."""
     uses = [use for step in mission.step for use in step.schemas if isinstance(use, MoveToGoalUse)]
     frames = {use.frame for use in uses}
-    if len(uses) != len(mission.step) or len(frames) != 1:
+    waypoints = tuple((*use.point, use.heading_deg) for use in uses if use.point is not None)
+    if len(waypoints) != len(mission.step) or len(frames) != 1:
         return None
-    waypoints = tuple((use.x_m, use.y_m, use.heading_deg) for use in uses)
     frame = frames.pop()
     steps = tuple(step.model_copy(update={"name": f"waypoint-{n}"}) for n, step in enumerate(mission.step, 1))
     is_route = not mission.endless and steps == route_config(waypoints, frame, mission.name).step

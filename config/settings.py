@@ -13,8 +13,9 @@ from pydantic import Field, model_validator
 from config.behaviors import BehaviorsConfig
 from config.files import did_you_mean
 from config.mission import MissionConfig
-from config.mission_step import LABELS
+from config.mission_step import LABELS, Frame
 from config.model import ModelConfig
+from config.places import PlacesConfig
 from config.robot import RobotConfig
 from config.strict import Strict, TomlList
 from config.world import WorldConfig
@@ -134,6 +135,11 @@ class LocalizationConfig(Strict):
     known_room: WorldConfig | None = None
     """The map of the room in which the robot finds itself, as ``run --map`` sets it: walls, boxes, polygons, drums.
     The map frame is the room's; the robot drives in the odometry's all the same."""
+
+    @property
+    def has_map(self) -> bool:
+        """Whether there is a map frame besides odometry's."""
+        return self.correct_drift or self.known_room is not None
 
     @model_validator(mode="after")
     def _one_map_frame(self) -> LocalizationConfig:
@@ -269,6 +275,8 @@ class Settings(RobotConfig):
     """The objects to recognise."""
     world: WorldConfig | None = None
     """The world of the emulator, which runs if no port is given."""
+    places: PlacesConfig = PlacesConfig()
+    """Named places, no-go areas and speed limits; those of a map (``run --map``) replace them."""
     cycle: CycleConfig = CycleConfig()
     perception: PerceptionConfig = PerceptionConfig()
     behaviors: BehaviorsConfig = BehaviorsConfig()
@@ -280,6 +288,11 @@ class Settings(RobotConfig):
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()
     console: ConsoleConfig = ConsoleConfig()
+
+    @property
+    def places_frame(self) -> Frame:
+        """The frame in which the places lie."""
+        return "map" if self.perception.localization.has_map else "odom"
 
     @model_validator(mode="after")
     def _distinct_models(self) -> Settings:

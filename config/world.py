@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import Field
 
+from config.places import PLACE_KEYS, PlacesConfig
 from config.strict import Coordinate, Point, Strict, TomlList
 
 ITEMS_MAX: Final = 20_000
@@ -98,8 +99,8 @@ class OdometryConfig(Strict):
     """Turn reported on a straight way, rad/m: a differential base's wheels differ in size."""
 
 
-class WorldConfig(Strict):
-    """A world file."""
+class WorldConfig(PlacesConfig):
+    """A world file: a room, and the places and no-go areas on its map."""
 
     drum: TomlList[DrumConfig] = Field(default=(), max_length=ITEMS_MAX)
     wall: TomlList[WallConfig] = Field(default=(), max_length=ITEMS_MAX)
@@ -108,6 +109,10 @@ class WorldConfig(Strict):
     start: StartConfig = StartConfig()
     acoustics: AcousticsConfig = AcousticsConfig()
     odometry: OdometryConfig = OdometryConfig()
+
+    def places(self) -> PlacesConfig:
+        """Return what is marked on the map of this room."""
+        return PlacesConfig(**{key: getattr(self, key) for key in PLACE_KEYS})
 
     def sides_m(self) -> list[tuple[float, float, float, float]]:
         """Return both ends of each wall, and of each side of the boxes and polygons, m."""

@@ -22,6 +22,7 @@ from runtime.console.commands.command import CommandContext
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.dispatcher import CommandDispatcher
 from runtime.console.commands.parameters import parameters
+from runtime.console.commands.place_commands import places_message
 from runtime.console.commands.tuning import Tuning
 from runtime.console.frames.frame_publisher import FramePublisher
 from runtime.console.frames.session_info import session_info
@@ -117,7 +118,7 @@ class Console:
         default = Limits(clients=config.clients_max, command_age_max_s=config.command_age_max_s)
         self._limits = default if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
-        self._shown = _in_session(settings)
+        self._shown, self._places = _in_session(settings), settings.places
         self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
@@ -285,7 +286,10 @@ class Console:
         info = session_info(
             self._run.live_settings.current, name=self._run.name, emulated=self._emulated, units=self._units
         )  # fmt: skip
-        return {**info, "recording": self._commands.recording is not None, "robots": self._robots}
+        places = places_message(self._run.live_settings.current)
+        return {
+            **info, "recording": self._commands.recording is not None, "robots": self._robots, "places": places,
+        }  # fmt: skip
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:
         self._console_log.note("configuration changed from the console", changed=[str(one) for one in changed])
@@ -298,6 +302,9 @@ class Console:
             self.hub.begin_session(self._session())
         else:
             self.hub.broadcast({"type": "parameters", "parameters": parameters(settings)})
+        if settings.places != self._places:
+            self._places = settings.places
+            self.hub.broadcast(places_message(settings))
 
     def _on_stalled(self, client: str) -> None:
         self._console_log.refuse(f"it accepted no data for {self._limits.stall_s:g} s: disconnected", client)

@@ -219,7 +219,10 @@ def _on_mission(
     """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
     behaviors, body = settings.behaviors, settings.body
     radii_m = {model.name: model.reach_m for model in settings.models}
-    scene = Scene(percept, body, behaviors, ODOM_FRAME, 0.0, cycle_s, map_frame, radii_m=radii_m, run_s=run_s)
+    scene = Scene(
+        percept, body, behaviors, ODOM_FRAME, 0.0, cycle_s, map_frame, radii_m=radii_m, run_s=run_s,
+        places=settings.places, places_frame=settings.places_frame,
+    )  # fmt: skip
     asked = drive_mission(mission, scene)
     if asked.hold_reason is not None:
         return DriveResult(Drive(STANDSTILL), (), asked.mission, leg, asked.hold_reason)

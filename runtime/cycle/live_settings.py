@@ -73,6 +73,9 @@ class LiveSettings:
         if not changed:
             return ()
         history = [*self._history, self._current] if can_undo else []
+        if settings.places != self._current.places:  # they have an undo of their own
+            history = [before.model_copy(update={"places": settings.places}) for before in history]
+            history = history[:-1] if history and history[-1] == settings else history
         if settings.models != self._current.models:
             # A model cannot be removed while the robot runs: undo reverts the other changes only.
             history = [before.model_copy(update={"models": settings.models}) for before in history]

@@ -80,11 +80,18 @@ class Reloader:
             if not self._is_requested:
                 return
 
+    def _proposed(self) -> Settings:
+        """Return the settings of the files; places that an operator has changed stay unless the files' changed."""
+        settings, live = self._propose(), self._live_settings
+        if settings.places != live.initial.places:
+            return settings
+        return settings.model_copy(update={"places": live.current.places})
+
     async def _check(self) -> ReloadResult:
         """Return the result for the files as they are now, with this process prepared for the change."""
         live = self._live_settings
         before = live.current
-        result = await asyncio.to_thread(live.check, self._propose)
+        result = await asyncio.to_thread(live.check, self._proposed)
         problem = await self._prepare(before, result.settings)
         if problem is not None:
             return ReloadResult(before, problems=(problem,))

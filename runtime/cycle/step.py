@@ -17,6 +17,7 @@ from behaviors.avoid_past import Trail
 from behaviors.move_ahead import Leg
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
+from config.places import PlacesConfig
 from config.settings import Settings
 from drivers.driver import LineState, RobotDriver
 from drivers.messages import Flags, Odometry, Pose, Twist
@@ -48,25 +49,13 @@ from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.unheard_limit import limit_unheard
+from runtime.cycle.velocity_limits import ZoneLimits, goal_in_zone, wants_map, zone_limits
 from runtime.timing.phases import Phase, ignore_phase
 
 __all__ = [
-    "NO_MAP",
-    "STANDSTILL",
-    "Command",
-    "CycleRecord",
-    "DriveInput",
-    "DriveRequest",
-    "Edit",
-    "Inputs",
-    "Order",
-    "Refused",
-    "State",
-    "StopCause",
-    "apply_command",
-    "apply_settings",
-    "step",
-]
+    "NO_MAP", "STANDSTILL", "Command", "CycleRecord", "DriveInput", "DriveRequest", "Edit", "Inputs", "Order",
+    "Refused", "State", "StopCause", "apply_command", "apply_settings", "step",
+]  # fmt: skip
 
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
@@ -134,6 +123,10 @@ class State:
     """What takes each of the last cycle's edits back. Made anew each cycle and not recorded."""
     step_settings: StepSettings | None = None
     """Of the mission's step; None without one. They follow from mission and settings and are not recorded."""
+    zones: ZoneLimits | None = None
+    """No-go zones and speed areas; None without any. They follow from the settings and are not recorded."""
+    void_places: PlacesConfig | None = None
+    """The places in odometry's frame that a restart of the odometry voided."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,9 +174,10 @@ def step(
     """
     leaves_canyons = settings.behaviors.leave_canyon.leave_canyon_gain > 0.0
     state.perception.canyon_map.is_wanted = leaves_canyons and needs_space(state.drive_request)
-    new_segments = _perceive(state, inputs)
+    new_segments = _perceive(state, inputs, settings)
     mark(Phase.PERCEIVE)
-    problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request)
+    state.zones = zone_limits(state.zones, state.void_places, state.perception, settings)
+    problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request, settings)
     command = _decide(state, inputs, settings, accepts=problem is None)
     mark(Phase.DECIDE)
     carry_out(command)
@@ -217,7 +211,7 @@ def apply_settings(state: State, settings: Settings) -> None:
     state.perception.set_firing_pattern(settings.ring)
 
 
-def _perceive(state: State, inputs: Inputs) -> int:
+def _perceive(state: State, inputs: Inputs, settings: Settings) -> int:
     """Return how many segments the received firings gave: the part of perception that always runs."""
     if inputs.received.rebooted:
         state.perception.reset()
@@ -227,6 +221,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
         state.leg = None
         state.drive_request = after_reboot(state.drive_request)  # a goal is a place in the odometry before the reboot
         state.last_firing_robot_s = 0.0
+        state.void_places = settings.places if settings.places_frame == "odom" else None
     if inputs.received.odometry is not None:
         state.odometry = inputs.received.odometry
     new_segments = 0
@@ -276,11 +271,11 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
         state.leg = None
 
 
-def _refusal(state: State, drive_request: DriveInput) -> str | None:
+def _refusal(state: State, drive_request: DriveInput, settings: Settings) -> str | None:
     """Return why a drive request cannot be carried out, None if it can."""
     if needs_map(drive_request) and state.perception.localized() is None:
         return NO_MAP
-    return refusal(state.drive_request, drive_request)
+    return refusal(state.drive_request, drive_request) or goal_in_zone(drive_request, state.zones, settings)
 
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
@@ -293,7 +288,7 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     state.run_s = inputs.run_s
     goal = state.drive_request if isinstance(state.drive_request, Goal) else None
     gap_s = max(0.0, gap_s)
-    map_frame = state.perception.known_map_frame() if needs_map(state.drive_request) else None
+    map_frame = state.perception.known_map_frame() if wants_map(state.drive_request, settings) else None
     state.goal_place = None if goal is None else goal_place(goal, state.goal_place, map_frame, gap_s)
     movement = state.motion_monitor.movement
     state.mode = advance(before, inputs, flags, gap_s, movement, state.clock_monitor.clock)
@@ -345,6 +340,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             percept, occupancy=state.perception.occupancy(), canyons=state.perception.canyons(),
             steady=state.perception.steady_obstacles(now_s, age_max_s),
         )  # fmt: skip
+    if (zones := state.zones) is not None:
+        percept, state.hold_reason = zones.seen(percept, state.drive_request, settings.body.radius_m)
+        if state.hold_reason is not None:
+            state.goal_drive = None  # standing here is no lack of progress
+            return Drive(STANDSTILL)
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
         state.goal_drive, map_frame, gap_s, state.trail, state.step_settings,
@@ -365,6 +365,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     twist, reason = limit_unheard(
         result.decision.twist, percept, unheard.points(), settings, is_ring_silent=unheard.is_ring_silent
     )
+    if zones is not None:
+        commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
+        last = commands[-1].twist if commands else STANDSTILL
+        twist, by_zone = zones.applied(twist, last, state.drive_request, odometry, age_s, settings)
+        reason = reason or by_zone
     state.hold_reason = state.hold_reason or reason
     return Drive(twist)
 

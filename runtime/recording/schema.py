@@ -193,9 +193,9 @@ class ObjectList(TimedPayload):
 
 
 _HINTS: Final = get_type_hints(State)
-_CARRIED: Final = tuple(
-    f.name for f in fields(State) if f.name not in {"perception", "percept", "step_settings", "undos"}
-)
+_MADE_ANEW: Final = frozenset({"perception", "percept", "step_settings", "undos", "zones"})
+"""What a replay makes of the other fields, the settings and perception's own state."""
+_CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in _MADE_ANEW)
 _ADDED: Final = MappingProxyType(
     {
         "motion_monitor": MotionMonitor(),
@@ -203,6 +203,7 @@ _ADDED: Final = MappingProxyType(
         "goal_place": None,
         "goal_drive": None,
         "trail": (),
+        "void_places": None,
     }
 )
 """Fields that older recordings of this format lack, with the value that they had then."""

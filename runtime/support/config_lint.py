@@ -28,8 +28,7 @@ def lint_settings(settings: Settings) -> list[str]:
             "several firings wait for each cycle"
         )
     localization = settings.perception.localization
-    has_map = localization.correct_drift or localization.known_room is not None
-    if settings.mission is not None and settings.mission.needs_map and not has_map:
+    if settings.mission is not None and settings.mission.needs_map and not localization.has_map:
         warnings.append(
             f"mission {settings.mission.name} names places in the map, but the run has none, so it stands: run with "
             "--map FILE or with perception.localization.correct_drift = true, or name places in odom"

@@ -70,7 +70,14 @@ MODEL: dict[str, Any] = {
     "closed": False,
     "arc_radius_m": 1.0,
 }
+PLACES: dict[str, Any] = {
+    "place": [{"name": "charger", "x_m": 1.0, "y_m": 2.0, "heading_deg": 90.0}],
+    "no_go_line": [{"name": "stairs", "points_m": [[0.0, 0.0], [1.0, 0.0]]}],
+    "no_go_area": [{"name": "rug", "vertices_m": [[5.0, 5.0], [6.0, 5.0], [6.0, 6.0]]}],
+    "speed_area": [{"name": "ward", "vertices_m": [[7.0, 5.0], [8.0, 5.0], [8.0, 6.0]], "speed_max_m_s": 0.1}],
+}
 WORLD: dict[str, Any] = {
+    **PLACES,
     "drum": [{"x_m": 1.0, "y_m": 2.0, "radius_m": 0.3}],
     "wall": [{"x1_m": 0.0, "y1_m": 3.0, "x2_m": 5.0, "y2_m": 3.0}],
     "box": [{"x_m": -2.0, "y_m": 2.0, "width_m": 1.0, "depth_m": 0.5, "angle_deg": 30.0}],
@@ -127,6 +134,7 @@ RUN: dict[str, Any] = {
     **ROBOT,
     "models": [MODEL],
     "world": WORLD,
+    "places": copy.deepcopy(PLACES),
     "cycle": {},
     "perception": {
         "grid": {"method": "directed"},

@@ -7,12 +7,20 @@ members of the collection, which other programs pass over.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, Final, Literal
 
+import orjson
+import tomli_w
+
+from config.load import ConfigError, parse_text
+from config.places import PLACE_KEYS, PlacesConfig
 from config.world import DrumConfig, WorldConfig
 
 CIRCLE_POINTS: Final = 48
 """Corners of the polygon that stands for a round object."""
+KEPT: Final = ("name", "heading_deg", "speed_max_m_s")
+"""Properties of what an operator has marked, as in a map file."""
 DIGITS: Final = 4
 """Decimals of a coordinate, m."""
 
@@ -44,9 +52,57 @@ def world_geojson(world: WorldConfig, name: str, frame: Literal["odom", "map"]) 
         _feature("LineString", [_point(wall.x1_m, wall.y1_m), _point(wall.x2_m, wall.y2_m)], kind="wall")
         for wall in world.wall
     ]
-    return {
-        "type": "FeatureCollection", "name": name, "units": "m", "frame": frame, "features": [*drums, *areas, *walls],
-    }  # fmt: skip
+    features = [*drums, *areas, *walls, *_marked(world.places())]
+    return {"type": "FeatureCollection", "name": name, "units": "m", "frame": frame, "features": features}
+
+
+def places_of_geojson(text: str, name: str) -> PlacesConfig:
+    """Return the places of a feature collection, as `world_geojson` writes them; other features are passed over.
+
+    A point with a name is a place. A line or an area of the kinds `no_go_line`, `no_go_area` and `speed_area` is one.
+
+    Raises
+    ------
+    ConfigError
+        The text is no feature collection in metres, or a feature of these kinds is invalid.
+    """
+    table: dict[str, list[dict[str, Any]]] = {key: [] for key in PLACE_KEYS}
+    try:
+        collection = orjson.loads(text)
+        if collection.get("units") != "m":
+            raise ConfigError(f'{name}: not a map in metres: the collection lacks "units": "m"')
+        for feature in collection["features"]:
+            given, shape = feature["properties"], feature["geometry"]
+            kind, points = given.get("kind"), shape["coordinates"]
+            row = {key: given[key] for key in KEPT if given.get(key) is not None}
+            if kind == "place" and shape["type"] == "Point":
+                table["place"].append({**row, "x_m": float(points[0]), "y_m": float(points[1])})
+            elif kind == "no_go_line" and shape["type"] == "LineString":
+                table[kind].append({**row, "points_m": _corners(points)})
+            elif kind in {"no_go_area", "speed_area"} and shape["type"] == "Polygon":
+                table[kind].append({**row, "vertices_m": _corners(points[0][:-1])})
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+        raise ConfigError(f"{name}: not GeoJSON of a map ({type(error).__name__})") from None
+    return parse_text(PlacesConfig, tomli_w.dumps(table), name)
+
+
+def _corners(points: list[list[float]]) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y, *_ in points]
+
+
+def _marked(places: PlacesConfig) -> Iterator[dict[str, Any]]:
+    """Yield a feature for each place, line and area that an operator has marked."""
+    for place in places.place:
+        yield _feature(
+            "Point", _point(place.x_m, place.y_m), kind="place", name=place.name, heading_deg=place.heading_deg
+        )
+    for line in places.no_go_line:
+        yield _feature("LineString", [_point(*point) for point in line.points_m], kind="no_go_line", name=line.name)
+    for area in places.no_go_area:
+        yield _feature("Polygon", [_ring(area.vertices_m)], kind="no_go_area", name=area.name)
+    for area in places.speed_area:
+        limit = area.speed_max_m_s
+        yield _feature("Polygon", [_ring(area.vertices_m)], kind="speed_area", name=area.name, speed_max_m_s=limit)
 
 
 def _feature(shape: str, coordinates: list[Any], **properties: object) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 import tomli_w
 
 from config.model import ModelConfig
+from config.places import PLACE_KEYS, PlacesConfig
 from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from drivers.messages import Floats
 from perception.detected_object import DetectedObject
@@ -62,6 +63,11 @@ def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[
             for side in sides
         ),
     )
+
+
+def with_places(world: WorldConfig, places: PlacesConfig) -> WorldConfig:
+    """Return a world with what an operator has marked on its map."""
+    return world.model_copy(update={key: getattr(places, key) for key in PLACE_KEYS})
 
 
 def round_names(objects: Sequence[DetectedObject], models: Sequence[ModelConfig]) -> list[str]:

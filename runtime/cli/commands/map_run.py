@@ -38,7 +38,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
     from runtime.analysis.export.geojson import world_geojson
     from runtime.analysis.export.occupancy_image import occupancy_image, yaml_beside
     from runtime.analysis.export.shapes import firing_scans
-    from runtime.analysis.export.world_file import round_names, world_of, world_text
+    from runtime.analysis.export.world_file import round_names, with_places, world_of, world_text
     from runtime.analysis.map_changes import MapChange, compare_with_map
     from runtime.analysis.timeline_builder import wall_ends
 
@@ -66,18 +66,22 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
             view.known, world, round_names(objects, settings.models), echoes, half_angle_rad
         )
         head = f"The map of {utf8(Path(source.file).name)}, corrected by what that run found (m)."
+    world = with_places(world, settings.places)
     with writing("--out", out):
         Path(out).write_text(world_text(world, (head,)), encoding="utf-8")
     output.print(f"{out}: {len(world.drum)} drums, {len(world.polygon)} polygons, {len(world.wall)} walls")
+    if (marked := world.places()).has_any:
+        output.print(f"{out}: {marked}")
     for change in changes:
         output.print(str(change))
     if view is not None and not changes:
         output.print("nothing has changed where the robot has looked")
     if geojson is not None:
         frame: Literal["odom", "map"] = "odom" if view is None else "map"
+        features = world_geojson(world, utf8(Path(source.file).stem), frame)
         with writing("--geojson", geojson):
-            Path(geojson).write_bytes(orjson.dumps(world_geojson(world, utf8(Path(source.file).stem), frame)) + b"\n")
-        output.print(f"{geojson}: {len(world.drum) + len(world.polygon) + len(world.wall)} features")
+            Path(geojson).write_bytes(orjson.dumps(features) + b"\n")
+        output.print(f"{geojson}: {len(features['features'])} features")
     if grid is not None:
         try:
             scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)

@@ -8,6 +8,7 @@ from config.errors import WRONG_CALL, UserError
 from config.files import is_utf8, one_line, utf8
 from config.load import ConfigError, list_shipped, load_settings, with_goal, with_known_room
 from config.mission_step import Frame
+from config.places import check_places, no_such_place
 from config.settings import GoalConfig, Settings
 from runtime.support.pattern_check import refuse_undrivable
 
@@ -47,7 +48,8 @@ def settings_of_files(
     if goal is not None:
         if mission is not None:
             raise UserError("--goal and --mission exclude each other: leave one of them out", WRONG_CALL)
-        settings = with_goal(settings, parse_goal(goal, "odom" if map_file is None else "map"))
+        settings = with_goal(settings, parse_goal(goal, "odom" if map_file is None else "map", settings))
+    check_places(settings.mission, settings.places)
     refuse_undrivable(settings)
     return without_console(settings) if no_console else settings
 
@@ -89,14 +91,20 @@ def reload_settings(
     return settings if port is None else with_port(settings, port)
 
 
-def parse_goal(text: str, frame: Frame) -> GoalConfig:
-    """Return the goal of `--goal`: X,Y in metres and, if given, the final heading in degrees.
+def parse_goal(text: str, frame: Frame, settings: Settings) -> GoalConfig:
+    """Return the goal of `--goal`: the name of a place, or X,Y in metres and, if given, the heading in degrees.
 
     Raises
     ------
     UserError
         The text is something else.
     """
+    if text.strip()[:1].isalpha() and "," not in text:
+        place = settings.places.named(text.strip())
+        if place is None:
+            raise UserError(f"--goal {one_line(text)}: {no_such_place(one_line(text), settings.places)}", WRONG_CALL)
+        there = {"x_m": place.x_m, "y_m": place.y_m, "heading_deg": place.heading_deg}
+        return GoalConfig.model_validate({**there, "frame": settings.places_frame})
     keys = ("x_m", "y_m", "heading_deg")
     try:
         values = [float(word) for word in text.split(",")]
@@ -104,7 +112,7 @@ def parse_goal(text: str, frame: Frame) -> GoalConfig:
     except ValueError:  # a word is no number, there are too many or too few, or one is out of its bounds
         raise UserError(
             f"--goal {one_line(text)}: expected X,Y in metres, or X,Y,HEADING with a final heading from -360 to 360 "
-            "degrees, for example --goal 3,1.5,90",
+            "degrees, for example --goal 3,1.5,90, or the name of a place",
             WRONG_CALL,
         ) from None
 

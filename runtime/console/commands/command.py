@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
+from config.places import PlacesConfig
 from perception.edits import Edit
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
@@ -19,6 +20,8 @@ from runtime.timing.time_control import TimeControl
 
 Arguments = TypeVar("Arguments")
 
+PLACES_UNDO_MAX: Final = 50
+"""Changes of the places that can be undone."""
 ANSWERED_LATER: Final = object()
 """A handler returns this if the answer is sent by others once the outcome is known."""
 
@@ -63,6 +66,8 @@ class CommandContext:
     """In the order in which the cycle carries them out."""
     history: EditHistory = field(default_factory=EditHistory)
     """The edits that can be undone."""
+    places_before: deque[PlacesConfig] = field(default_factory=lambda: deque(maxlen=PLACES_UNDO_MAX))
+    """The places that each change replaced, for undo."""
     is_teleoperated: bool = False
     """Whether the last drive request was a velocity from a client's teleoperation."""
     grid: tuple[float, bytes] = (-math.inf, b"")

@@ -17,7 +17,14 @@ from perception.edits import (
     PlaceRobot,
     RejectObject,
 )
-from runtime.console.commands import async_commands, file_commands, handlers, robot_commands, settings_commands
+from runtime.console.commands import (
+    async_commands,
+    file_commands,
+    handlers,
+    place_commands,
+    robot_commands,
+    settings_commands,
+)
 from runtime.console.commands import messages as arguments
 from runtime.console.commands.command import Command, Permission, always
 from runtime.console.commands.messages import MessageReader, NoArguments
@@ -57,6 +64,11 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("reject_object", RejectObject, CONTROL, handlers.edit, always, survives_stop=True),
     Command("lift_area", LiftArea, CONTROL, handlers.edit, always, survives_stop=True),
     Command("undo_edit", NoArguments, CONTROL, handlers.undo_edit, always, survives_stop=True),
+    Command("set_places", place_commands.SetPlaces, CONTROL, place_commands.set_places, always, survives_stop=True),
+    Command("undo_places", NoArguments, CONTROL, place_commands.undo_places, always, survives_stop=True),
+    Command("go_to_place", place_commands.GoToPlace, CONTROL, place_commands.go_to_place, always),
+    Command("read_places", place_commands.ReadPlaces, TOKEN, place_commands.read_places),
+    Command("save_map", place_commands.SaveMap, TOKEN, place_commands.save_map),
     Command("place_robot", PlaceRobot, CONTROL, handlers.edit, always, survives_stop=True),
     Command("confirm_object", ConfirmObject, CONTROL, handlers.edit, always, survives_stop=True),
     Command("evidence", arguments.GetEvidence, TOKEN, handlers.get_evidence),

@@ -15,6 +15,7 @@ from config.errors import UserError
 from config.layers import Location
 from config.load import MODELS_MAX, ConfigError, parse_text, with_room, with_value
 from config.model import ModelConfig
+from config.places import PlacesConfig
 from config.problems import shown
 from config.reload import MAP, Difference, ReloadResult, differences
 from config.settings import Settings
@@ -110,7 +111,7 @@ class Tuning:
         return model
 
     async def set_map(self, toml: str | None, refusal: Callable[[], str | None]) -> None:
-        """Find the robot in a known room from now on, as after a start with `--map`.
+        """Find the robot in a known room from now on, as after a start with `--map`; its places come with it.
 
         Parameters
         ----------
@@ -127,7 +128,8 @@ class Tuning:
 
         def proposed() -> Settings:
             room = None if toml is None else parse_text(WorldConfig, toml, "map")
-            return with_room(self.current, room, "map")
+            places = PlacesConfig() if room is None else room.places()
+            return with_room(self.current.model_copy(update={"places": places}), room, "map")
 
         def result() -> Settings:
             why = refusal()
@@ -144,6 +146,13 @@ class Tuning:
         changed = self._live_settings.apply(result(), can_undo=False)
         if changed:
             self._on_change(changed)
+
+    def set_places(self, places: PlacesConfig) -> bool:
+        """Put other places in force; return whether anything changed. `undo` does not concern them."""
+        changed = self._live_settings.apply(self.current.model_copy(update={"places": places}), can_undo=True)
+        if changed:
+            self._on_change(changed)
+        return bool(changed)
 
     def undo(self) -> tuple[Difference, ...]:
         """Undo the last change; return what changed.

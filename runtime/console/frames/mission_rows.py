@@ -38,13 +38,16 @@ class MissionRows:
 
 
 def _step(step: StepConfig) -> dict[str, Any]:
-    """Return a step: its schemas, where its conditions lead, and its places x, y and heading (m, degrees)."""
+    """Return a step: its schemas, where its conditions lead, and its places x, y and heading (m, degrees).
+
+    A place of the map is given by its name.
+    """
     places: list[tuple[float, float, float | None]] = []
-    frame = "odom"
+    frame, place = "odom", None
     for use in step.schemas:
         if isinstance(use, MoveToGoalUse):
-            places.append((use.x_m, use.y_m, use.heading_deg))
-            frame = use.frame
+            places += [] if use.point is None else [(*use.point, use.heading_deg)]
+            frame, place = use.frame, use.place
         elif isinstance(use, StayOnPathUse):
             places += [(x, y, None) for x, y in use.points_m]
             frame = use.frame
@@ -56,6 +59,7 @@ def _step(step: StepConfig) -> dict[str, Any]:
             for c in step.conditions
         ],
         "places": places,
+        "place": place,
         "frame": frame,
     }
 

@@ -77,6 +77,11 @@ ROBOT: dict[str, Any] = {
 """A robot as the page describes it."""
 OTHERS: list[dict[str, Any]] = [
     ROBOT,
+    {"type": "set_places", "places": {"place": [{"name": "charger", "x_m": 1, "y_m": -2.5}]}},
+    {"type": "undo_places"},
+    {"type": "go_to_place", "name": "charger"},
+    {"type": "read_places", "text": ""},
+    {"type": "save_map", "format": "toml"},
     {"type": "rename_recording", "file": "run.mcap", "to": "dock"},
     {"type": "pin_recording", "file": "run.mcap", "pinned": True},
     {"type": "delete_recording", "file": "run.mcap"},

@@ -35,6 +35,7 @@ def test_commands_that_need_no_control() -> None:
         "seek_recording", "play_recording", "step_recording", "close_recording",
         "list_settings", "read_settings", "check_settings",
         "read_mission", "save_route", "make_files", "list_jobs", "cancel_job", "robot_file",
+            "read_places", "save_map",
     }  # fmt: skip
 
 

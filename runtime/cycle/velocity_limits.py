@@ -1,0 +1,146 @@
+"""Limits on a velocity that was decided on, whatever is driven: no-go lines and areas, and speed areas.
+
+Zones lie in the map, where the run has one. While the robot does not know its place there, they cannot be kept. Then
+the robot stands, or follows an operator's velocity slowly: the operator sees where it goes, and it may have to move
+to find its place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from behaviors.missions.mission import Mission
+from behaviors.move_to_goal import Goal
+from behaviors.no_go import Zones, limited, no_go_at, with_no_go, zones_of
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
+from config.places import PlacesConfig
+from config.settings import Settings
+from drivers.messages import Odometry, Pose, Twist
+from perception.percept import Percept
+from perception.pipeline import Perception
+from runtime.cycle.drive_requests import DriveInput, DriveRequest, needs_map
+
+UNKNOWN_PLACE: Final = (
+    "the no-go areas and speed limits cannot be kept, because the robot does not know its place in the map, so it "
+    "stands: say where it is, teleoperate it slowly until it finds its place, or remove them"
+)
+UNKNOWN_PLACE_SLOW: Final = (
+    "the no-go areas and speed limits are not kept, because the robot does not know its place in the map: it drives "
+    "slowly until it knows; keep it out of them"
+)
+VOID: Final = (
+    "the no-go areas and speed limits cannot be kept, because the robot's odometry has started anew and they lay in "
+    "its frame: set or remove them again; until then it stands, or drives slowly by teleoperation"
+)
+CYCLES: Final = 2.0
+"""A command is followed so many cycles after the one that it replaces, at most: one until it is sent, one until the
+base has taken it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneLimits:
+    """The zones in force, and where they lie."""
+
+    zones: Zones
+    frame: Pose | None
+    """Their frame in odometry's; None while it is not known."""
+    is_void: bool
+    """Whether odometry has started anew since they were set in its frame."""
+
+    def seen(self, percept: Percept, drive_request: DriveRequest, radius_m: float) -> tuple[Percept, str | None]:
+        """Return the percept with no-go lines as obstacles, and why the robot must stand, None if it may drive.
+
+        Parameters
+        ----------
+        percept : Percept
+            In odometry's frame.
+        drive_request : DriveRequest
+            What is driven.
+        radius_m : float
+            Of the body, m.
+        """
+        if self.frame is not None:
+            return with_no_go(percept, self.zones, self.frame, radius_m), None
+        if isinstance(drive_request, Teleoperate):
+            return percept, None
+        return percept, VOID if self.is_void else UNKNOWN_PLACE
+
+    def applied(
+        self, asked: Twist, last: Twist, drive_request: DriveRequest, odometry: Odometry, age_s: float,
+        settings: Settings,
+    ) -> tuple[Twist, str | None]:  # fmt: skip
+        """Return a velocity within the limits, and what the operator should know of them.
+
+        Parameters
+        ----------
+        asked : Twist
+            What was decided on.
+        last : Twist
+            The command of the cycle before.
+        drive_request : DriveRequest
+            What is driven.
+        odometry : Odometry
+            The newest.
+        age_s : float
+            Its age, s.
+        settings : Settings
+            The run's.
+        """
+        if self.frame is None:
+            if drive_request == TELEOPERATION_ENDED:
+                return asked, None
+            share = min(1.0, settings.behaviors.arbiter.cautious_velocity_m_s / max(abs(asked.v), 1e-9))
+            slow = Twist(share * asked.v, share * asked.w) if asked.v else asked
+            return slow, VOID if self.is_void else UNKNOWN_PLACE_SLOW
+        here = self.frame.inverse().compose(odometry.pose)
+        delay_s = CYCLES / settings.cycle.rate_hz + age_s
+        twist, by = limited(asked, last, odometry.twist, here, self.zones, settings.body, delay_s)
+        stands = by is not None and twist.v == 0.0 != asked.v
+        return twist, f"{by} is in the way" if stands else None
+
+
+def zone_limits(
+    before: ZoneLimits | None, void: PlacesConfig | None, perception: Perception, settings: Settings
+) -> ZoneLimits | None:
+    """Return the limits of this cycle; None where the run has no zones.
+
+    Parameters
+    ----------
+    before : ZoneLimits or None
+        Of the cycle before.
+    void : PlacesConfig or None
+        The places whose frame was lost when odometry started anew.
+    perception : Perception
+        Knows the map frame.
+    settings : Settings
+        The run's.
+    """
+    places = settings.places
+    if not places.limits_drive:
+        return None
+    zones = before.zones if before is not None and before.zones.places is places else zones_of(places)
+    if settings.places_frame == "map":
+        return ZoneLimits(zones, perception.known_map_frame(), is_void=False)
+    is_void = void is not None and void == places
+    return ZoneLimits(zones, None if is_void else Pose(0.0, 0.0, 0.0), is_void)
+
+
+def goal_in_zone(asked: DriveInput, zones: ZoneLimits | None, settings: Settings) -> str | None:
+    """Return why a goal cannot be driven to because it lies in a no-go area; None if it does not, or is none."""
+    if zones is None or zones.frame is None or not isinstance(asked, Goal):
+        return None
+    x, y = asked.x, asked.y
+    if asked.frame == "odom":
+        place = zones.frame.inverse().compose(Pose(x, y, 0.0))
+        x, y = place.x, place.y
+    what = no_go_at(zones.zones, x, y, settings.body.radius_m)
+    return None if what is None else f"the goal lies in or beside {what}: set it elsewhere, or change the area"
+
+
+def wants_map(drive_request: DriveRequest, settings: Settings) -> bool:
+    """Return whether what is driven depends on the robot's place in the map."""
+    if needs_map(drive_request):
+        return True
+    by_name = isinstance(drive_request, Mission) and bool(drive_request.plan.places())
+    return by_name and settings.places_frame == "map"

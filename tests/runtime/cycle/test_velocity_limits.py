@@ -1,0 +1,124 @@
+"""No-go areas, speed areas and named places in the closed loop, whatever is driven; replays are equal to the bit."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from behaviors.missions.mission import Mission
+from behaviors.move_to_goal import Goal
+from behaviors.no_go import zones_of
+from behaviors.teleoperation import Teleoperate
+from config.load import load_settings, with_known_room, with_mission
+from config.mission import MissionConfig, StepConfig
+from config.mission_step import MoveToGoalUse, TimeCondition, WanderUse
+from config.places import NoGoAreaConfig, NoGoLineConfig, PlaceConfig, PlacesConfig
+from config.settings import Settings
+from drivers.messages import Pose
+from runtime.cycle.drive_requests import DriveRequest, Legs
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import CycleRecord, State
+from runtime.cycle.velocity_limits import UNKNOWN_PLACE, UNKNOWN_PLACE_SLOW, VOID, goal_in_zone, zone_limits
+from runtime.simulation.closed_loop import OperatorInput, simulate
+from tests.runtime.cycle.requested_robot import RequestedRobot, arm, driving
+from tests.runtime.scripted_step import ScriptedRobot
+
+ROOM = load_settings("room", ["perception.method=paper"])
+STOPPING_ERROR_M = 0.0
+"""The margin that is kept holds all that the base does otherwise than it should."""
+
+
+def random_places(rng: np.random.Generator) -> PlacesConfig:
+    """Return places of the emulated room: two free ones, and up to three zones that leave them and the start free."""
+    places = tuple(
+        PlaceConfig(name=name, x_m=x, y_m=y) for name, x, y in (("charger", -1.5, -1.5), ("desk", 3.4, 0.2))
+    )
+    free = [(0.0, -0.6), *((place.x_m, place.y_m) for place in places)]
+    areas, lines = [], []
+    while len(areas) + len(lines) < 3:
+        x, y, size = float(rng.uniform(-3.5, 3.5)), float(rng.uniform(-2.5, 2.5)), float(rng.uniform(0.2, 0.7))
+        if min(math.dist((x, y), at) for at in free) < size + 0.9:
+            continue
+        turns = np.sort(rng.uniform(0.0, 2.0 * math.pi, 5)).tolist()
+        corners = tuple((x + size * math.cos(a), y + size * math.sin(a)) for a in turns)
+        if rng.random() < 0.4:
+            lines.append(NoGoLineConfig(points_m=corners[:3]))
+        else:
+            areas.append(NoGoAreaConfig(vertices_m=corners))
+    return PlacesConfig(place=places, no_go_area=tuple(areas), no_go_line=tuple(lines))
+
+
+def mission(*steps: StepConfig) -> MissionConfig:
+    return MissionConfig(name="errand", step=steps)
+
+
+def to_place(name: str) -> StepConfig:
+    return StepConfig(name=f"to-{name}", schemas=(MoveToGoalUse(name="move_to_goal", place=name),))
+
+
+def least_gap_m(settings: Settings, seed: int, seconds: float, teleoperated: bool = False) -> tuple[float, State]:
+    """Return how near the rim truly comes to a zone in the room, m, and the state at the end."""
+    zones, world = zones_of(settings.places), ROOM.world
+    assert world is not None
+    rng, least = np.random.default_rng(seed), [math.inf]
+    asked = Teleoperate(0.4, 0.0)
+
+    def on_state(_: CycleRecord, state: State, start: Pose) -> None:
+        here = start.inverse().compose(truth[-1])
+        at = np.array((here.x, here.y))
+        least[0] = min(least[0], *(float(zone.distances_m(at)) - settings.body.radius_m for zone in zones.no_go))
+
+    truth: list[Pose] = []
+
+    def operator(cycle: int, state: State) -> OperatorInput:
+        nonlocal asked
+        if cycle % 30 == 0:
+            asked = Teleoperate(float(rng.choice([0.5, 0.5, -0.5])), float(rng.uniform(-1.0, 1.0)))
+        request = Request.ARM if state.mode.mode is Mode.READY else None
+        return OperatorInput(request, drive_request=asked)
+
+    def is_over(state: State) -> bool:
+        return isinstance(state.drive_request, Mission) and state.drive_request.progress.status != "running"
+
+    result = simulate(
+        settings, world, seed, seconds, lambda _, now: truth.append(now.pose), on_state=on_state,
+        operator=operator if teleoperated else None, is_over=is_over,
+    )  # fmt: skip
+    return least[0], result.state
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_mission_arrives_at_its_places_and_enters_no_zone(seed: int) -> None:
+    places = random_places(np.random.default_rng(seed))
+    settings = with_mission(ROOM.model_copy(update={"places": places}), mission(to_place("desk"), to_place("charger")))
+    gap_m, state = least_gap_m(settings, seed, 150.0)
+    assert gap_m > -STOPPING_ERROR_M
+    assert isinstance(state.drive_request, Mission)
+    assert state.drive_request.progress.status == "done", state.hold_reason
+    assert state.odometry is not None
+
+
+def wandering(seed: int) -> MissionConfig:
+    return mission(
+        StepConfig(
+            name="stroll", schemas=(WanderUse(name="wander", seed=seed),), stuck_after_s=1e4,
+            until=(TimeCondition(when="time", after_s=600.0),),
+        )  # fmt: skip
+    )
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
+    places = random_places(np.random.default_rng(100 + seed))
+    given = ROOM.model_copy(update={"places": places})
+    assert least_gap_m(with_mission(given, wandering(seed)), seed, 40.0)[0] > -STOPPING_ERROR_M
+    assert least_gap_m(given, seed, 40.0, teleoperated=True)[0] > -STOPPING_ERROR_M
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(2, 42))
+def test_nothing_enters_a_zone_in_many_rooms(seed: int) -> None:
+    test_a_mission_arrives_at_its_places_and_enters_no_zone(seed)
+    test_neither_wander_nor_an_operator_enters_a_zone(seed)
