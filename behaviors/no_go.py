@@ -230,7 +230,8 @@ def _braking_places(
         steps = math.copysign(0.5 * moment_s, start) * (rates[1:] + rates[:-1])
         ways = np.stack([np.cumsum(steps * c, axis=1), np.cumsum(steps * s, axis=1)], axis=-1)
         places.append(ways.reshape(-1, 2))
-    return np.concatenate(places) + np.array((pose.x, pose.y))
+    reached: Floats = np.concatenate(places) + np.array((pose.x, pose.y))
+    return reached
 
 
 def with_no_go(percept: Percept, zones: Zones, frame: Pose, radius_m: float) -> Percept:

@@ -22,7 +22,7 @@ x_m = 1.0
 y_m = 2.0
 heading_deg = 90.0
 [[place]]
-name = "door"
+name = "gate"
 x_m = -1.0
 y_m = 2.0
 [[no_go_line]]
@@ -66,7 +66,7 @@ def places_text() -> str:
 def test_an_unknown_place_is_refused_with_those_that_there_are() -> None:
     settings = load_settings("room").model_copy(update={"places": parse_text(PlacesConfig, places_text(), "places")})
     assert with_mission(settings, mission("charger")).mission is not None
-    with pytest.raises(ConfigError, match=r"no place is named charge; did you mean charger\?.*charger, door"):
+    with pytest.raises(ConfigError, match=r"no place is named charge; did you mean charger\?.*charger, gate"):
         with_mission(settings, mission("charge"))
     with pytest.raises(ConfigError, match="no place has been named yet"):
         with_mission(load_settings("room"), mission("charger"))
@@ -82,8 +82,8 @@ def test_a_run_drives_to_a_place_by_its_name(tmp_path: Path) -> None:
     found = goal("charger")
     assert found is not None
     assert (found.x_m, found.y_m, found.heading_deg, found.frame) == (1.0, 2.0, 90.0, "map")  # type: ignore[attr-defined]
-    with pytest.raises(UserError, match=r"no place is named dor; did you mean door\?"):
-        goal("dor")
+    with pytest.raises(UserError, match=r"no place is named gat; did you mean gate\?"):
+        goal("gat")
 
 
 @pytest.mark.parametrize(

@@ -100,9 +100,9 @@ def _marked(places: PlacesConfig) -> Iterator[dict[str, Any]]:
         yield _feature("LineString", [_point(*point) for point in line.points_m], kind="no_go_line", name=line.name)
     for area in places.no_go_area:
         yield _feature("Polygon", [_ring(area.vertices_m)], kind="no_go_area", name=area.name)
-    for area in places.speed_area:
-        limit = area.speed_max_m_s
-        yield _feature("Polygon", [_ring(area.vertices_m)], kind="speed_area", name=area.name, speed_max_m_s=limit)
+    for slow in places.speed_area:
+        limit = slow.speed_max_m_s
+        yield _feature("Polygon", [_ring(slow.vertices_m)], kind="speed_area", name=slow.name, speed_max_m_s=limit)
 
 
 def _feature(shape: str, coordinates: list[Any], **properties: object) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from runtime.console.commands.messages import MESSAGE_MAX_BYTES, NoArguments, Se
 
 NO_UNDO = "there is no change of the places to undo"
 HEAD = "The map with its places, saved from the operator console (m)."
+OF_ODOMETRY = "That run had no map, so the places lie in the frame of its odometry."
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,10 +112,7 @@ def save_map(call: Call, asked: SaveMap) -> str:
     world = with_places(WorldConfig() if room is None else room, settings.places)
     if asked.format == "geojson":
         return orjson.dumps(world_geojson(world, "map", settings.places_frame)).decode()
-    frame = (
-        () if settings.places_frame == "map" else ("There was no map: the places are in the odometry of that run.",)
-    )
-    return world_text(world, (HEAD, *frame))
+    return world_text(world, (HEAD,) if settings.places_frame == "map" else (HEAD, OF_ODOMETRY))
 
 
 def places_message(settings: Settings) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """No-go areas, speed areas and named places in the closed loop, whatever is driven; replays are equal to the bit."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,20 +9,19 @@ from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
 from behaviors.no_go import zones_of
 from behaviors.teleoperation import Teleoperate
-from config.load import load_settings, with_known_room, with_mission
+from config.load import load_settings, with_mission
 from config.mission import MissionConfig, StepConfig
 from config.mission_step import MoveToGoalUse, TimeCondition, WanderUse
 from config.places import NoGoAreaConfig, NoGoLineConfig, PlaceConfig, PlacesConfig
 from config.settings import Settings
 from drivers.messages import Pose
-from runtime.cycle.drive_requests import DriveRequest, Legs
+from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
-from runtime.cycle.velocity_limits import UNKNOWN_PLACE, UNKNOWN_PLACE_SLOW, VOID, goal_in_zone, zone_limits
+from runtime.cycle.velocity_limits import VOID
 from runtime.simulation.closed_loop import OperatorInput, simulate
-from tests.runtime.cycle.requested_robot import RequestedRobot, arm, driving
-from tests.runtime.scripted_step import ScriptedRobot
+from tests.runtime.cycle.requested_robot import RequestedRobot, driving
 
 ROOM = load_settings("room", ["perception.method=paper"])
 STOPPING_ERROR_M = 0.0
@@ -33,10 +31,10 @@ STOPPING_ERROR_M = 0.0
 def random_places(rng: np.random.Generator) -> PlacesConfig:
     """Return places of the emulated room: two free ones, and up to three zones that leave them and the start free."""
     places = tuple(
-        PlaceConfig(name=name, x_m=x, y_m=y) for name, x, y in (("charger", -1.5, -1.5), ("desk", 3.4, 0.2))
+        PlaceConfig(name=name, x_m=x, y_m=y) for name, x, y in (("charger", -1.5, -1.5), ("lift", 3.4, 0.2))
     )
-    free = [(0.0, -0.6), *((place.x_m, place.y_m) for place in places)]
-    areas, lines = [], []
+    free = [(0.0, 0.0), *((place.x_m, place.y_m) for place in places)]
+    areas, lines = list[NoGoAreaConfig](), list[NoGoLineConfig]()
     while len(areas) + len(lines) < 3:
         x, y, size = float(rng.uniform(-3.5, 3.5)), float(rng.uniform(-2.5, 2.5)), float(rng.uniform(0.2, 0.7))
         if min(math.dist((x, y), at) for at in free) < size + 0.9:
@@ -65,7 +63,7 @@ def least_gap_m(settings: Settings, seed: int, seconds: float, teleoperated: boo
     rng, least = np.random.default_rng(seed), [math.inf]
     asked = Teleoperate(0.4, 0.0)
 
-    def on_state(_: CycleRecord, state: State, start: Pose) -> None:
+    def on_state(_record: CycleRecord, _state: State, start: Pose) -> None:
         here = start.inverse().compose(truth[-1])
         at = np.array((here.x, here.y))
         least[0] = min(least[0], *(float(zone.distances_m(at)) - settings.body.radius_m for zone in zones.no_go))
@@ -92,7 +90,9 @@ def least_gap_m(settings: Settings, seed: int, seconds: float, teleoperated: boo
 @pytest.mark.parametrize("seed", range(2))
 def test_a_mission_arrives_at_its_places_and_enters_no_zone(seed: int) -> None:
     places = random_places(np.random.default_rng(seed))
-    settings = with_mission(ROOM.model_copy(update={"places": places}), mission(to_place("desk"), to_place("charger")))
+    settings = with_mission(
+        ROOM.model_copy(update={"places": places}), mission(to_place("lift"), to_place("charger"))
+    )
     gap_m, state = least_gap_m(settings, seed, 150.0)
     assert gap_m > -STOPPING_ERROR_M
     assert isinstance(state.drive_request, Mission)
@@ -103,9 +103,11 @@ def test_a_mission_arrives_at_its_places_and_enters_no_zone(seed: int) -> None:
 def wandering(seed: int) -> MissionConfig:
     return mission(
         StepConfig(
-            name="stroll", schemas=(WanderUse(name="wander", seed=seed),), stuck_after_s=1e4,
+            name="stroll",
+            schemas=(WanderUse(name="wander", seed=seed),),
+            stuck_after_s=1e4,
             until=(TimeCondition(when="time", after_s=600.0),),
-        )  # fmt: skip
+        )
     )
 
 
@@ -122,3 +124,44 @@ def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
 def test_nothing_enters_a_zone_in_many_rooms(seed: int) -> None:
     test_a_mission_arrives_at_its_places_and_enters_no_zone(seed)
     test_neither_wander_nor_an_operator_enters_a_zone(seed)
+
+
+AREA = PlacesConfig(
+    place=(PlaceConfig(name="lift", x_m=2.0, y_m=2.0),),
+    no_go_area=(NoGoAreaConfig(name="rug", vertices_m=((1.0, -1.0), (2.0, -1.0), (2.0, 1.0), (1.0, 1.0))),),
+)
+
+
+def with_area(script: RequestedRobot) -> RequestedRobot:
+    script.settings = script.settings.model_copy(update={"places": AREA})
+    return script
+
+
+def test_a_goal_in_an_area_is_refused_and_named() -> None:
+    script = with_area(driving())
+    record = script.request_drive(Goal(1.5, 0.0))
+    assert [one.why for one in record.refused] == [
+        "the goal lies in or beside the no-go area rug: set it elsewhere, or change the area"
+    ]
+    assert not script.request_drive(Goal(4.0, 0.0)).refused
+
+
+def test_places_of_odometry_are_void_after_its_restart_until_they_are_set_again() -> None:
+    script = with_area(driving())
+    script.cycle(rebooted=True)
+    while script.state.mode.mode is not Mode.DRIVE:
+        script.cycle(request=Request.ARM)
+    record = script.request_drive(Legs())
+    assert record.command is not None
+    assert script.state.hold_reason == VOID
+    record = script.request_drive(Teleoperate(0.3, 0.0))
+    assert script.state.hold_reason == VOID
+    assert 0.0 < record.command.v <= script.settings.behaviors.arbiter.cautious_velocity_m_s  # type: ignore[union-attr]
+    script.settings = script.settings.model_copy(update={"places": replace_name(AREA)})
+    script.request_drive(Legs())
+    assert script.state.hold_reason != VOID
+
+
+def replace_name(places: PlacesConfig) -> PlacesConfig:
+    """Return places that an operator has set again."""
+    return places.model_copy(update={"place": ()})
