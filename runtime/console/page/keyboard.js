@@ -6,7 +6,7 @@ import { byId, el, writesText } from "./dom.js";
 const WORDS = [
   ["Space", "HALT, except while you type text"],
   ["Shift+A", "arm, or re-arm"],
-  ["1 … 8", "tools: move the map, select, move an object, place a model, goal, tape, say where the robot is, waypoints"],
+  ["1 … 9", "tools: move the map, select, move an object, place a model, goal, tape, say where the robot is, waypoints, places"],
   ["arrows", "on the map: move it, or the crosshair of a tool (Shift: finely)"],
   ["Enter", "on the map: what a click does; elsewhere: press a button, switch a box"],
   ["+  −", "zoom"],
@@ -20,7 +20,7 @@ const WORDS = [
   ["arrows, Shift+arrows", "with the move tool: nudge the selected object by 1 cm or 10 cm"],
   ["W A S D", "drive while held, if enabled; arrows on the driving pad"],
   ["K", "pause or resume the emulator"],
-  ["Ctrl+Z", "undo the last edit of the map; with the waypoint tool, of the route; in Tune, the last parameter"],
+  ["Ctrl+Z", "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; in Tune, the last parameter"],
   ["Escape", "cancel; clear the selection"],
   ["?", "this list"],
 ];
@@ -36,7 +36,7 @@ export function watchKeyboard({ drive, tools, view, fit, chosen, time, undo, not
     Delete: chosen.delete, Backspace: chosen.delete, p: chosen.pin, P: chosen.unpin, k: () => time.pause(), "?": help,
     A: (event) => event.shiftKey && drive.arm(), // and not where the capitals are locked
   };
-  for (let n = 1; n <= 8; n++) acts[n] = () => tools.chooseNth(n);
+  for (let n = 1; n <= 9; n++) acts[n] = () => tools.chooseNth(n);
 
   addEventListener("keydown", (event) => {
     if (event.key !== " " || event.ctrlKey || event.metaKey || event.altKey || writesText(event.target)) return;

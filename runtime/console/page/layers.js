@@ -8,6 +8,7 @@ import { drawEvidenceGrid } from "./draw_evidence.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
 import { drawMapFrame, drawRobot, drawVectors, drawGoal, drawValley, trailDrawer } from "./draw_motion.js";
 import { drawMission } from "./draw_mission.js";
+import { drawPlaces } from "./draw_places.js";
 import { drawAreas, drawClusters, drawEllipses, drawEvidence, drawLabels, drawModels } from "./draw_objects.js";
 import { AGE_LEGEND, segmentsDrawer } from "./draw_segments.js";
 import { prefer, preferred } from "./preferences.js";
@@ -26,6 +27,7 @@ const TABLE = [
   ["ellipses", "front", "95 % ellipses of their positions (dotted: magnified)", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
   ["cross_paths", "front", "cross paths, and what reflected them (bar: wall, angle: corner, triangle: edge, ring: round, square: other model)", drawCrossPaths, true, "M6 15c5-10 23-10 28 0M16 17v-8m-3 4h6", "cross"],
   ["areas", "front", "vacant areas: nothing stands here", drawAreas, true, "M20 2a8 8 0 1 1-.1 0ZM14 4l12 12M26 4 14 16", "muted", "2 3"],
+  ["places", "front", "places, no-go lines and areas, speed areas (dashed)", drawPlaces, true, "M6 4h14l4 12H4zm4 0-4 10m10-10-6 12m12-12-5 12", "stop"],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],
   ["map_frame", "front", "map frame, known room, and where the robot is: 95 % ellipse", drawMapFrame, true, "M8 17V4m0 13h13M24 10a6 4 0 1 1-.1 0Z", "drive"],

@@ -17,6 +17,8 @@ import { MissionPanel } from "./mission.js";
 import { Notifications } from "./notifications.js";
 import { describeMap, Objects } from "./objects.js";
 import { Parameters } from "./parameters.js";
+import { Places } from "./places.js";
+import { PlacesPanel } from "./places_panel.js";
 import { Plots } from "./plots.js";
 import { watchPointers } from "./pointer.js";
 import { prefer, preferred } from "./preferences.js";
@@ -36,6 +38,7 @@ import { askForToken, takeToken } from "./token.js";
 import { hereTool, moveTool, placeTool } from "./tool_objects.js";
 import { Route } from "./route.js";
 import { RoutePanel } from "./route_panel.js";
+import { placesTool } from "./tool_places.js";
 import { goalTool, tapeTool } from "./tool_points.js";
 import { routeTool } from "./tool_route.js";
 import { selectionBar, panTool, selectTool } from "./tool_select.js";
@@ -69,6 +72,8 @@ const theme = new Theme(() => {
 
 const mapEdits = new MapEdits({ run, units, connection, notifications });
 const route = new Route({ run, connection, notifications });
+const places = new Places({ run, connection, notifications });
+const places_tool = placesTool({ places, view, redraw });
 const drive = {}; // filled in below: the goal tool and the drive panel need each other
 const announce = (text) => setText(byId("announce"), text);
 const tools = new Toolbox({
@@ -82,6 +87,7 @@ const tools = new Toolbox({
     tapeTool({ units, announce, redraw }),
     hereTool({ run, connection, notifications, redraw, choose: (id) => tools.choose(id) }),
     routeTool({ route, view, redraw }),
+    places_tool,
   ],
 });
 scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), run, view, theme, units, selection, options });
@@ -92,6 +98,8 @@ drive.panel = new Drive({ run, units, connection, notifications, teleoperation, 
 new MissionPanel({ run, units, connection, notifications });
 new RoutePanel({ route, run, units, connection, notifications, tools });
 route.on("changed", redraw);
+new PlacesPanel({ places, tool: places_tool, run, units, connection, notifications, tools });
+places.on("changed", redraw);
 const alerts = new Alerts({ run, connection, seen: () => byId("log").offsetParent !== null });
 const status = new Status({ run, units, connection, notifications, alerts, askForToken: () => askForToken(notifications) });
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
@@ -225,7 +233,7 @@ byId("clear-map").addEventListener("click", () => notifications.confirm("Clear t
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
+watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tools.current.id === "places" ? places_tool : tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 tabs.restore(preferred("tab", ""));
 tools.restore(preferred("tool", ""));

@@ -1,0 +1,112 @@
+// The layer of places: flags with names, no-go lines and hatched no-go areas, speed areas with their limit.
+
+import { cornersOf } from "./places.js";
+import { textWithHalo } from "./scene.js";
+
+const HATCH_PX = 9;
+export const PIN_PX = 8;
+
+export function drawPlaces(f) {
+  const { ctx, run, theme, view, units } = f;
+  const { places } = run;
+  if (!places || !places.frameIsKnown && !run.state.localized) return;
+  const onScreen = (kind, row) => cornersOf(kind, row).map((corner) => places.inPlane(corner)).map(([x, y]) => view.toScreen(x, y));
+  const isSelected = (kind, i) => places.selected?.[0] === kind && places.selected[1] === i;
+  f.onScreen();
+  ctx.globalAlpha = places.frameIsKnown ? 1 : 0.45;
+  for (const [i, row] of places.all.speed_area.entries()) {
+    const points = onScreen("speed_area", row);
+    outline(ctx, points, true);
+    ctx.fillStyle = ctx.strokeStyle = theme.warning;
+    fillFaintly(ctx, 0.12);
+    ctx.setLineDash([6, 4]);
+    stroke(ctx, isSelected("speed_area", i) ? 3 : 1.5);
+    ctx.setLineDash([]);
+    label(f, points, `${row.name ? `${row.name} ` : ""}≤ ${units.speed ? units.speed(row.speed_max_m_s) : `${row.speed_max_m_s} m/s`}`, theme.warning);
+  }
+  for (const [i, row] of places.all.no_go_area.entries()) {
+    const points = onScreen("no_go_area", row);
+    outline(ctx, points, true);
+    ctx.fillStyle = ctx.strokeStyle = theme.stop;
+    fillFaintly(ctx, 0.1);
+    hatch(ctx, points);
+    outline(ctx, points, true);
+    stroke(ctx, isSelected("no_go_area", i) ? 3.5 : 2);
+    label(f, points, row.name || "no-go", theme.stop);
+  }
+  for (const [i, row] of places.all.no_go_line.entries()) {
+    const points = onScreen("no_go_line", row);
+    outline(ctx, points, false);
+    ctx.strokeStyle = theme.stop;
+    stroke(ctx, isSelected("no_go_line", i) ? 5 : 3);
+    if (row.name) label(f, points, row.name, theme.stop);
+  }
+  for (const [i, row] of places.all.place.entries()) drawPlace(f, row, isSelected("place", i));
+  ctx.globalAlpha = 1;
+}
+
+function drawPlace(f, row, isSelected) {
+  const { ctx, run, theme, view } = f;
+  const [x, y, heading] = run.places.inPlane([row.x_m, row.y_m], row.heading_deg === null ? null : (row.heading_deg * Math.PI) / 180);
+  const [sx, sy] = view.toScreen(x, y);
+  ctx.strokeStyle = theme.drive;
+  if (heading !== null) {
+    ctx.beginPath();
+    ctx.moveTo(sx, sy);
+    ctx.lineTo(sx + 2.4 * PIN_PX * Math.cos(heading), sy - 2.4 * PIN_PX * Math.sin(heading));
+    stroke(ctx, 3);
+  }
+  ctx.beginPath();
+  ctx.rect(sx - PIN_PX / 1.4, sy - PIN_PX / 1.4, 1.43 * PIN_PX, 1.43 * PIN_PX);
+  ctx.fillStyle = isSelected ? theme.accent : theme.paper;
+  ctx.fill();
+  stroke(ctx, 2);
+  ctx.font = f.theme.font(12, 650);
+  ctx.textAlign = "center";
+  ctx.textBaseline = "bottom";
+  textWithHalo(f, row.name, sx, sy - PIN_PX - 2, theme.drive);
+}
+
+function outline(ctx, points, isClosed) {
+  ctx.beginPath();
+  points.forEach(([x, y], i) => (i === 0 ? ctx.moveTo(x, y) : ctx.lineTo(x, y)));
+  if (isClosed) ctx.closePath();
+}
+
+function stroke(ctx, width) {
+  ctx.lineWidth = width;
+  ctx.stroke();
+}
+
+function fillFaintly(ctx, alpha) {
+  const { globalAlpha } = ctx;
+  ctx.globalAlpha = alpha * globalAlpha;
+  ctx.fill("evenodd");
+  ctx.globalAlpha = globalAlpha;
+}
+
+// Diagonal lines inside the outline that is the context's path.
+function hatch(ctx, points) {
+  const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
+  const left = Math.max(0, Math.min(...xs)), right = Math.min(4000, Math.max(...xs));
+  const top = Math.max(0, Math.min(...ys)), bottom = Math.min(4000, Math.max(...ys));
+  if (right <= left || bottom <= top) return;
+  ctx.save();
+  ctx.clip("evenodd");
+  ctx.beginPath();
+  for (let at = left - (bottom - top); at < right; at += HATCH_PX) {
+    ctx.moveTo(at, bottom);
+    ctx.lineTo(at + bottom - top, top);
+  }
+  stroke(ctx, 0.8);
+  ctx.restore();
+}
+
+function label(f, points, text, colour) {
+  const x = points.reduce((sum, point) => sum + point[0], 0) / points.length;
+  const y = points.reduce((sum, point) => sum + point[1], 0) / points.length;
+  f.ctx.font = f.theme.font(11.5, 650);
+  f.ctx.textAlign = "center";
+  f.ctx.textBaseline = "middle";
+  textWithHalo(f, text, x, y, colour);
+}
