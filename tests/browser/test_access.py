@@ -155,7 +155,7 @@ async def test_panels_tools_and_help_are_reached_with_keys_alone(server: FakeSer
     await expect(page.locator("#tool-select")).to_be_focused()
     await page.keyboard.press("ArrowUp")
     await page.keyboard.press("ArrowUp")
-    await expect(page.locator("#tool-route")).to_have_attribute("aria-checked", "true")
+    await expect(page.locator("#tool-places")).to_have_attribute("aria-checked", "true")
 
     await page.keyboard.press("?")
     await opened.says("#dialog", "HALT, except while you type text")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -69,7 +70,7 @@ def test_a_goal_by_name_and_an_unknown_one() -> None:
         await ask(page, type="go_to_place", name="charger")
         goal = case.run.asked[-1]
         assert isinstance(goal, Goal)
-        assert (goal.x, goal.y, goal.heading) == (1.0, 2.0, pytest.approx(3.14159, abs=1e-4))
+        assert (goal.x, goal.y, goal.heading) == (1.0, 2.0, math.pi)
         refused = await page.ask(type="go_to_place", name="charge")
         assert refused["error"] == "no place is named charge; did you mean charger?; the places are charger"
 
