@@ -1,4 +1,4 @@
-"""The commands that connect a run to other programs: `ros2`, `ros2-robot`, `foxglove`."""
+"""The commands that are clients of runs: `fleet`, `ros2`, `ros2-robot`, `foxglove`."""
 
 from __future__ import annotations
 
@@ -60,6 +60,29 @@ def ros2_robot_command(
     from runtime.cli.commands.ros2_robot import write_robot_file
 
     return write_robot_file(out, radius_m=radius, speed_m_s=speed, turn_rad_s=turn, seconds=seconds, force=force)
+
+
+def fleet(
+    *urls: str,
+    host: str = "127.0.0.1",
+    port: Count = 8764,
+) -> int:
+    """Serve one page for several runs: mode, battery and place of each, HALT for one and for all.
+
+    Runs of this machine appear by themselves.
+
+    Parameters
+    ----------
+    urls
+        Start URLs of runs on other machines, with their tokens.
+    host
+        Address to listen on; the page has a token of its own.
+    port
+        TCP port; 0 takes any that is free.
+    """
+    from runtime.cli.commands.fleet import serve_fleet_page
+
+    return serve_fleet_page(urls, host, port)
 
 
 def foxglove(

@@ -137,6 +137,7 @@ class Console:
         self.url, self.token = "", ""
         self.listening: tuple[str, int] | None = None
         self._robots: Sequence[Mapping[str, Any]] = ()
+        self._local_runs: Sequence[Mapping[str, Any]] = ()
         self.tunnel: str | None = None
         self._replaced_port: int | None = None
         """The port of the settings, where another program has it."""
@@ -223,7 +224,15 @@ class Console:
     def show_robots(self, robots: Sequence[Mapping[str, Any]]) -> None:
         """Show other robots of the local network on every page: name, mode, url, version of each."""
         self._robots = robots
-        self.hub.broadcast({"type": "robots", "robots": robots})
+        self.hub.broadcast({"type": "robots", "robots": self._others()})
+
+    def show_local_runs(self, runs: Sequence[Mapping[str, Any]]) -> None:
+        """Show the other runs of this machine on every page, in the same form."""
+        self._local_runs = runs
+        self.hub.broadcast({"type": "robots", "robots": self._others()})
+
+    def _others(self) -> list[Mapping[str, Any]]:
+        return [*self._local_runs, *self._robots]
 
     def hints(self) -> list[str]:
         """Return lines for the terminal: where the page is, and how to reach it from another machine."""
@@ -288,7 +297,7 @@ class Console:
         )  # fmt: skip
         places = places_message(self._run.live_settings.current)
         return {
-            **info, "recording": self._commands.recording is not None, "robots": self._robots, "places": places,
+            **info, "recording": self._commands.recording is not None, "robots": self._others(), "places": places,
         }  # fmt: skip
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:

@@ -314,6 +314,7 @@ async def run_process(
             log_status.listeners.append(hook.on_log)
             stack.callback(log_status.listeners.remove, hook.on_log)
         if settings.console.enabled:
+            from runtime.cli.commands.local_runs import shown_local_runs
             from runtime.cli.commands.network_presence import on_the_network
             from runtime.cli.commands.serve_console import serve_console
             from runtime.support.console_address import announced
@@ -327,7 +328,8 @@ async def run_process(
             log_status.listeners.append(page.hub.on_log)
             stack.callback(log_status.listeners.remove, page.hub.on_log)
             listeners.append(page.on_cycle)
-            stack.enter_context(announced(page.url, state_folder()))
+            stack.enter_context(announced(page.url, folder := state_folder()))
+            await stack.enter_async_context(shown_local_runs(page.url, folder, page.show_local_runs))
             presence = await stack.enter_async_context(on_the_network(page, process, settings.console, log))
             if presence is not None:
                 listeners.append(presence.on_cycle)

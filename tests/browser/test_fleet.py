@@ -1,0 +1,96 @@
+"""The fleet page on three emulated runs: HALT one, HALT all, and a frozen run is shown as not confirmed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Locator, Page, expect
+
+from runtime.bridges.fleet import Fleet
+from runtime.bridges.fleet_server import serve_fleet
+from tests.browser.fake_server import TIMEOUT_S
+from tests.browser.open_page import Opener, until
+from tests.browser.real_run import Run, run
+
+pytestmark = [
+    pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.asyncio(loop_scope="session"),
+]  # fmt: skip
+
+UNCONFIRMED = "HALT not confirmed: use the robot's own stop"
+SHOWN_MAX_S = 2.0
+"""One second is asked of an idle machine; the page looks five times a second."""
+
+
+@contextlib.asynccontextmanager
+async def fleet_page(runs: list[Run]) -> AsyncIterator[str]:
+    """Serve the fleet page of these runs; yield its address."""
+    lines: asyncio.Queue[str] = asyncio.Queue()
+    fleet = Fleet(time.monotonic, list)
+    urls = [one.url for one in runs]
+    serving = asyncio.create_task(serve_fleet(fleet, "127.0.0.1", 0, urls, lines.put_nowait))
+    try:
+        yield (await asyncio.wait_for(lines.get(), TIMEOUT_S)).removeprefix("fleet: ")
+    finally:
+        serving.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await serving
+
+
+async def test_halt_one_halt_all_and_a_frozen_run(tmp_path: Path, opener: Opener) -> None:
+    async with contextlib.AsyncExitStack() as stack:
+        runs = []
+        for name in ("one", "two", "three"):
+            (tmp_path / name).mkdir()
+            runs.append(await stack.enter_async_context(run(tmp_path / name, opener)))
+        url = await stack.enter_async_context(fleet_page(runs))
+        opened = await opener.open(url, real_time=True, live=False)
+        await operate(opened.page, runs)
+        await opened.save_screenshot("fleet")
+
+
+async def drives(page: Page, runs: list[Run]) -> None:
+    """Arm the robots until the page shows that all drive."""
+
+    async def all_drive() -> bool:
+        for one, card in zip(runs, await cards(page), strict=True):
+            if (await card.get_attribute("data-mode")) in {"READY", "SAFE_STOP"}:
+                one.command.signal(signal.SIGUSR1)
+                await asyncio.sleep(1.5)
+        return [await card.get_attribute("data-mode") for card in await cards(page)] == ["DRIVE"] * len(runs)
+
+    await until(all_drive, "three robots that drive")
+
+
+async def cards(page: Page) -> list[Locator]:
+    """Return the cards in the order of the runs."""
+    return await page.locator("#fleet-runs > li").all()
+
+
+async def operate(page: Page, runs: list[Run]) -> None:
+    await expect(page.locator("#fleet-runs > li")).to_have_count(3)
+    await drives(page, runs)
+    first, second, third = await cards(page)
+    await first.get_by_role("button", name="HALT").click()
+    await expect(first.locator(".halt-state")).to_have_text("HALT confirmed")
+    assert await first.get_attribute("data-mode") == "SAFE_STOP"
+    assert await second.get_attribute("data-mode") == "DRIVE"
+
+    frozen = runs[2].command
+    frozen.signal(signal.SIGSTOP)
+    try:
+        await page.locator("#halt-all").click()
+        asked_s = time.monotonic()
+        await expect(third.locator(".halt-state")).to_have_text(UNCONFIRMED)
+        assert time.monotonic() - asked_s < SHOWN_MAX_S
+        await expect(page.locator("#fleet-alarm")).to_contain_text("HALT not confirmed")
+        await expect(second.locator(".halt-state")).to_have_text("HALT confirmed")
+    finally:
+        frozen.signal(signal.SIGCONT)
+    await expect(third.locator(".halt-state")).to_have_text("HALT confirmed")
+    await expect(page.locator("#fleet-alarm")).to_be_hidden()
