@@ -183,8 +183,7 @@ def _row(run: FleetRun, now_s: float) -> dict[str, Any]:
         "url": f"http://{run.address}/",
         "name": session.get("name") or "",
         "is_local": run.is_local,
-        "problem": run.problem
-        or (f"nothing has come for {now_s - run.state_s:.0f} s" if is_silent and state else ""),
+        "problem": run.problem or silent,
         "mode": state.get("mode", ""),
         "reason": state.get("reason") or state.get("hold_reason") or "",
         "battery": "" if not state else "low" if "BATTERY_LOW" in state["flags"] else "no warning",
@@ -195,9 +194,11 @@ def _row(run: FleetRun, now_s: float) -> dict[str, Any]:
 
 def _place(state: Message, session: Message) -> str:
     """Return where the robot is: beside a named place, in the map, or in the odometry of its run."""
-    localized, places = state.get("localized"), session.get("places") or {}
-    in_map = localized is not None and localized["status"] == "tracking"
-    x, y = (localized if in_map else state)["pose"][:2]
+    localized: Message | None = state.get("localized")
+    places: Message = session.get("places") or {}
+    known = localized if localized is not None and localized["status"] == "tracking" else None
+    x, y = (state if known is None else known)["pose"][:2]
+    in_map = known is not None
     if in_map == (places.get("frame") == "map"):
         near = sorted((math.hypot(x - p["x_m"], y - p["y_m"]), p["name"]) for p in places.get("place", ()))
         if near and near[0][0] <= NEAR_M:
