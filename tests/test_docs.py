@@ -73,3 +73,15 @@ def test_the_notebook_prints_what_it_shows(monkeypatch: pytest.MonkeyPatch) -> N
                 exec("".join(cell["source"]), names)
             shown = ("".join(output["text"]) for output in cell["outputs"])
             assert printed.getvalue() == "".join(shown)
+
+
+@pytest.mark.compiled
+def test_the_notebook_runs_outside_the_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads((ROOT / "docs" / "library.ipynb").read_text("utf-8"))["cells"]
+    first, *_, last = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    names: dict[str, object] = {}
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        exec(first, names)
+        exec(last, names)
+    assert printed.getvalue().startswith("left out")

@@ -6,7 +6,7 @@ import re
 import subprocess
 from pathlib import Path
 
-from runtime.support.build import commit_of, describe_build, version_of
+from runtime.support.build import commit_of, describe_build, kept_commit, version_of
 
 
 def git(folder: Path, *arguments: str) -> None:
@@ -34,3 +34,9 @@ def test_the_commit_of_a_clone_and_whether_files_differ(tmp_path: Path) -> None:
     inner = tmp_path / "inner"
     inner.mkdir()
     assert commit_of(inner) is None, "installed within another repository"
+
+
+def test_a_wheel_names_the_commit_that_it_was_built_from(tmp_path: Path) -> None:
+    assert kept_commit(tmp_path / "commit.txt") is None
+    (tmp_path / "commit.txt").write_text("1a2b3c4d5e+\n", "utf-8")
+    assert kept_commit(tmp_path / "commit.txt") == "1a2b3c4d5e+"
