@@ -3,7 +3,9 @@
 Readings are compounded by odometry into keyframes, so that those of one sensor are independent. Without a pose, a
 search of the whole room gives hypotheses, which the exact likelihood of all raw readings then weighs keyframe by
 keyframe. The robot tracks once one place has nearly all probability and explains the readings better than no place
-would. It is lost when its place no longer does. A firing is only taken down; all else is done in quanta.
+would. It is lost when its place no longer does. A place that the operator names is compared with the best ones of the
+whole room, by all readings that are remembered: the operator may be wrong, and the robot may have been carried. A
+firing is only taken down; all else is done in quanta.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
-from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, bounds, index_of
+from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, bounds, index_of, up_to
 from perception.edits import PlaceRobot, invalid_pose
 from perception.localization.background import Background
 from perception.localization.drift_correction import LocalizedPose, Status
@@ -82,6 +84,10 @@ class KnownRoom:
         That the reported place is the robot's.
     shares : LearnedShares
         How often a reading has which cause.
+    refuted : int
+        Places named by the operator that the readings have refuted so far.
+    rivals : int
+        Places elsewhere that explain the readings as well as the reported one, when they were compared last.
     """
 
     SCRATCH: Final = ("_search_evidence",)
@@ -89,6 +95,7 @@ class KnownRoom:
     BOUNDS: Final = bounds(
         _mounts=CONSTANT, _odometry=PLACE, _status=index_of(len(STATUSES)), probability=SHARE, _window_begin=COUNT,
         _stage=Bound(IDLE, WEIGHING), _search_begin=COUNT, _searched_at_m=FINITE, _pause_m=FINITE, _travel=PLACE,
+        _named_at=COUNT, refuted=COUNT, rivals=up_to(HYPOTHESES_MAX),
     )  # fmt: skip
 
     def __init__(self, room: Room, ring: RingConfig, model: RangeModel | None = None, seed: int = 0) -> None:
@@ -133,6 +140,11 @@ class KnownRoom:
         self._pause_m = SEARCH_M[0]
         self._travel = 0.0
         """Direction of travel at the last firing."""
+        self._named_at = 0
+        """Number of the first keyframe since the operator named a place."""
+        self._is_named, self._is_compared = False, True
+        """Whether the operator named the reported place and no search has found it since; whether one has ended."""
+        self.refuted = self.rivals = 0
 
     @property
     def status(self) -> Status:
@@ -156,7 +168,7 @@ class KnownRoom:
         if self._status == TRACKING:
             if self._tracked.evidence <= SUSPECT_LOG:
                 self._window_begin = max(self._window_begin, min(self._tracked.peak_at + 1, keyframes.count - 1))
-            elif self.probability > SURE:
+            elif self.probability > SURE and not self._is_named:
                 return
         way_m = keyframes.driven_m - self._searched_at_m
         if way_m >= self._pause_m or (keyframes.is_stand and way_m >= STAND_SEARCH_M):
@@ -167,7 +179,10 @@ class KnownRoom:
             self._stage = DUE
 
     def assume(self, pose: Pose) -> None:
-        """Take the operator's word that the robot is at a pose (position, direction of travel) in the map frame."""
+        """Take the operator's word that the robot is at a pose (position, direction of travel) in the map frame.
+
+        The keyframes before are kept: if the readings refute the place, a search may still use them.
+        """
         heading = pose.theta - self._travel + float(self._odometry[2])
         here = np.array([[pose.x, pose.y, heading]])
         self._grid.cancel()
@@ -177,6 +192,7 @@ class KnownRoom:
         self._tracked.conclude()
         self._keyframes.begin()
         self._status, self.probability, self._is_confirmed = LOCALIZING, 0.0, True
+        self._named_at, self._is_named, self._is_compared, self.rivals = self._keyframes.count, True, False, 0
         self._searched_at_m, self._pause_m = self._keyframes.driven_m, SEARCH_M[0]
 
     @property
@@ -255,7 +271,8 @@ class KnownRoom:
         """Take what a search found if it explains its readings better than what is tracked; or confirm that.
 
         The best of all places fits by chance what the one that is tracked does not. So that is kept until the search
-        overcomes this too, and has found one place rather than many.
+        overcomes this too, and has found one place rather than many. A place that explains also what was heard before
+        the operator named another one is no chance.
         """
         tracked, found = self._tracked, self._candidates
         is_same = False
@@ -264,17 +281,26 @@ class KnownRoom:
             one, other = tracked.pose(at), found.pose(at)
             turn = abs(wrap_angle(one.theta - other.theta))
             is_same = math.hypot(one.x - other.x, one.y - other.y) <= MERGE_M and turn <= MERGE_RAD
-        begin = self._search_begin
-        is_sure = len(tracked) > 0 and float(tracked.best.share) * tracked.explains > SURE
-        lead = LEAD_LOG - (self._search_evidence if is_sure else 0.0)
-        is_better = not len(tracked) or found.gained_since(begin) > tracked.gained_since(begin) + lead
+        begin = max(self._search_begin, self._named_at)
+        is_sure = len(tracked) > 0 and float(tracked.best.share) * tracked.explains > (
+            DOUBT if self._is_named else SURE
+        )
+        heard_before = found.gained_since(self._search_begin) - found.gained_since(begin)
+        is_chance = heard_before <= -self._search_evidence
+        lead = LEAD_LOG - (self._search_evidence if is_sure and is_chance else 0.0)
+        ahead = found.gained_since(begin) - tracked.gained_since(begin) if len(tracked) else math.inf
         is_choice = self._status != TRACKING or float(found.best.share) > DOUBT
-        if is_better and is_choice and not is_same:
+        if ahead > lead and is_choice and not (is_same and tracked.explains > DOUBT):
             self._tracked, self._candidates = found, tracked
             self._status = LOCALIZING if self._status == TRACKING else self._status
             self._is_confirmed = self._is_complete
-        elif is_same or self._is_complete:
-            self._is_confirmed = True
+            if self._is_named and not is_same:
+                self._refute()
+            self._is_named, self.rivals = False, found.rivals
+        else:
+            self._is_confirmed = self._is_confirmed or is_same or self._is_complete
+            self.rivals = found.rivals if is_same else max(1, found.rivals) if ahead > -LEAD_LOG else 0
+            self._is_named = self._is_named and not (is_same and self.rivals == 0)
         if is_same:
             # From the whole window, with what is known of the causes now.
             tracked.likeness = max(tracked.likeness, found.likeness)
@@ -284,11 +310,32 @@ class KnownRoom:
         track = self._tracked
         explains = track.explains
         self.probability = float(track.best.share) * min(explains, track.fits) * (1.0 if self._is_confirmed else SURE)
+        if self._is_named and explains < DOUBT:
+            self._refute()
+        if not self._is_named:
+            self.rivals = track.rivals
         if self._status == TRACKING:
             if explains < DOUBT:
                 self._lose()
         elif self._stage == IDLE:
             self._status = TRACKING if self.probability > SURE else LOST if explains < DOUBT else LOCALIZING
+            if self._named_at < self._keyframes.count:
+                self._compare_named(explains)
+
+    def _refute(self) -> None:
+        """Give up the place that the operator named."""
+        self._is_named = False
+        self.refuted += 1
+
+    def _compare_named(self, explains: float) -> None:
+        """Search the room once the operator's place has its first keyframe: from before it, then only since.
+
+        The robot may have been carried before the operator named a place.
+        """
+        if not self._is_compared:
+            self._is_compared, self._stage = True, DUE
+        elif explains < DOUBT and self._window_begin < self._named_at:
+            self._window_begin, self._stage = self._named_at, DUE
 
     def _lose(self) -> None:
         """Begin anew, with what was heard since the readings began to speak against the place."""

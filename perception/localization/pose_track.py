@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from drivers.messages import Pose, wrap_angle
-from perception.bounds import COUNT, FINITE, PLACE, bounds, index_of
+from perception.bounds import COUNT, FINITE, PLACE, SHARE, bounds, index_of
 from perception.kernel import Floats
 from perception.localization.background import Background
 from perception.localization.keyframes import KEYFRAMES_MAX, Keyframes
@@ -17,6 +17,9 @@ from perception.localization.particle_update import TEMPER, update_particles
 from perception.localization.pose_particles import (
     HEADINGS,
     HYPOTHESES_MAX,
+    SAME_M,
+    SAME_RAD,
+    SHARE_TEMPER,
     Best,
     Hypotheses,
     ParticleScratch,
@@ -51,6 +54,8 @@ LIKENESS_MAX: Final = 4.5
 """Most likeness that is remembered, nat: a robot that is carried must notice it within a few keyframes."""
 INDEPENDENT_M: Final = 0.5
 """Readings on a way as short as this have errors in common, those of the map and of what it lacks."""
+RIVAL_SHARE: Final = 0.1
+"""A hypothesis that has this share of the best one's probability is a rival: the best is not sure beside it."""
 NOISES: Final = 512
 
 
@@ -88,7 +93,7 @@ class PoseTrack:
     """What is given, a view of other memory, and what is overwritten before each use."""
     BOUNDS: Final = bounds(
         _memory=Hypotheses.BOUNDS, entered=COUNT, _step=index_of(QUANTA * HYPOTHESES_MAX), _at=PLACE, evidence=FINITE,
-        likeness=FINITE, _peak=FINITE, peak_at=COUNT, _gains=FINITE,
+        likeness=FINITE, _peak=FINITE, peak_at=COUNT, _gains=FINITE, _weights=SHARE,
     )  # fmt: skip
 
     def __init__(self, surroundings: Surroundings, background: Background, noise: Floats) -> None:
@@ -105,7 +110,9 @@ class PoseTrack:
         self.peak_at = 0
         self._is_weighed = False
         self._gains = np.zeros(KEYFRAMES_MAX)
-        """What each keyframe added to the evidence, nat, under its number modulo `KEYFRAMES_MAX`."""
+        """What each keyframe says for the best place, nat, under its number modulo `KEYFRAMES_MAX`."""
+        self._weights = np.zeros(KEYFRAMES_MAX)
+        """How much of that is independent of the keyframe before."""
 
     def clear(self) -> None:
         """Forget all hypotheses."""
@@ -197,13 +204,23 @@ class PoseTrack:
         return 1.0 / (1.0 + math.exp(-self.likeness))
 
     def gained_since(self, number: int) -> float:
-        """Return what the keyframes from a number on have added to the evidence, nat."""
-        return float(self._gains[np.arange(number, self.entered) % KEYFRAMES_MAX].sum())
+        """Return what the keyframes from a number on say for the best place, nat; the first one counts in full."""
+        rows = np.arange(number, self.entered) % KEYFRAMES_MAX
+        return float(self._gains[rows[:1]].sum() + (self._weights * self._gains)[rows[1:]].sum())
 
     @property
     def explains(self) -> float:
         """Probability that the best place explains the readings better than none would."""
         return 1.0 / (1.0 + math.exp(-self.evidence))
+
+    @property
+    def rivals(self) -> int:
+        """Hypotheses elsewhere that are not much less likely than the best one."""
+        rows, best = self._memory["hypotheses"][0][: len(self)], self.best
+        turns = np.abs((rows["heading"] - best.heading + math.pi) % (2.0 * math.pi) - math.pi)
+        away = (np.hypot(rows["x"] - best.x, rows["y"] - best.y) > SAME_M) | (turns > SAME_RAD)
+        odds = SHARE_TEMPER * (rows["log_evidence"] - rows["log_evidence"].max(initial=-math.inf))
+        return int((away & (odds > math.log(RIVAL_SHARE))).sum())
 
     def pose(self, odometry: Pose) -> Pose:
         """Return the pose of the ring where odometry has it here; there must be a hypothesis."""
@@ -231,13 +248,13 @@ class PoseTrack:
     def _weigh(self, way_m: float, ranges_m: Floats, shares: LearnedShares) -> None:
         """Add what a keyframe says for or against the best place, compared with no place (Page's cumulative sum)."""
         share = min(1.0, way_m / INDEPENDENT_M) if self._is_weighed else 1.0
-        weight, heard = TEMPER * share, float(np.isfinite(ranges_m).sum())
+        row, heard = self.entered % KEYFRAMES_MAX, float(np.isfinite(ranges_m).sum())
         gain = self.best.log_ratio - self._background.log_ratio(ranges_m, shares)
         line = float(np.interp(shares.records[0].specular, (0.0, MIRRORS), ALIKE_GAIN))
         alike = ALIKE_WEIGHT * (gain - line * heard)
         self.likeness = max(-EVIDENCE_MAX, min(LIKENESS_MAX, self.likeness + share * alike))
-        self._gains[self.entered % KEYFRAMES_MAX] = weight * gain
-        self.evidence = max(-EVIDENCE_MIN, min(EVIDENCE_MAX, self.evidence + weight * gain))
+        self._gains[row], self._weights[row] = TEMPER * gain, share
+        self.evidence = max(-EVIDENCE_MIN, min(EVIDENCE_MAX, self.evidence + share * TEMPER * gain))
         self._is_weighed = True
         if self.evidence >= self._peak:
             self._peak, self.peak_at = self.evidence, self.entered

@@ -6,6 +6,8 @@ from typing import Final
 
 from drivers.driver import Received
 from drivers.token_bucket import LineLimit
+from perception.localization.drift_correction import Status
+from perception.localization.known_room import KnownRoom
 from perception.pipeline import Perception
 from perception.sensor_report import SensorReport
 
@@ -22,6 +24,8 @@ class Alerts:
         self._changes = 0
         self._waiting = 0
         self._reported: dict[int, SensorReport] = {}
+        self._place: tuple[Status, int, int] = ("localizing", 0, 0)
+        """Of the known room: status, places refuted, rivals."""
 
     def update(self, received: Received, perception: Perception, run_s: float) -> list[str]:
         """Return a line for each new fact: what happened, likely cause, next action.
@@ -43,7 +47,7 @@ class Alerts:
         return lines
 
     def _new_facts(self, received: Received, perception: Perception) -> list[str]:
-        lines = [*received.notes, *self._new_waiting(perception)]
+        lines = [*received.notes, *self._new_waiting(perception), *self._new_place(perception.known_room)]
         if perception.sensor_monitor.changes == self._changes:
             return lines
         self._changes = perception.sensor_monitor.changes
@@ -51,6 +55,35 @@ class Alerts:
         lines += [report.reason for sensor, report in now.items() if self._reported.get(sensor) != report]
         lines += [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
         self._reported = now
+        return lines
+
+    def _new_place(self, room: KnownRoom | None) -> list[str]:
+        """Return what is new of the robot's place in a known room."""
+        if room is None:
+            return []
+        (status, refuted, rivals), lines = self._place, []
+        self._place = room.status, room.refuted, room.rivals
+        if self._place == (status, refuted, rivals):
+            return []
+        if room.refuted > refuted:
+            lines.append(
+                "the readings do not fit the place that was named for the robot: it searches the whole room; "
+                "goals in the map wait"
+            )
+        elif room.status == "lost" != status:
+            lines.append(
+                "the robot's place is lost: the readings do not fit it any more, as if the robot was carried or the "
+                "room changed; it searches the whole room; goals in the map wait; move it by hand control, or say "
+                "where it is"
+            )
+        if room.status == "tracking" != status:
+            here = room.localized().pose
+            lines.append(f"the robot's place is known: ({here.x:.2f} m, {here.y:.2f} m) in the map")
+        if room.rivals > rivals == 0:
+            lines.append(
+                f"the readings fit {room.rivals + 1} places of this room alike: drive to where they differ, or say "
+                "where the robot is"
+            )
         return lines
 
     def _new_waiting(self, perception: Perception) -> list[str]:

@@ -38,6 +38,12 @@ NO_PLACE: Final = (
     "the goal is a place in the map, and the robot does not know its own there: wait until it does, say where it is, "
     "or set a goal in odometry's frame"
 )
+PLACE_LOST: Final = (
+    "the robot took itself to be at the goal, but the readings do not fit its place any more: wait until it is "
+    "found, or say where it is; it will not set out by itself"
+)
+AWAY_M: Final = 0.5
+"""A robot that is farther from its reached goal than its success radius by this was moved, or was not there, m."""
 LEG_DONE: Final = "the leg is done"
 NO_WAY: Final = (
     "step {} finds no way: something is too near ahead, or the schemas cancel one another; if that lasts, the step "
@@ -162,7 +168,15 @@ def _to_goal(
     if goal_drive.progress.given_up is not None:
         hold_reason = f"{goal_drive.progress.given_up}; clear the way or set another goal"
     if drive_request.reached and isinstance(decision, Drive):
+        if place is None:
+            return DriveResult(Drive(STANDSTILL), (), drive_request, leg, PLACE_LOST, goal_drive)
         drive_request, decision, hold_reason = _at_goal(drive_request, responses, percept, settings, map_frame)
+        away_m = math.hypot(place.x - percept.pose.x, place.y - percept.pose.y)
+        if decision == Drive(STANDSTILL) and away_m > settings.behaviors.move_to_goal.success_radius_m + AWAY_M:
+            hold_reason = (
+                f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) was reached, but the robot is "
+                f"{away_m:.1f} m from it now: it was moved, or its place was wrong; set the goal again"
+            )
     return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive, trail)
 
 

@@ -98,7 +98,7 @@ export class Drive {
     setAttribute(byId("pad"), "aria-disabled", this.teleoperation.refusalReason() !== null);
     const others = clients - 1;
     setText(byId("role-text"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "no other client is connected."}`);
-    setText(byId("drive-request-text"), driveRequestText(drive_request, this.units));
+    setText(byId("drive-request-text"), driveRequestText(drive_request, this.units, this.run.state.localized));
     setAttribute(byId("drive-request-legs"), "aria-pressed", drive_request?.kind === "legs");
     setAttribute(byId("drive-request-goal"), "aria-pressed", drive_request?.kind === "goal");
   }
@@ -141,11 +141,12 @@ export class Drive {
   }
 }
 
-function driveRequestText(drive_request, units) {
+function driveRequestText(drive_request, units, localized) {
   if (!drive_request) return "No drive request yet.";
   if (drive_request.kind === "goal") {
     const place = units.place(drive_request.x, drive_request.y) + (drive_request.frame === "map" ? " in the map" : "");
-    return `${drive_request.reached ? "At" : "To"} the goal at ${place}.`;
+    const isAt = drive_request.reached && !(drive_request.frame === "map" && localized?.status === "lost");
+    return `${isAt ? "At" : "To"} the goal at ${place}.`;
   }
   if (drive_request.kind === "mission") return `Mission ${drive_request.name}: ${drive_request.status}.`;
   return drive_request.kind === "teleoperate" ? "Teleoperation." : "Ahead, as configured.";

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from drivers.driver import Received
+from drivers.messages import Pose
 from perception.detected_object import MapCounts
 from perception.sensor_report import SensorReport
 from runtime.cycle.alerts import LINES_BURST, LINES_PER_S, Alerts
@@ -21,6 +22,7 @@ class StubPerception:
         self.sensor_monitor = SimpleNamespace(changes=0)
         self.reports: list[SensorReport] = []
         self.counts = MapCounts(0, 0, 0)
+        self.known_room: SimpleNamespace | None = None
 
     def report(self, *reports: SensorReport) -> None:
         self.reports = list(reports)
@@ -80,3 +82,23 @@ def test_a_robot_that_causes_line_after_line_has_the_excess_counted() -> None:
         int(re.findall(r"\((\d+) such lines were left out before\)", line)[0]) for line in lines if "(" in line
     )
     assert 0 <= 16 * 2000 - len(lines) - left_out < 16 * 20, "all but those since the last line are counted"
+
+
+def test_what_is_new_of_the_place_in_a_known_room_is_reported_once() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    seen: Any = perception
+    here = SimpleNamespace(pose=Pose(1.0, 2.0, 0.0))
+    perception.known_room = SimpleNamespace(status="localizing", refuted=0, rivals=0, localized=lambda: here)
+    assert alerts.update(NOTHING, seen, 0.0) == []
+    for change, said in (
+        ({"status": "tracking"}, "the robot's place is known: (1.00 m, 2.00 m) in the map"),
+        ({"status": "lost"}, "the robot's place is lost"),
+        ({"status": "localizing", "rivals": 2}, "the readings fit 3 places of this room alike"),
+        ({"rivals": 1}, None),
+        ({"status": "lost", "refuted": 1, "rivals": 0}, "the readings do not fit the place that was named"),
+    ):
+        vars(perception.known_room).update(change)
+        lines = alerts.update(NOTHING, seen, 1.0)
+        assert len(lines) == (said is not None)
+        assert not lines or lines[0].startswith(said or "")
+        assert alerts.update(NOTHING, seen, 1.0) == []
