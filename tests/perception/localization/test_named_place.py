@@ -137,7 +137,7 @@ def test_a_robot_that_was_carried_and_misnamed_is_found(was_known: bool) -> None
 
 @pytest.mark.parametrize("is_mirrored", [False, True])
 def test_a_room_that_is_ambiguous_is_called_so(is_mirrored: bool) -> None:
-    """A rectangle looks the same from two places; the operator decides, and is told that the readings do not."""
+    """A rectangle looks the same from two places; the operator decides, and the log says that the readings do not."""
     world, steps = world_of(RECTANGLE, ACOUSTICS), np.arange(0.0, 2.4, 0.05)
     truth = np.column_stack([1.2 + steps, 1.1 + 0.2 * steps, np.full(len(steps), 0.3)])
     drive = heard_on_the_way(RING, world, truth, 3)
