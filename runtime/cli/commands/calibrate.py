@@ -61,14 +61,23 @@ def calibrate_robot(
             "slowly",
             FAILED,
         )
+    if not found.has_gain:
+        raise UserError(
+            f"{file}: the drive shows neither where the sensors are nor by how much odometry and ranges are wrong; "
+            "nothing was written: turn slowly twice on the spot a metre from a bare wall, drive four metres past "
+            "something round, turn twice again, and measure the way (--way) and the radius (--drum)",
+            FAILED,
+        )
     with writing("--out", out):
         Path(out).write_text(robot_text(settings, found, Path(file).name), encoding="utf-8")
     output = plain_console()
     output.print(sensors_table(settings, found))
     output.print(scales_line(found))
-    unknown = [i for i, sigma in enumerate(found.angle_sigmas_rad.tolist()) if not math.isfinite(sigma)]
-    if unknown:
-        output.print(f"the directions of sensors {', '.join(map(str, unknown))} were not heard often enough and stay")
+    for what, sigmas in (("places", found.place_sigmas_m), ("directions", found.angle_sigmas_rad)):
+        nominal = [str(i) for i, sigma in enumerate(sigmas.tolist()) if not math.isfinite(sigma)]
+        if nominal:
+            which = "all sensors" if len(nominal) == len(sigmas) else f"sensors {', '.join(nominal)}"
+            output.print(f"the {what} of {which} are not shown by this drive and stay as they were")
     if way_m is None:
         output.print("the odometry's distance was taken as true: measure the way and give --way to find its scale")
     output.print(f"{out}: robot file written; use it with: echolocate run --robot {out} --port DEVICE")
@@ -93,9 +102,8 @@ def sensors_table(settings: Settings, found: Calibration) -> Table:
         sigma = math.degrees(found.angle_sigmas_rad[i])
         table.add_row(
             str(i), str(found.readings[i]), f"{1e3 * x:.1f}", f"{1e3 * y:.1f}",
-            f"{1e3 * found.place_sigmas_m[i]:.1f}", f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}",
-            f"{math.degrees(angle):.2f}",
-            f"{sigma:.2f}" if math.isfinite(sigma) else "–", f"{math.degrees(angle - nominal.angle_rad):+.2f}",
+            _shown(1e3 * found.place_sigmas_m[i], 1), f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}",
+            f"{math.degrees(angle):.2f}", _shown(sigma, 2), f"{math.degrees(angle - nominal.angle_rad):+.2f}",
         )  # fmt: skip
     return table
 
@@ -110,6 +118,8 @@ def scales_line(found: Calibration) -> str:
     """
     scales = ", ".join(
         f"{name} {100.0 * (value - 1.0):+.2f} % (± {100.0 * sigma:.2f})"
+        if math.isfinite(sigma)
+        else f"{name} not shown"
         for name, value, sigma in zip(
             ("odometry's distance", "its turn", "range"), found.scales, found.scale_sigmas, strict=True
         )
@@ -120,6 +130,11 @@ def scales_line(found: Calibration) -> str:
         f"beam: half angle {math.degrees(found.half_angle_rad):.2f}°, {beam}; noise of a range: "
         f"{1e3 * found.noise.constant_m:.1f} mm and {100.0 * found.noise.share:.2f} % of it"
     )
+
+
+def _shown(sigma: float, digits: int) -> str:
+    """Return an uncertainty, or a dash where the drive does not show the value."""
+    return f"{sigma:.{digits}f}" if math.isfinite(sigma) else "–"
 
 
 def robot_text(settings: Settings, found: Calibration, source: str) -> str:
@@ -156,15 +171,17 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
         found.mounts.tolist(), found.place_sigmas_m, found.angle_sigmas_rad, strict=True
     ):
         x, y, angle = mount
+        place = f"± {1e3 * place_m:.1f} mm" if math.isfinite(place_m) else "its place is the nominal one"
         sure = f"± {math.degrees(angle_rad):.2f}°" if math.isfinite(angle_rad) else "its direction is the nominal one"
         rows.append(
-            f"    {{ x_m = {x:.4f}, y_m = {y:.4f}, angle_deg = {math.degrees(angle):.2f} }},"
-            f"  # ± {1e3 * place_m:.1f} mm, {sure}"
+            f"    {{ x_m = {x:.4f}, y_m = {y:.4f}, angle_deg = {math.degrees(angle):.2f} }},  # {place}, {sure}"
         )
-    d, t, r = (100.0 * sigma for sigma in found.scale_sigmas)
+    d, t, r = (
+        f"{100.0 * sigma:.2f} %" if math.isfinite(sigma) else "not shown by the drive" for sigma in found.scale_sigmas
+    )
     head = [
         f"# Calibrated from {utf8(Path(source).name)}.",
-        f"# Uncertainty of the scales (one standard deviation): distance {d:.2f} %, turn {t:.2f} %, range {r:.2f} %.",
+        f"# Uncertainty of the scales (one standard deviation): distance {d}, turn {t}, range {r}.",
         "",
         "[ring]",
         *tomli_w.dumps(ring).splitlines(),
