@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from config.settings import Settings
+from runtime.support.blind_sides import blind_notes
 from runtime.support.pattern_check import pattern_speed_m_s
 
 
@@ -39,4 +40,4 @@ def lint_settings(settings: Settings) -> list[str]:
             f"ring.firing: the pattern looks ahead so seldom that it limits the speed to {speed_m_s:.2f} m/s, below "
             f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; fire more sensors at a time"
         )
-    return warnings
+    return [*warnings, *blind_notes(settings)]

@@ -17,6 +17,7 @@ from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
 from drivers.firing_pattern import FiringError
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.support.config_lint import lint_settings
 from runtime.support.pattern_check import refuse_undrivable
 
 Given = Mapping[str, Any]
@@ -268,6 +269,7 @@ def _write(file: str, text: str, *, force: bool) -> int:
         The values contradict each other, or the file cannot be written.
     """
     check_outputs({"FILE": file}, force=force)
+    notes: list[str] = []
     draft = Path(file).with_name(f".{Path(file).name}.draft.toml")
     try:
         with writing("FILE", draft):
@@ -275,11 +277,14 @@ def _write(file: str, text: str, *, force: bool) -> int:
         checked = load_any(str(draft), ())
         if isinstance(checked, Settings):
             refuse_undrivable(checked)
+            notes = lint_settings(checked)
         draft.replace(file)
     except (UserError, FiringError) as error:
         said = str(error).replace(str(draft), file)
         raise UserError(f"{said}; nothing was written", WRONG_CALL) from error
     finally:
         draft.unlink(missing_ok=True)
+    for note in notes:
+        sys.stdout.write(f"{file}: {note}\n")
     sys.stdout.write(f"{file}: written; look at it, then: echolocate check {file}\n")
     return DONE

@@ -1,0 +1,93 @@
+"""The directions in which a ring never looks, and what they forbid: the texts of `check`, `init` and `run`.
+
+The rule is that of each cycle (`behaviors.field_of_view`): the robot drives only towards where the ring has looked.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from behaviors.field_of_view import path_half_angle_rad, seen_speed_m_s
+from config.settings import Settings
+from perception.percept import Pose
+from runtime.support.pattern_check import oldest_percept
+
+STEP_DEG: Final = 1
+"""Step of the directions that are tried."""
+SLOW_SHARE: Final = 0.99
+"""A speed below this share of the base velocity is named."""
+
+
+def blind_sides_deg(settings: Settings) -> list[tuple[int, int]]:
+    """Return the sectors of the ring's frame in which no sensor that fires looks: begin and end, degrees.
+
+    Both ends count counter-clockwise from straight ahead, and an end is greater than its begin.
+    """
+    view = oldest_percept(settings, 0.0).field_of_view
+    axes = view.bearings_rad[np.isfinite(view.ages_s)]
+    directions = np.arange(0, 360, STEP_DEG)
+    off = np.radians(directions)[:, None] - axes[None, :]
+    off = np.abs(np.remainder(off + math.pi, math.tau) - math.pi)
+    blind = ~(off <= view.half_angle_rad + math.radians(0.5 * STEP_DEG)).any(axis=1)
+    if blind.all():
+        return [(-180, 180)]
+    begins = directions[blind & ~np.roll(blind, 1)].tolist()
+    ends = directions[blind & ~np.roll(blind, -1)].tolist()
+    return sorted(
+        (begin if begin <= 180 else begin - 360, end + (360 if end < begin else 0) - (0 if begin <= 180 else 360))
+        for begin in begins
+        for end in [min(ends, key=lambda end: (end - begin) % 360)]
+    )
+
+
+def blind_notes(settings: Settings) -> list[str]:
+    """Return what the ring's blind sides forbid, one text each; none where it looks all round."""
+    sides = blind_sides_deg(settings)
+    if not sides:
+        return []
+    arbiter, body = settings.behaviors.arbiter, settings.body
+    path_deg = math.degrees(path_half_angle_rad(body, arbiter.clearance_m))
+    where = " and ".join(f"{begin}° to {end}°" for begin, end in sides)
+    notes = [
+        f"ring: no sensor looks from {where} (counter-clockwise from its front): what stands there is known only if "
+        f"the ring heard it before, and the robot never drives there: its path needs every direction within "
+        f"{path_deg:.0f}° of the way"
+    ]
+    if settings.body.synchro:
+        notes.append(
+            "ring: it does not turn with the wheels, so each goal, leg, or step of a mission that leads to a blind "
+            "side stops there; choose ways that it sees, or mount sensors all round"
+        )
+    else:
+        back_m_s = _speed_m_s(settings, math.pi)
+        if back_m_s < SLOW_SHARE * arbiter.base_velocity_m_s:
+            allowed = "not at all" if back_m_s == 0.0 else f"at {back_m_s:.2f} m/s at most"
+            notes.append(
+                f"ring: backwards the robot drives {allowed}; out of a dead end it turns on the spot, which needs no "
+                "look as the body is round, and then stands until the ring has looked along the new way"
+            )
+    return [*notes, *_blind_goal(settings)]
+
+
+def _blind_goal(settings: Settings) -> list[str]:
+    """Return a note on the run's goal if it lies where a ring that does not turn never looks."""
+    goal = settings.goal
+    if goal is None or goal.frame != "odom" or not settings.body.synchro:
+        return []
+    course = math.atan2(goal.y_m, goal.x_m)
+    if _speed_m_s(settings, course) > 0.0:
+        return []
+    return [
+        f"goal: ({goal.x_m:g} m, {goal.y_m:g} m) lies at {math.degrees(course):.0f}°, where the ring never looks: "
+        "the robot cannot drive straight to it"
+    ]
+
+
+def _speed_m_s(settings: Settings, course_rad: float) -> float:
+    """Return the speed that the ring allows at a course in its own frame, m/s."""
+    percept = replace(oldest_percept(settings, 0.0), pose=Pose(0.0, 0.0, course_rad))
+    return seen_speed_m_s(percept, settings.body, settings.behaviors.arbiter.clearance_m)

@@ -1,0 +1,68 @@
+"""What a ring's blind sides forbid, against the rule by which each cycle drives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from behaviors.field_of_view import path_half_angle_rad, seen_speed_m_s
+from config.load import load_settings
+from config.robot import SensorConfig
+from config.settings import Settings
+from perception.percept import Pose
+from runtime.support.blind_sides import blind_notes, blind_sides_deg
+from runtime.support.pattern_check import oldest_percept
+
+
+def robot(*angles_deg: float, half_deg: float = 12.0, synchro: bool = False) -> Settings:
+    """A robot with sensors on its rim at these bearings."""
+    settings = load_settings("hallway", ["ring.firing=single", f"ring.beam_half_angle_deg={half_deg}"])
+    sensors = tuple(
+        SensorConfig(x_m=0.2 * math.cos(math.radians(a)), y_m=0.2 * math.sin(math.radians(a)), angle_deg=a)
+        for a in angles_deg
+    )
+    ring = settings.ring.model_copy(update={"sensors": sensors, "count": None, "radius_m": None})
+    body = settings.body.model_copy(update={"synchro": synchro})
+    return settings.model_copy(update={"ring": ring, "body": body})
+
+
+def test_a_ring_that_looks_all_round_has_no_blind_side() -> None:
+    assert blind_notes(robot(*np.arange(0.0, 360.0, 20.0).tolist())) == []
+
+
+def test_four_sensors_in_front_are_blind_behind_and_do_not_back() -> None:
+    settings = robot(-30.0, -10.0, 10.0, 30.0)
+    assert blind_sides_deg(settings) == [(43, 317)]
+    sides, back = blind_notes(settings)
+    assert "no sensor looks from 43° to 317°" in sides
+    assert "backwards the robot drives not at all" in back
+
+
+def test_a_goal_to_a_blind_side_of_a_ring_that_does_not_turn_is_named() -> None:
+    settings = robot(-30.0, -10.0, 10.0, 30.0, synchro=True)
+    goal = load_settings("hallway", ["goal.x_m=-3.0", "goal.y_m=0.1"]).goal
+    assert "goal: (-3 m, 0.1 m) lies at 178°, where the ring never looks" in blind_notes(
+        settings.model_copy(update={"goal": goal})
+    )[-1]  # fmt: skip
+    assert "leads to a blind" in blind_notes(settings)[-1]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_drives_to_a_side_that_is_called_blind(seed: int) -> None:
+    """Over random rings, courses into a blind side have no speed, and those clear of all are not forbidden by age."""
+    rng = np.random.default_rng(seed)
+    settings = robot(*rng.uniform(0.0, 360.0, rng.integers(1, 9)).tolist(), half_deg=float(rng.uniform(5.0, 25.0)))
+    arbiter, sides = settings.behaviors.arbiter, blind_sides_deg(settings)
+    path_deg = math.degrees(path_half_angle_rad(settings.body, arbiter.clearance_m))
+    for course in range(0, 360, 3):
+        percept = replace(oldest_percept(settings, 0.0), pose=Pose(0.0, 0.0, math.radians(course)))
+        view = replace(percept.field_of_view, ages_s=np.zeros(len(settings.ring.mounts)))
+        speed = seen_speed_m_s(replace(percept, field_of_view=view), settings.body, arbiter.clearance_m)
+        gaps = [abs((a - course + 180) % 360 - 180) for begin, end in sides for a in range(begin, end + 1)]
+        if min(gaps, default=360) <= path_deg - 1.0:
+            assert speed == 0.0
+        elif min(gaps, default=360) > path_deg + 1.5:
+            assert speed > 0.0
