@@ -65,8 +65,8 @@ def run(
     mission
         What to do once armed: a mission file, or the name of a shipped one; None for that of the run file.
     goal
-        Where to drive once armed: X,Y in metres, or X,Y,HEADING with the final heading in degrees. A place in the map
-        with --map, otherwise in odometry's frame, from where the run begins.
+        Where to drive once armed: X,Y in metres, or X,Y,HEADING with the final heading in degrees, or the name of a
+        place. A place in the map with --map, otherwise in odometry's frame, from where the run begins.
     seed
         Emulated robot: seed of everything random.
     trace

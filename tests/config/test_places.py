@@ -8,6 +8,7 @@ from config.errors import UserError
 from config.load import ConfigError, load_settings, load_world, parse_text, with_known_room, with_mission
 from config.mission import MissionConfig
 from config.places import PlacesConfig
+from runtime.cli.commands.check import check_config
 from runtime.cli.commands.run_settings import settings_of_files
 
 MAP = """
@@ -84,6 +85,15 @@ def test_a_run_drives_to_a_place_by_its_name(tmp_path: Path) -> None:
     assert (found.x_m, found.y_m, found.heading_deg, found.frame) == (1.0, 2.0, 90.0, "map")  # type: ignore[attr-defined]
     with pytest.raises(UserError, match=r"no place is named gat; did you mean gate\?"):
         goal("gat")
+
+
+def test_check_names_an_unknown_place(tmp_path: Path) -> None:
+    steps = '[[step]]\nname = "go"\nschemas = [{ name = "move_to_goal", place = "charger" }]\n'
+    (tmp_path / "errand.toml").write_text(f'name = "errand"\n{steps}', encoding="utf-8")
+    (tmp_path / "run.toml").write_text('robot = "denning"\nmission = "./errand.toml"\n', encoding="utf-8")
+    assert check_config(str(tmp_path / "errand.toml"), []) == 0, "its map is not known yet"
+    with pytest.raises(ConfigError, match="mission errand: no place is named charger"):
+        check_config(str(tmp_path / "run.toml"), [])
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from config.errors import DONE
 from config.load import load_any
+from config.places import check_places
 from config.settings import Settings
 from runtime.support.config_lint import lint_settings
 from runtime.support.pattern_check import refuse_undrivable
@@ -25,6 +26,7 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
         refuse_undrivable(settings)
+        check_places(settings.mission, settings.places)
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
     sys.stdout.write(f"{config}: good\n")
