@@ -155,6 +155,8 @@ class Fleet:
                     if run.halt in {"sent", "unconfirmed"}:
                         self._send_halt(run)
                     async for message in client.messages():
+                        if message["type"] == "session" and client.has_control:
+                            await client.request("release_control")  # the first client gets it; a page is to have it
                         if message["type"] == "state":
                             run.state, run.state_s = message, self._clock()
             except ConsoleError as error:

@@ -54,9 +54,21 @@ def test_a_halt_is_confirmed_by_the_answer_and_a_state_after_it() -> None:
     with_fleet(body)
 
 
+def test_control_of_the_run_is_left_to_its_page() -> None:
+    async def body(case: ConsoleCase, fleet: Fleet, _now_s: list[float]) -> None:
+        await shows(case, fleet, "problem", "")
+        hub = case.console.hub
+        await case.settled(lambda: not any(map(hub.control.is_held_by, hub.clients)), "control that is free")
+        page = await case.connect()
+        assert (await page.next("session"))["role"] == "control"
+
+    with_fleet(body)
+
+
 def test_a_run_that_is_not_reached_or_silent_is_named() -> None:
     async def body(case: ConsoleCase, fleet: Fleet, now_s: list[float]) -> None:
-        await shows(case, fleet, "problem", "")
+        case.run.state.mode = ModeState(Mode.DRIVE)
+        await shows(case, fleet, "mode", "DRIVE")
         assert fleet.add(NOWHERE) is None
         assert fleet.halt("127.0.0.1:1") == 1
         await case.settled(lambda: "no run answers" in fleet.rows()[1]["problem"], "the problem")
