@@ -92,7 +92,7 @@ class Opened:
     async def world(self, expression: str) -> Any:
         """Return the value of an expression over the exports of the page's main module."""
         return await self.page.evaluate(
-            f"async () => {{ const {{ connection, teleoperation, selection, tools, units, view, run }} ="
+            f"async () => {{ const {{ buttons, connection, teleoperation, selection, tools, units, view, run }} ="
             f" await {MODULE}; return {expression}; }}"
         )
 

@@ -2,6 +2,8 @@
 
 import { byId, el, setAttribute, setText } from "./dom.js";
 import { Alerts } from "./alerts.js";
+import { Beside } from "./beside.js";
+import { Buttons } from "./buttons.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { Drive } from "./drive.js";
@@ -108,7 +110,7 @@ const log = new Log(run);
 const time = new Time({ run, connection, notifications, shoot: () => screenshot({ scene, view, run, theme, units }) });
 const ring = new Ring({ canvas: byId("ring"), text: byId("ring-text"), run, theme, units });
 const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), run, theme });
-const plots = new Plots({ run, units, theme, shown: () => tabs?.shown === "plot" });
+const plots = new Plots({ run, units, theme, shown: () => tabs?.shows("plot") ?? false });
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
 const files = new Files({ run, connection, notifications, address, play: (file) => time.openFile(file).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
@@ -116,13 +118,18 @@ new SettingsFiles({ run, connection, notifications });
 new RobotForm({ run, connection, notifications });
 new Robots({ run, connection });
 new MapFile({ run, units, connection, notifications, tools });
-tabs = new Tabs((name) => {
+const panelShown = (name) => {
   drawInstruments();
   alerts.look();
-  prefer("tab", name);
   if (name === "time") time.shown();
   if (name === "files") files.shown();
+};
+tabs = new Tabs((name) => {
+  prefer("tab", name);
+  panelShown(name);
 });
+const buttons = new Buttons({ run, notifications });
+buttons.offer("mission", () => (run.session?.missions ?? []).map(({ name }) => ({ id: name, name, act: () => connection.request({ type: "start_mission", name }) })));
 
 let instrumentsAsked = false;
 function drawInstruments() {
@@ -236,10 +243,11 @@ byId("clear-map").addEventListener("click", () => notifications.confirm("Clear t
 watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tools.current.id === "places" ? places_tool : tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 tabs.restore(preferred("tab", ""));
+new Beside({ tabs, shown: panelShown });
 tools.restore(preferred("tool", ""));
 new DriveMode({ teleoperation, changed: () => drawInstruments() });
 const tour = new Tour({ mayAct: () => run.session?.has_token ?? token !== "" });
 run.on("session", () => tour.refresh());
 tour.beginOnce();
 
-export { connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };
+export { buttons, connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };

@@ -1,36 +1,26 @@
-// The plot panel: any number of a frame over time, a lane for each field, live and in playback. Reading a lane at a time:
-// pointer or slider.
+// The plot panel: any number of a frame over time, live and in playback: a lane for each field, or for two with an axis each.
+// All lanes share a time axis. Reading a lane at a time: pointer or slider.
 
 import { byId, download, el, setAttribute, setText } from "./dom.js";
 import { History, numericFields } from "./history.js";
+import { bounds, digits, FOOT, LEFT, linePath, timeAxis, valueAxis } from "./plot_draw.js";
+import { difference, fieldName, rateOf, seriesOf, shownAs } from "./plot_fields.js";
+import { PlotTime } from "./plot_time.js";
 import { prefer, preferred } from "./preferences.js";
 import { fitted } from "./theme.js";
 import { isWall } from "./walls.js";
 
 const LANES_MAX = 8;
-const LEFT = 46;
-const GAP_S = 2.5; // a line is broken where frames are missing
+const RIGHT = 44; // of a second axis
 const LISTED_EVERY_MS = 1000;
-const DEGREES = 180 / Math.PI;
-// How a field is shown: the first rule whose pattern matches says unit and factor; lengths follow the page's units.
-const RULES = [
-  [/^(pose|localized\.(pose|frame)|objects\.\d+)\.[xy]$|^drive_request\.[xyv]$|^ranges\.|\.sigma$|way_m$|^twist\.v$/, "length", 1],
-  [/heading$|theta$|^twist\.w$|^drive_request\.w$|^ring_yaw$|direction$/, "°", DEGREES],
-  [/^phases\.|_us$/, "ms", 1e-3],
-  [/^age\.|_s$|\.s$/, "s", 1],
-  [/bytes$/, "MB", 1e-6],
-];
-const PER_SECOND = new Set(["twist.v", "twist.w", "drive_request.v", "drive_request.w"]);
-const WORDS = [[/^twist\.v$/, "speed"], [/^twist\.w$/, "rate of turn"], [/^pose\.heading$/, "heading"], [/^ranges\./, "range "], [/^age\./, "age of range "],
-  [/^phases\./, "phase "], [/^objects\./, "object "], [/^vectors\./, "vector "], [/_(us|s|m)$/, ""], [/[._]/g, " "]];
-
-export const fieldName = (path) => WORDS.reduce((name, [pattern, word]) => name.replace(pattern, word), path);
+const SECOND = "&"; // between the two fields of a lane, as it is kept
 
 export class Plots {
-  #lanes = new Map(); // path → {element, canvas, value}
+  #lanes = new Map(); // path of the left axis → {element, canvas, value, combine, second: path or null}
   #history = new History();
   #listed = { names: "", at_ms: -Infinity };
   #last = null;
+  #time = new PlotTime(() => this.draw());
 
   constructor({ run, units, theme, shown }) {
     Object.assign(this, { run, units, theme, shown });
@@ -39,12 +29,14 @@ export class Plots {
     this.window.value = preferred("plot window", "30");
     this.window.addEventListener("change", () => {
       prefer("plot window", this.window.value);
-      this.draw();
+      this.#time.follow();
     });
     this.at.addEventListener("input", () => this.draw());
     byId("plot-filter").addEventListener("input", () => this.#list());
     byId("plot-save").addEventListener("click", () => this.#save());
-    for (const path of preferred("plot fields", ["twist.v", "ranges.0"])) if (typeof path === "string") this.#addLane(path);
+    const acts = { "plot-in": () => this.#time.zoom(this.#span, 0.5), "plot-out": () => this.#time.zoom(this.#span, 2), "plot-earlier": () => this.#move(-0.25), "plot-later": () => this.#move(0.25), "plot-follow": () => this.#time.follow() };
+    for (const [id, act] of Object.entries(acts)) byId(id).addEventListener("click", act);
+    for (const lane of preferred("plot fields", ["twist.v", "ranges.0"])) if (typeof lane === "string") this.#addLane(...lane.split(SECOND));
     run.on("session", () => run.watchesRecording && this.#history.clear());
     run.on("state", (state) => this.#take(state));
     units.on("changed", () => this.draw());
@@ -70,40 +62,95 @@ export class Plots {
   #list() {
     const newest = this.#history.samples.at(-1)?.frame ?? {};
     const wanted = byId("plot-filter").value.trim().toLowerCase();
-    const paths = [...new Set([...this.#lanes.keys(), ...numericFields(newest)])].filter((path) => wanted === "" || `${fieldName(path)} ${path}`.toLowerCase().includes(wanted));
+    const paths = [...new Set([...this.#fields, ...numericFields(newest)])].filter((path) => wanted === "" || `${fieldName(path)} ${path}`.toLowerCase().includes(wanted));
     const names = paths.join();
     if (names === this.#listed.names) return;
     this.#listed.names = names;
     byId("plot-fields").replaceChildren(...paths.map((path) => {
       const box = el("input", { type: "checkbox", "data-path": path, onchange: () => this.#choose(path, box.checked) });
-      box.checked = this.#lanes.has(path);
+      box.checked = this.#fields.includes(path);
       return el("li", {}, el("label", {}, box, fieldName(path)));
     }));
     byId("plot-none").hidden = paths.length > 0;
   }
 
+  get #fields() {
+    return [...this.#lanes].flatMap(([path, { second }]) => (second === null ? [path] : [path, second]));
+  }
+
+  #move(share) {
+    const { from, to } = this.#span;
+    this.#time.pan({ from, to }, share * (to - from));
+  }
+
   #choose(path, on) {
     if (on) this.#addLane(path);
-    else this.#removeLane(path);
-    prefer("plot fields", [...this.#lanes.keys()]);
+    else this.#remove(path);
+    this.#keep();
+  }
+
+  #keep() {
+    prefer("plot fields", [...this.#lanes].map(([path, { second }]) => (second === null ? path : `${path}${SECOND}${second}`)));
+    for (const [path, lane] of this.#lanes) this.#offerCombinations(path, lane);
     this.draw();
   }
 
-  #addLane(path) {
-    if (this.#lanes.has(path)) return;
-    if (this.#lanes.size >= LANES_MAX) this.#removeLane(this.#lanes.keys().next().value);
-    const value = el("b"), canvas = el("canvas", { role: "img", "aria-label": fieldName(path) });
+  #addLane(path, second = null) {
+    if (this.#fields.includes(path)) return;
+    if (this.#lanes.size >= LANES_MAX) this.#remove(this.#lanes.keys().next().value);
+    const value = el("b"), canvas = el("canvas", { role: "img", "aria-label": fieldName(path) }), name = el("span", {}, fieldName(path));
+    const combine = el("select", { class: "combine", "aria-label": `Combine ${fieldName(path)}`, title: "A second axis, the rate, or a difference", onchange: () => this.#combine(path, combine.value) });
     const remove = el("button", { type: "button", class: "small", "aria-label": `Remove ${fieldName(path)}`, onclick: () => this.#choose(path, false) }, "✕");
-    const element = el("figure", { class: "lane", "data-path": path }, el("figcaption", {}, el("span", {}, fieldName(path)), value, remove), canvas);
-    canvas.addEventListener("pointermove", (event) => this.#readAt((event.offsetX - LEFT) / (canvas.clientWidth - LEFT)));
+    const element = el("figure", { class: "lane", "data-path": path }, el("figcaption", {}, name, value, combine, remove), canvas);
+    canvas.addEventListener("pointermove", (event) => event.buttons === 0 && this.#readAt((event.offsetX - LEFT) / (canvas.clientWidth - this.#margins)));
     canvas.addEventListener("pointerleave", () => this.#readAt(1));
+    this.#time.watch(canvas, () => this.#span, LEFT);
     byId("plot-lanes").append(element);
-    this.#lanes.set(path, { element, canvas, value });
+    this.#lanes.set(path, { element, canvas, name, value, combine, second: null });
     this.#tick(path, true);
+    if (second !== null) this.#setSecond(path, second);
+    for (const [one, lane] of this.#lanes) this.#offerCombinations(one, lane);
   }
 
-  #removeLane(path) {
-    this.#lanes.get(path)?.element.remove();
+  // What a lane can be combined with: the fields of the other lanes.
+  #offerCombinations(path, { combine, second }) {
+    const others = [...this.#lanes].filter(([other, lane]) => other !== path && lane.second === null).map(([other]) => other);
+    const options = [["", "combine…"], ["rate", "its rate"], ...(second === null ? others.map((one) => [`axis ${one}`, `${fieldName(one)} on the right`]) : [["apart", `${fieldName(second)} apart`]]),
+      ...others.map((one) => [`minus ${one}`, `minus ${fieldName(one)}`])];
+    combine.replaceChildren(...options.map(([value, text]) => el("option", { value }, text)));
+  }
+
+  #combine(path, what) {
+    const [kind, other] = [what.split(" ")[0], what.slice(what.indexOf(" ") + 1)];
+    const lane = this.#lanes.get(path);
+    if (kind === "rate") this.#addLane(rateOf(path));
+    else if (kind === "minus") this.#addLane(difference(path, other));
+    else if (kind === "axis") {
+      this.#remove(other);
+      this.#setSecond(path, other);
+    } else if (kind === "apart") {
+      const { second } = lane;
+      this.#setSecond(path, null);
+      this.#addLane(second);
+    }
+    this.#keep();
+  }
+
+  #setSecond(path, second) {
+    const lane = this.#lanes.get(path);
+    if (lane.second !== null) this.#tick(lane.second, false);
+    lane.second = second;
+    if (second !== null) this.#tick(second, true);
+    setText(lane.name, second === null ? fieldName(path) : `${fieldName(path)}, ${fieldName(second)} (right)`);
+  }
+
+  // Removes a field, and its lane if it is the one of the left axis.
+  #remove(path) {
+    for (const [left, { second }] of this.#lanes) if (second === path) this.#setSecond(left, null);
+    const lane = this.#lanes.get(path);
+    if (lane === undefined) return;
+    if (lane.second !== null) this.#tick(lane.second, false);
+    lane.element.remove();
     this.#lanes.delete(path);
     this.#tick(path, false);
   }
@@ -117,12 +164,14 @@ export class Plots {
     this.draw();
   }
 
-  // The time shown: up to the newest frame, in a recording around the present moment.
   get #span() {
-    const long = Number(this.window.value), now = this.#last?.robot_s ?? 0;
-    const newest = this.#history.samples.at(-1)?.t ?? now;
-    const to = Math.min(newest, now + long / 2);
-    return { from: to - long, to, now };
+    const now = this.#last?.robot_s ?? 0;
+    return this.#time.span({ long: Number(this.window.value), now, newest: this.#history.samples.at(-1)?.t ?? now });
+  }
+
+  // What the axes take of a lane's width, px: the same of all lanes, so that equal times are below one another.
+  get #margins() {
+    return LEFT + ([...this.#lanes.values()].some(({ second }) => second !== null) ? RIGHT : 2);
   }
 
   draw() {
@@ -133,98 +182,62 @@ export class Plots {
     const words = back === 0 ? "now" : `${Math.abs(back).toFixed(1)} s ${back < 0 ? "before" : "after"}`;
     setAttribute(this.at, "aria-valuetext", words);
     setText(byId("plot-read"), words);
-    for (const [path, lane] of this.#lanes) this.#drawLane(path, lane, span, read);
+    setAttribute(byId("plot-follow"), "aria-pressed", !this.#time.isHeld);
+    const margins = this.#margins;
+    for (const [path, lane] of this.#lanes) this.#drawLane(path, lane, span, read, margins);
   }
 
-  #show(path) {
-    const [, unit = "", factor = 1] = RULES.find(([pattern]) => pattern.test(path)) ?? [];
-    const times = unit === "length" ? 1 / this.units.metres : factor;
-    const name = (unit === "length" ? this.units.name : unit) + (PER_SECOND.has(path) ? "/s" : "");
-    return { name, isAngle: unit === "°" && !PER_SECOND.has(path), scaled: (value) => (value === null || isSilence(path, value) ? null : value * times) };
+  #points(path, { from, to }) {
+    const { factor } = shownAs(path, this.units);
+    return seriesOf(this.#history, path, from, to).map(([t, one]) => [t, one === null ? null : one * factor]);
   }
 
-  #drawLane(path, { canvas, value }, { from, to, now }, read) {
-    const { name, isAngle, scaled } = this.#show(path);
-    const points = this.#history.series(path, from, to).map(([t, one]) => [t, scaled(one)]);
-    const at = points.reduce((best, point) => (best === null || Math.abs(point[0] - read) < Math.abs(best[0] - read) ? point : best), null);
-    setText(value, at === null || at[1] === null ? "none" : `${digits(at[1])} ${name}`.trim());
-    const { ctx, width, height } = fitted(canvas);
+  #drawLane(path, { canvas, value, second }, span, read, margins) {
+    const { from, to, now } = span, { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
-    const known = points.filter(([, one]) => one !== null).map(([, one]) => one);
-    const [low, high] = bounds(known);
-    const x = (t) => LEFT + ((t - from) / (to - from)) * (width - LEFT - 2), y = (one) => height - 6 - ((one - low) / (high - low)) * (height - 14);
-    this.#axes(ctx, width, y, known.length > 0 ? [low, (low + high) / 2, high] : []);
-    ctx.strokeStyle = this.theme.accent;
-    ctx.lineWidth = 1.6;
-    ctx.lineJoin = "round";
-    ctx.stroke(linePath(points, x, y, isAngle));
+    const x = (t) => LEFT + ((t - from) / (to - from)) * (width - margins);
+    timeAxis(ctx, this.theme, span, x, height);
+    const curves = [[path, this.theme.accent, []], ...(second === null ? [] : [[second, this.theme.segment, [5, 3]]])];
+    const words = curves.map(([of, colour, dash], i) => {
+      const points = this.#points(of, span), { name, isAngle } = shownAs(of, this.units);
+      const known = points.filter(([, one]) => one !== null).map(([, one]) => one);
+      const [low, high] = bounds(known), y = (one) => height - FOOT - 4 - ((one - low) / (high - low)) * (height - FOOT - 12);
+      valueAxis(ctx, this.theme, y, known.length > 0 ? [low, (low + high) / 2, high] : [], { right: i === 1, width: width - margins + LEFT, colour });
+      ctx.strokeStyle = colour;
+      ctx.lineWidth = 1.6;
+      ctx.lineJoin = "round";
+      ctx.setLineDash(dash);
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(LEFT, 0, width - margins, height);
+      ctx.clip();
+      ctx.stroke(linePath(points, x, y, isAngle));
+      ctx.restore();
+      ctx.setLineDash([]);
+      const at = points.reduce((best, point) => (best === null || Math.abs(point[0] - read) < Math.abs(best[0] - read) ? point : best), null);
+      const range = known.length > 0 ? `${digits(Math.min(...known))} to ${digits(Math.max(...known))} ${name}` : "no value";
+      return { read: at === null || at[1] === null ? "none" : `${digits(at[1])} ${name}`.trim(), range: `${fieldName(of)}: ${range}` };
+    });
+    setText(value, words.map((one) => one.read).join(", "));
     ctx.strokeStyle = this.theme.ink;
     ctx.lineWidth = 1;
-    for (const t of new Set([now < to ? now : null, read < to ? read : null])) {
+    for (const t of new Set([now < to && now > from ? now : null, read < to ? read : null])) {
       if (t === null) continue;
       ctx.setLineDash(t === now ? [] : [3, 3]);
       ctx.beginPath();
       ctx.moveTo(x(t), 0);
-      ctx.lineTo(x(t), height);
+      ctx.lineTo(x(t), height - FOOT);
       ctx.stroke();
     }
     ctx.setLineDash([]);
-    const range = known.length > 0 ? `${digits(Math.min(...known))} to ${digits(Math.max(...known))} ${name}` : "no value";
-    setAttribute(canvas, "aria-label", `${fieldName(path)}: ${range} in ${Math.round(to - from)} s`);
-  }
-
-  #axes(ctx, width, y, marks) {
-    ctx.font = this.theme.font(10.5);
-    ctx.textAlign = "right";
-    ctx.textBaseline = "middle";
-    ctx.lineWidth = 1;
-    for (const mark of marks) {
-      const at = Math.round(y(mark)) + 0.5;
-      ctx.strokeStyle = this.theme.line;
-      ctx.beginPath();
-      ctx.moveTo(LEFT, at);
-      ctx.lineTo(width, at);
-      ctx.stroke();
-      ctx.fillStyle = this.theme.muted;
-      ctx.fillText(digits(mark), LEFT - 5, at);
-    }
+    setAttribute(canvas, "aria-label", `${words.map(({ range }) => range).join("; ")} in ${Number((to - from).toFixed(to - from < 10 ? 1 : 0))} s`);
   }
 
   // What the lanes show as a table: a row a frame, SI units as on the wire.
   #save() {
-    const { from, to } = this.#span, paths = [...this.#lanes.keys()];
-    const columns = paths.map((path) => this.#history.series(path, from, to));
-    const rows = (columns[0] ?? []).map(([t], i) => [t, ...columns.map((column, k) => inTable(paths[k], column[i][1]))].join());
+    const { from, to } = this.#span, paths = this.#fields;
+    const columns = paths.map((path) => seriesOf(this.#history, path, from, to));
+    const rows = (columns[0] ?? []).map(([t], i) => [t, ...columns.map((column) => column[i][1] ?? "")].join());
     download("echolocate-plot.csv", new Blob([[["robot_s", ...paths].join(), ...rows, ""].join("\n")], { type: "text/csv" }));
   }
-}
-
-// No echo is −1 on the wire; in a table it is an empty cell, like all that is not known.
-const inTable = (path, value) => (value === null || isSilence(path, value) ? "" : value);
-
-const isSilence = (path, value) => path.startsWith("ranges.") && value < 0;
-
-function linePath(points, x, y, isAngle) {
-  const path = new Path2D();
-  let before = null;
-  for (const [t, value] of points) {
-    const broken = before === null || value === null || t - before[0] > GAP_S || (isAngle && Math.abs(value - before[1]) > 180);
-    if (value !== null && broken) path.moveTo(x(t), y(value));
-    else if (value !== null) path.lineTo(x(t), y(value));
-    before = value === null ? null : [t, value];
-  }
-  return path;
-}
-
-// A little more than the values take; a constant has room around it.
-function bounds(values) {
-  const low = Math.min(...values), high = Math.max(...values);
-  if (values.length === 0) return [0, 1];
-  return high > low ? [low - 0.04 * (high - low), high + 0.04 * (high - low)] : [low - 0.5, high + 0.5];
-}
-
-function digits(value) {
-  const size = Math.abs(value);
-  const text = size >= 1000 ? value.toFixed(0) : size >= 100 ? value.toFixed(1) : size >= 1 || size === 0 ? value.toFixed(2) : value.toPrecision(2);
-  return (Number(text) === 0 ? "0" : text).replace("-", "−");
 }

@@ -9,6 +9,7 @@ const STEP_PX = 24;
 // [id, style property, which side grows, least size, least rest, px]
 const BORDERS = [
   { id: "split-panel", property: "--panel-width", across: true, of: "tabs", grows: -1, least: 260, rest: 340 },
+  { id: "split-beside", property: "--beside-width", across: true, of: "beside", grows: -1, least: 260, rest: 800 },
   { id: "split-cycle", property: "--cycle-height", across: false, of: "panel-cycle", grows: -1, least: 110, rest: 240 },
   { id: "split-map", property: "--map-height", across: false, of: "map", grows: 1, least: 140, rest: 180 },
 ];

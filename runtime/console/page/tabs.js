@@ -5,6 +5,8 @@ import { byId } from "./dom.js";
 export class Tabs {
   #tabs = [...byId("tabs").querySelectorAll('[role="tab"]')];
   #changed;
+  beside = ""; // the panel that is shown beside the chosen one
+  taken = () => {}; // called when that is to be the chosen one
 
   constructor(changed) {
     this.#changed = changed;
@@ -15,11 +17,12 @@ export class Tabs {
   }
 
   show(name, { focus = false } = {}) {
+    if (name === this.beside) this.taken();
     for (const tab of this.#tabs) {
       const chosen = tab.id === `tab-${name}`;
       tab.setAttribute("aria-selected", String(chosen));
       tab.tabIndex = chosen ? 0 : -1;
-      byId(tab.getAttribute("aria-controls")).hidden = !chosen;
+      byId(tab.getAttribute("aria-controls")).hidden = !chosen && tab.id !== `tab-${this.beside}`;
       if (chosen && focus) tab.focus();
     }
     this.#changed(name);
@@ -28,6 +31,19 @@ export class Tabs {
   // Shows the panel of the last visit, if this screen has a tab for it.
   restore(name) {
     if (this.#tabs.some((tab) => tab.id === `tab-${name}` && tab.offsetParent !== null)) this.show(name);
+  }
+
+  get names() {
+    return this.#tabs.map((tab) => tab.id.slice(4));
+  }
+
+  label(name) {
+    return byId(`tab-${name}`).firstChild.textContent;
+  }
+
+  // Whether a panel is on the screen.
+  shows(name) {
+    return name === this.shown || name === this.beside;
   }
 
   get shown() {

@@ -1,0 +1,78 @@
+// The time axis that all plots share: it follows the newest frame until it is zoomed or moved, by wheel, pointer or buttons.
+
+const LEAST_S = 0.5;
+const MOST_S = 1800;
+const WHEEL = 0.0016;
+const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600];
+const TICKS_MAX = 7;
+
+export class PlotTime {
+  #held = null; // {from, to} where it does not follow
+
+  constructor(changed) {
+    this.changed = changed;
+  }
+
+  get isHeld() {
+    return this.#held !== null;
+  }
+
+  // The time shown: up to the newest frame, in a recording around the present moment.
+  span({ long, now, newest }) {
+    if (this.#held !== null) return { ...this.#held, now };
+    const to = Math.min(newest, now + long / 2);
+    return { from: to - long, to, now };
+  }
+
+  follow() {
+    this.#held = null;
+    this.changed();
+  }
+
+  // Makes the span `factor` times as long about a moment.
+  zoom({ from, to }, factor, about = to) {
+    const long = Math.max(LEAST_S, Math.min((to - from) * factor, MOST_S));
+    const share = (about - from) / (to - from);
+    this.#held = { from: about - share * long, to: about + (1 - share) * long };
+    this.changed();
+  }
+
+  pan({ from, to }, by_s) {
+    this.#held = { from: from + by_s, to: to + by_s };
+    this.changed();
+  }
+
+  // Zooms by wheel and moves by drag; `span` returns what is shown, `left` is where the axis begins, px. A press without a
+  // drag is left to others.
+  watch(canvas, span, left) {
+    const perPixel = () => (({ from, to }) => (to - from) / Math.max(1, canvas.clientWidth - left))(span());
+    let held = null;
+    canvas.addEventListener("wheel", (event) => {
+      if (!event.deltaY) return;
+      event.preventDefault();
+      this.zoom(span(), Math.exp(event.deltaY * WHEEL), span().from + (event.offsetX - left) * perPixel());
+    }, { passive: false });
+    canvas.addEventListener("pointerdown", (event) => {
+      held = { x: event.clientX };
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (held === null || event.clientX === held.x) return;
+      this.pan(span(), (held.x - event.clientX) * perPixel());
+      held.x = event.clientX;
+    });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(name, () => { held = null; });
+    canvas.addEventListener("dblclick", () => this.follow());
+  }
+}
+
+// The moments to mark between two times, at most a few, at whole steps before or after `now`.
+export function ticks({ from, to, now }) {
+  const step = STEPS_S.find((one) => (to - from) / one <= TICKS_MAX) ?? STEPS_S.at(-1);
+  const marks = [];
+  for (let k = Math.ceil((from - now) / step); now + k * step <= to + 1e-9; k++) {
+    const s = k * step;
+    marks.push([now + s, s === 0 ? "now" : `${s > 0 ? "+" : "−"}${Number(Math.abs(s).toFixed(1))} s`]);
+  }
+  return marks;
+}
