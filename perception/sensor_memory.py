@@ -19,6 +19,10 @@ RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 """Of a range; infinite where nothing was heard, or nothing is known yet."""
 
 
+LOOKS: Final = 16
+"""Looks of each sensor that are kept, `sensor_silence.APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
+
+
 class NeighbourCounts(Record):
     """A sensor's running counts, against which its neighbours are compared."""
 
@@ -26,8 +30,18 @@ class NeighbourCounts(Record):
     """Changes of the steady reading."""
     leaps: Count
     """Those by more than `LEAP_M`."""
-    near_echoes: Count
-    """Echoes nearer than the near limit."""
+
+
+class SensorLook(Record):
+    """A reading and where the sensor made it, in the odometry's frame."""
+
+    range_m: Annotated[float, PLACE]
+    """The reading, m; below zero without an echo."""
+    x: Place
+    """Place of the sensor, m."""
+    y: Place
+    axis: Place
+    """Direction of its axis, rad."""
 
 
 class SensorMemory(Record):
@@ -73,6 +87,22 @@ class SensorMemory(Record):
     """For each set, short readings less those that were not."""
     is_crossed: Annotated[Ints, SETS_MAX, FLAG]
     """For each set, 1 where the sensor is masked for crosstalk."""
+    looks: Annotated[Records[SensorLook], LOOKS]
+    """The last looks, of the number n in place n % LOOKS."""
+    looks_made: Count
+    """Number of the next look."""
+    heard_looks: Count
+    """Number of the next look when the sensor heard its last echo."""
+    audible: Count
+    """Looks at something that others heard from both sides, …"""
+    misses: Count
+    """… and those of them without an echo."""
+    deaf_looks: Count
+    """Of the latter, those since the last echo that are unlike the one before them."""
+    deaf_x: Place
+    """Where the last one of these was made, m and rad."""
+    deaf_y: Place
+    deaf_axis: Place
 
 
 class RingMemory(Record):
@@ -86,3 +116,7 @@ class RingMemory(Record):
     y: Place
     regularity: Share
     """Recent share of firings whose set was known."""
+    audible: Count
+    """Looks of all sensors at something that others heard from both sides, …"""
+    misses: Count
+    """… and those of them without an echo."""

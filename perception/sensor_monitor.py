@@ -6,9 +6,9 @@ A single reading proves nothing; how readings change while the robot moves and w
   that could give that reading, or although its neighbours saw objects pass. The same reading is legitimate at rest,
   along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
   or those of the whole ring do not.
-- *Silent.* The sensor hears nothing over a long distance while both neighbours hear echoes. Its silence, which would
-  mean free space, is not mapped; its first echo is. It is no more than a suspicion: along a hall, a healthy sensor
-  hears nothing either. So its silence still counts as a look (`perception.fresh_echoes`), which has no echo.
+- *Silent.* The sensor hears nothing of what others heard where it looks, from both sides of its axis
+  (`perception.sensor_silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
+  still counts as a look (`perception.fresh_echoes`), which has no echo.
 - *Too near.* The sensor answers ranges below the least that it can measure.
 - *Failing.* The sensor should fire and reports no range, however often the ring fires.
 - *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not depend on which other sensors fired. A
@@ -37,14 +37,15 @@ from perception.records import Records, records, zeros
 from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
 from perception.sensor_mounts import mounts_array
 from perception.sensor_report import SILENT, SensorReport, describe_fault
+from perception.sensor_silence import miss_share
 from perception.sensor_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
 """Largest angle between neighbours' axes, two places of a ring of 24 and some slack; beyond it sensors see different
 surfaces."""
 NEAR_SHARE: Final = 0.45
-"""Near limit as a share of the ring's reach. Along a straight wall a beam measures up to 2.2 times as far as its
-neighbour 15° nearer to the wall, so an echo beyond this does not predict what the neighbour hears."""
+"""Share of the ring's reach beyond which an echo does not predict what another sensor hears: along a straight wall a
+beam measures up to 2.2 times as far as its neighbour 15° nearer to the wall."""
 LEAST_SHARE: Final = 0.5
 """What is below this share of the least range is too near to be measured; a calibration doubles a range at most."""
 SAME_AXIS_RAD: Final = 1e-6
@@ -188,11 +189,12 @@ class SensorMonitor:
 
     def reports(self) -> tuple[SensorReport, ...]:
         """Return a report on each faulty sensor, in the order of the sensors."""
-        faults, stuck_m = self._sensors["faults"], self._sensors["stuck_m"]
-        return tuple(
-            describe_fault(i, int(faults[i]), float(stuck_m[i]), self._crosstalk_partners(i))
-            for i in np.flatnonzero(faults).tolist()
-        )
+        return tuple(self._report(i) for i in np.flatnonzero(self._sensors["faults"]).tolist())
+
+    def _report(self, i: int) -> SensorReport:
+        one, partners = self._sensors[i], self._crosstalk_partners(i)
+        misses = miss_share(self._sensor_records[i], self._ring_records[0])
+        return describe_fault(i, int(one["faults"]), float(one["stuck_m"]), partners, int(one["deaf_looks"]), misses)
 
     def _crosstalk_partners(self, i: int) -> list[int]:
         """Return the sensors that fire in the sets in which sensor `i` is masked."""

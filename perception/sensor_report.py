@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
@@ -26,7 +27,15 @@ class SensorReport:
     """What happened, the likely cause, the next action."""
 
 
-def describe_fault(sensor: int, faults: int, stuck_m: float, partners: Sequence[int]) -> SensorReport:
+def odds(deaf_looks: int, miss_share: float) -> str:
+    """Return the odds against a healthy sensor that misses so many looks by chance, as text."""
+    digits = math.floor(-deaf_looks * math.log10(max(1e-3, min(0.999, miss_share))))
+    return f"10^{digits} to 1"
+
+
+def describe_fault(
+    sensor: int, faults: int, stuck_m: float, partners: Sequence[int], deaf_looks: int = 0, miss_share: float = 0.0
+) -> SensorReport:
     """Return the report on a sensor with at least one fault.
 
     Parameters
@@ -39,6 +48,10 @@ def describe_fault(sensor: int, faults: int, stuck_m: float, partners: Sequence[
         The range it repeats if it is stuck, m.
     partners : sequence of int
         The sensors that fire in the sets in which it is masked for crosstalk.
+    deaf_looks : int
+        If it is silent: at how much it has looked since its last echo that others heard from both sides.
+    miss_share : float
+        The share of such looks that the other sensors miss.
     """
     if faults & FAILING:
         return SensorReport(
@@ -65,8 +78,9 @@ def describe_fault(sensor: int, faults: int, stuck_m: float, partners: Sequence[
         return SensorReport(
             sensor,
             "silent",
-            f"sensor {sensor} hears nothing where both its neighbours hear echoes: its silence is masked until its "
-            f"first echo; check that nothing covers it, then replace it",
+            f"sensor {sensor} has heard nothing in {deaf_looks} looks at what other sensors heard there; they miss "
+            f"{miss_share:.0%} of such looks, so the odds are {odds(deaf_looks, miss_share)} that it is deaf or "
+            f"covered: its silence is masked until its first echo; check that nothing covers it, then replace it",
         )
     return SensorReport(
         sensor,

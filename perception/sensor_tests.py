@@ -17,6 +17,7 @@ from perception.records import Records
 from perception.sensor_crosstalk import count_short_readings, find_set, is_doubtful
 from perception.sensor_memory import TOO_NEAR_READINGS, RingMemory, SensorMemory
 from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
+from perception.sensor_silence import weigh_silence
 from perception.sensor_wall import NOISE_SHARE, is_along_wall
 
 # The thresholds below were tuned on the simulated halls of tests/perception/test_sensor_monitor.py: no healthy sensor
@@ -32,13 +33,9 @@ readings must have leapt instead: a rough wall along the path gives equal readin
 PASSED_MIN_M: Final = 2.0
 """Stuck after passing by: the base has moved at least this far, m."""
 PASSED_READINGS_MIN: Final = 40
-"""Stuck after passing by, or silent: at least so many equal readings."""
+"""Stuck after passing by: at least so many equal readings."""
 PASSED_CHANGES_MIN: Final = 12
 """Stuck after passing by: changes of either neighbour's reading that count even without leaps."""
-SILENT_MIN_M: Final = 5.0
-"""Silent: the base has moved at least this far without an echo, m; free space is common."""
-NEAR_ECHO_SHARE: Final = 0.5
-"""Silent: near echoes of either neighbour for each firing without an echo."""
 LEAP_M: Final = 0.3
 """A change of the reading by more than this is a leap, m."""
 REGULARITY_MIN: Final = 0.8
@@ -76,7 +73,7 @@ def begin_run(
     c.run_m, c.run_x, c.run_y, c.run_yaw, c.run_length = r, x, y, yaw, 1
     for side in range(2):
         counts, then = sensors[neighbours[i, side]].counts, c.run_neighbours[side]
-        then.changes, then.leaps, then.near_echoes = counts.changes, counts.leaps, counts.near_echoes
+        then.changes, then.leaps = counts.changes, counts.leaps
 
 
 @kernel
@@ -113,10 +110,10 @@ def count_changes(c: SensorMemory, r: float, tolerance: float) -> None:
 @kernel
 def neighbour_counts(
     i: int, neighbours: Ints, sensors: Records[SensorMemory], skip_deaf: bool
-) -> tuple[float, float, float]:
-    """Return the lesser of both neighbours' changes, leaps and near echoes since sensor `i`'s run began.
+) -> tuple[float, float]:
+    """Return the lesser of both neighbours' changes and leaps since sensor `i`'s run began.
 
-    All three are zero for a sensor without two neighbours.
+    Both are zero for a sensor without two neighbours.
 
     Parameters
     ----------
@@ -129,19 +126,18 @@ def neighbour_counts(
     skip_deaf : bool
         Leave out a neighbour that hears no echo at present.
     """
-    changes = leaps = near_echoes = math.inf
+    changes = leaps = math.inf
     for side in range(2):
         k = neighbours[i, side]
         if k < 0:
-            return 0.0, 0.0, 0.0
+            return 0.0, 0.0
         if not (skip_deaf and math.isinf(sensors[k].steady_m)):
             counts, then = sensors[k].counts, sensors[i].run_neighbours[side]
             changes = min(changes, float(counts.changes - then.changes))
             leaps = min(leaps, float(counts.leaps - then.leaps))
-            near_echoes = min(near_echoes, float(counts.near_echoes - then.near_echoes))
     if not math.isfinite(changes):
-        return 0.0, 0.0, 0.0
-    return changes, leaps, near_echoes
+        return 0.0, 0.0
+    return changes, leaps
 
 
 @kernel
@@ -187,34 +183,12 @@ def is_stuck(
     approach = along * math.cos(half_angle) - across * math.sin(half_angle)
     stuck = False
     if approach >= APPROACH_MIN_M and c.run_length >= EQUAL_READINGS_MIN:
-        changes, _, _ = neighbour_counts(i, neighbours, sensors, True)  # noqa: FBT003 - kernels take no keywords
+        changes, _ = neighbour_counts(i, neighbours, sensors, True)  # noqa: FBT003 - kernels take no keywords
         stuck = changes >= NEIGHBOUR_CHANGES_MIN
     if not stuck and math.hypot(dx, dy) >= PASSED_MIN_M and c.run_length >= PASSED_READINGS_MIN:
-        changes, leaps, _ = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003 - kernels take no keywords
+        changes, leaps = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003 - kernels take no keywords
         stuck = leaps >= NEIGHBOUR_CHANGES_MIN or changes >= PASSED_CHANGES_MIN
     return bool(stuck and others_changed(i, sensors))
-
-
-@kernel
-def is_silent(i: int, x: float, y: float, neighbours: Ints, sensors: Records[SensorMemory]) -> bool:
-    """Return whether a healthy sensor would have heard an echo by now.
-
-    Parameters
-    ----------
-    i : int
-        Index of the sensor.
-    x, y : float
-        Place of the ring now, in the odometry's frame, m.
-    neighbours : (n, 2) int
-        Indices of each sensor's left and right neighbour; −1 for both without two.
-    sensors : (n,) records
-        What is remembered of each sensor.
-    """
-    c = sensors[i]
-    if math.hypot(x - c.run_x, y - c.run_y) < SILENT_MIN_M or c.run_length < PASSED_READINGS_MIN:
-        return False
-    _, _, near_echoes = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003 - kernels take no keywords
-    return bool(near_echoes >= NEAR_ECHO_SHARE * c.run_length)
 
 
 @kernel
@@ -222,7 +196,7 @@ def update_run_faults(
     i: int, r: float, x: float, y: float, axis: float, half_angle: float, tolerance: float, neighbours: Ints,
     sensors: Records[SensorMemory],
 ) -> None:  # fmt: skip
-    """Set or clear sensor `i`'s faults `STUCK` and `SILENT` from its run of equal readings.
+    """Set or clear sensor `i`'s fault `STUCK` from its run of equal readings.
 
     Parameters
     ----------
@@ -240,13 +214,9 @@ def update_run_faults(
         c.off_stuck = 0 if abs(r - c.stuck_m) <= tolerance else c.off_stuck + 1
         if c.off_stuck >= RECOVERY_READINGS:
             c.faults &= ~STUCK
-    elif math.isfinite(r):
-        c.faults &= ~SILENT
-        if is_stuck(i, x, y, axis, half_angle, neighbours, sensors):
-            c.faults |= STUCK
-            c.stuck_m, c.off_stuck = c.run_m, 0
-    elif is_silent(i, x, y, neighbours, sensors):
-        c.faults |= SILENT
+    elif math.isfinite(r) and is_stuck(i, x, y, axis, half_angle, neighbours, sensors):
+        c.faults |= STUCK
+        c.stuck_m, c.off_stuck = c.run_m, 0
 
 
 @kernel
@@ -292,7 +262,7 @@ def check_firing(
     least : float
         Ranges below this cannot be measured, m.
     near : float
-        Echoes nearer than this are near, m.
+        What is farther away is not compared between sensors, m.
     sensors : (n,) records
         What is remembered of each sensor. Updated.
     ring : (1,) record
@@ -330,8 +300,6 @@ def check_firing(
         c.missed = 0
         c.faults &= ~FAILING
         count_changes(c, r, tolerance)
-        if r < near:
-            c.counts.near_echoes += 1
         if c.run_length == 0 or not (r == c.run_m or abs(r - c.run_m) <= tolerance):
             c.run_firing = ring[0].firings
             begin_run(i, r, x, y, own_yaw, neighbours, sensors)
@@ -341,7 +309,13 @@ def check_firing(
             begin_run(i, c.run_m, x, y, own_yaw, neighbours, sensors)
         else:
             c.run_length += 1
-        update_run_faults(i, r, x, y, own_yaw + mounts[i, 2], half_angle, tolerance, neighbours, sensors)
+        axis = own_yaw + mounts[i, 2]
+        update_run_faults(i, r, x, y, axis, half_angle, tolerance, neighbours, sensors)
+        cos, sin = math.cos(own_yaw), math.sin(own_yaw)
+        own_x, own_y = x + cos * mounts[i, 0] - sin * mounts[i, 1], y + sin * mounts[i, 0] + cos * mounts[i, 1]
+        c.faults &= ~SILENT
+        if weigh_silence(i, r, own_x, own_y, axis, half_angle, near, sensors, ring):
+            c.faults |= SILENT
         if ring[0].regularity >= REGULARITY_MIN:
             count_short_readings(c, r, fired_set)
             if is_doubtful(c, r, x, y, fired_set):

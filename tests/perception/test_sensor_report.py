@@ -12,7 +12,11 @@ from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
     [
         (FAILING, "failing", "sensor 7 never answers when it should fire"),
         (STUCK, "stuck", "sensor 7 always answers 1.25 m although the base has moved on"),
-        (SILENT, "silent", "sensor 7 hears nothing where both its neighbours hear echoes"),
+        (
+            SILENT,
+            "silent",
+            "they miss 20% of such looks, so the odds are 10^10 to 1",
+        ),
         (CROSSTALK, "crosstalk", "sensor 7 reads short when it fires together with 3, 11 and not otherwise"),
         (FAILING | STUCK | SILENT | CROSSTALK, "failing", "check its cable and its board"),
         (STUCK | SILENT | CROSSTALK, "stuck", "look for something that hangs in front of it"),
@@ -22,7 +26,7 @@ from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
     ],
 )
 def test_the_most_severe_fault_is_described(faults: int, name: str, text: str) -> None:
-    report = describe_fault(7, faults, 1.25, [3, 11])
+    report = describe_fault(7, faults, 1.25, [3, 11], 15, 0.2)
     assert (report.sensor, report.fault) == (7, name)
     assert text in report.reason
     assert "\n" not in report.reason

@@ -10,7 +10,7 @@ import pytest
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
 from perception.sensor_memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, SensorMemory
-from perception.sensor_report import FAILING, SILENT, STUCK, TOO_NEAR
+from perception.sensor_report import FAILING, STUCK, TOO_NEAR
 from perception.sensor_tests import (
     EQUAL_READINGS_MIN,
     FAULTS_CHANGED,
@@ -23,7 +23,6 @@ from perception.sensor_tests import (
     RECOVERY_READINGS,
     begin_run,
     check_firing,
-    is_silent,
     is_stuck,
     neighbour_counts,
     others_changed,
@@ -45,14 +44,13 @@ def ring() -> Records[RingMemory]:
     return records(RingMemory, zeros(RingMemory, 1))
 
 
-def run_of(memory: Records[SensorMemory], length: int, changes: int, leaps: int, near: int = 0) -> None:
+def run_of(memory: Records[SensorMemory], length: int, changes: int, leaps: int) -> None:
     """Sensor 0 repeats a reading while both neighbours change theirs."""
     begin_run(0, 2.0, 0.0, 0.0, 0.0, NEIGHBOURS, memory)
     memory[0].run_length = length
     for k in (1, 3):
         memory[k].counts.changes += changes
         memory[k].counts.leaps += leaps
-        memory[k].counts.near_echoes += near
     for k in range(1, COUNT):
         memory[k].readings, memory[k].last_m, memory[k].run_firing = 1, 1.0, 1
 
@@ -60,14 +58,14 @@ def run_of(memory: Records[SensorMemory], length: int, changes: int, leaps: int,
 def test_neighbours_are_counted_from_the_beginning_of_the_run() -> None:
     memory = sensors()
     memory[1].counts.changes = memory[3].counts.changes = 100
-    run_of(memory, 5, changes=3, leaps=2, near=1)
+    run_of(memory, 5, changes=3, leaps=2)
     memory[3].counts.leaps += 5
-    assert neighbour_counts(0, NEIGHBOURS, memory, False) == (3.0, 2.0, 1.0)  # noqa: FBT003 - kernels take no keywords
-    assert neighbour_counts(0, ALONE, memory, False) == (0.0, 0.0, 0.0)  # noqa: FBT003
+    assert neighbour_counts(0, NEIGHBOURS, memory, False) == (3.0, 2.0)  # noqa: FBT003 - kernels take no keywords
+    assert neighbour_counts(0, ALONE, memory, False) == (0.0, 0.0)  # noqa: FBT003
     memory[1].steady_m = math.inf
-    assert neighbour_counts(0, NEIGHBOURS, memory, True) == (3.0, 7.0, 1.0), "the deaf one is left out"  # noqa: FBT003
+    assert neighbour_counts(0, NEIGHBOURS, memory, True) == (3.0, 7.0), "the deaf one is left out"  # noqa: FBT003
     memory[3].steady_m = math.inf
-    assert neighbour_counts(0, NEIGHBOURS, memory, True) == (0.0, 0.0, 0.0)  # noqa: FBT003
+    assert neighbour_counts(0, NEIGHBOURS, memory, True) == (0.0, 0.0)  # noqa: FBT003
 
 
 def test_most_others_must_have_changed() -> None:
@@ -104,31 +102,14 @@ def test_stuck_needs_a_way_equal_readings_and_neighbours_that_change(
     assert not is_stuck(0, x, y, 0.0, HALF, NEIGHBOURS, memory), "the whole ring reads the same: at rest"
 
 
-@pytest.mark.parametrize(
-    ("x", "length", "near", "silent"),
-    [(5.1, 40, 20, True), (4.9, 40, 20, False), (5.1, 39, 20, False), (5.1, 40, 19, False)],
-)
-def test_silent_needs_a_way_and_near_echoes_of_both_neighbours(
-    x: float, length: int, near: int, silent: bool
-) -> None:
+def test_a_stuck_sensor_recovers_after_several_other_readings() -> None:
     memory = sensors()
-    run_of(memory, length, 0, 0, near)
-    assert is_silent(0, x, 0.0, NEIGHBOURS, memory) == silent
-
-
-def test_a_stuck_sensor_recovers_after_several_other_readings_and_a_silent_one_at_its_first_echo() -> None:
-    memory = sensors()
-    run_of(memory, PASSED_READINGS_MIN, 20, 20, 40)
+    run_of(memory, PASSED_READINGS_MIN, 20, 20)
     update_run_faults(0, 2.0, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
     assert memory[0].faults == STUCK
     for k in range(RECOVERY_READINGS):
         assert memory[0].faults == STUCK
         update_run_faults(0, 3.0 + k, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
-    assert memory[0].faults == 0
-    update_run_faults(0, math.inf, 6.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
-    assert memory[0].faults == SILENT
-    memory[0].run_length = 1
-    update_run_faults(0, 3.0, 6.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
     assert memory[0].faults == 0
 
 
