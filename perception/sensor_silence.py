@@ -25,7 +25,7 @@ PRIOR_MISSES: Final = 3.0
 PRIOR_LOOKS: Final = 10.0
 """Looks, and misses among them, that stand for what is known of healthy sensors before a run."""
 MISS_MIN: Final = 0.2
-"""A healthy sensor misses no less than this: the looks at one thing are alike."""
+"""A healthy sensor misses no less than this: the looks at one object are alike."""
 APART_M: Final = 0.1
 """A look that is nearer than this to the one before, and turned by less than a quarter of the beam, is not kept."""
 AGAIN_M: Final = 0.3

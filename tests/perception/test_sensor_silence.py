@@ -59,7 +59,7 @@ def test_a_place_is_audible_if_others_heard_it_from_both_sides(
 
 
 def turning(deaf: int | None, turns: int, echo_at: int | None = None) -> tuple[bool, Records[SensorMemory]]:
-    """Turn three sensors, 15° apart, round and round among things all around, and return whether sensor 0 is deaf."""
+    """Turn three sensors, 15° apart, among objects all around, and return whether sensor 0 is deaf."""
     (sensors, ring), is_deaf = memory(), False
     for k in range(turns * 24):
         for i in range(3):
@@ -78,7 +78,7 @@ def test_what_others_heard_where_it_looks_names_a_deaf_sensor_and_an_echo_clears
     assert sensors[0].deaf_looks == 0
 
 
-def test_a_robot_that_stands_or_looks_out_between_two_things_says_nothing() -> None:
+def test_a_robot_that_stands_or_looks_out_between_two_objects_says_nothing() -> None:
     for swing_deg in (0.0, 5.0, 12.0):
         sensors, ring = memory()
         for k in range(2000):
