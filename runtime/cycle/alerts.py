@@ -1,4 +1,4 @@
-"""Alerts to the operator about sensors and odometry while the robot drives; each is sent once, at a bounded rate."""
+"""Alerts to the operator about sensors and odometry; each is sent once, at a bounded rate."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from perception.localization.drift_correction import Status
 from perception.localization.known_room import KnownRoom
 from perception.pipeline import Perception
 from perception.sensor_report import SensorReport
+from runtime.cycle.step import State
 
 LINES_PER_S: Final = 1.0
 LINES_BURST: Final = 60.0
@@ -26,21 +27,26 @@ class Alerts:
         self._reported: dict[int, SensorReport] = {}
         self._place: tuple[Status, int, int] = ("localizing", 0, 0)
         """Of the known room: status, places refuted, rivals."""
+        self._ring_problems: set[str] = set()
 
-    def update(self, received: Received, perception: Perception, run_s: float) -> list[str]:
+    def update(self, received: Received, state: State, run_s: float) -> list[str]:
         """Return a line for each new fact: what happened, likely cause, next action.
 
         Parameters
         ----------
         received : Received
             From the robot in this cycle.
-        perception : Perception
+        state : State
             After the cycle.
         run_s : float
             The cycle's beginning; a robot that causes too many lines has the excess counted in the next one.
         """
         lines = []
-        for line in self._new_facts(received, perception):
+        facts = self._new_facts(received, state.perception)
+        if (problem := state.ring_problem) is not None and state.mode.reason != problem:
+            facts += [] if problem in self._ring_problems else [f"while the robot does not drive: {problem}"]
+            self._ring_problems.add(problem)
+        for line in facts:
             left_out = self._limit.take(run_s)
             if left_out is not None:
                 lines.append(f"{line} ({left_out} such lines were left out before)" if left_out else line)
@@ -52,7 +58,7 @@ class Alerts:
             return lines
         self._changes = perception.sensor_monitor.changes
         now = {report.sensor: report for report in perception.sensor_reports()}
-        lines += [report.reason for sensor, report in now.items() if self._reported.get(sensor) != report]
+        lines += [report.reason for sensor, report in now.items() if self._is_new(report)]
         lines += [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
         self._reported = now
         return lines
@@ -85,6 +91,11 @@ class Alerts:
                 "where the robot is"
             )
         return lines
+
+    def _is_new(self, report: SensorReport) -> bool:
+        """Return whether a sensor's fault is another one than before; the figures in its reason may change."""
+        before = self._reported.get(report.sensor)
+        return before is None or before.fault != report.fault
 
     def _new_waiting(self, perception: Perception) -> list[str]:
         before, self._waiting = self._waiting, perception.counts.waiting

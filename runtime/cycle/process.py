@@ -323,7 +323,7 @@ class RobotProcess:
         if self._state.mode.entered_since(before):
             self._mode_log.entered(self._state, record.inputs.run_s)
         self._line_log.observe(record, self._driver, self._budget.flood(record.inputs.run_s))
-        for line in self._alerts.update(received, self._state.perception, record.inputs.run_s):
+        for line in self._alerts.update(received, self._state, record.inputs.run_s):
             self._log.warning(line)
         if on_firing is not None:
             for firing in received.firings:

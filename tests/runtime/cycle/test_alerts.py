@@ -37,9 +37,13 @@ def report(sensor: int, fault: str) -> SensorReport:
     return SensorReport(sensor=sensor, fault=fault, reason=f"sensor {sensor} is {fault}")  # type: ignore[arg-type]
 
 
+def state(perception: StubPerception, ring_problem: str | None = None, reason: str | None = None) -> Any:
+    return SimpleNamespace(perception=perception, ring_problem=ring_problem, mode=SimpleNamespace(reason=reason))
+
+
 def test_each_fact_is_reported_once() -> None:
     alerts, perception = Alerts(), StubPerception()
-    seen: Any = perception
+    seen = state(perception)
     assert alerts.update(NOTHING, seen, 0.0) == []
     perception.report(report(7, "failing"))
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 7 is failing"]
@@ -54,7 +58,7 @@ def test_each_fact_is_reported_once() -> None:
 
 def test_objects_without_room_are_reported_once() -> None:
     alerts, perception = Alerts(), StubPerception()
-    seen: Any = perception
+    seen = state(perception)
     perception.counts = MapCounts(9, 9, 9, archived=70, waiting=4)
     (line,) = alerts.update(NOTHING, seen, 0.0)
     assert line.startswith("4 objects near the robot have no room")
@@ -66,16 +70,34 @@ def test_objects_without_room_are_reported_once() -> None:
     assert len(alerts.update(NOTHING, seen, 0.3)) == 1, "again, after all had found room"
 
 
+def test_the_figures_in_a_report_may_change() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    for looks in (12, 13):
+        perception.report(SensorReport(3, "silent", f"sensor 3 has heard nothing in {looks} looks"))
+        lines = alerts.update(NOTHING, state(perception), 0.0)
+        assert lines == (["sensor 3 has heard nothing in 12 looks"] if looks == 12 else [])
+
+
+def test_a_problem_of_the_ring_that_stops_no_drive_is_a_line() -> None:
+    """While the robot is pushed, say; what stops a drive is the reason of that stop."""
+    alerts, perception, why = Alerts(), StubPerception(), "the ring repeats old readings"
+    assert alerts.update(NOTHING, state(perception, why, reason=why), 0.0) == []
+    lines = alerts.update(NOTHING, state(perception, why, reason="not armed"), 1.0)
+    assert lines == [f"while the robot does not drive: {why}"]
+    assert alerts.update(NOTHING, state(perception, why, reason="not armed"), 2.0) == []
+    assert alerts.update(NOTHING, state(perception), 3.0) == []
+
+
 def test_notes_of_the_driver_are_passed_on() -> None:
-    perception: Any = StubPerception()
+    perception = StubPerception()
     received = Received((), None, rebooted=False, notes=("the odometry jumped by 0.30 m",))
-    assert Alerts().update(received, perception, 0.0) == ["the odometry jumped by 0.30 m"]
+    assert Alerts().update(received, state(perception), 0.0) == ["the odometry jumped by 0.30 m"]
 
 
 def test_a_robot_that_causes_line_after_line_has_the_excess_counted() -> None:
     alerts, perception = Alerts(), StubPerception()
     received = Received((), None, rebooted=False, notes=("it jumped",) * 16)
-    seen: Any = perception
+    seen = state(perception)
     lines = [line for k in range(2000) for line in alerts.update(received, seen, 0.05 * k)]
     assert len(lines) <= LINES_BURST + LINES_PER_S * 100.0
     left_out = sum(
@@ -86,7 +108,7 @@ def test_a_robot_that_causes_line_after_line_has_the_excess_counted() -> None:
 
 def test_what_is_new_of_the_place_in_a_known_room_is_reported_once() -> None:
     alerts, perception = Alerts(), StubPerception()
-    seen: Any = perception
+    seen = state(perception)
     here = SimpleNamespace(pose=Pose(1.0, 2.0, 0.0))
     perception.known_room = SimpleNamespace(status="localizing", refuted=0, rivals=0, localized=lambda: here)
     assert alerts.update(NOTHING, seen, 0.0) == []

@@ -181,7 +181,7 @@ def test_a_robot_with_broken_sensors_drives_on_and_says_which(measured: Callable
     run, alerts, lines = hallway(0, *faults), Alerts(), list[str]()
     while run.run_s < UNTIL_S:
         record = run.cycle()
-        lines += alerts.update(record.inputs.received, run.state.perception, run.run_s)
+        lines += alerts.update(record.inputs.received, run.state, run.run_s)
     assert {r.sensor: r.fault for r in run.state.perception.sensor_reports()} == {5: "stuck", 7: "failing"}
     assert len(lines) == 2
     assert "sensor 7 never answers when it should fire" in lines[0]
