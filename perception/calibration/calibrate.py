@@ -107,7 +107,7 @@ def calibrate(
     radii
         Measured radius of each round object, m.
     way_m
-        Measured distance from the first to the last pose, m; without it, the odometry's distance is taken as true.
+        Measured distance from the first to the last pose, m; without it, a round object's radius alone shows lengths.
     synchro
         The ring does not turn with the wheels.
     """
@@ -125,7 +125,9 @@ def calibrate(
         beam_fit = fit_beams(_looks(drive, fit, nominal[:, 2], synchro=synchro), len(nominal))
         angles = nominal[:, 2] + beam_fit.turns
         inside = beam_fit.half_angle
-    return _shown(fit, beam_fit, nominal, half_angle, has_way=way_m is not None)
+    # A bearing is as wrong as the sensor's place is, seen from what it hears.
+    turn_sigmas = np.hypot(beam_fit.sigmas, fit.mount_sigmas_m / np.median(echoes.range_m))
+    return _shown(fit, beam_fit, turn_sigmas, nominal, half_angle)
 
 
 def _first_guess(
@@ -194,21 +196,20 @@ def _looks(drive: Drive, fit: GeometryFit, angles: Floats, *, synchro: bool) -> 
     return Looks(fired.sensor[look], turned[surface, look], d, radii[surface], read[look], fit.noise.sigmas(d))
 
 
-def _shown(fit: GeometryFit, beams: BeamFit, nominal: Floats, half_angle: float, *, has_way: bool) -> Calibration:
+def _shown(fit: GeometryFit, beams: BeamFit, turn_sigmas: Floats, nominal: Floats, half_angle: float) -> Calibration:
     """Return what the drive shows, with nominal values for what it does not show.
 
     The places of sensors in the ring follow from its turns: where the turn's scale is not shown, no place is.
     """
     geometry, sigmas = fit.geometry, fit.scale_sigmas
     is_shown = [sigma <= SCALE_SHOWN * PRIORS.scale for sigma in sigmas]
-    is_shown[0] = is_shown[0] and has_way
     has_place = (fit.mount_sigmas_m <= PLACE_SHOWN * PRIORS.mount_m) & (fit.readings > 0) & is_shown[1]
-    has_angle = has_place & np.isfinite(beams.sigmas)
+    has_angle = has_place & np.isfinite(turn_sigmas)
     mounts = nominal.copy()
     mounts[has_place, :2] = geometry.mounts[has_place]
     mounts[has_angle, 2] += beams.turns[has_angle]
     return Calibration(
-        mounts, np.where(has_place, fit.mount_sigmas_m, np.inf), np.where(has_angle, beams.sigmas, np.inf),
+        mounts, np.where(has_place, fit.mount_sigmas_m, np.inf), np.where(has_angle, turn_sigmas, np.inf),
         fit.readings, beams.half_angle if has_angle.any() else half_angle, beams.everything_echoes,
         Scales(*(value if shown else 1.0 for value, shown in zip(geometry.scales, is_shown, strict=True))),
         Scales(*(sigma if shown else math.inf for sigma, shown in zip(sigmas, is_shown, strict=True))),

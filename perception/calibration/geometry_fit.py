@@ -171,7 +171,7 @@ def fit_geometry(
     priors
         How well they are known.
     way_m
-        Measured distance from the first to the last pose, m; without it, the odometry's distance is taken as true.
+        Measured distance from the first to the last pose, m; without it, a round object's radius alone shows lengths.
     synchro
         The ring does not turn with the wheels.
 
@@ -184,7 +184,7 @@ def fit_geometry(
     prior[:3] = 1.0
     at = prior.copy()
     at[:3] = start.scales
-    sigma = _prior_sigmas(vector, start, priors, way_m is not None)
+    sigma = _prior_sigmas(vector, start, priors)
     range_sigma = np.full(len(echoes.sensor), GATES_M[0])
     information, chosen = np.zeros((len(at), len(at))), np.zeros(0, dtype=np.intp)
     for k in range(ROUNDS_MAX):
@@ -230,19 +230,20 @@ def fit_geometry(
     return GeometryFit(vector.unpack(at), Scales(*sigmas[:3].tolist()), np.array(greatest), readings, noise)
 
 
-def _prior_sigmas(vector: _Vector, start: Geometry, priors: Priors, measured: bool) -> Floats:
+def _prior_sigmas(vector: _Vector, start: Geometry, priors: Priors) -> Floats:
     drums = np.tile([10.0, 10.0, priors.radius_m], vector.drums)
     bend = priors.bend_rad_per_sqrt_m * math.sqrt(KNOT_M)
-    scales = [priors.scale if measured else 1e-6, priors.scale, priors.scale]
     return np.concatenate([
-        scales, np.full(2 * vector.walls, 10.0), drums, np.full(len(start.bends), bend),
+        [priors.scale] * 3, np.full(2 * vector.walls, 10.0), drums, np.full(len(start.bends), bend),
         np.full(2 * len(start.mounts), priors.mount_m),
     ])  # fmt: skip
 
 
 def _range_noise(ranges: Floats, misfits: Floats) -> RangeNoise:
     """Return the noise that misfits show: by the medians of the nearer and of the farther half of the readings."""
-    far = ranges > np.median(ranges)
+    far = ranges > np.median(ranges) if len(ranges) else np.zeros(0, dtype=np.bool_)
+    if not far.any():  # few readings, or all of one range: a robot that stands
+        return RangeNoise(max(RANGE_SIGMA_MIN_M, _spread(misfits)), 0.0)
     squares = [(float(np.mean(ranges[half] ** 2)), _spread(misfits[half]) ** 2) for half in (~far, far)]
     (near_m2, near), (far_m2, beyond) = squares
     share = math.sqrt(max(0.0, (beyond - near) / (far_m2 - near_m2))) if far_m2 > near_m2 else 0.0

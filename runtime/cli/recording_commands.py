@@ -318,7 +318,7 @@ def calibrate(
     out
         Robot file to write (TOML).
     way
-        Measured distance between both stands, m; without it, the odometry's distance is taken as true.
+        Measured distance between both stands, m; without it, a round object's radius alone shows lengths.
     drum
         Measured radius of a round object beside the way, m; may be repeated.
     force

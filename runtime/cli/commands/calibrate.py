@@ -57,8 +57,8 @@ def calibrate_robot(
     found = calibrate(firings, settings.ring, radii_m, way_m, synchro=settings.body.synchro)
     if found is None:
         raise UserError(
-            f"{file}: no surface was heard often enough from enough places; drive nearer to a wall and turn more "
-            "slowly",
+            f"{file}: no surface was heard often enough from enough places, so nothing was written; drive nearer to "
+            "a wall and turn more slowly",
             FAILED,
         )
     if not found.has_gain:
@@ -79,7 +79,7 @@ def calibrate_robot(
             which = "all sensors" if len(nominal) == len(sigmas) else f"sensors {', '.join(nominal)}"
             output.print(f"the {what} of {which} are not shown by this drive and stay as they were")
     if way_m is None:
-        output.print("the odometry's distance was taken as true: measure the way and give --way to find its scale")
+        output.print("without a measured way, lengths are known less well: measure it and give --way")
     output.print(f"{out}: robot file written; use it with: echolocate run --robot {out} --port DEVICE")
     return DONE
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,23 @@ def test_a_ring_log_of_a_drive_becomes_a_robot_file(
     assert "# Calibrated from drive.csv." in out.read_text("utf-8")
     assert run_command(call) == WRONG_CALL, "it exists: --force"
     assert "--force" in capsys.readouterr().err
+
+
+def test_a_drive_that_shows_nothing_writes_nothing(
+    drive: CalibrationDrive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A robot that stands learns nothing of itself, however long it listens."""
+    log, out, at = tmp_path / "stand.csv", tmp_path / "mine.toml", drive.firings[0].pose
+    firings = [
+        replace(f, pose=at, ring_yaw=at.theta, ranges_m=drive.firings[k % 4].ranges_m)
+        for k, f in enumerate(drive.firings[:150])
+    ]
+    write_ring_log(log, firings)
+    nominal = str(robot_file(tmp_path, drive))
+    call = ["calibrate", str(log), "--robot", nominal, "--out", str(out), "--drum", str(DRUM.radius_m)]
+    assert run_command(call) == FAILED
+    assert "nothing was written" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_calls_that_are_refused(hall_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
