@@ -229,6 +229,8 @@ def test_what_the_operator_says_is_confirmed_or_refuted(off: float) -> None:
 class Track:
     """Stands in for what is tracked, or for what a search found."""
 
+    rivals = 0
+
     def __init__(self, x: float, gained: float, explains: float, share: float) -> None:
         self._x, self._gained, self.explains, self.best = x, gained, explains, SimpleNamespace(share=share)
 
