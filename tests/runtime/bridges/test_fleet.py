@@ -58,7 +58,7 @@ def test_control_of_the_run_is_left_to_its_page() -> None:
     async def body(case: ConsoleCase, fleet: Fleet, _now_s: list[float]) -> None:
         await shows(case, fleet, "problem", "")
         hub = case.console.hub
-        await case.settled(lambda: not any(map(hub.control.is_held_by, hub.clients)), "control that is free")
+        await case.settled(lambda: not any(map(hub.control.is_held_by, hub.clients.values())), "control that is free")
         page = await case.connect()
         assert (await page.next("session"))["role"] == "control"
 
