@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig, RobotConfig
 from drivers.firing_pattern import firing_pattern, sensors
-from drivers.latched_ranges import RepeatDetector, RepeatFilter
+from drivers.latched_ranges import RepeatFilter
 from drivers.messages import CrossPaths, Firing, Floats, Pose
 from runtime.recording.conventions.headings import (
     NEAR_NAT,
@@ -21,14 +21,18 @@ from runtime.recording.conventions.headings import (
     sureness,
 )
 from runtime.recording.conventions.options import RingLogOptions
-from runtime.recording.conventions.silence import Silence, find_silence
+from runtime.recording.conventions.repeats import find_repeats
+from runtime.recording.conventions.silence import Silence, check_near, find_silence
 from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
-from runtime.recording.conventions.units import Units, find_units, way_ratios
+from runtime.recording.conventions.units import Units, check_scale, find_units, way_ratios
 from runtime.recording.ring_log import RingLogError
 
 MIRROR_M: Final = 0.02
 """How far a sensor's mirror image may lie from the sensor that takes its column, m and rad."""
 
+
+KERNEL: Final = 0.07
+"""Width of an echo's density, as a share of the median range, where units are compared."""
 
 _NO_SILENCE: Final = Silence()
 _SI: Final = Units()
@@ -60,6 +64,14 @@ class Conventions:
     def is_plain(self) -> bool:
         """Whether firings pass as they are."""
         return self.columns is None and (self.silence, self.units, self.angles) == (_NO_SILENCE, _SI, _RADIANS)
+
+    def is_same(self, other: Conventions) -> bool:
+        """Return whether both convert alike, up to the width of a noisy band of silence and the time of a cycle."""
+        one, two = self.silence, other.silence
+        is_alike = one.option == two.option and one.nan_is_silence == two.nan_is_silence
+        return is_alike and (self.units, self.angles) == (other.units, other.angles) and (
+            (self.cycle_s is None) == (other.cycle_s is None)
+        )  # fmt: skip
 
     def converted(self, firing: Firing) -> Firing:
         """Return a firing in metres, radians and seconds; repeats are still in it."""
@@ -107,18 +119,18 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if (ranges < 0.0).any():
         raise RingLogError(f"has ranges below 0, as {float(np.nanmin(ranges)):g}; correct them, or say --silence -1")
     table = table._replace(ranges=ranges if columns is None else ranges[:, columns])
-    period = 1 if options.latched == "no" else _repeats(table.ranges)
-    is_latched = options.latched == "yes" or period > 1
+    period = find_repeats(table, set_size) if options.latched == "auto" else 1.0
+    is_latched = options.latched == "yes" or period > 1.0
     if is_latched:
         table = table._replace(ranges=_without_repeats(table.ranges))
         if options.latched == "auto":
             said.append((
-                f"each value is repeated, for {period} rows mostly, until its sensor fires again: only changes are "
+                f"each value is repeated, for {period:g} rows mostly, until its sensor fires again: only changes are "
                 "readings", "--latched yes, or no if all are fresh",
             ))  # fmt: skip
     motion, is_related = motion_scores(table, options)
     likely = max(motion, key=motion.__getitem__)
-    units = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
+    units, scores = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
     given = (options.time_unit, options.length_unit, options.range_unit)
     if any(g == "auto" and u != plain for g, u, plain in zip(given, units, Units(), strict=True)):
         said.append((units.words, units.options))
@@ -129,6 +141,18 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     )
     if angles != asked:
         said.append((angles.words, angles.options))
+    if options.silence == "auto":
+        check_near(table.ranges, LENGTHS[units.range_], robot.ring.range_min_m)
+    if said and len(scores) > 1:
+        finite = table.ranges[np.isfinite(table.ranges)]
+        kernel = KERNEL * float(np.median(finite)) if len(finite) else 1.0
+
+        def echoes(one: Units) -> Floats:
+            reach = LENGTHS[one.range_]
+            found = echo_scores(table, robot, [angles], reach, LENGTHS[one.length] / reach, kernel * reach)
+            return found[angles]
+
+        check_scale(units, scores, echoes)
     cycle_s = None
     if is_latched:
         row_s = TIMES[units.time] * float(np.median(np.diff(table.t))) if len(table.t) > 1 else 0.0
@@ -154,13 +178,6 @@ def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
             "--sensor-order mirrored: this ring is not its own mirror image; name the robot's own file"
         )
     return columns
-
-
-def _repeats(ranges: Floats) -> int:
-    detector = RepeatDetector(ranges.shape[1])
-    for row in ranges:
-        detector.add(row)
-    return detector.period
 
 
 def _without_repeats(ranges: Floats) -> Floats:

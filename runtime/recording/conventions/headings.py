@@ -96,8 +96,9 @@ def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, f
 
 
 def echo_scores(
-    table: Table, robot: RobotConfig, choices: list[Angles], mounts_per_unit: float, length_per_range: float
-) -> dict[Angles, Floats]:
+    table: Table, robot: RobotConfig, choices: list[Angles], mounts_per_unit: float, length_per_range: float,
+    kernel_m: float = KERNEL_M,
+) -> dict[Angles, Floats]:  # fmt: skip
     """Return how well earlier echoes explain later ones under each convention, in blocks of time.
 
     Parameters
@@ -112,6 +113,8 @@ def echo_scores(
         The unit of the ranges, m.
     length_per_range : float
         The unit of positions over that of ranges.
+    kernel_m : float
+        Width of an echo's density.
     """
     rows, sensors = np.nonzero(np.isfinite(table.ranges))
     if len(rows) < 4 * BLOCKS:
@@ -131,7 +134,7 @@ def echo_scores(
         px = x + c * mounts[:, 0] - s * mounts[:, 1] + reach * np.cos(bearing)
         py = y + s * mounts[:, 0] + c * mounts[:, 1] + reach * np.sin(bearing)
         squared = (px[:, None] - px) ** 2 + (py[:, None] - py) ** 2
-        near = np.tril((1.0 + squared / KERNEL_M**2) ** -1.5, -1)
+        near = np.tril((1.0 + squared / kernel_m**2) ** -1.5, -1)
         density = near.sum(axis=1)[1:] / np.arange(1, len(px))
         tail = np.log(density + 1e-3)[len(px) // 10 :]
         scores[one] = np.array([block.mean() for block in np.array_split(tail, BLOCKS)])

@@ -13,11 +13,10 @@ import numpy as np
 from config.robot import RobotConfig
 from drivers.latched_ranges import RepeatFilter
 from drivers.messages import Firing, Pose, wrap_angle
-from runtime.recording.conventions.decision import decide
+from runtime.recording.conventions.decision import Conventions, decide
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError, read_ring_log
-from runtime.recording.ring_log_units import plausible_firings
 
 FIRST: Final = 20_000
 """Rows on which the decision rests: a quarter of an hour at the rate of most rings, 20 MB."""
@@ -49,15 +48,15 @@ def open_ring_log(
         The file cannot be read, is invalid, or its conventions are ambiguous; the text names the option to give.
     """
     options.check()
-    is_strict = options.silence in {"auto", "inf"}
-    rows = read_ring_log(path, sensors=len(robot.ring.mounts), is_strict=is_strict)
-    firings = rows if options == AUTO else converted_firings(rows, path, robot, options.settled(), warn)
-    yield from plausible_firings(firings, path, robot, warn)
+    rows = read_ring_log(path, sensors=len(robot.ring.mounts), is_strict=options.silence == "inf")
+    first = FIRST if path.is_file() else FIRST_OF_PIPE
+    yield from converted_firings(rows, path, robot, options, warn, first=first)
 
 
 def converted_firings(
-    rows: Iterable[Firing], path: Path, robot: RobotConfig, options: RingLogOptions, warn: Callable[[str], None]
-) -> Iterator[Firing]:
+    rows: Iterable[Firing], path: Path, robot: RobotConfig, options: RingLogOptions, warn: Callable[[str], None], *,
+    first: int = FIRST,
+) -> Iterator[Firing]:  # fmt: skip
     """Yield firings converted to the form's own conventions.
 
     Parameters
@@ -66,29 +65,58 @@ def converted_firings(
         As the file has them.
     path, robot, options, warn
         As of `open_ring_log`.
+    first : int
+        Rows on which the decision rests. It is made again at each doubling, until `FIRST`.
 
     Raises
     ------
     RingLogError
-        As of `open_ring_log`.
+        As of `open_ring_log`, or later rows contradict what the first ones showed.
     """
     rows = iter(rows)
-    first = list(itertools.islice(rows, FIRST if path.is_file() else FIRST_OF_PIPE))
-    if not first:
+    seen = list(itertools.islice(rows, first))
+    if not seen:
         return
-    try:
-        found = decide(_table(first), robot, options)
-    except RingLogError as error:
-        raise RingLogError(f"{path}: {error}; or name the robot file of the robot that recorded the log") from error
+    found = _decided(seen, path, robot, options)
     if found.said:
-        what = "; ".join(words for words, _ in found.said)
-        warn(f"{path}: {what}. To settle it: {'; '.join(option for _, option in found.said)}")
-    firings: Iterator[Firing] = (
-        one if found.is_plain else found.converted(one) for one in itertools.chain(first, rows)
-    )
+        warn(_found_words(path, found))
+    every = itertools.chain(seen, rows if first >= FIRST else _confirmed(rows, seen, found, path, robot, options))
+    firings: Iterator[Firing] = (one if found.is_plain else found.converted(one) for one in every)
     if found.cycle_s is not None:
         firings = _changes(firings, len(robot.ring.mounts), found.cycle_s)
     yield from _checked(firings, path)
+
+
+def _decided(seen: list[Firing], path: Path, robot: RobotConfig, options: RingLogOptions) -> Conventions:
+    try:
+        return decide(_table(seen), robot, options)
+    except RingLogError as error:
+        raise RingLogError(f"{path}: {error}; or name the robot file of the robot that recorded the log") from error
+
+
+def _found_words(path: Path, found: Conventions) -> str:
+    what = "; ".join(words for words, _ in found.said)
+    return f"{path}: {what}. To settle it: {'; '.join(option for _, option in found.said)}"
+
+
+def _confirmed(
+    rows: Iterator[Firing], first: list[Firing], found: Conventions, path: Path, robot: RobotConfig,
+    options: RingLogOptions,
+) -> Iterator[Firing]:  # fmt: skip
+    """Yield later rows; raise an error if the rows until then show other conventions than the first ones."""
+    seen, due = list(first), 2 * len(first)
+    for row in rows:
+        if len(seen) < FIRST:
+            seen.append(row)
+            if len(seen) == due:
+                due *= 2
+                later = _decided(seen, path, robot, options)
+                if not later.is_same(found):
+                    raise RingLogError(
+                        f"{_found_words(path, later)}. The first {len(first)} rows did not show it: "
+                        "give the options, or the file instead of a pipe"
+                    )
+        yield row
 
 
 def _changes(firings: Iterable[Firing], sensors: int, cycle_s: float) -> Iterator[Firing]:

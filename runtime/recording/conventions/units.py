@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from config.robot import RobotConfig
 from drivers.messages import Floats
+from runtime.recording.conventions.headings import sureness
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.silence import Silence
 from runtime.recording.conventions.table import ANGLES, LENGTHS, TIMES, Table
@@ -27,6 +29,10 @@ APART_NAT: Final = 4.0
 """By how much the second best units must be less likely than the best."""
 METRES_NAT: Final = 6.0
 """Odds on positions and ranges in metres, as most logs have them, where t is in another unit."""
+RIVAL_NAT: Final = 20.0
+"""Units less likely by this are left out."""
+WORSE: Final = 3.0
+"""Standard errors from which echoes refute units that are too small."""
 IMPOSSIBLE_NAT: Final = -60.0
 PERIOD_LN, SPEED_LN, REACH_LN = 1.5, 1.0, 0.8
 """Spreads of the logarithms of the row's period, the speed and the farthest echo, over the robot's."""
@@ -62,8 +68,8 @@ class Units(NamedTuple):
 
 def find_units(
     table: Table, silence: Silence, robot: RobotConfig, options: RingLogOptions, angle: str, ratios: Floats
-) -> Units:
-    """Return the units of times, positions and ranges.
+) -> tuple[Units, dict[Units, float]]:
+    """Return the units of times, positions and ranges, and the log-likelihood of each combination.
 
     Parameters
     ----------
@@ -93,14 +99,14 @@ def find_units(
         )
     ]  # fmt: skip
     if len(choices) == 1:
-        return choices[0]
+        return choices[0], {choices[0]: 0.0}
     facts = _Facts.of(table, silence, angle)
     scores = {units: _score(units, facts, robot, ratios) for units in choices}
     best = max(scores, key=scores.__getitem__)
     default = Units(*(given if given != "auto" else plain for given, plain in zip(
         (options.time_unit, options.length_unit, options.range_unit), Units(), strict=True)))  # fmt: skip
     if scores[default] > scores[best] - SURE_NAT:
-        return default
+        return default, scores
     if _contradictions(best, facts, robot):
         raise RingLogError(_impossible(facts, robot))
     rivals = [units for units in choices if units != best and scores[units] > scores[best] - APART_NAT]
@@ -108,7 +114,43 @@ def find_units(
     if rivals:
         names = " or ".join(f"{units.words} ({units.options})" for units in [best, *rivals[:2]])
         raise RingLogError(f"cannot be in metres and seconds ({_impossible(facts, robot)}); it may have {names}")
-    return best
+    return best, scores
+
+
+def check_scale(units: Units, scores: dict[Units, float], echoes: Callable[[Units], Floats]) -> None:
+    """Raise an error unless the echoes and what the robot can do leave one combination of units.
+
+    The place of the sensors on the robot is known in metres. In units that are too small it is too large in the
+    file's numbers, and echoes of one surface fall apart as the robot turns. Units that are too large only blur them.
+
+    Parameters
+    ----------
+    units : Units
+        The combination to confirm.
+    scores : dict
+        Of `find_units`.
+    echoes : callable
+        Returns how well earlier echoes explain later ones under units, in blocks of time.
+
+    Raises
+    ------
+    RingLogError
+        Others are as likely; the text names the options.
+    """
+    plain = {one: score - METRES_NAT * (one.length == one.range_ == "m") for one, score in scores.items()}
+    near = [one for one, score in plain.items() if score > plain[units] - RIVAL_NAT or one == units]
+    found = {(one.length, one.range_): echoes(one) for one in near}
+    for one in near:
+        reach = LENGTHS[one.range_]
+        larger = [blocks for (_, range_), blocks in found.items() if LENGTHS[range_] > reach]
+        worse = max((sureness(blocks, found[one.length, one.range_]) for blocks in larger), default=0.0)
+        if worse > WORSE:
+            plain[one] -= min(0.5 * worse**2, RIVAL_NAT)
+    rivals = [one for one in near if one[1:] != units[1:] and plain[one] > plain[units] - APART_NAT]
+    if rivals:
+        rivals.sort(key=plain.__getitem__, reverse=True)
+        names = " or ".join(f"{one.words} ({one.options})" for one in [units, *rivals[:2]])
+        raise RingLogError(f"is in other conventions than a ring log's, and its units are open: it may have {names}")
 
 
 def _choice(given: str, known: object) -> list[str]:

@@ -185,8 +185,16 @@ def written(drive: Drive, how: Convention, rng: np.random.Generator, path: Path)
     if how.heading == "north-ccw":
         theta, yaw = theta - 0.5 * math.pi, yaw - 0.5 * math.pi
     if how.heading == "sensors-cw":
-        bearings = np.array([m.angle_rad for m in drive.settings.ring.mounts])
-        mirror = [int(np.argmin(np.abs(np.angle(np.exp(1j * (bearings + b)))))) for b in bearings]
+        mounts = [(m.x_m, m.y_m, m.angle_rad) for m in drive.settings.ring.mounts]
+        mirror = [
+            min(
+                range(len(mounts)),
+                key=lambda k: math.hypot(
+                    mounts[k][0] - x_m, mounts[k][1] + y_m, abs(math.remainder(mounts[k][2] + angle, math.tau))
+                ),
+            )
+            for x_m, y_m, angle in mounts
+        ]
         ranges = ranges[:, mirror]
     if how.wrapped != "no":
         low = 0.0 if how.wrapped == "positive" else -math.pi

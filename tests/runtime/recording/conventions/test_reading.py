@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,13 +15,14 @@ from config.load import load_settings
 from drivers.messages import Firing
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.reading import open_ring_log
-from runtime.recording.ring_log import read_ring_log
+from runtime.recording.ring_log import RingLogError, read_ring_log
 from runtime.recording.ring_log_replay import replay_firings
 from tests.recordings import DATA, recording
 from tests.runtime.recording.conventions.tables import (
     MODELS,
     ROBOTS,
     WORLDS,
+    Case,
     Convention,
     Drive,
     draw,
@@ -66,7 +69,48 @@ def check_right(got: list[Firing], drive: Drive, how: Convention) -> None:
         assert np.array_equal(np.isnan(ranges), np.isnan(want.ranges))
 
 
-@pytest.mark.parametrize("seed", range(8))
+def check_named(refusal: str, right: RingLogOptions) -> None:
+    """Fail unless a refusal names the right value of each option that it names."""
+    values = {f"--{name.replace('_', '-')}": value for name, value in vars(right).items()}
+    if right.sensor_order == "mirrored":
+        values.pop("--heading")
+    else:
+        values.pop("--sensor-order")
+    named = {option: value for option, value in values.items() if f"{option} " in refusal}
+    assert named
+    assert all(re.search(f"{option} {re.escape(value)}\\b", refusal) for option, value in named.items()), refusal
+
+
+def try_case(case: Case, path: Path) -> str:
+    """Return what became of a table: right, or the option that its refusal names; fail if it is neither."""
+    drive = make_drive(case.seed, case.robot, case.world, case.model)
+    written(drive, case.how, np.random.default_rng(case.seed), path)
+    outcome = "right"
+    refusal = ""
+    try:
+        got = list(open_ring_log(path, drive.settings))
+    except RingLogError as error:
+        refusal = str(error)
+    if refusal:
+        outcome = "refused"
+        check_named(refusal, right_options(case.how))
+        got = list(open_ring_log(path, drive.settings, right_options(case.how)))
+    check_right(got, drive, case.how)
+    return outcome
+
+
+@pytest.mark.parametrize("seed", range(1000, 1016))
+def test_a_table_in_any_convention_is_right_or_refused_with_the_option(seed: int, tmp_path: Path) -> None:
+    try_case(draw(seed), tmp_path / "table.csv")
+
+
+@pytest.mark.soak
+def test_many_tables_in_any_convention(tmp_path: Path) -> None:
+    outcomes = Counter(try_case(draw(seed), tmp_path / "table.csv") for seed in range(2000, 2200))
+    assert outcomes["right"] > 100
+
+
+@pytest.mark.parametrize("seed", range(4))
 def test_a_table_of_which_all_is_said_gives_its_drive(seed: int, tmp_path: Path) -> None:
     case = draw(seed)
     drive = make_drive(case.seed, case.robot, case.world, case.model)
