@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
+from drivers.firing_pattern import firing_pattern
 from drivers.messages import Firing
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.reading import open_ring_log
@@ -21,6 +22,7 @@ from tests.recordings import DATA, recording
 from tests.runtime.recording.conventions.tables import (
     MODELS,
     ROBOTS,
+    ROW_S,
     WORLDS,
     Case,
     Convention,
@@ -51,11 +53,13 @@ def check_right(got: list[Firing], drive: Drive, how: Convention) -> None:
     want = latched(drive) if how.latched else drive
     poses = np.array([(f.pose.x, f.pose.y, f.pose.theta, f.ring_yaw) for f in got])
     true = want.pose
-    if how.latched:  # fired since the row before
-        back = np.angle(np.exp(1j * (true[:-1, 2:] - true[1:, 2:])))
+    if how.latched:  # fired since the row before: half way to the first of its firings
+        masks, step_s = firing_pattern(drive.settings.ring).masks, drive.settings.ring.firing.step_period_s
+        back = 0.5 * max(0.0, min(ROW_S, len(masks) * step_s) - step_s) / ROW_S
+        moved = np.diff(want.pose, axis=0)
+        moved[:, 2:] = np.angle(np.exp(1j * moved[:, 2:]))
         true = true.copy()
-        true[1:, 2:] += 0.5 * back
-        true[1:, :2] = 0.5 * (want.pose[1:, :2] + want.pose[:-1, :2])
+        true[1:] -= back * moved
     assert np.abs(poses[:, :2] - true[:, :2]).max() < 0.01
     assert np.abs(np.angle(np.exp(1j * (poses[:, 2:] - true[:, 2:])))).max() < 0.01
     assert np.abs(np.array([f.robot_s for f in got]) - want.t).max() < 0.01
