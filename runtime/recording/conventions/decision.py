@@ -206,7 +206,8 @@ def _find_angles(
         return next(iter(motion))
     default = next(one for one in motion)  # ccw and rad come first, or what is given
     most = max(motion.values())
-    near = [one for one in motion if not is_related or motion[one] > most - NEAR_NAT]
+    # Without motion the unit stays: angles in another one hardly turn the ring, and then even noise agrees.
+    near = [one for one in motion if (motion[one] > most - NEAR_NAT if is_related else one.unit == default.unit)]
     reach, length = LENGTHS[units.range_], LENGTHS[units.length]
     echoes = echo_scores(table, robot, list(dict.fromkeys([default, *near])), reach, length / reach)
     clearest = max(echoes, key=lambda one: float(echoes[one].mean()))

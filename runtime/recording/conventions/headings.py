@@ -25,6 +25,8 @@ SPREAD_RAD: Final = 0.15
 """Spread of a step's direction about the heading: slip, and the bend of a step."""
 NEAR_NAT: Final = 20.0
 """Conventions whose motion is less likely by this are left to the ranges only if they are the form's own."""
+LEAP: Final = 10.0
+"""A step longer than the median one by this counts as one of this length: odometry leaps."""
 RELATED_NAT: Final = 0.5
 """Gain a step over random directions, from which the motion is along the heading at all. A robot that drives sideways
 as often as forward has none."""
@@ -72,9 +74,11 @@ def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, f
     units = list(ANGLES) if options.angle_unit == "auto" else [options.angle_unit]
     choices = [Angles(heading, unit) for heading in headings for unit in units]
     x, y, theta = table.pose[:, 0], table.pose[:, 1], table.pose[:, 2]
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    if way[-1] <= 0.0:
+    steps = np.hypot(np.diff(x), np.diff(y))
+    if not steps.any():
         return dict.fromkeys(choices, 0.0), False
+    steps = np.minimum(steps, LEAP * np.median(steps[steps > 0.0]))
+    way = np.concatenate([[0.0], np.cumsum(steps)])
     a = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], STEPS, endpoint=False)))
     a, b = a[:-1], a[1:]
     dx, dy = x[b] - x[a], y[b] - y[a]

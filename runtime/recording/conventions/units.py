@@ -105,6 +105,8 @@ def find_units(
     best = max(scores, key=scores.__getitem__)
     default = Units(*(given if given != "auto" else plain for given, plain in zip(
         (options.time_unit, options.length_unit, options.range_unit), Units(), strict=True)))  # fmt: skip
+    if options.angle_unit == "auto" and facts.rate > TURNS_FAST * robot.body.turn_max_rad_s * TIMES[best.time]:
+        raise RingLogError(f"{_impossible(facts, robot)}: say --angle-unit deg if it is in degrees")
     if scores[default] > scores[best] - SURE_NAT:
         return default, scores
     if _contradictions(best, facts, robot):

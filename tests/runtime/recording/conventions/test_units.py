@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from config.load import load_settings
+from drivers.messages import Firing, Pose
+from runtime.recording.conventions.options import AUTO
+from runtime.recording.conventions.reading import converted_firings
 from runtime.recording.conventions.table import LENGTHS, TIMES, Table
 from runtime.recording.conventions.units import Units, way_ratios
+from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import Drive, make_drive
 
 
@@ -30,3 +40,99 @@ def test_ranges_change_with_the_way_by_the_ratio_of_the_units(drive: Drive, leng
 
 def test_options_say_what_units_are() -> None:
     assert Units("ms", "cm", "in").options == "--time-unit ms --length-unit cm --range-unit in"
+
+
+ROBOT = load_settings("hallway")
+LOG = Path("log.csv")
+HALF_S = 3.0
+
+
+def drive_along(count: int = 300, turn: float = 0.2, heading: float = 0.4) -> Iterator[Firing]:
+    """Yield a drive along an arc at 0.2 m/s, with an eighth of the ring firing at a time."""
+    rng, dt = np.random.default_rng(1), 0.05
+    x, y, theta = 0.0, 0.0, heading
+    for k in range(count):
+        ranges = np.full(24, np.nan)
+        ranges[k % 8 :: 8] = rng.uniform(0.3, 7.0, 3)
+        ranges[(k + 8) % 24 if k % 3 else k % 24] = np.inf
+        yield Firing(dt * k, Pose(x, y, theta), theta, ranges)
+        x, y = x + 0.2 * dt * math.cos(theta), y + 0.2 * dt * math.sin(theta)
+        theta += turn * dt
+
+
+def in_other_units(
+    firing: Firing, *, t: float = 1.0, place: float = 1.0, angle: float = 1.0, reach: float = 1.0
+) -> Firing:
+    """Return a firing whose numbers are multiplied."""
+    pose = Pose(place * firing.pose.x, place * firing.pose.y, angle * firing.pose.theta)
+    return Firing(t * firing.robot_s, pose, angle * firing.ring_yaw, reach * firing.ranges_m)
+
+
+def turns_on_the_spot(firing: Firing) -> Firing:
+    return replace(firing, pose=Pose(0.0, 0.0, 3.0 * firing.pose.theta))
+
+
+def straight_first(firing: Firing) -> Firing:
+    """Return a firing of a drive whose first half leads along x, where degrees and radians are the same."""
+    along = 0.2 * min(firing.robot_s, HALF_S)
+    if firing.robot_s <= HALF_S:
+        return replace(firing, pose=Pose(along, 0.0, 0.0), ring_yaw=0.0)
+    angle = 0.2 * (firing.robot_s - HALF_S)  # an arc of a radius of 1 m
+    return replace(firing, pose=Pose(along + math.sin(angle), 1.0 - math.cos(angle), angle), ring_yaw=angle)
+
+
+@pytest.mark.parametrize("count", [1, 50, 300, 407])
+def test_a_log_in_metres_and_radians_passes_unchanged(count: int) -> None:
+    given, said = list(drive_along(count)), list[str]()
+    changes: list[Callable[[Firing], Firing]] = [
+        lambda f: f, turns_on_the_spot, straight_first,
+        lambda f: in_other_units(f, place=0.0), lambda f: in_other_units(f, place=-1.0),
+    ]  # fmt: skip
+    for change in changes:
+        changed = [change(firing) for firing in given]
+        assert list(converted_firings(changed, LOG, ROBOT, AUTO, said.append)) == changed, "on the spot, or backwards"
+    assert not said
+
+
+def test_leaps_of_the_odometry_are_no_unit() -> None:
+    leaps = [replace(f, pose=replace(f.pose, x=f.pose.x + 40.0 * (k // 60))) for k, f in enumerate(drive_along())]
+    assert list(converted_firings(leaps, LOG, ROBOT, AUTO, lambda _: None)) == leaps
+
+
+@pytest.mark.parametrize("count", [300, 450])
+@pytest.mark.parametrize(
+    ("change", "option"),
+    [
+        (lambda f: in_other_units(f, reach=1e3), "--range-unit mm"),
+        (lambda f: in_other_units(f, reach=100.0), "--range-unit cm"),
+        (lambda f: in_other_units(f, reach=1.0 / 0.3048), "--range-unit ft"),
+        (lambda f: in_other_units(f, place=1e3), "--length-unit mm"),
+        (lambda f: in_other_units(f, place=1e3, reach=1e3, angle=180.0 / math.pi), "deg"),
+        (lambda f: in_other_units(f, angle=180.0 / math.pi), "--angle-unit deg"),
+        (lambda f: in_other_units(straight_first(f), angle=180.0 / math.pi), "--angle-unit deg"),
+        (lambda f: in_other_units(turns_on_the_spot(f), angle=180.0 / math.pi), "--angle-unit deg"),
+        (lambda f: in_other_units(f, t=1e3), "--time-unit ms"),
+    ],
+    ids=["mm", "cm", "ft", "mm-places", "all", "degrees", "degrees-after-a-straight", "degrees-on-the-spot", "ms"],
+)
+def test_a_log_in_other_units_is_converted_or_refused(
+    change: Callable[[Firing], Firing], option: str, count: int
+) -> None:
+    said: list[str] = []
+    refused = None
+    try:
+        got = list(converted_firings(map(change, drive_along(count)), LOG, ROBOT, AUTO, said.append))
+    except RingLogError as error:
+        refused = error
+    if refused is not None:
+        assert refused.exit_code == 2
+        assert option in str(refused)
+        assert str(LOG) in str(refused)
+        return
+    (text,) = said
+    assert option in text
+    assert len(got) == count
+    assert max(math.hypot(f.pose.x, f.pose.y) for f in got) < 10.0
+    assert max(abs(f.pose.theta) for f in got) < 20.0
+    assert max(float(f.ranges_m[np.isfinite(f.ranges_m)].max()) for f in got) < 8.0
+    assert got[-1].robot_s < 30.0
