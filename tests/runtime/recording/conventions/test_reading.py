@@ -222,8 +222,10 @@ def test_a_pipe_whose_later_rows_show_other_conventions_is_refused() -> None:
         Firing(float(t), Pose(x, y, -theta), -yaw, ranges)
         for t, (x, y, theta, yaw), ranges in zip(drive.t, drive.pose, drive.ranges, strict=True)
     ]
-    first = 30
+    first, said = 30, list[str]()
     still = [replace(rows[0], ranges_m=row.ranges_m) for row in rows[:first]]
-    firings = converted_firings([*still, *rows], Path("pipe"), drive.settings, RingLogOptions(), str, first=first)
+    firings = converted_firings(
+        [*still, *rows], Path("pipe"), drive.settings, RingLogOptions(), [].append, first=first
+    )
     with pytest.raises(RingLogError, match=r"--heading cw|--length-unit m "):
         list(firings)

@@ -50,3 +50,20 @@ def test_a_number_is_exact_and_leaves_glitches_above_it() -> None:
     rows, _ = table(np.array([7.6]))
     rows.ranges[5, 0] = 34.0
     assert find_silence(rows, "7.6", 1).applied(rows.ranges)[5, 0] == 34.0
+
+
+@pytest.mark.parametrize(
+    ("silent", "share"), [([0.0], 0.3), ([7.6], 0.3), (NOISY, 0.3), (NOISY, 0.04), ([1.2345], 0.04)]
+)
+def test_silence_is_found_in_ranges_without_inf(silent: Floats, share: float) -> None:
+    rows, is_silent = table(np.array(silent), share)
+    smooth = 2.0 + np.sin(0.01 * np.arange(ROWS))[:, None] + np.zeros(SENSORS)
+    rows.ranges[~is_silent] = smooth[~is_silent]
+    found = find_silence(rows, "auto", 1)
+    assert found.words
+    assert (np.isposinf(found.applied(rows.ranges)) == is_silent).mean() > 0.99
+
+
+def test_no_silence_is_found_where_each_sensor_hears_something() -> None:
+    rows, _ = table(np.array([1.0]), 0.0)
+    assert not find_silence(rows, "auto", 1).words
