@@ -225,7 +225,7 @@ def test_a_pipe_whose_later_rows_show_other_conventions_is_refused() -> None:
     first, said = 30, list[str]()
     still = [replace(rows[0], ranges_m=row.ranges_m) for row in rows[:first]]
     firings = converted_firings(
-        [*still, *rows], Path("pipe"), drive.settings, RingLogOptions(), [].append, first=first
+        [*still, *rows], Path("pipe"), drive.settings, RingLogOptions(), said.append, first=first
     )
     with pytest.raises(RingLogError, match=r"--heading cw|--length-unit m "):
         list(firings)
