@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig, RobotConfig
-from drivers.firing_pattern import firing_pattern, sensors
+from drivers.firing_pattern import FiringError, firing_pattern, sensors
 from drivers.latched_ranges import RepeatFilter
 from drivers.messages import CrossPaths, Firing, Floats, Pose
 from runtime.recording.conventions.headings import (
@@ -110,8 +110,7 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     """
     columns = mirrored_columns(robot.ring) if options.sensor_order == "mirrored" else None
     said = []
-    pattern = firing_pattern(robot.ring)
-    set_size = max(len(sensors(mask)) for mask in pattern.masks)
+    set_size, pattern_s = _firing_limits(robot.ring)
     silence = find_silence(table, options.silence, set_size)
     if silence.words:
         said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
@@ -156,7 +155,7 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     cycle_s = None
     if is_latched:
         row_s = TIMES[units.time] * float(np.median(np.diff(table.t))) if len(table.t) > 1 else 0.0
-        cycle_s = max(len(pattern.masks) * pattern.step_period_s, period * row_s if period > 1 else 0.0)
+        cycle_s = max(pattern_s, period * row_s if period > 1 else 0.0)
     return Conventions(silence, units, angles, columns, cycle_s, tuple(said))
 
 
@@ -178,6 +177,18 @@ def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
             "--sensor-order mirrored: this ring is not its own mirror image; name the robot's own file"
         )
     return columns
+
+
+def _firing_limits(ring: RingConfig) -> tuple[int, float]:
+    """Return how many sensors fire at once at most, and the time of a cycle, s.
+
+    A robot file whose ring cannot fire as it says is good for a log; then all may fire at once.
+    """
+    try:
+        pattern = firing_pattern(ring)
+    except FiringError:
+        return len(ring.mounts), ring.firing.step_period_s
+    return max(len(sensors(mask)) for mask in pattern.masks), len(pattern.masks) * pattern.step_period_s
 
 
 def _without_repeats(ranges: Floats) -> Floats:

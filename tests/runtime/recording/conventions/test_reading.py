@@ -229,3 +229,15 @@ def test_a_pipe_whose_later_rows_show_other_conventions_is_refused() -> None:
     )
     with pytest.raises(RingLogError, match=r"--heading cw|--length-unit m "):
         list(firings)
+
+
+def test_a_ring_that_cannot_fire_as_its_file_says_is_good_for_a_log(tmp_path: Path) -> None:
+    text = (
+        "[ring]\ncount = 11\nradius_m = 0.2\nresolution_m = 0.01\nbeam_half_angle_deg = 12.0\n"
+        "range_min_m = 0.15\nrange_max_m = 5.0\n"
+        "[body]\nradius_m = 0.25\nspeed_max_m_s = 0.5\nturn_max_rad_s = 1.0\nsynchro = false\n"
+    )
+    (tmp_path / "eleven.toml").write_text(text, "utf-8")
+    robot = load_settings(robot=str(tmp_path / "eleven.toml"))
+    rows = [Firing(0.1 * k, Pose(0.02 * k, 0.0, 0.0), 0.0, np.full(11, 2.0 + 0.01 * k)) for k in range(60)]
+    assert list(converted_firings(rows, Path("log.csv"), robot, RingLogOptions(), pytest.fail)) == rows
