@@ -16,7 +16,16 @@ from bench.console import measure as measure_console
 from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
 from bench.estimator import Peer
 from bench.lie_commands import lies
-from bench.map_commands import corner_bound, false_canyons, false_drums, false_walls, grid, map_size, walls
+from bench.map_commands import (
+    corner_bound,
+    false_canyons,
+    false_drums,
+    false_walls,
+    free_cells,
+    grid,
+    map_size,
+    walls,
+)
 from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
@@ -243,6 +252,7 @@ for command in (
     false_drums,
     false_walls,
     false_canyons,
+    free_cells,
     grid,
 ):
     app.command(command)

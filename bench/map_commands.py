@@ -52,6 +52,28 @@ def grid(
     return report(json, rows, tables[0])
 
 
+def free_cells(*, json: str = "free-cells.json", rooms: int = 20, seed: int = 0) -> int:
+    """Count the cells that the evidence grid and the exported image call free and that no sound could have reached.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        How many random rooms.
+    seed
+        The first of them.
+    """
+    use_kernel_cache()
+    from bench.free_cells import measure
+
+    console, settings = Console(stderr=True), load_settings("hallway", ["perception.grid.method=directed"])
+    prepare_kernels(settings, console, (EMULATOR, *GRIDS))
+    with console.status("bench") as status:
+        rows = measure(settings, range(seed, seed + rooms), status.update)
+    return report(json, rows, rows_table("cells called free", rows))
+
+
 def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
     """Measure what a firing costs in halls of more and more drums, driven through once and back.
 

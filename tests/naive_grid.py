@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from drivers.messages import Floats
 from perception.mapping.grid import directed as d
 from perception.mapping.grid.cell_evidence import CERTAIN, FADING_PLACES, NAT, UNDIRECTED
+from perception.mapping.grid.window import SPREAD_CELLS, SPREAD_RELATIVE
 
 
 @dataclass
@@ -103,7 +104,7 @@ class NaiveGrid:
 
     def sigma(self, r: float) -> float:
         """Return the standard deviation of a range."""
-        return max(d.SPREAD_CELLS * self.cell_m, self.rounding_m, d.SPREAD_RELATIVE * r)
+        return max(SPREAD_CELLS * self.cell_m, self.rounding_m, SPREAD_RELATIVE * r)
 
     def beam(
         self, sensor: tuple[float, float, float], reach: float

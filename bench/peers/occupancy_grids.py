@@ -37,6 +37,8 @@ class Peer(ABC):
     """
 
     planes = 1
+    mirrors = 1.0
+    """Not known, as of `perception.mapping.grid.evidence_grid.GridMethod`."""
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
@@ -50,6 +52,10 @@ class Peer(ABC):
             for sensor, r in zip(placed(firing, self.ring), firing.ranges_m.tolist(), strict=True):
                 if not math.isnan(r):
                     self.enter(sensor, r, silence_m)
+
+    def holding(self) -> NDArray[np.bool_]:
+        """Return which cells of the torus are rather occupied, shape (n, n)."""
+        return np.asarray((self.log_odds > 0.0).any(axis=2))
 
     @abstractmethod
     def enter(self, sensor: list[float], r: float, silence_m: float) -> None:

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.kernel import Floats, kernel
-from perception.mapping.grid.window import OCTANTS
+from perception.kernel import Floats, Ints, kernel
+from perception.mapping.grid.window import OCTANTS, octant
 
 UNDIRECTED: Final = OCTANTS
 """Index of the undirected evidence of a cell, behind those of the looking directions."""
@@ -33,6 +33,8 @@ NOWHERE: Final = 0
 """The place of evidence that was never renewed; no place has this number."""
 SURE: Final = NAT // 2
 """A cell of so much evidence answers."""
+FAINT: Final = int(0.1 * NAT)
+"""Directed evidence up to this is as good as none: any cell of a single echo's arc has it."""
 FADING_PLACES: Final = 50
 """Evidence loses one unit for each so many places: 1 nat on 5 km of way, on which odometry has drifted through the
 window; the faint evidence of one echo is gone after a few hundred metres."""
@@ -100,6 +102,27 @@ def is_sure_elsewhere(planes: Cells, maybe_sure: Flags, iy: int, ix: int, own: i
 
 
 @kernel
+def fill_sure(planes: Cells, maybe_sure: Flags, place: int, out: Flags) -> None:
+    """Write which cells are `SURE` in some looking direction.
+
+    Parameters
+    ----------
+    planes, maybe_sure, place
+        As of `is_sure_elsewhere`; nothing is updated.
+    out : (n, n) bool
+        Out.
+    """
+    for iy in range(maybe_sure.shape[0]):
+        for ix in range(maybe_sure.shape[1]):
+            out[iy, ix] = False
+            if maybe_sure[iy, ix]:
+                for k in range(OCTANTS):
+                    if evidence_now(planes[k, iy, ix], place) >= SURE:
+                        out[iy, ix] = True
+                        break
+
+
+@kernel
 def without_hits(kept: Cells) -> int:
     """Return the evidence of a cell in one direction, this place's hits left out."""
     return min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
@@ -115,3 +138,52 @@ def hit_nat(share: float) -> int:
     """Return the evidence of a share of an echo, in units."""
     q = 0.5 + 0.49 * min(1.0, share)
     return int(NAT * math.log(q / (1.0 - q)))
+
+
+@kernel
+def fill_probability(
+    planes: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
+    odds: NDArray[np.float32], out: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Write the probability of each cell.
+
+    Parameters
+    ----------
+    planes, corner, cell_m, place
+        As of `directed.enter_readings`.
+    mirrors : float
+        Weight of the looking directions, 0 to 1, where they are asked together; the rest is that of the undirected.
+    from_x, from_y : float
+        The place from which the cells are asked, m; NaN: from any direction.
+    odds : (2 CERTAIN + 1,) float32
+        Probability by evidence, from −`CERTAIN`.
+    out : (n, n) float32
+        Out: the probabilities, row by row from the smallest y.
+    """
+    mask = planes.shape[1] - 1
+    for row in range(mask + 1):
+        iy = int(corner[1]) + row
+        jy = iy & mask
+        for column in range(mask + 1):
+            ix = int(corner[0]) + column
+            jx = ix & mask
+            both = planes[UNDIRECTED, jy, jx]
+            if both[STAMP] == NOWHERE:
+                out[row, column] = odds[CERTAIN]
+                continue
+            if math.isnan(from_x):
+                most = 0
+                least = 0
+                for k in range(OCTANTS if mirrors > 0.0 else 0):
+                    kept = planes[k, jy, jx]
+                    if kept[STAMP] != NOWHERE:
+                        value = evidence_now(kept, place)
+                        most = max(most, value)
+                        least = min(least, value)
+                directed = max(0, most - FAINT) if most > 0 else least
+                value = int(mirrors * directed + (1.0 - mirrors) * evidence_now(both, place))
+            else:
+                k = octant((ix + 0.5) * cell_m - from_x, (iy + 0.5) * cell_m - from_y)
+                value = evidence_now(planes[k, jy, jx], place)
+                value = max(0, value - FAINT) if value > 0 else value
+            out[row, column] = odds[CERTAIN + value]

@@ -32,26 +32,31 @@ from perception.mapping.grid.cell_evidence import (
     FREE,
     HIT,
     NAT,
-    NOWHERE,
     PLACES,
-    STAMP,
     SURE,
     UNDIRECTED,
     Cells,
     Flags,
-    evidence_now,
+    fill_probability,
+    fill_sure,
     hit_nat,
     is_sure_elsewhere,
     make_draws,
     renew,
     without_hits,
 )
-from perception.mapping.grid.window import OCTANTS, Ring, Window, octant, row_of_beam, set_edges
+from perception.mapping.grid.window import (
+    OCTANTS,
+    SPREAD_CELLS,
+    SPREAD_RELATIVE,
+    Ring,
+    Window,
+    octant,
+    row_of_beam,
+    set_edges,
+)
 from perception.sensor_mounts import mounts_at
 
-SPREAD_CELLS: Final = 0.5
-SPREAD_RELATIVE: Final = 0.01
-"""Standard deviation of an echo's range, in cells and as a share of the range, at least."""
 ARC_SIGMAS: Final = 1.5
 UNDIRECTED_ARC_SIGMAS: Final = 2.0
 """Half the thickness of an echo's arc, in a looking direction and in the undirected evidence; …"""
@@ -72,8 +77,6 @@ UNDIRECTED_PASSED: Final = 1.8 * NAT
 UNDIRECTED_SILENT: Final = 1.8 * NAT
 UNDIRECTED_UNIT: Final = 2.0
 """The same for the undirected evidence, in which the passages of all directions count."""
-FAINT: Final = int(0.1 * NAT)
-"""Directed evidence up to this is as good as none: any cell of a single echo's arc has it."""
 MIDDLE: Final = 0.75
 """A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
 BEYOND_M: Final = 0.3
@@ -267,55 +270,6 @@ def enter_hits(
         first = last
 
 
-@kernel
-def fill_probability(
-    planes: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
-    odds: NDArray[np.float32], out: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Write the probability of each cell.
-
-    Parameters
-    ----------
-    planes, corner, cell_m, place
-        As of `enter_readings`.
-    mirrors : float
-        Weight of the looking directions, 0 to 1, where they are asked together; the rest is that of the undirected.
-    from_x, from_y : float
-        The place from which the cells are asked, m; NaN: from any direction.
-    odds : (2 CERTAIN + 1,) float32
-        Probability by evidence, from −`CERTAIN`.
-    out : (n, n) float32
-        Out: the probabilities, row by row from the smallest y.
-    """
-    mask = planes.shape[1] - 1
-    for row in range(mask + 1):
-        iy = int(corner[1]) + row
-        jy = iy & mask
-        for column in range(mask + 1):
-            ix = int(corner[0]) + column
-            jx = ix & mask
-            both = planes[UNDIRECTED, jy, jx]
-            if both[STAMP] == NOWHERE:
-                out[row, column] = odds[CERTAIN]
-                continue
-            if math.isnan(from_x):
-                most = 0
-                least = 0
-                for k in range(OCTANTS if mirrors > 0.0 else 0):
-                    kept = planes[k, jy, jx]
-                    if kept[STAMP] != NOWHERE:
-                        value = evidence_now(kept, place)
-                        most = max(most, value)
-                        least = min(least, value)
-                directed = max(0, most - FAINT) if most > 0 else least
-                value = int(mirrors * directed + (1.0 - mirrors) * evidence_now(both, place))
-            else:
-                k = octant((ix + 0.5) * cell_m - from_x, (iy + 0.5) * cell_m - from_y)
-                value = evidence_now(planes[k, jy, jx], place)
-                value = max(0, value - FAINT) if value > 0 else value
-            out[row, column] = odds[CERTAIN + value]
-
-
 class DirectedGrid:
     """The grid's memory.
 
@@ -329,6 +283,7 @@ class DirectedGrid:
 
     SCRATCH: Final = (
         "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
+        "_sure",
     )  # fmt: skip
     BOUNDS: Final = bounds(cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0, ANSWERS_MAX), _place=index_of(PLACES))
 
@@ -340,6 +295,7 @@ class DirectedGrid:
         self._planes: Cells = np.zeros((OCTANTS + 1, window.cells, window.cells, 4), np.int16)
         self.cells: Cells = np.moveaxis(self._planes, 0, 2)
         self._maybe_sure: Flags = np.zeros((window.cells, window.cells), np.bool_)
+        self._sure: Flags = np.zeros((window.cells, window.cells), np.bool_)
         self._answers = np.zeros(2)
         self._place = 0
         room = len(ring.mounts) * arc_cells_max(window, ring)
@@ -379,6 +335,11 @@ class DirectedGrid:
             self._planes, self.window.corner, self.window.cell_m, self._place, self.mirrors, x, y, self._odds, out
         )
         return out
+
+    def holding(self) -> Flags:
+        """Return which cells of the torus are sure in some direction, shape (n, n); see `SURE`."""
+        fill_sure(self._planes, self._maybe_sure, self._place, self._sure)
+        return self._sure
 
     def drop_caches(self) -> None:
         """Derive anew what depends on the cells, after they were overwritten."""

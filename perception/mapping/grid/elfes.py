@@ -132,6 +132,15 @@ class ElfesGrid:
         del seen_from
         return (1.0 / (1.0 + np.exp(-self.window.unrolled(self.log_odds)))).astype(np.float32)
 
+    @property
+    def mirrors(self) -> float:
+        """How far this is a place of mirrors: not known to this method, so as far as can be."""
+        return 1.0
+
+    def holding(self) -> NDArray[np.bool_]:
+        """Return which cells of the torus are rather occupied."""
+        return np.asarray(self.log_odds > 0.0)
+
     def drop_caches(self) -> None:
         """Do nothing: nothing depends on the cells."""
 

@@ -1,12 +1,14 @@
 """The evidence grid as perception keeps it: the method of the settings, fed with firings, asked for a window.
 
 It counts the robot's way, by which evidence ages and repeats are recognised, and learns how far this place answers at
-all: silence shows free space only to the range from which echoes really come.
+all: silence shows free space only to the range from which echoes really come. Whatever the method, a cell is free
+only if a line of sight has crossed it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Final, Protocol
 
 import numpy as np
@@ -17,6 +19,8 @@ from config.settings import GridConfig
 from drivers.messages import Firing
 from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats
+from perception.mapping.grid.known_cells import EVEN
+from perception.mapping.grid.sight_lines import SightLines
 from perception.mapping.grid.window import Ring, Window
 from perception.percept import OccupancyWindow
 from perception.sensor_mounts import mounts_array
@@ -33,6 +37,11 @@ HEARD_MIN: Final = 20
 
 class GridMethod(Protocol):
     """A method of updating cells."""
+
+    @property
+    def mirrors(self) -> float:
+        """How far this is a place of mirrors, 0 to 1; 1 where the method does not know."""
+        ...
 
     def observe(self, firing: Firing, bearings: Floats, place: int, silence_m: float) -> None:
         """Enter a firing.
@@ -52,6 +61,10 @@ class GridMethod(Protocol):
 
     def probability(self, seen_from: tuple[float, float] | None) -> NDArray[np.float32]:
         """Return the probability of each cell, row by row from the smallest y; see `EvidenceGrid.occupancy`."""
+        ...
+
+    def holding(self) -> NDArray[np.bool_]:
+        """Return which cells of the torus hold something, seen from any direction, shape (cells, cells)."""
         ...
 
     def drop_caches(self) -> None:
@@ -101,6 +114,7 @@ class EvidenceGrid:
         )  # fmt: skip
         self.window = Window(config.cells, config.cell_m)
         self.method = make_grid_method(config, self.window, self.ring)
+        self.sight_lines = SightLines(self.window, self.ring)
         self._way_m = 0.0
         self._at = np.full(2, math.nan)
         self._heard = np.zeros(int(ring.range_max_m / HEARD_M) + 2, np.int64)
@@ -117,8 +131,36 @@ class EvidenceGrid:
         self._at[:] = pose.x, pose.y
         echoes = ranges[ranges < math.inf]
         np.add.at(self._heard, np.minimum(echoes / HEARD_M, len(self._heard) - 1).astype(np.int64), 1)
-        self.method.observe(firing, self.bearings, 1 + int(self._way_m / PLACE_M), self.silence_m)
+        self.method.observe(firing, self.bearings, self.place, self.silence_m)
+        self.sight_lines.observe(firing, self.bearings, self.place, self.method.holding())
         self._firings += 1
+
+    @property
+    def place(self) -> int:
+        """Where on its way the robot is, in steps of `PLACE_M`."""
+        return 1 + int(self._way_m / PLACE_M)
+
+    def crossed_before(
+        self, holding: NDArray[np.bool_], firings: Iterable[tuple[Firing, Floats, int]]
+    ) -> NDArray[np.bool_]:
+        """Return which cells lines of sight of some firings cross before what is known to stand there.
+
+        Parameters
+        ----------
+        holding : (n, n) bool
+            The cells that hold something, row by row from the smallest y.
+        firings : iterable of (Firing, (n,) float, int)
+            The firings, each with its `bearings` and its `place`.
+
+        Returns
+        -------
+        (n, n) bool
+            As `holding`.
+        """
+        lines, holds = SightLines(self.window, self.ring), self.window.rolled(holding)
+        for firing, bearings, place in firings:
+            lines.observe(firing, bearings, place, holds)
+        return self.window.unrolled(lines.crossed(self.method.mirrors))
 
     @property
     def silence_m(self) -> float:
@@ -141,11 +183,14 @@ class EvidenceGrid:
         ----------
         seen_from : (float, float), optional
             A place x, y, m: then each cell's probability is that of an answer towards it. By default it is that of an
-            answer in any direction.
+            answer in any direction, and ½ where it would be less in a cell that no line of sight has crossed.
         """
         cell_m = self.window.cell_m
         x, y = (cell_m * float(number) for number in self.window.corner)
-        return OccupancyWindow(self.method.probability(seen_from), x, y, cell_m)
+        occupied = self.method.probability(seen_from)
+        if seen_from is None:
+            occupied[(occupied < EVEN) & ~self.window.unrolled(self.sight_lines.crossed(self.method.mirrors))] = EVEN
+        return OccupancyWindow(occupied, x, y, cell_m)
 
     def drop_caches(self) -> None:
         """Derive anew what depends on the memory, after it was overwritten."""
@@ -154,6 +199,7 @@ class EvidenceGrid:
     def clear(self) -> None:
         """Forget everything, as after a reset of the odometry."""
         self.method.clear()
+        self.sight_lines.clear()
         self._heard[:] = 0
         self.bearings[:] = math.nan
         self._at[:] = math.nan

@@ -140,6 +140,15 @@ class MoravecElfesGrid:
         empty, occupied = cells[..., EMPTY], cells[..., OCCUPIED]
         return (0.5 + 0.5 * np.where(occupied >= empty, occupied, -empty)).astype(np.float32)
 
+    @property
+    def mirrors(self) -> float:
+        """How far this is a place of mirrors: not known to this method, so as far as can be."""
+        return 1.0
+
+    def holding(self) -> NDArray[np.bool_]:
+        """Return which cells of the torus are rather occupied."""
+        return np.asarray((self.cells[..., OCCUPIED] >= self.cells[..., EMPTY]) & (self.cells[..., OCCUPIED] > 0.0))
+
     def drop_caches(self) -> None:
         """Do nothing: nothing depends on the cells."""
 

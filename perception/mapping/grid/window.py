@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,15 @@ from perception.bounds import CONSTANT, Bound, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.sensor_mounts import mounts_at
 
+Cell = TypeVar("Cell", bound=np.generic)
+
 OCTANTS: Final = 8
 """Looking directions, 45° each; the first is around +x, then counter-clockwise."""
 EIGHTH_TAN: Final = math.tan(0.125 * math.pi)
 """Of half a looking direction."""
+SPREAD_CELLS: Final = 0.5
+SPREAD_RELATIVE: Final = 0.01
+"""Standard deviation of an echo's range, in cells and as a share of the range, at least."""
 CENTRED_CELLS: Final = 4
 """The window follows once the robot is so many cells from its middle."""
 COORDINATE_MAX_M: Final = 1e6
@@ -107,6 +112,11 @@ def set_edges(bearing: float, half_angle: float, edges: Floats) -> None:
     edges[3] = math.sin(bearing + half_angle)
 
 
+def is_possible(pose: Pose) -> bool:
+    """Return whether a robot can have a pose."""
+    return abs(pose.x) < COORDINATE_MAX_M and abs(pose.y) < COORDINATE_MAX_M and math.isfinite(pose.theta)
+
+
 def placed(firing: Firing, ring: Ring) -> list[list[float]]:
     """Return place x, y (m) and direction (rad) of each sensor at a firing."""
     mounts = mounts_at(firing, ring.mounts, ring.turning)
@@ -133,6 +143,7 @@ class Window:
         Side of a cell, m.
     """
 
+    SCRATCH: Final = ("_shared",)
     BOUNDS: Final = bounds(cells=CONSTANT, cell_m=CONSTANT, corner=_corner_bound)
 
     def __init__(self, cells: int, cell_m: float) -> None:
@@ -142,6 +153,11 @@ class Window:
         """The number of the first cell in x and y, counted from the odometry's origin."""
         self.placed = False
         self.fixed = False
+        self._shared: list[NDArray[np.generic]] = []
+
+    def share(self, plane: NDArray[np.generic]) -> None:
+        """Clear a plane of the cells' memory, too, wherever cells come in; see `follow`."""
+        self._shared.append(plane)
 
     def fix(self, x: float, y: float) -> None:
         """Put the middle of the window at a place (m) for good: it no longer follows the robot."""
@@ -156,9 +172,9 @@ class Window:
         pose : Pose
             The robot's.
         planes : tuple of array
-            The cells' memory, each of shape (cells, cells, …): y, then x. Updated.
+            The cells' memory, each of shape (cells, cells, …): y, then x. Updated; those that share the window, too.
         """
-        if not (abs(pose.x) < COORDINATE_MAX_M and abs(pose.y) < COORDINATE_MAX_M and math.isfinite(pose.theta)):
+        if not is_possible(pose):
             return False
         if self.fixed:
             return True
@@ -171,7 +187,7 @@ class Window:
                 count = min(abs(moved), self.cells)
                 first = int(self.corner[axis]) + (self.cells if moved > 0 else -count)
                 lines = np.arange(first, first + count) & (self.cells - 1)
-                for plane in planes:
+                for plane in (*planes, *self._shared):
                     if axis == 0:
                         plane[:, lines] = 0
                     else:
@@ -180,10 +196,15 @@ class Window:
         self.placed = True
         return True
 
-    def unrolled(self, plane: Floats) -> Floats:
+    def unrolled(self, plane: NDArray[Cell]) -> NDArray[Cell]:
         """Return a plane of the torus row by row from the smallest y, as an array of its own."""
         x, y = (int(first) & (self.cells - 1) for first in self.corner)
         return np.roll(plane, (-y, -x), axis=(0, 1))
+
+    def rolled(self, rows: NDArray[Cell]) -> NDArray[Cell]:
+        """Return the plane of the torus whose rows from the smallest y on are given, as an array of its own."""
+        x, y = (int(first) & (self.cells - 1) for first in self.corner)
+        return np.roll(rows, (y, x), axis=(0, 1))
 
     def clear(self) -> None:
         """Forget the place, unless it is fixed."""

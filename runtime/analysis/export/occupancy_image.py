@@ -1,8 +1,9 @@
 """A finished run's map as an occupancy image with its YAML, as ROS's map_server reads and writes them.
 
-Occupied is what was recognised, and what the directed evidence grid holds for occupied; free is what it holds for
-free, and where the robot has been. All else is unknown. The grid enters all readings of the run once more: an echo
-that something recognised explains marks its contact only.
+Occupied is what was recognised, and what the evidence grid holds for occupied. Free is where the robot has been, and
+what the grid holds for free where a line of sight has crossed it. All else is unknown. The grid enters all readings
+of the run once more: an echo that something recognised explains marks its contact only. Then they are entered again
+as lines of sight, which end at what is known by then: so no beam of the first minute passes a wall found later.
 """
 
 from __future__ import annotations
@@ -83,7 +84,8 @@ def yaml_beside(path: Path) -> Path:
 
 
 def occupancy_image(
-    world: WorldConfig, echoes: Echoes, ring: RingConfig, way: Floats, body_radius_m: float
+    world: WorldConfig, echoes: Echoes, ring: RingConfig, way: Floats, body_radius_m: float,
+    method: str = GridConfig().method,
 ) -> OccupancyImage:  # fmt: skip
     """Return the image of a run.
 
@@ -99,6 +101,8 @@ def occupancy_image(
         Positions of the robot, m.
     body_radius_m : float
         The robot's radius, m.
+    method : str
+        Of the evidence grid, as the settings name it; `directed` where they keep none.
 
     Raises
     ------
@@ -114,7 +118,7 @@ def occupancy_image(
     columns, rows = (int(n) for n in np.ceil((high - low) / RESOLUTION_M))
     if rows * columns > PIXELS_MAX:
         raise ValueError(f"an image of {columns} × {rows} pixels is too large")
-    window = run_evidence(world, echoes, ring, low, high)
+    window = run_evidence(world, echoes, ring, low, high, method)
     pixels = np.full((rows, columns), UNKNOWN, np.uint8)
     probability = _pixels_of(window, low, rows, columns)
     pixels[probability <= FREE_MAX] = FREE
@@ -126,12 +130,14 @@ def occupancy_image(
     return OccupancyImage(np.ascontiguousarray(pixels[::-1]), float(low[0]), float(low[1]))
 
 
-def run_evidence(world: WorldConfig, echoes: Echoes, ring: RingConfig, low: Floats, high: Floats) -> OccupancyWindow:
-    """Return the directed evidence grid of all readings of a run.
+def run_evidence(
+    world: WorldConfig, echoes: Echoes, ring: RingConfig, low: Floats, high: Floats, method: str = GridConfig().method
+) -> OccupancyWindow:  # fmt: skip
+    """Return the evidence grid of all readings of a run; ½ where it is free and no line of sight has crossed.
 
     Parameters
     ----------
-    world, echoes, ring
+    world, echoes, ring, method
         As of `occupancy_image`.
     low, high : (2,) float
         The rectangle that it has to hold, m.
@@ -142,15 +148,16 @@ def run_evidence(world: WorldConfig, echoes: Echoes, ring: RingConfig, low: Floa
         It is too large.
     """
     from perception.mapping.grid.evidence_grid import EvidenceGrid
+    from perception.mapping.grid.known_cells import EVEN
 
     cells = 2 ** math.ceil(math.log2(max(32.0, float((high - low).max()) / CELL_M + 1.0)))
     if cells > CELLS_MAX:
         raise ValueError(f"an evidence grid of {cells} × {cells} cells is too large")
-    grid = EvidenceGrid(
-        ring, GridConfig().model_copy(update={"method": "directed", "cells": cells, "cell_m": CELL_M})
-    )
+    chosen = "directed" if method == "off" else method
+    grid = EvidenceGrid(ring, GridConfig().model_copy(update={"method": chosen, "cells": cells, "cell_m": CELL_M}))
     grid.window.fix(*(0.5 * (low + high)).tolist())
     half_angle = math.radians(ring.beam_half_angle_deg)
+    entered = list[tuple[Firing, Floats, int]]()
     for scan in scans_of(echoes, ring):
         sensors, ranges = scan.rows["sensor"], np.full(len(ring.mounts), np.nan)
         ranges[sensors] = scan.rows["range_m"]
@@ -158,8 +165,19 @@ def run_evidence(world: WorldConfig, echoes: Echoes, ring: RingConfig, low: Floa
         grid.bearings[sensors] = explained_bearings(world, scan.rows, half_angle)
         on_wheels = [row for row in scan.rows if row["sensor"] in ring.turning]
         theta = float(on_wheels[0]["bearing"]) - ring.mounts[on_wheels[0]["sensor"]][2] if on_wheels else scan.yaw
-        grid.observe(Firing(scan.t_s, Pose(scan.x, scan.y, theta), scan.yaw, ranges))
-    return grid.occupancy()
+        firing = Firing(scan.t_s, Pose(scan.x, scan.y, theta), scan.yaw, ranges)
+        grid.observe(firing)
+        entered.append((firing, grid.bearings.copy(), grid.place))
+    x_m, y_m = (CELL_M * float(number) for number in grid.window.corner)
+    occupied = grid.method.probability(None)
+    holds = occupied > EVEN
+    for outline in world_outlines(world):
+        at = np.floor((_dense(outline) - (x_m, y_m)) / CELL_M).astype(np.int64)
+        at = at[((at >= 0) & (at < cells)).all(axis=1)]
+        holds[at[:, 1], at[:, 0]] = True
+    crossed = grid.crossed_before(holds, entered)
+    occupied[(occupied < EVEN) & ~crossed] = EVEN
+    return OccupancyWindow(occupied, x_m, y_m, CELL_M)
 
 
 def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> Floats:

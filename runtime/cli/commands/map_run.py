@@ -87,7 +87,8 @@ def map_run(source: TimelineSource, out: str, grid: str | None, geojson: str | N
             scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
             way = scans if view is None else view.way
             with progress(console, "drawing the map"):
-                image = occupancy_image(world, echoes, settings.ring, way, settings.body.radius_m)
+                method, radius_m = settings.perception.grid.method, settings.body.radius_m
+                image = occupancy_image(world, echoes, settings.ring, way, radius_m, method)
         except ValueError as error:
             raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
         with writing("--grid", grid):

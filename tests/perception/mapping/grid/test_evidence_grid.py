@@ -38,6 +38,7 @@ def fire(grid: EvidenceGrid, x: float, *heard: float) -> None:
 def test_settings_name_the_method_and_the_window(method: str, kind: type) -> None:
     grid = make(method, 64)
     assert isinstance(grid.method, kind)
+    grid.bearings[0] = 0.0  # the echoes are a recognised wall's
     for k in range(30):
         fire(grid, 0.02 * k, 1.5 - 0.02 * k)
     window = grid.occupancy()
@@ -47,7 +48,7 @@ def test_settings_name_the_method_and_the_window(method: str, kind: type) -> Non
     wall = math.floor((1.5 + SETTINGS.ring.mounts[0][0] - window.x_m) / 0.1)
     row = window.occupied[32]
     assert row[wall - 1 : wall + 2].max() > 0.6
-    assert row[wall - 8] < 0.4
+    assert row[wall - 5] < 0.4
     grid.clear()
     assert (grid.occupancy().occupied == 0.5).all()
 

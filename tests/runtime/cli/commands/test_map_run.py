@@ -32,6 +32,16 @@ def test_the_map_of_a_recording_is_a_world_that_can_be_loaded(
     assert (len(found["features"]), found["frame"]) == (len(world.drum) + len(world.wall), "odom")
 
 
+def test_the_image_is_drawn_by_the_method_that_the_settings_name(hall_log: Path, tmp_path: Path) -> None:
+    images = {}
+    for method in ("off", "directed", "elfes"):
+        grid = tmp_path / f"{method}.pgm"
+        call = ["map", str(hall_log), "--out", str(tmp_path / f"{method}.toml"), "--grid", str(grid)]
+        assert run_command([*call, "--set", f"perception.grid.method={method}"]) == DONE
+        images[method] = grid.read_bytes()
+    assert images["off"] == images["directed"] != images["elfes"]
+
+
 @pytest.mark.promise("P28")
 def test_the_map_of_a_ring_log_whose_name_is_not_utf8(hall_log: Path, tmp_path: Path) -> None:
     out, log = tmp_path / "map.toml", tmp_path / "\udcff.csv"

@@ -1,0 +1,126 @@
+"""Lines of sight against plain geometry, and what they promise: nothing behind what is known to stand is free."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.messages import Firing, Floats, Pose
+from perception.mapping.grid.sight_lines import COUNT, LINE, LOCATED_RAD, PLACES_MIN, SightLines
+from perception.mapping.grid.window import Ring, Window
+
+CELL_M = 0.1
+UNKNOWN = np.full(3, math.nan)
+MOUNTS = np.array([[0.2, 0.0, 0.0], [0.0, 0.2, 1.7], [-0.2, 0.0, -2.6]])
+RING = Ring(MOUNTS, math.radians(12.0), 0.0, 5.0)
+
+
+def make() -> tuple[SightLines, Window]:
+    window = Window(128, CELL_M)
+    window.fix(0.0, 0.0)
+    return SightLines(window, RING), window
+
+
+def fire(ranges: list[float], x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Firing:
+    return Firing(0.0, Pose(x, y, yaw), yaw, np.array(ranges))
+
+
+def evidence(lines: SightLines, window: Window) -> Floats:
+    """Return the evidence of each cell, row by row from the smallest y."""
+    sights = lines.sights.astype(np.float64)
+    return window.unrolled(sights[..., COUNT] + sights[..., LINE])
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10_000))
+def test_a_passage_counts_up_to_the_first_cell_on_its_line_that_holds_something(seed: int) -> None:
+    """Cells well inside one line, and well before or behind what stands there, are as plain geometry has them."""
+    rng = np.random.default_rng(seed)
+    lines, window = make()
+    x, y, yaw = rng.uniform(-1.0, 1.0, 3).tolist()
+    holds = np.zeros((128, 128), np.bool_)
+    rows, columns = rng.integers(20, 108, (2, 30))
+    holds[rows, columns] = True
+    corners = CELL_M * window.corner
+    stands = corners + CELL_M * (np.column_stack([columns, rows]) + 0.5)
+    r = float(rng.uniform(0.5, 4.0))
+    lines.observe(fire([r, math.nan, math.nan], x, y, yaw), UNKNOWN, 1, window.rolled(holds))
+    found = evidence(lines, window)
+    sensor = np.array([x + 0.2 * math.cos(yaw), y + 0.2 * math.sin(yaw)])
+    end = r
+    for row, column in np.argwhere(np.ones_like(holds)).tolist():
+        at = corners + CELL_M * (np.array([column, row]) + 0.5) - sensor
+        d = math.hypot(*at)
+        off = abs(math.remainder(math.atan2(at[1], at[0]) - yaw, 2.0 * math.pi))
+        if off > RING.half_angle + 1e-6 or d > end:
+            assert found[row, column] == 0.0
+            continue
+        towards = at / d
+        ahead = (stands - sensor) @ towards
+        beside = np.abs((stands - sensor) @ np.array([-towards[1], towards[0]]))
+        wide = 0.075 + 0.5 * 2.0 * RING.half_angle / 16 * d
+        if not ((beside < wide) & (ahead > -0.1) & (ahead < d + 0.1)).any() and off < RING.half_angle - 1e-6:
+            assert found[row, column] > 0.0 or d > end - 0.11
+        if ((beside < 0.01) & (ahead > 0.1) & (ahead < d - 0.2) & (ahead < 1.0)).any():
+            assert found[row, column] == 0.0
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10_000))
+def test_nothing_behind_a_known_wall_is_ever_crossed(seed: int) -> None:
+    """Whatever is heard from inside a closed ring of cells, strays and silences, no cell outside it is free."""
+    rng = np.random.default_rng(seed)
+    lines, window = make()
+    rows, columns = np.indices((128, 128))
+    away = np.hypot(columns - 64, rows - 64)
+    radius = float(rng.uniform(12.0, 30.0))
+    holds = (away >= radius) & (away < radius + 1.5)
+    for place in range(1, 60):
+        x, y = rng.uniform(-0.4, 0.4, 2).tolist()
+        ranges = rng.choice([math.inf, rng.uniform(0.3, 5.0), math.nan], 3).tolist()
+        bearings = np.where(rng.random(3) < 0.5, rng.uniform(-0.2, 0.2, 3), math.nan)
+        yaw = float(rng.uniform(-3.0, 3.0))
+        lines.observe(fire(ranges, x, y, yaw), bearings, place, window.rolled(holds))
+    found = evidence(lines, window)
+    assert found[away < radius].any()
+    assert not found[away >= radius + 1.5].any()
+
+
+@pytest.mark.parametrize(
+    ("r", "bearing", "has_line", "has_count"),
+    [(2.0, 0.0, True, True), (2.0, 0.9 * LOCATED_RAD, True, True), (2.0, 1.5 * LOCATED_RAD, False, True),
+     (2.0, math.nan, False, True), (math.inf, math.nan, False, False)],
+)  # fmt: skip
+def test_an_echo_proves_its_own_line_and_elsewhere_little(
+    r: float, bearing: float, *, has_line: bool, has_count: bool
+) -> None:  # fmt: skip
+    lines, window = make()
+    nothing = np.zeros((128, 128), np.bool_)
+    bearings = np.array([bearing, math.nan, math.nan])
+    for place in range(1, 9):
+        for _ in range(5):  # repeats from one place are one reading
+            lines.observe(fire([r, math.nan, math.nan], 0.0, 0.05), bearings, place, nothing)
+        among_mirrors, elsewhere = (window.unrolled(lines.crossed(mirrors))[64, 64 + 12] for mirrors in (1.0, 0.0))
+        assert among_mirrors == has_line
+        assert elsewhere == (has_line or (has_count and place >= PLACES_MIN))
+
+
+def test_cells_that_come_into_the_window_are_unknown_and_an_impossible_pose_changes_nothing() -> None:
+    window = Window(32, CELL_M)
+    lines = SightLines(window, RING)
+    nothing = np.zeros((32, 32), np.bool_)
+    window.follow(Pose(0.0, 0.0, 0.0), ())
+    lines.observe(fire([1.0, 1.0, 1.0]), UNKNOWN, 1, nothing)
+    before = lines.sights.copy()
+    assert before.any()
+    lines.observe(fire([1.0, 1.0, 1.0], math.nan), UNKNOWN, 2, nothing)
+    np.testing.assert_array_equal(lines.sights, before)
+    window.follow(Pose(50.0, 0.0, 0.0), ())
+    assert not lines.sights.any()
+    lines.observe(fire([1.0, 1.0, 1.0], 50.0), UNKNOWN, 3, nothing)
+    lines.clear()
+    assert not lines.sights.any()
