@@ -35,7 +35,7 @@ async def test_objects_are_listed_as_text_in_feet_or_metres(server: FakeServer, 
     assert await server.wait("evidence", 2) == {"object": 2}
     await expect(page.locator("#object-name")).to_have_text("2 drum")
     await opened.says("#object-facts", "95 % ellipse")
-    await opened.says("#evidence", "odds × 10⁹")
+    await opened.says("#evidence", "odds × more than a million")
     await opened.says("#evidence", "odds × 11")
     await opened.says("#evidence", "3 of them against")
     await opened.save_screenshot("picked")

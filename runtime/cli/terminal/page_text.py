@@ -31,6 +31,15 @@ def length(metres: float, units: Units, digits: int = 2) -> str:
     return f"{number(metres, units, digits)} {units}"
 
 
+def spread(sigma_m: float, units: Units) -> str:
+    """Return a standard error with its unit; in millimetres where it is less than one."""
+    if not sigma_m < 10_000.0:
+        return "± more than 10 km"
+    if sigma_m >= 0.001:
+        return f"± {length(sigma_m, units, 3)}"
+    return f"± {number(1e3 * sigma_m, 'm', 1)} mm" if sigma_m >= 0.00005 else "± less than 0.1 mm"
+
+
 def place(x: float, y: float, units: Units) -> str:
     """Return a point, given in metres, with its unit."""
     return f"{number(x, units)}, {number(y, units)} {units}"
@@ -43,8 +52,8 @@ def degrees(radians: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a probability in whole per cent."""
-    return f"{'> 99' if 0.995 < share < 1.0 else math.floor(100.0 * share + 0.5)} %"
+    """Return a probability in whole per cent; no evidence makes it 0 or 100."""
+    return f"{'> 99' if share >= 0.995 else '< 1' if share < 0.005 else math.floor(100.0 * share + 0.5)} %"
 
 
 def is_hidden(seen: DetectedObject, radius_m: float, robot: Pose, objects: Iterable[DetectedObject]) -> bool:
@@ -94,7 +103,7 @@ def object_row(seen: DetectedObject, units: Units, *, hidden: bool = False) -> t
     """Return number, name, certainty, place and uncertainty of an object, or the length of a wall."""
     if seen.ends is None:
         where = f"{place(seen.x, seen.y, units)}, {degrees(seen.theta)}"
-        size = f"± {length(seen.sigma, units, 3)}"
+        size = spread(seen.sigma, units)
     else:
         x1, y1, x2, y2 = seen.ends
         where = f"{number(x1, units)}, {number(y1, units)} to {place(x2, y2, units)}"
@@ -113,10 +122,10 @@ def localized_place(here: LocalizedPose, units: Units) -> str:
     """Return the robot's place in the map frame, with the standard errors of its worst direction and its heading."""
     from perception.bayes.object_report import worst_sigma
 
-    said = f"{here.status} {math.floor(100.0 * here.probability + 0.5)} %"
+    said = f"{here.status} {percent(here.probability)}"
     covariance = here.covariance
     if not math.isfinite(float(covariance.sum())):
         return f"unknown, {said}"
     sigma = worst_sigma(float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
-    at = f"{number(here.pose.x, units)}, {number(here.pose.y, units)} ± {length(sigma, units, 3)}"
+    at = f"{number(here.pose.x, units)}, {number(here.pose.y, units)} {spread(sigma, units)}"
     return f"{at}, {degrees(here.pose.theta)} ± {math.degrees(math.sqrt(covariance[2, 2])):.1f}°, {said}"

@@ -1,6 +1,7 @@
 // Box canyons: the mouth as a bar across the way in, the closed outline behind it, the axis, depth and probability.
 
 import { textWithHalo } from "./scene.js";
+import { percent } from "./units.js";
 
 const SURE = 0.9; // from here on leave-canyon stays outside
 const AXIS_MAX_PX = 60;
@@ -44,7 +45,7 @@ function drawCanyon(f, { mouth: [x1, y1, x2, y2], axis, depth, probability }) {
   ctx.font = theme.font(11, 600);
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
-  const text = `dead end, ${f.units.length(depth, 1)} deep, ${Math.round(100 * probability)} %`, half = 0.5 * ctx.measureText(text).width;
+  const text = `dead end, ${f.units.length(depth, 1)} deep, ${percent(probability)}`, half = 0.5 * ctx.measureText(text).width;
   f.labels.push([at[0] - half, at[1] - 7, at[0] + half, at[1] + 7]);
   textWithHalo(f, text, at[0], at[1], theme.stop);
 }

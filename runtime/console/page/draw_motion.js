@@ -2,6 +2,7 @@
 
 import { ellipseOf } from "./draw_objects.js";
 import { textWithHalo, overlap } from "./scene.js";
+import { magnitude } from "./units.js";
 
 const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
 const LENGTH_MAX = 2; // in units
@@ -147,7 +148,7 @@ export function drawVectors(f) {
     arrow(ctx, x, y, dx, dy, Math.min(sum ? 13 : 10, length));
     ctx.font = theme.font(roomy ? 11.5 : 10, sum ? 700 : 600);
     ctx.textAlign = "left";
-    const text = `${name.replaceAll("_", "-")}${roomy ? ` ${size.toFixed(2)}` : ""}`;
+    const text = `${name.replaceAll("_", "-")}${roomy ? ` ${magnitude(size)}` : ""}`;
     const width = ctx.measureText(text).width;
     const tx = Math.max(4, Math.min(view.width - width - 4, dx >= 0 ? x + dx + 7 : x + dx - 7 - width));
     let ty = y + dy + (sum ? 0 : dy > 0 ? 8 : -8);

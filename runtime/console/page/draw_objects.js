@@ -3,6 +3,7 @@
 
 import { addArc, ellipseArc } from "./cross_paths.js";
 import { textWithHalo, overlap } from "./scene.js";
+import { percent } from "./units.js";
 import { isWall } from "./walls.js";
 
 const CHI2_95 = 5.991;
@@ -68,8 +69,6 @@ export function ellipseOf(covariance) {
     angle: Math.atan2(2 * xy, xx - yy) / 2,
   };
 }
-
-export const percent = (share) => `${share > 0.995 && share < 1 ? "> 99" : Math.round(100 * share)} %`;
 
 // What an operator has said counts more than a number; behind a wall no reading checks the number.
 export function certainty(object) {

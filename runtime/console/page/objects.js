@@ -2,8 +2,8 @@
 // of the map.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
-import { certainty, ellipseOf, percent } from "./draw_objects.js";
-import { degrees } from "./units.js";
+import { certainty, ellipseOf } from "./draw_objects.js";
+import { degrees, percent, times } from "./units.js";
 import { countObjects, isWall } from "./walls.js";
 
 const EVIDENCE_EVERY_MS = 1000;
@@ -51,7 +51,7 @@ export class Objects {
       const [x1, y1, x2, y2] = object.ends ?? [];
       setText(row.where, object.ends ? `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}`
         : `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
-      setText(row.off, object.ends ? `${this.units.length(Math.hypot(x2 - x1, y2 - y1))} long` : `± ${this.units.length(object.sigma, 3)}`);
+      setText(row.off, object.ends ? `${this.units.length(Math.hypot(x2 - x1, y2 - y1))} long` : this.units.spread(object.sigma));
       const picked = object.number !== null && object.number === this.selection.object;
       setAttribute(row.element, "aria-selected", picked);
       if (this.#list.children[index] !== row.element) this.#list.insertBefore(row.element, this.#list.children[index] ?? null);
@@ -115,7 +115,7 @@ export class Objects {
       ["certainty", object.hidden_by === null ? chance : `behind wall ${object.hidden_by}, where no reading checks it; before: ${chance}`],
       ["place", isWall(object) ? `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}` : this.units.place(object.x, object.y, 3)],
       ["turned by", degrees(object.theta)],
-      isWall(object) ? ["length", this.units.length(Math.hypot(x2 - x1, y2 - y1))] : ["uncertainty", `± ${this.units.length(object.sigma, 3)}`],
+      isWall(object) ? ["length", this.units.length(Math.hypot(x2 - x1, y2 - y1))] : ["uncertainty", this.units.spread(object.sigma)],
     ];
     if (object.covariance && !isWall(object)) {
       const { major, minor, angle } = ellipseOf(object.covariance);
@@ -176,13 +176,6 @@ export class Objects {
       el("p", { class: "hint" }, `${readings.length + lines.length} ${lines.length > 0 ? "segments" : "readings"} on the map, ${against} of them against (dashed, ✕)`),
       others === "" ? null : el("p", { class: "hint" }, `Other explanations: ${others}`)].filter((part) => part !== null));
   }
-}
-
-// A natural logarithm of odds as the number of times: 1.2, 11, 10⁹.
-function times(logarithm) {
-  const tens = logarithm / Math.LN10;
-  if (tens < 4) return String(Number(Math.exp(logarithm).toPrecision(2)));
-  return `10${String(Math.round(tens)).replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit])}`;
 }
 
 // Describes the map in a sentence, for screen readers.

@@ -2,7 +2,7 @@
 // data, line counters. Changes of the state are announced to screen readers.
 
 import { byId, setAttribute, setText } from "./dom.js";
-import { degrees } from "./units.js";
+import { degrees, percent } from "./units.js";
 
 const STALE_S = 2.5; // while the robot does not answer, updates come once a second
 const RECENT_MS = 5000;
@@ -112,11 +112,11 @@ export class Status {
 
   // With one standard deviation: of the place in its worst direction, and of the heading.
   #place({ pose: [x, y, theta], covariance, status, probability }) {
-    const said = `${status} ${Math.round(100 * probability)} %`;
+    const said = `${status} ${percent(probability)}`;
     if (covariance === null) return `unknown, ${said}`;
     const [xx, xy, yy, heading] = covariance;
     const sigma = Math.sqrt((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy));
-    const place = `${this.#units.number(x)}, ${this.#units.number(y)} ± ${this.#units.length(sigma, 3)}`;
+    const place = `${this.#units.number(x)}, ${this.#units.number(y)} ${this.#units.spread(sigma)}`;
     return `${place}, ${degrees(theta)} ± ${((Math.sqrt(heading) * 180) / Math.PI).toFixed(1)}°, ${said}`;
   }
 

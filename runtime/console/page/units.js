@@ -28,6 +28,13 @@ export class Units extends Emitter {
     return `${this.number(metres, digits)} ${this.name}`;
   }
 
+  // A standard error, in millimetres where it is less than one.
+  spread(sigma) {
+    if (!(sigma < 10000)) return "± more than 10 km";
+    if (sigma >= 0.001) return `± ${this.length(sigma, 3)}`;
+    return sigma >= 0.00005 ? `± ${(1000 * sigma).toFixed(1)} mm` : "± less than 0.1 mm";
+  }
+
   place(x, y, digits = 2) {
     return `${this.number(x, digits)}, ${this.number(y, digits)} ${this.name}`;
   }
@@ -40,3 +47,16 @@ export class Units extends Emitter {
 
 // From −180° to 180°, however often the robot has turned.
 export const degrees = (radians) => `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−");
+
+// A probability; no evidence makes it 0 or 100.
+export const percent = (share) => `${share >= 0.995 ? "> 99" : share < 0.005 ? "< 1" : Math.round(100 * share)} %`;
+
+// A natural logarithm of odds as the number of times: 1.2, 11, 10⁵. Readings are not so independent that a greater number could be meant.
+export function times(logarithm) {
+  const tens = logarithm / Math.LN10;
+  if (tens < 4) return String(Number(Math.exp(logarithm).toPrecision(2)));
+  return tens < 6 ? `10${tens < 4.5 ? "⁴" : tens < 5.5 ? "⁵" : "⁶"}` : "more than a million";
+}
+
+// The magnitude of a schema's vector; inside the safety margin it is a million, for Arkin's infinity.
+export const magnitude = (size) => (size < 1000 ? size.toFixed(2) : "unbounded");

@@ -26,15 +26,18 @@ NODE, _ = compute_driver_executable()  # the one that drives the browser in test
 @pytest.mark.promise("P31")
 def test_the_forms_are_those_of_the_page() -> None:
     """Node runs the page's own code over the same values."""
+    rng = random.Random(3)
     values = [0.0, -0.004, 1.005, 2.675, -12.3456, 0.0005, 3.14159, -85.0, 7.7724]
-    shares = [0.0, 0.004, 0.5, 0.994, 0.9951, 1.0]
+    shares = [0.0, 0.004, 0.5, 0.994, 0.995, 0.9951, 1.0, *(rng.random() for _ in range(50))]
+    sigmas = [0.0, 3e-5, 7e-4, 0.001, 0.04, *(10.0 ** rng.uniform(-9.0, 9.0) for _ in range(50))]
     page = Path(page_folder.__file__).parent / "page"
     script = (
-        f"import {{Units, degrees}} from {json.dumps((page / 'units.js').as_uri())};"
-        f"const percent = {_percent(page)}; const units = new Units(); const out = [];"
+        f"import {{Units, degrees, percent}} from {json.dumps((page / 'units.js').as_uri())};"
+        "const units = new Units(); const out = [];"
         f"for (const name of ['m', 'ft']) {{ units.choose(name); for (const v of {values})"
         " out.push(units.number(v), units.length(v, 3), units.place(v, -v), degrees(v)); }"
-        f"for (const s of {shares}) out.push(percent(s)); console.log(JSON.stringify(out));"
+        f"for (const s of {shares}) out.push(percent(s));"
+        f"for (const s of {sigmas}) out.push(units.spread(s)); console.log(JSON.stringify(out));"
     )
     done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
     units: tuple[Units, ...] = ("m", "ft")
@@ -47,7 +50,30 @@ def test_the_forms_are_those_of_the_page() -> None:
             page_text.degrees(v),
         )
     ]  # fmt: skip
-    assert json.loads(done.stdout) == [*ours, *map(page_text.percent, shares)]
+    spreads = [page_text.spread(sigma, "ft") for sigma in sigmas]
+    assert json.loads(done.stdout) == [*ours, *map(page_text.percent, shares), *spreads]
+
+
+@pytest.mark.parametrize("exponent", range(-30, 31, 3))
+def test_no_probability_is_0_or_100_and_no_uncertainty_is_nought(exponent: int) -> None:
+    small = 10.0**-exponent if exponent >= 0 else 10.0**exponent
+    for said in (page_text.percent(share) for share in (small, 1.0 - small, 0.0, 1.0)):
+        assert not said.startswith(("0 ", "100 ")), said
+    assert re.search("[1-9]", page_text.spread(10.0**exponent, "m"))
+
+
+def test_odds_on_the_page_end_at_a_million_and_magnitudes_at_a_thousand() -> None:
+    """Node runs the page's own code; the longest said before had 434,294,469 digits."""
+    page = Path(page_folder.__file__).parent / "page"
+    logarithms = [0.0, 0.7, 2.4, 9.3, 11.5, 13.7, 13.9, 1e3, 1e9]
+    script = (
+        f"import {{magnitude, times}} from {json.dumps((page / 'units.js').as_uri())};"
+        f"console.log(JSON.stringify([...{logarithms}.map(times), ...[0.5, 99.9, 1e6].map(magnitude)]));"
+    )
+    done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
+    million = "more than a million"
+    assert json.loads(done.stdout) == ["1", "2", "11", "10⁴", "10⁵", "10⁶", million, million, million,
+                                      "0.50", "99.90", "unbounded"]  # fmt: skip
 
 
 @pytest.mark.promise("P31")
@@ -85,11 +111,3 @@ def test_a_hidden_object_is_called_so_unless_it_was_confirmed() -> None:
     seen = DetectedObject("drum", 1.0, 2.0, 0.0, 0.1, 9, 0.9, 0.9)
     assert page_text.certainty(seen, hidden=True) == "hidden"
     assert page_text.certainty(replace(seen, confirmed=True), hidden=True) == "✓ 90 %"
-
-
-def _percent(page: Path) -> str:
-    """Return the page's function as its source has it."""
-    text = (page / "draw_objects.js").read_text(encoding="utf-8")
-    found = re.search(r"export const percent = (.*);", text)
-    assert found is not None
-    return found[1]
