@@ -2,7 +2,7 @@
 
 Most schemas request a direction (`arbitrate`). Teleoperation requests a velocity (`limit_velocity`), which echoes can
 only reduce. With incomplete or invalid inputs the decision is to stop. Neither moves the robot towards a direction in
-which the ring has not looked (`behaviors.field_of_view`).
+which the ring has not looked (`behaviors.field_of_view`), and neither chatters (`behaviors.commitment`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 from behaviors.clearance import stoppable_speed_m_s
+from behaviors.commitment import Commitment
 from behaviors.field_of_view import UnseenWay, seen_speed_m_s, unseen_way
 from behaviors.response import Response, summed
 from config.behaviors import ArbiterConfig
@@ -60,6 +61,7 @@ def arbitrate(
     config: ArbiterConfig,
     expected: Sequence[str],
     turn_rad_s: tuple[float, float] = (-math.inf, math.inf),
+    commitment: Commitment | None = None,
 ) -> Decision:
     """Return the velocity for the sum of all responses, or a reason to stop.
 
@@ -82,6 +84,8 @@ def arbitrate(
         Names of the schemas that must have responded.
     turn_rad_s
         The least and the greatest turning rate, rad/s; the base's limits hold as well.
+    commitment
+        Of the command before, if any: the side to which the robot turns to a nearly opposite course.
 
     Returns
     -------
@@ -98,7 +102,8 @@ def arbitrate(
     course = math.atan2(y, x)
     angle = wrap_angle(course - percept.pose.theta)
     speed = magnitude * _course_speed_m_s(abs(angle), config)
-    w = max(turn_rad_s[0], min(turn_rad_s[1], config.turn_gain_per_s * angle))
+    w = config.turn_gain_per_s * (angle if commitment is None else commitment.kept_angle(angle))
+    w = max(turn_rad_s[0], min(turn_rad_s[1], w))
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
     seen = seen_speed_m_s(percept, body, config.clearance_m, w)
     if seen == 0.0 and (unseen := _unseen_ways(percept, course, body, config)) is not None:

@@ -25,6 +25,8 @@ class Leg:
     origin_y: float
     outbound: bool = True
     done: bool = False
+    gave_up: bool = False
+    """Whether it ended because the robot came no farther."""
 
     @classmethod
     def starting_at(cls, pose: Pose) -> Leg:
@@ -54,6 +56,20 @@ def move_ahead(percept: Percept, leg: Leg, config: MoveAheadConfig) -> tuple[Res
         return Response(SCHEMA, 0.0, 0.0), leg
     magnitude = config.move_ahead_gain if leg.outbound else -config.move_ahead_gain
     return Response(SCHEMA, magnitude * ux, magnitude * uy), leg
+
+
+def along_m(pose: Pose, leg: Leg, config: MoveAheadConfig) -> float:
+    """Return how far the robot is from the leg's start in the direction in which the leg leads now, m."""
+    direction = math.radians(config.move_ahead_direction_deg)
+    along = (pose.x - leg.origin_x) * math.cos(direction) + (pose.y - leg.origin_y) * math.sin(direction)
+    return along if leg.outbound else -along
+
+
+def given_up(leg: Leg, config: MoveAheadConfig) -> Leg:
+    """Return a leg on which the robot comes no farther: it turns back where legs do, and ends otherwise."""
+    if config.at_end == "turn_back" and config.distance_m is not None:
+        return replace(leg, outbound=not leg.outbound)
+    return replace(leg, done=True, gave_up=True)
 
 
 def _advance(leg: Leg, progress_m: float, config: MoveAheadConfig) -> Leg:

@@ -30,6 +30,7 @@ from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
+    chatter,
     correction,
     drift_bound,
     known_room,
@@ -242,6 +243,7 @@ for command in (
     place_bound,
     navigation,
     beacons,
+    chatter,
     correction,
     nees,
     drift_bound,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
+from rich.console import Console
 
 from bench.in_rooms import try_in_rooms
 from bench.table import report, rows_table
@@ -137,6 +138,33 @@ def navigation(
         lambda rows: rows_table("drives to goals in unknown rooms", rows),
         json,
     )
+
+
+def chatter(*, robots: int = 20, rooms: int = 5, first: int = 100, seconds: float = 40.0, hours: float = 10.0) -> int:
+    """Measure how often the commanded speed changes its sign or standstill, and false reports of a base that stands.
+
+    Parameters
+    ----------
+    robots, rooms
+        Number of random robots and of random rooms, each robot in each room by two requests in turn.
+    first
+        Seed of the first robot.
+    seconds
+        Length of each drive, s.
+    hours
+        Time that random bases obey random commands, h.
+    """
+    use_kernel_cache()
+    from tests.runtime.cycle.test_chatter import chatter as figures
+    from tests.runtime.cycle.test_motion_monitor import assert_obedient
+
+    console = Console(stderr=True)
+    with console.status("bench") as status:
+        lines = [figures(range(first, first + max(1, robots)), range(max(1, rooms)), seconds, status.update)]
+        status.update("bases that obey")
+        lines.append(assert_obedient(range(first, first + round(12.0 * hours)), 300.0))
+    Console().print(*lines, sep="\n")
+    return 0
 
 
 def beacons(recording: Path, *, json: str = "beacons.json") -> int:

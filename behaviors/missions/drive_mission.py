@@ -21,6 +21,7 @@ from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene, Visited
 from behaviors.schema_registry import SCHEMAS
+from behaviors.way_progress import GROUND_M
 from config.mission_step import HELPERS, Condition, SchemaUse, SeenCondition, UnseenCondition
 from perception.percept import Pose
 
@@ -171,7 +172,8 @@ def _watched(mission: Mission, scene: Scene, answers: tuple[Answer, ...]) -> Mis
         has_moved = True
     elif remaining_m is None or remaining_m == 0.0:  # nowhere in particular, or only a turn is left
         turned = abs(math.remainder(pose.theta - anchor.theta, math.tau))
-        has_moved = math.hypot(pose.x - anchor.x, pose.y - anchor.y) >= PROGRESS_M
+        ground_m = GROUND_M if remaining_m is None else PROGRESS_M
+        has_moved = math.hypot(pose.x - anchor.x, pose.y - anchor.y) >= ground_m
         has_moved |= remaining_m == 0.0 and turned >= PROGRESS_M
     else:
         has_moved = progress.best_m is None or remaining_m <= progress.best_m - PROGRESS_M

@@ -10,13 +10,14 @@ from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
 from behaviors.avoid_past import Trail
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.commitment import Commitment
 from behaviors.field_of_view import unseen_way
 from behaviors.follow_valley import SCHEMA as VALLEY
 from behaviors.leave_canyon import SCHEMA as CANYON
 from behaviors.missions.drive_mission import drive_mission, given_up
 from behaviors.missions.mission import Mission
 from behaviors.move_ahead import SCHEMA as AHEAD
-from behaviors.move_ahead import Leg, move_ahead
+from behaviors.move_ahead import Leg, along_m, move_ahead
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response, summed
@@ -30,6 +31,7 @@ from perception.percept import Percept, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
 from runtime.cycle.escape_schemas import escape_schemas
 from runtime.cycle.goal_drive import GoalDrive, drive_through_valley, drive_to_goal
+from runtime.cycle.stalled_drives import ENDED_S, DriveMemory, observe_way
 
 SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""
@@ -44,7 +46,12 @@ PLACE_LOST: Final = (
 )
 AWAY_M: Final = 0.5
 """A robot that is farther from its reached goal than its success radius by this was moved, or was not there, m."""
+WAITS_TO_START: Final = "the robot has only just stopped, and starts again two seconds after its last start"
 LEG_DONE: Final = "the leg is done"
+LEG_GIVEN_UP: Final = (
+    f"the leg has ended, as the robot came no farther along it for {ENDED_S:.0f} s: clear the way and resume the "
+    "legs, or set a goal"
+)
 NO_WAY: Final = (
     "step {} finds no way: something is too near ahead, or the schemas cancel one another; if that lasts, the step "
     "is stuck"
@@ -58,6 +65,9 @@ class StepSettings:
     step: StepConfig
     run: Settings
     settings: Settings
+
+
+NO_MEMORY: Final = DriveMemory()
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +88,17 @@ class DriveResult:
     """Where the robot has been, if avoid-past is in use."""
     step_settings: StepSettings | None = None
     """Of the mission's step, for the next cycle."""
+    memory: DriveMemory = NO_MEMORY
+    """For the next cycle."""
+    remaining_m: float | None = None
+    """How far it still is, m, from any origin; None if the request leads nowhere in particular."""
 
 
 def drive(
     drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
     place: GoalPlace | None = None, goal_drive: GoalDrive | None = None, map_frame: Pose | None = None,
     cycle_s: float = 0.0, trail: Trail = (), step_settings: StepSettings | None = None,
+    memory: DriveMemory = NO_MEMORY,
 ) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
@@ -111,18 +126,48 @@ def drive(
         Of the cycle before.
     step_settings : StepSettings, optional
         Of the cycle before, for a mission.
+    memory : DriveMemory, optional
+        Of the cycle before.
     """
+    commitment = memory.commitment
     match drive_request:
         case Teleoperate():
-            return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings)
+            result = _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings)
         case Goal():
-            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame)
-        case Mission():
-            return _on_mission(
-                drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s, step_settings
+            result = _to_goal(
+                drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame, commitment
             )
+        case Mission():
+            result = _on_mission(
+                drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s, step_settings,
+                commitment,
+            )  # fmt: skip
         case _:
-            return _along_legs(drive_request, run_s, leg, percept, settings, trail)
+            result = _along_legs(drive_request, run_s, leg, percept, settings, trail, commitment)
+    stands = (
+        isinstance(result.decision, Drive) and result.decision.twist == STANDSTILL and result.hold_reason is not None
+    )
+    progress, leg, stalled = observe_way(
+        result.drive_request, result.leg, None if stands else memory.progress, percept.pose, result.remaining_m,
+        requested_run_s, run_s, settings.behaviors.move_ahead,
+    )  # fmt: skip
+    hold_reason, memory = result.hold_reason or stalled, DriveMemory(memory.commitment, progress)
+    return replace(result, leg=leg, hold_reason=hold_reason, memory=memory)
+
+
+def commit(result: DriveResult, twist: Twist, requested_run_s: float, run_s: float) -> tuple[Twist, DriveResult]:
+    """Return the velocity to command, without speed where a start waits, and the result with what that commits to.
+
+    `twist` is the velocity after all limits; the times are those of `drive`, s.
+    """
+    request, requested, before = result.drive_request, 0, result.memory.commitment
+    if isinstance(request, Teleoperate):  # each message is a request: only another direction is a new one
+        requested = (request.v > 0.0) - (request.v < 0.0)
+    elif before.started_run_s is not None and before.started_run_s < requested_run_s:
+        before = replace(before, started_run_s=None)
+    decided, (twist, commitment) = twist, before.commit(twist, run_s, requested)
+    hold_reason = result.hold_reason or (WAITS_TO_START if twist == STANDSTILL != decided else None)
+    return twist, replace(result, hold_reason=hold_reason, memory=replace(result.memory, commitment=commitment))
 
 
 def _teleoperate(
@@ -152,7 +197,7 @@ def _teleoperate(
 
 def _to_goal(
     drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
-    percept: Percept, settings: Settings, trail: Trail, map_frame: Pose | None,
+    percept: Percept, settings: Settings, trail: Trail, map_frame: Pose | None, commitment: Commitment,
 ) -> DriveResult:  # fmt: skip
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
     if place is None and not drive_request.reached:
@@ -161,7 +206,7 @@ def _to_goal(
     way_rad = math.atan2(there.y - percept.pose.y, there.x - percept.pose.x)
     others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
     there, goal_drive, responses, decision, hold_reason = drive_to_goal(
-        there, goal_drive, percept, run_s, others, settings
+        there, goal_drive, percept, run_s, others, settings, commitment
     )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
@@ -177,7 +222,8 @@ def _to_goal(
                 f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) was reached, but the robot is "
                 f"{away_m:.1f} m from it now: it was moved, or its place was wrong; set the goal again"
             )
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive, trail)
+    vectors, left_m = with_sum(responses, decision), math.hypot(there.x - percept.pose.x, there.y - percept.pose.y)
+    return DriveResult(decision, vectors, drive_request, leg, hold_reason, goal_drive, trail, remaining_m=left_m)
 
 
 def _at_goal(
@@ -209,8 +255,9 @@ def _turn_to(
 
 
 def _along_legs(
-    drive_request: DriveRequest, run_s: float, leg: Leg, percept: Percept, settings: Settings, trail: Trail
-) -> DriveResult:
+    drive_request: DriveRequest, run_s: float, leg: Leg, percept: Percept, settings: Settings, trail: Trail,
+    commitment: Commitment,
+) -> DriveResult:  # fmt: skip
     """Return what the configured legs lead to."""
     ahead, leg = move_ahead(percept, leg, settings.behaviors.move_ahead)
     others: tuple[Response, ...] = ()
@@ -221,14 +268,20 @@ def _along_legs(
     away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     responses = (ahead, away, *others)
     expected = (AHEAD, AVOID, *(response.schema for response in others))
-    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
+    decision = arbitrate(
+        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment
+    )
+    if leg.gave_up and isinstance(decision, Drive):
+        return DriveResult(Drive(STANDSTILL), (), drive_request, leg, LEG_GIVEN_UP, trail=trail)
     hold_reason = LEG_DONE if leg.done else None
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, trail=trail)
+    remaining_m = -along_m(percept.pose, leg, settings.behaviors.move_ahead)
+    vectors = with_sum(responses, decision)
+    return DriveResult(decision, vectors, drive_request, leg, hold_reason, trail=trail, remaining_m=remaining_m)
 
 
 def _on_mission(
     mission: Mission, run_s: float, leg: Leg, goal_drive: GoalDrive | None, percept: Percept, settings: Settings,
-    map_frame: Pose | None, cycle_s: float, step_settings: StepSettings | None,
+    map_frame: Pose | None, cycle_s: float, step_settings: StepSettings | None, commitment: Commitment,
 ) -> DriveResult:  # fmt: skip
     """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
     behaviors, body = settings.behaviors, settings.body
@@ -254,7 +307,7 @@ def _on_mission(
     if asked.goal is not None:
         beside = (r for r in (*asked.leads, *asked.helpers) if r.schema not in {TO_GOAL, VALLEY, CANYON})
         _, goal_drive, responses, decision, hold_reason = drive_to_goal(
-            asked.goal, goal_drive, percept, run_s, tuple(beside), settings
+            asked.goal, goal_drive, percept, run_s, tuple(beside), settings, commitment
         )
         if goal_drive.progress.fault is not None:
             mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")
@@ -263,16 +316,24 @@ def _on_mission(
         remaining_m = math.inf if asked.remaining_m is None else asked.remaining_m
         beside = (r for r in asked.helpers if r.schema != VALLEY)
         goal_drive, responses, decision, hold_reason = drive_through_valley(
-            Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, run_s, tuple(beside), settings
-        )
+            Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, run_s, tuple(beside), settings,
+            commitment,
+        )  # fmt: skip
     else:
         away = avoid_static_obstacle(others, body.radius_m, settings.behaviors.avoid_static_obstacle)
         responses = (*asked.leads, *asked.helpers, away)
-        decision = arbitrate(responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID))
+        decision = arbitrate(
+            responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID), commitment=commitment
+        )
     if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:
         hold_reason = NO_WAY.format(step.name)
     vectors = with_sum(responses, decision)
-    return DriveResult(decision, vectors, mission, leg, hold_reason, goal_drive, step_settings=step_settings)
+    left_m = asked.remaining_m
+    if asked.goal is not None:
+        left_m = math.hypot(asked.goal.x - percept.pose.x, asked.goal.y - percept.pose.y)
+    return DriveResult(
+        decision, vectors, mission, leg, hold_reason, goal_drive, step_settings=step_settings, remaining_m=left_m
+    )
 
 
 def of_step(step: StepConfig, settings: Settings, before: StepSettings | None) -> StepSettings:

@@ -9,6 +9,7 @@ from typing import Final
 from behaviors.arbiter import Decision, Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import Zone, avoid_static_obstacle
+from behaviors.commitment import Commitment
 from behaviors.follow_valley import AT_GOAL_M, Valley, follow_valley
 from behaviors.goal_progress import Progress, observe_progress
 from behaviors.leave_canyon import NO_DETOUR, Detour, leave_canyon
@@ -53,7 +54,7 @@ class GoalDrive:
 
 def drive_to_goal(
     goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, beside: tuple[Response, ...],
-    settings: Settings,
+    settings: Settings, commitment: Commitment | None = None,
 ) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
     """Return the goal and the drive for the next cycle, the responses, the decision, and why the robot holds.
 
@@ -71,6 +72,8 @@ def drive_to_goal(
         Of schemas beside avoid-static-obstacle.
     settings : Settings
         The run's.
+    commitment : Commitment, optional
+        Of the command before.
     """
     behaviors, body = settings.behaviors, settings.body
     distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
@@ -106,7 +109,7 @@ def drive_to_goal(
         hold_reason = NO_VALLEY if valley.direction_rad is None else None
         room_m = behaviors.follow_valley.safety_m
     responses = (response, _pushes(percept, room_m, settings), *beside)
-    decision = _arbitrate(responses, percept, now.turn_rad_s, settings)
+    decision = _arbitrate(responses, percept, now.turn_rad_s, settings, commitment)
     now = replace(now, turn_rad_s=decision.twist.w if isinstance(decision, Drive) else 0.0)
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
@@ -121,7 +124,7 @@ def drive_to_goal(
 
 def drive_through_valley(
     way: Response, distance_m: float, before: GoalDrive | None, percept: Percept, run_s: float,
-    beside: tuple[Response, ...], settings: Settings,
+    beside: tuple[Response, ...], settings: Settings, commitment: Commitment | None = None,
 ) -> tuple[GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
     """Return the drive for the next cycle, the responses, the decision, and why the robot holds, without a goal.
 
@@ -133,7 +136,7 @@ def drive_through_valley(
         How far it is to where they lead, m; infinite if they lead nowhere in particular.
     beside : tuple of Response
         Of other schemas.
-    before, percept, run_s, settings
+    before, percept, run_s, settings, commitment
         As of `drive_to_goal`.
     """
     now = GoalDrive(Progress.starting_at(percept.pose, 0.0, run_s)) if before is None else before
@@ -141,13 +144,16 @@ def drive_through_valley(
     response, valley = follow_valley(percept, way, distance_m, now.valley, Search(), radius_m, config)
     responses = (response, _pushes(percept, config.safety_m, settings), *beside)
     expected = tuple(r.schema for r in responses)
-    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected)
+    decision = arbitrate(
+        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment
+    )
     is_closed = valley.direction_rad is None and math.hypot(way.x, way.y) > 0.0
     return replace(now, valley=valley), responses, decision, NO_VALLEY if is_closed else None
 
 
 def _arbitrate(
-    responses: tuple[Response, ...], percept: Percept, last_rad_s: float, settings: Settings
+    responses: tuple[Response, ...], percept: Percept, last_rad_s: float, settings: Settings,
+    commitment: Commitment | None,
 ) -> Decision:  # fmt: skip
     """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily.
 
@@ -159,7 +165,7 @@ def _arbitrate(
     if any(r.schema == AVOID and (r.x, r.y) != (0.0, 0.0) for r in responses):
         change_rad_s = math.inf
     limits = max(-rate_rad_s, last_rad_s - change_rad_s), min(rate_rad_s, last_rad_s + change_rad_s)
-    return arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected, limits)
+    return arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected, limits, commitment)
 
 
 def _is_occupied(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from drivers.token_bucket import LineLimit
-from runtime.cycle.modes import Mode
+from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import State
 from runtime.support.sd_notify import SdNotifier
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 LINES_PER_S: Final = 2.0
 LINES_BURST: Final = 200.0
 """Lines at once: a person changes the mode a few times a minute, a robot that fails to keep the line each cycle."""
+HELD_S: Final = 2.0
+"""A reason that ends sooner, as that of a start that waits, is not logged, s."""
 STOP_REASONS_MAX: Final = 1000
 """Reasons of stops that are kept; the oldest are dropped."""
 
@@ -33,13 +35,32 @@ class ModeLog:
     ----------
     stop_reasons
         Of the newest stops, in order.
+    hold_reasons
+        Why the robot held in DRIVE for `HELD_S` or more, in order.
     """
 
     def __init__(self, log: FilteringBoundLogger, notifier: SdNotifier) -> None:
         self.stop_reasons: list[str] = []
         self._log = log
         self._notifier = notifier
+        self.hold_reasons: list[str] = []
+        self._held: str | None = None
+        self._held_run_s: float | None = None
+        self._is_told = False
         self._limit = LineLimit(LINES_PER_S, LINES_BURST)
+
+    def observe(self, state: State, before: ModeState, run_s: float) -> None:
+        """Log the mode if it was entered since `before`, and why a robot in DRIVE holds, once that has lasted."""
+        if state.mode.entered_since(before):
+            self.entered(state, run_s)
+        if state.hold_reason != self._held or self._held_run_s is None:
+            self._held, self._held_run_s, self._is_told = state.hold_reason, run_s, False
+        elif not self._is_told and self._held is not None and run_s - self._held_run_s >= HELD_S:
+            self._is_told = True
+            self.hold_reasons.append(self._held)
+            del self.hold_reasons[:-STOP_REASONS_MAX]
+            if self._limit.take(run_s) is not None:
+                self._log.info("holds", reason=self._held, cycle=state.cycle)
 
     def entered(self, state: State, run_s: float) -> None:
         """Log the mode that was entered at `run_s`."""

@@ -231,7 +231,7 @@ class RobotProcess:
                 await self._shut_down(link_task)
         return run_summary(
             self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row,
-            self._mode_log.stop_reasons,
+            self._mode_log.stop_reasons, self._mode_log.hold_reasons,
         )  # fmt: skip
 
     async def _prepare(self, preparation: Preparation) -> bool:
@@ -320,8 +320,7 @@ class RobotProcess:
     def _report(self, record: CycleRecord, before: ModeState, on_cycle: OnCycle | None) -> None:
         """Record and show the cycle, and log what is new about mode, sensors and odometry."""
         received, on_firing = record.inputs.received, self._observers.on_firing
-        if self._state.mode.entered_since(before):
-            self._mode_log.entered(self._state, record.inputs.run_s)
+        self._mode_log.observe(self._state, before, record.inputs.run_s)
         self._line_log.observe(record, self._driver, self._budget.flood(record.inputs.run_s))
         for line in self._alerts.update(received, self._state, record.inputs.run_s):
             self._log.warning(line)

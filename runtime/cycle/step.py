@@ -43,11 +43,12 @@ from runtime.cycle.drive_requests import (
     refusal,
     requested,
 )
-from runtime.cycle.driving import StepSettings, drive
+from runtime.cycle.driving import StepSettings, commit, drive
 from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
+from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.unheard_limit import limit_unheard
 from runtime.cycle.velocity_limits import ZoneLimits, goal_in_zone, wants_map, zone_limits
 from runtime.timing.phases import Phase, ignore_phase
@@ -109,6 +110,8 @@ class State:
     """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
     """Why the robot does not move although it may drive; None if it moves."""
+    drive_memory: DriveMemory = field(default_factory=DriveMemory)
+    """What the last cycle in DRIVE left, whatever is driven."""
     motion_monitor: MotionMonitor = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
     clock_monitor: ClockMonitor = field(default_factory=ClockMonitor)
@@ -224,9 +227,8 @@ def _perceive(state: State, inputs: Inputs, settings: Settings) -> int:
         state.void_places = settings.places if settings.places_frame == "odom" else None
     if inputs.received.odometry is not None:
         state.odometry = inputs.received.odometry
-    new_segments = 0
-    for firing in inputs.received.firings:
-        new_segments += state.perception.observe(firing)
+    new_segments = sum(map(state.perception.observe, inputs.received.firings))
+    for firing in inputs.received.firings[-1:]:
         state.last_firing_robot_s = firing.robot_s
     state.ring_problem = state.perception.ring_monitor.take_problem()
     return new_segments
@@ -240,8 +242,9 @@ def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) 
         _accept_drive_request(state, inputs)
     state.motion_monitor = state.motion_monitor.observe(inputs.received.odometry, inputs.run_s, settings.body)
     if inputs.line is LineState.READY:
-        received = inputs.received
-        state.clock_monitor = state.clock_monitor.observe(received.odometry, received.firings, inputs.run_s)
+        state.clock_monitor = state.clock_monitor.observe(
+            inputs.received.odometry, inputs.received.firings, inputs.run_s
+        )
     else:  # what is on its way is unknown
         state.clock_monitor = ClockMonitor()
     command = _command(state, inputs, settings)
@@ -280,16 +283,13 @@ def _refusal(state: State, drive_request: DriveInput, settings: Settings) -> str
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Return the command that mode and schemas lead to."""
-    flags = inputs.received.flags
-    if state.odometry is not None and state.odometry.flags:
-        flags |= state.odometry.flags
+    flags = inputs.received.flags | (Flags(0) if state.odometry is None else state.odometry.flags)
     before = state.mode
-    gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
+    gap_s = 0.0 if state.run_s is None else max(0.0, inputs.run_s - state.run_s)
     state.run_s = inputs.run_s
-    goal = state.drive_request if isinstance(state.drive_request, Goal) else None
-    gap_s = max(0.0, gap_s)
-    map_frame = state.perception.known_map_frame() if wants_map(state.drive_request, settings) else None
-    state.goal_place = None if goal is None else goal_place(goal, state.goal_place, map_frame, gap_s)
+    request = state.drive_request
+    map_frame = state.perception.known_map_frame() if wants_map(request, settings) else None
+    state.goal_place = goal_place(request, state.goal_place, map_frame, gap_s) if isinstance(request, Goal) else None
     movement = state.motion_monitor.movement
     state.mode = advance(before, inputs, flags, gap_s, movement, state.clock_monitor.clock)
     if state.mode.mode is Mode.DRIVE:
@@ -297,6 +297,7 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
         if isinstance(decision, Drive):
             return decision.twist
         state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.run_s, decision.reason)
+    state.drive_memory = DriveMemory()
     must_stand = state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}
     if must_stand and (state.mode.entered_since(before) or movement is not Movement.AS_COMMANDED):
         return Order.HALT
@@ -343,35 +344,35 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if (zones := state.zones) is not None:
         percept, state.hold_reason = zones.seen(percept, state.drive_request, settings.body.radius_m)
         if state.hold_reason is not None:
-            state.goal_drive = None  # standing here is no lack of progress
+            state.goal_drive, state.drive_memory = None, DriveMemory()  # standing here is no lack of progress
             return Drive(STANDSTILL)
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
-        state.goal_drive, map_frame, gap_s, state.trail, state.step_settings,
+        state.goal_drive, map_frame, gap_s, state.trail, state.step_settings, state.drive_memory,
     )  # fmt: skip
     state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
-    state.trail, state.step_settings = result.trail, result.step_settings
-    state.percept = percept
-    state.vectors, state.hold_reason = result.vectors, result.hold_reason
-    if isinstance(result.decision, Unseen):
+    state.trail, state.step_settings, state.percept = result.trail, result.step_settings, percept
+    decision, reason = result.decision, result.hold_reason
+    if isinstance(decision, Unseen):
         driven_s = inputs.run_s - state.mode.entered_run_s
-        if min(result.decision.age_s - age_max_s, driven_s) <= age_max_s:
+        if min(decision.age_s - age_max_s, driven_s) <= age_max_s:
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
-            state.hold_reason = result.decision.reason
-            return Drive(STANDSTILL)
-    if not isinstance(result.decision, Drive):
-        return result.decision
-    unheard = state.perception.unheard
-    twist, reason = limit_unheard(
-        result.decision.twist, percept, unheard.points(), settings, is_ring_silent=unheard.is_ring_silent
-    )
-    if zones is not None:
-        commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
-        last = commands[-1].twist if commands else STANDSTILL
-        twist, by_zone = zones.applied(twist, last, state.drive_request, odometry, age_s, settings)
-        reason = reason or by_zone
-    state.hold_reason = state.hold_reason or reason
-    return Drive(twist)
+            reason, decision = decision.reason, Drive(STANDSTILL)
+    if isinstance(decision, Drive):
+        unheard = state.perception.unheard
+        twist, slowed = limit_unheard(
+            decision.twist, percept, unheard.points(), settings, is_ring_silent=unheard.is_ring_silent
+        )
+        if zones is not None:
+            commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
+            last = commands[-1].twist if commands else STANDSTILL
+            twist, by_zone = zones.applied(twist, last, state.drive_request, odometry, age_s, settings)
+            slowed = slowed or by_zone
+        result = replace(result, hold_reason=reason or slowed)
+        twist, result = commit(result, twist, state.requested_run_s, inputs.run_s)
+        decision = Drive(twist)
+    state.vectors, state.hold_reason, state.drive_memory = result.vectors, result.hold_reason, result.memory
+    return decision
 
 
 def _edit(state: State, inputs: Inputs, problem: str | None) -> tuple[Refused, ...]:

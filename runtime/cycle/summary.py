@@ -151,6 +151,8 @@ class RunSummary(PerceivedRows):
     process: FootprintRow
     mode: str
     stop_reasons: list[str]
+    hold_reasons: list[str]
+    """Why the robot held or made no progress in DRIVE, in order."""
     timing: TimingSummary
     pose: NotRequired[PoseRow]
     """Of a run that corrects drift or has a map: the robot at the end. The objects are in odometry's frame."""
@@ -246,6 +248,7 @@ def run_summary(
     driver: RobotDriver,
     footprint: FootprintRow,
     stop_reasons: list[str],
+    hold_reasons: list[str],
 ) -> RunSummary:
     """Return the summary of a run.
 
@@ -263,6 +266,8 @@ def run_summary(
         What the process used of its machine.
     stop_reasons : list of str
         Of every stop, in order.
+    hold_reasons : list of str
+        Why the robot held in DRIVE, in order.
     """
     counts = driver.counts
     perceived = perceived_rows(state.perception, driver.odometry_origin)
@@ -283,6 +288,7 @@ def run_summary(
         "process": footprint,
         "mode": state.mode.mode.value,
         "stop_reasons": stop_reasons,
+        "hold_reasons": hold_reasons,
         "timing": timing_monitor.summary(),
     }
     here = state.perception.localized()

@@ -22,6 +22,7 @@ from runtime.cycle.drive_requests import validate
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import DIRECTIONS, MotionMonitor
+from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.step import CycleRecord
 from runtime.cycle.summary import ObjectRow
 
@@ -202,11 +203,23 @@ def check_state(state: Mapping[str, Any]) -> None:
             _bounded("state.trail", value, PLACE_MAX_M)
     if (problem := validate(state["drive_request"])) is not None:
         raise ValueError(f"state.drive_request: {problem}")
+    _memory("state.drive_memory", state["drive_memory"])
     _motion("state.motion_monitor", state["motion_monitor"])
     _clock("state.clock_monitor", state["clock_monitor"])
     for response in state["vectors"]:
         _bounded("state.vectors.x", response.x, PLACE_MAX_M)
         _bounded("state.vectors.y", response.y, PLACE_MAX_M)
+
+
+def _memory(what: str, memory: DriveMemory) -> None:
+    commitment, progress = memory.commitment, memory.progress
+    _time(f"{what}.commitment.started_run_s", commitment.started_run_s)
+    _bounded(f"{what}.commitment.requested", commitment.requested, 1.0)
+    _bounded(f"{what}.commitment.turn_rad_s", commitment.turn_rad_s, SPEED_MAX)
+    _count(f"{what}.progress.part", progress.part)
+    _time(f"{what}.progress.run_s", progress.run_s)
+    for value in (progress.x, progress.y, progress.best_m or 0.0):
+        _bounded(f"{what}.progress", value, PLACE_MAX_M)
 
 
 def _clock(what: str, monitor: ClockMonitor) -> None:

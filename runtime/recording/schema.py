@@ -22,6 +22,7 @@ from perception.snapshot import Snapshot, fixed_shape
 from runtime.cycle.clock_monitor import ClockMonitor
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import MotionMonitor
+from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.field_checks import (
     COUNT_MAX,
@@ -198,12 +199,14 @@ _MADE_ANEW: Final = frozenset({"perception", "percept", "step_settings", "undos"
 _CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in _MADE_ANEW)
 _ADDED: Final = MappingProxyType(
     {
+        "drive_memory": DriveMemory(),
         "motion_monitor": MotionMonitor(),
         "clock_monitor": ClockMonitor(),
         "goal_place": None,
         "goal_drive": None,
         "trail": (),
         "void_places": None,
+        "ring_problem": None,
     }
 )
 """Fields that older recordings of this format lack, with the value that they had then."""

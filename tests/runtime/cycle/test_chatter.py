@@ -1,8 +1,9 @@
-"""The speed's sign and standstill change rarely in free space: random robots in random rooms, by every request."""
+"""The speed's sign and standstill change once a second at most: random robots in random rooms, by every request."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -25,11 +26,22 @@ pytestmark = pytest.mark.compiled
 FREE_M = 0.5
 """Nothing is nearer to the rim in free space."""
 STICK_S = 4.0
+IN_5_S_MAX = 6
+"""Three starts, each followed by a stop, fit in any 5 s."""
 REQUESTS = ("legs", "wander", "goal", "stick")
 
 
-def changes_at_s(robot: int, room: int, request: str, seconds: float) -> tuple[list[float], list[str]]:
-    """Return when the commanded speed changed its sign or standstill in free space, and why the robot stopped.
+@dataclass
+class Changes:
+    """When the commanded speed changed its sign or standstill, by whether anything was near, and why it stopped."""
+
+    free_s: list[float] = field(default_factory=list)
+    near_s: list[float] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+
+
+def changes_in(robot: int, room: int, request: str, seconds: float) -> Changes:
+    """Return the changes of the commanded speed in a drive.
 
     What an operator's stick asks for changes by itself; those changes do not count.
     """
@@ -44,9 +56,9 @@ def changes_at_s(robot: int, room: int, request: str, seconds: float) -> tuple[l
         run.state.drive_request = Mission(mission)
     elif request == "goal":
         run.state.drive_request = Goal(2.0, 0.5)
-    found, reasons, before, stick = list[float](), list[str](), None, Teleoperate(0.0, 0.0)
+    found, before, stick = Changes(), None, Teleoperate(0.0, 0.0)
     moved_at_s = 0.0
-    while run.run_s < seconds and not any("bumper" in reason for reason in reasons):
+    while run.run_s < seconds and not any("bumper" in reason for reason in found.reasons):
         if request == "stick":
             if run.run_s >= moved_at_s:
                 moved_at_s, before = run.run_s + STICK_S, None
@@ -55,39 +67,50 @@ def changes_at_s(robot: int, room: int, request: str, seconds: float) -> tuple[l
             run.state.drive_request, run.state.requested_run_s = stick, run.run_s
         command = run.cycle(Request.ARM if run.mode is Mode.SAFE_STOP else None).command
         if run.mode is Mode.SAFE_STOP:
-            reasons.append(run.state.mode.reason or "")
+            found.reasons.append(run.state.mode.reason or "")
         if isinstance(command, Twist):
             sign = int(np.sign(command.v))
             pose = run.robot.truth.pose
             is_free = clearance(pose.x, pose.y, scene.circles, scene.segments) > settings.body.radius_m + FREE_M
-            if before is not None and sign != before and is_free:
-                found.append(run.run_s)
+            if before is not None and sign != before:
+                (found.free_s if is_free else found.near_s).append(run.run_s)
             before = sign
-    return found, reasons
+        else:
+            before = None
+    return found
 
 
-def assert_calm(robots: range, rooms: range, seconds: float, requests: tuple[str, ...] = REQUESTS) -> str:
-    worst, total, count = 0, 0, 0
+def chatter(robots: range, rooms: range, seconds: float, report: Callable[[str], None] = lambda _: None) -> str:
+    """Return the figures of drives by every second request; none chatters, and none is said not to move."""
+    worst, free, near, count = 0, 0, 0, 0
     for robot in robots:
         for room in rooms:
-            for request in requests[(robot + room) % 2 :: 2] if len(requests) > 2 else requests:
-                found, reasons = changes_at_s(robot, room, request, seconds)
-                most = max((sum(at_s <= other_s < at_s + 5.0 for other_s in found) for at_s in found), default=0)
-                worst, total, count = max(worst, most), total + len(found), count + 1
-                assert len(found) <= seconds, f"robot {robot}, room {room}, {request}: {found}"
-                assert not any("does not move" in reason for reason in reasons), (robot, room, request)
-    assert total > 0
-    rate = total / (count * seconds)
+            for request in REQUESTS[(robot + room) % 2 :: 2]:
+                report(f"robot {robot}, room {room}, {request}")
+                found = changes_in(robot, room, request, seconds)
+                at_s = sorted(found.free_s + found.near_s)
+                most = max((sum(a <= b < a + 5.0 for b in at_s) for a in at_s), default=0)
+                worst, free, near, count = (
+                    max(worst, most),
+                    free + len(found.free_s),
+                    near + len(found.near_s),
+                    count + 1,
+                )
+                assert most <= IN_5_S_MAX, f"robot {robot}, room {room}, {request}: {at_s}"
+                assert len(at_s) <= seconds, f"robot {robot}, room {room}, {request}: {at_s}"
+                assert not any("does not move" in reason for reason in found.reasons), (robot, room, request)
+    drives_s = count * seconds
     return (
-        f"{len(robots)} random robots in {len(rooms)} rooms, {count} drives of {seconds:g} s: {rate:.2f} changes of "
-        f"the speed's sign or standstill a second in free space, at most {worst} in 5 s; none is said not to move"
+        f"{len(robots)} random robots in {len(rooms)} rooms, {count} drives of {seconds:g} s: {free / drives_s:.2f} "
+        f"changes of the speed's sign or standstill a second in free space, {near / drives_s:.2f} near obstacles, at "
+        f"most {worst} in 5 s; none is said not to move"
     )
 
 
 def test_no_random_robot_chatters(measured: Callable[[str], None]) -> None:
-    measured(assert_calm(range(8), range(1), 15.0))
+    measured(chatter(range(8), range(1), 15.0))
 
 
 @pytest.mark.soak
 def test_no_random_robot_chatters_in_many_rooms(measured: Callable[[str], None]) -> None:
-    measured(assert_calm(range(100, 120), range(5), 40.0))
+    measured(chatter(range(100, 120), range(5), 40.0))

@@ -1,0 +1,69 @@
+"""What the arbiter keeps from cycle to cycle, so that the speed's sign and standstill change once a second at most.
+
+Echoes, gaps between beams and schemas that cancel one another may allow a speed in one cycle and none in the next, or
+point the course ahead and behind in turn. A base that follows each of them is worn out and comes nowhere. So a start
+waits until `START_S` after the start before it, and a robot that turns on the spot to a course that is nearly
+opposite keeps its side.
+
+Stopping, driving slower and turning never wait, and neither does a direction that an operator newly asks for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from perception.percept import Twist
+
+START_S: Final = 2.0
+"""Least time between two starts, s: each is followed by one stop, which makes one change a second."""
+OPPOSITE_RAD: Final = math.radians(150.0)
+"""A course farther off the heading than this is nearly opposite: either side is about as far."""
+
+
+@dataclass(frozen=True, slots=True)
+class Commitment:
+    """What the last command committed the robot to; immutable, as keyframes hold it."""
+
+    started_run_s: float | None = None
+    """When the robot last started, by the run's clock; None before the first start under this request."""
+    turn_rad_s: float = 0.0
+    """Turning rate of the last command, rad/s."""
+    requested: int = 0
+    """Sign of the speed that an operator asks for; 0 without one."""
+    is_moving: bool = False
+    """Whether the last command had a speed."""
+
+    def kept_angle(self, angle_rad: float) -> float:
+        """Return the angle by which to turn to a course, within (−2π, 2π): on the side to which the robot turns.
+
+        Parameters
+        ----------
+        angle_rad
+            The course's angle from the heading, within [−π, π], rad.
+        """
+        if self.is_moving or abs(angle_rad) <= OPPOSITE_RAD or angle_rad * self.turn_rad_s >= 0.0:
+            return angle_rad
+        return angle_rad + math.copysign(2.0 * math.pi, self.turn_rad_s)
+
+    def commit(self, twist: Twist, run_s: float, requested: int = 0) -> tuple[Twist, Commitment]:
+        """Return the velocity to command, without its speed if that is a start that waits; and what it commits to.
+
+        Parameters
+        ----------
+        twist
+            The velocity that was decided on.
+        run_s
+            Now, by the run's clock, s.
+        requested
+            Sign of the speed that an operator asks for; another one than before does not wait.
+        """
+        started_run_s = self.started_run_s if requested == self.requested else None
+        if twist.v == 0.0:
+            return twist, Commitment(started_run_s, twist.w, requested)
+        if not self.is_moving or started_run_s is None:
+            if started_run_s is not None and 0.0 <= run_s - started_run_s < START_S:
+                return Twist(0.0, twist.w), Commitment(started_run_s, twist.w, requested)
+            started_run_s = run_s
+        return twist, Commitment(started_run_s, twist.w, requested, is_moving=True)

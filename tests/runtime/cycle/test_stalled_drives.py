@@ -1,0 +1,105 @@
+"""In DRIVE no half minute without progress has no reason: random robots before walls, by every request."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from behaviors.missions.mission import Mission
+from behaviors.move_to_goal import Goal
+from behaviors.way_progress import GROUND_M, NEARER_M
+from config.load import load_settings
+from drivers.messages import Pose
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
+from runtime.cycle.preparation import unprepared_state
+from runtime.cycle.step import STANDSTILL
+from tests.random_robots import random_furnished_room, random_robot
+from tests.runtime.emulated_run import Run
+
+pytestmark = pytest.mark.compiled
+
+SILENT_MAX_S = 30.0
+FAR_M = 30.0
+"""A goal so far away lies behind the walls of every room."""
+
+
+def gains(request: str, begin: Pose, start: Pose, pose: Pose, best_m: float) -> float | None:
+    """Return the new least distance if the robot has made progress since `begin`, by the truth; None otherwise."""
+    if request == "wander":
+        return 0.0 if math.hypot(pose.x - begin.x, pose.y - begin.y) >= GROUND_M + 0.1 else None
+    here = start.inverse().compose(pose)
+    left_m = -here.x if request == "legs" else math.hypot(FAR_M - here.x, here.y)
+    return left_m if left_m <= best_m - NEARER_M - 0.02 else None
+
+
+def silent_s(robot: int, room: int, request: str, seconds: float) -> tuple[float, list[str]]:
+    """Return the longest time in DRIVE without progress and without a reason, s, and the reasons that were given."""
+    settings = random_robot(robot)
+    run = Run(settings, random_furnished_room(room, settings), 100 * robot + room)
+    run.state = unprepared_state(settings)
+    if request == "wander":
+        mission = load_settings("room", mission="wander").mission
+        assert mission is not None
+        run.state.drive_request = Mission(mission)
+    elif request == "goal":
+        run.state.drive_request = Goal(FAR_M, 0.0)
+    start = begin = run.robot.truth.pose
+    best_m, since_s, longest_s, reasons = math.inf, 0.0, 0.0, [""]
+    while run.run_s < seconds:
+        run.cycle(Request.ARM if run.mode is Mode.SAFE_STOP else None)
+        pose, reason = run.robot.truth.pose, run.state.hold_reason
+        gained_m = gains(request, begin, start, pose, best_m)
+        if gained_m is not None or reason is not None or run.mode is not Mode.DRIVE:
+            best_m, begin, since_s = min(best_m, gained_m or math.inf), pose, run.run_s
+        longest_s = max(longest_s, run.run_s - since_s)
+        if reason is not None and reason != reasons[-1]:
+            reasons.append(reason)
+    return longest_s, reasons[1:]
+
+
+def assert_explained(robots: range, rooms: range, seconds: float) -> str:
+    worst_s, told = 0.0, 0
+    for robot in robots:
+        for room in rooms:
+            for request in ("legs", "wander", "goal"):
+                longest_s, reasons = silent_s(robot, room, request, seconds)
+                assert longest_s < SILENT_MAX_S, (
+                    f"robot {robot}, room {room}, {request}: {longest_s:.1f} s, {reasons}"
+                )
+                worst_s, told = max(worst_s, longest_s), told + any(" for 20 s: " in reason for reason in reasons)
+    assert told > 0
+    drives = len(robots) * len(rooms) * 3
+    return (
+        f"{drives} drives of {seconds:g} s: at most {worst_s:.1f} s without progress and reason; {told} were stalled"
+    )
+
+
+def test_no_drive_is_stalled_without_a_reason(measured: Callable[[str], None]) -> None:
+    measured(assert_explained(range(2), range(1), 42.0))
+
+
+@pytest.mark.soak
+def test_no_drive_is_stalled_without_a_reason_in_many_rooms(measured: Callable[[str], None]) -> None:
+    measured(assert_explained(range(200, 220), range(3), 120.0))
+
+
+def test_legs_before_a_wall_are_given_up_and_say_so() -> None:
+    """A robot that drives to and fro before a wall ends its leg, and stands with the reason."""
+    settings = random_robot(0)
+    run = Run(settings, random_furnished_room(0, settings), 5)
+    run.state = unprepared_state(settings)
+    reasons = []
+    while run.run_s < 90.0 and not (run.state.leg is not None and run.state.leg.done):
+        run.cycle(Request.ARM if run.mode is Mode.SAFE_STOP else None)
+        reasons.append(run.state.hold_reason)
+    run.cycle()
+    assert run.state.leg is not None
+    assert run.state.leg.gave_up
+    assert any(reason and "no farther along the leg for 20 s" in reason for reason in reasons)
+    run.until(run.run_s + 1.0)
+    assert run.state.hold_reason is not None
+    assert "the leg has ended" in run.state.hold_reason
+    assert all(record.command == STANDSTILL for record in run.records[-10:])
