@@ -37,7 +37,7 @@ class WayProgress:
     """When it was; None before the first cycle."""
 
     def observe(
-        self, pose: Pose, remaining_m: float | None, part: int, begun_run_s: float, run_s: float
+        self, pose: Pose, remaining_m: float | None, part: int, requested_run_s: float, run_s: float
     ) -> WayProgress:
         """Return the progress after a cycle.
 
@@ -49,10 +49,10 @@ class WayProgress:
             Distance left to where the request leads, m, from any origin; None if it leads nowhere in particular.
         part
             Which part of the request is driven; another one starts anew.
-        begun_run_s, run_s
+        requested_run_s, run_s
             When the request was made, and now, by the run's clock, s.
         """
-        is_new = self.run_s is None or part != self.part or begun_run_s > self.run_s
+        is_new = self.run_s is None or part != self.part or requested_run_s > self.run_s
         if not is_new and remaining_m is not None and self.best_m is not None:
             is_new = remaining_m <= self.best_m - NEARER_M
         elif not is_new:

@@ -46,7 +46,7 @@ class ModeLog:
         self.hold_reasons: list[str] = []
         self._held: str | None = None
         self._held_run_s: float | None = None
-        self._is_told = False
+        self._is_logged = False
         self._limit = LineLimit(LINES_PER_S, LINES_BURST)
 
     def observe(self, state: State, before: ModeState, run_s: float) -> None:
@@ -54,9 +54,9 @@ class ModeLog:
         if state.mode.entered_since(before):
             self.entered(state, run_s)
         if state.hold_reason != self._held or self._held_run_s is None:
-            self._held, self._held_run_s, self._is_told = state.hold_reason, run_s, False
-        elif not self._is_told and self._held is not None and run_s - self._held_run_s >= HELD_S:
-            self._is_told = True
+            self._held, self._held_run_s, self._is_logged = state.hold_reason, run_s, False
+        elif not self._is_logged and self._held is not None and run_s - self._held_run_s >= HELD_S:
+            self._is_logged = True
             self.hold_reasons.append(self._held)
             del self.hold_reasons[:-STOP_REASONS_MAX]
             if self._limit.take(run_s) is not None:

@@ -36,9 +36,9 @@ def test_a_robot_that_wanders_on_makes_progress() -> None:
         assert progress.stalled_s(0.1 * k) < STALLED_S
 
 
-@pytest.mark.parametrize(("part", "begun_run_s", "remaining_m"), [(1, 0.0, 5.0), (0, 30.0, 5.0), (0, 0.0, None)])
+@pytest.mark.parametrize(("part", "requested_run_s", "remaining_m"), [(1, 0.0, 5.0), (0, 30.0, 5.0), (0, 0.0, None)])
 def test_another_request_or_another_part_of_it_starts_anew(
-    part: int, begun_run_s: float, remaining_m: float | None
+    part: int, requested_run_s: float, remaining_m: float | None
 ) -> None:
-    progress = WayProgress().observe(HERE, 5.0, 0, 0.0, 0.0).observe(HERE, remaining_m, part, begun_run_s, 31.0)
+    progress = WayProgress().observe(HERE, 5.0, 0, 0.0, 0.0).observe(HERE, remaining_m, part, requested_run_s, 31.0)
     assert progress.stalled_s(31.0) == 0.0

@@ -61,7 +61,7 @@ def silent_s(robot: int, room: int, request: str, seconds: float) -> tuple[float
 
 
 def assert_explained(robots: range, rooms: range, seconds: float) -> str:
-    worst_s, told = 0.0, 0
+    worst_s, stalled = 0.0, 0
     for robot in robots:
         for room in rooms:
             for request in ("legs", "wander", "goal"):
@@ -69,12 +69,13 @@ def assert_explained(robots: range, rooms: range, seconds: float) -> str:
                 assert longest_s < SILENT_MAX_S, (
                     f"robot {robot}, room {room}, {request}: {longest_s:.1f} s, {reasons}"
                 )
-                worst_s, told = max(worst_s, longest_s), told + any(" for 20 s: " in reason for reason in reasons)
-    assert told > 0
+                worst_s, stalled = (
+                    max(worst_s, longest_s),
+                    stalled + any(" for 20 s: " in reason for reason in reasons),
+                )
+    assert stalled > 0
     drives = len(robots) * len(rooms) * 3
-    return (
-        f"{drives} drives of {seconds:g} s: at most {worst_s:.1f} s without progress and reason; {told} were stalled"
-    )
+    return f"{drives} drives of {seconds:g} s: at most {worst_s:.1f} s without progress and reason; {stalled} were stalled"
 
 
 def test_no_drive_is_stalled_without_a_reason(measured: Callable[[str], None]) -> None:
