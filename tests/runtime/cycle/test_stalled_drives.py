@@ -75,7 +75,7 @@ def assert_explained(robots: range, rooms: range, seconds: float) -> str:
                 )
     assert stalled > 0
     drives = len(robots) * len(rooms) * 3
-    return f"{drives} drives of {seconds:g} s: at most {worst_s:.1f} s without progress and reason; {stalled} were stalled"
+    return f"{drives} drives of {seconds:g} s: at most {worst_s:.1f} s without progress and reason; {stalled} stalled"
 
 
 def test_no_drive_is_stalled_without_a_reason(measured: Callable[[str], None]) -> None:
