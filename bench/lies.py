@@ -256,7 +256,8 @@ def run_trial(
         cycle += 1
         run_s = cycle / settings.cycle.rate_hz
         line.exchange(run_s)
-        inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
+        inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None,
+                               preparing=None if recognises else "left out")  # fmt: skip
         budget.begin()
         step(state, inputs, settings, lambda command: apply_command(driver, command), budget)
         truth, before = device.truth, place

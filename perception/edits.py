@@ -339,3 +339,15 @@ def no_such_segments(numbers: set[int]) -> str:
     named = ", ".join(map(str, sorted(numbers)[:NAMED_MAX]))
     more = f" and {len(numbers) - NAMED_MAX} more" if len(numbers) > NAMED_MAX else ""
     return f"no longer in the map: segment {named}{more}; the other segments were edited"
+
+
+def invalid_edit(edit: MapEdit) -> str | None:
+    """Return why a number, a place or the rows of an edit are impossible; None if they are not."""
+    if isinstance(edit, RestoreSegments):
+        return invalid_rows(edit)
+    if isinstance(edit, RestoreObjects):
+        return invalid_objects(edit)
+    refused = invalid_number(edit)
+    if isinstance(edit, PlaceModel | MoveObject):
+        refused = refused or invalid_pose(edit.x, edit.y, edit.theta)
+    return refused

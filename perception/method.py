@@ -9,11 +9,9 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
-from perception.bayes.bayes_method import BayesPerception
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Evidence, MapEdit, Segments
 from perception.kernel import Floats
-from perception.paper.paper_method import PaperPerception
 
 
 class Method(Protocol):
@@ -126,5 +124,9 @@ def make_method(ring: RingConfig, models: Sequence[ModelConfig], config: Percept
         The method and its settings.
     """
     if config.method == "paper":
+        from perception.paper.paper_method import PaperPerception
+
         return PaperPerception(ring, models, config)
+    from perception.bayes.bayes_method import BayesPerception
+
     return BayesPerception(ring, models, config.bayes)

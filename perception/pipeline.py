@@ -30,14 +30,9 @@ from perception.edits import (
     RejectObject,
     RemoveObject,
     RestoreArea,
-    RestoreObjects,
-    RestoreSegments,
     Segments,
     WithdrawConfirmation,
-    invalid_number,
-    invalid_objects,
-    invalid_pose,
-    invalid_rows,
+    invalid_edit,
 )
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
@@ -45,11 +40,12 @@ from perception.localization.drift_correction import LocalizedPose
 from perception.localization.equal_edit import edit_equally
 from perception.localization.known_room import KnownRoom, place_robot
 from perception.localization.map_frame import MapFrame
-from perception.localization.room import room_of
 from perception.mapping.canyons import ENDS_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
-from perception.method import Method, make_method
+from perception.method import Method
+from perception.no_method import NOT_READY, NoMethod
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
+from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room
 from perception.ring_monitor import RingMonitor
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
@@ -72,26 +68,22 @@ class Perception:
         The objects to recognise.
     config : PerceptionConfig
         The method and its settings.
-    method : Method, optional
-        In place of the one that `config` names; there is no evidence grid then.
+    recognises : bool
+        Whether it recognises from the start. Until it does, the ring is heard and watched, and there is no map.
     """
 
     BOUNDS: Final = bounds(_axes=CONSTANT, _half_angle=CONSTANT, _reach_m=CONSTANT, _sensors=CONSTANT)
 
     def __init__(
-        self,
-        ring: RingConfig,
-        models: Sequence[ModelConfig],
-        config: PerceptionConfig,
-        method: Method | None = None,
+        self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig, *, recognises: bool = True
     ) -> None:
-        self.method = make_method(ring, models, config) if method is None else method
+        # Snapshots hold the attributes in this order.
+        self.method: Method = NoMethod()
         self.sensor_monitor = SensorMonitor(ring)
         self.ring_monitor = RingMonitor(ring)
-        corrects = config.localization.correct_drift
-        self.map_frame = MapFrame(ring, models) if corrects else None
+        self.map_frame: MapFrame | None = None
         """Corrects drift, where the settings say so."""
-        self._other = make_method(ring, models, config) if corrects and method is None else None
+        self._other: Method | None = None
         """A second method, which enters firings at corrected poses; its objects are the landmarks. Once odometry is
         refuted, it changes places with `method`, which stops."""
         self._ring = ring
@@ -99,9 +91,7 @@ class Perception:
         """Finds the robot in the room of the settings, where there is one."""
         self.room: WorldConfig | None = None
         """That room."""
-        self._set_room(config.localization.known_room)
-        has_grid = method is None and config.grid.method != "off"
-        self.grid = EvidenceGrid(ring, config.grid) if has_grid else None
+        self.grid: EvidenceGrid | None = None
         """The evidence grid in the odometry's frame, where the settings have one."""
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
@@ -115,6 +105,20 @@ class Perception:
         radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.canyon_map = CanyonMap(2.0 * (radius_m + PASSAGE_M) - ENDS_M)
         """The box canyons found so far, in odometry's frame."""
+        if recognises:
+            self.recognise(models, config)
+
+    @property
+    def recognises(self) -> bool:
+        """Whether echoes are entered into a map."""
+        return not isinstance(self.method, NoMethod)
+
+    def recognise(self, models: Sequence[ModelConfig], config: PerceptionConfig, *, on: bool = True) -> None:
+        """Begin to recognise these models, with an empty map, as at a start; or stop, and have no map."""
+        self._models = tuple(models)
+        parts = begin_recognition(self._ring, models, config) if on else NO_RECOGNITION
+        self.method, self._other, self.map_frame, self.known_room, self.grid = parts
+        self.room = config.localization.known_room if on else None
 
     @property
     def can_refine(self) -> bool:
@@ -251,20 +255,16 @@ class Perception:
 
         No edit changes the obstacles that the robot avoids: the fresh echoes stay.
         """
+        if not self.recognises:
+            return NOT_READY
         if isinstance(edit, PlaceRobot):
             return place_robot(self.known_room, edit)
         if isinstance(edit, RejectObject | MarkVacant | LiftArea | RestoreArea):
             placed = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
             return edit_areas(self.vacant, placed, self._known, self._models)
-        refused = invalid_number(edit)
-        if isinstance(edit, ConfirmObject | WithdrawConfirmation | RemoveObject):
-            refused = refused or rejected(self.vacant, edit.object, self._known())
-        if isinstance(edit, PlaceModel | MoveObject):
-            refused = refused or invalid_pose(edit.x, edit.y, edit.theta)
-        if isinstance(edit, RestoreSegments):
-            refused = invalid_rows(edit)
-        if isinstance(edit, RestoreObjects):
-            refused = invalid_objects(edit)
+        refused = invalid_edit(edit)
+        if refused is None and isinstance(edit, ConfirmObject | WithdrawConfirmation | RemoveObject):
+            refused = rejected(self.vacant, edit.object, self._known())
         if refused is not None:
             return refused
         inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
@@ -347,12 +347,9 @@ class Perception:
         """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
         for method in self._methods():
             method.apply_settings(config)
-        if config.localization.known_room != self.room:
-            self._set_room(config.localization.known_room)
-
-    def _set_room(self, room: WorldConfig | None) -> None:
-        """Look for the robot's place in a room, as at the start of a run there; None forgets the room."""
-        self.room, self.known_room = room, None if room is None else KnownRoom(room_of(room), self._ring)
+        room = config.localization.known_room
+        if self.recognises and room != self.room:
+            self.room, self.known_room = room, find_in_room(room, self._ring)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Recognise these models: the present ones, and possibly further ones after them."""

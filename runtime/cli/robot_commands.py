@@ -45,7 +45,7 @@ def run(
     arm
         Arm the robot once, at the start. The emulated robot is armed without this option.
     seconds
-        End the run after this time.
+        End the run this long after recognition began.
     headless
         Print log lines instead of the live view.
     record

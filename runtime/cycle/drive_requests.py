@@ -35,6 +35,7 @@ __all__ = [
     "is_same_drive",
     "needs_map",
     "needs_objects",
+    "needs_recognition",
     "needs_space",
     "refusal",
     "requested",
@@ -94,6 +95,11 @@ def needs_space(drive_request: DriveRequest) -> bool:
         step = drive_request.step
         return drive_request.progress.status == "running" and (step.goal is not None or "follow_valley" in step.gains)
     return isinstance(drive_request, Goal)
+
+
+def needs_recognition(drive_request: DriveRequest) -> bool:
+    """Return whether a request waits while recognition is being prepared; legs and teleoperation do not."""
+    return isinstance(drive_request, Goal | Mission)
 
 
 def is_same_drive(before: DriveRequest, after: DriveRequest) -> bool:

@@ -61,6 +61,8 @@ class Inputs:
     """The operator's edits of the map, in this order."""
     host_s: float | None = None
     """The same moment by the host's clock; None in virtual time. For the record only: no decision depends on it."""
+    preparing: str | None = None
+    """How far the preparation of recognition is; None from the cycle on in which recognition begins."""
 
 
 def gather_inputs(
@@ -74,6 +76,7 @@ def gather_inputs(
     edits: tuple[Edit, ...] = (),
     drive_request: DriveInput | None = None,
     host_s: float | None = None,
+    preparing: str | None = None,
     line_messages: LineMessages = ROBOT_LINE,
 ) -> Inputs:
     """Return the inputs of a cycle, among them everything that the driver has received.
@@ -90,6 +93,8 @@ def gather_inputs(
         How long the oldest of the firings has waited.
     overrun, fault : str, optional
         Why the robot must not drive.
+    preparing : str, optional
+        How far the preparation of recognition is.
     line_messages : LineMessages
         Words the driver's messages for what is at the other end of the line.
     """
@@ -112,6 +117,7 @@ def gather_inputs(
         drive_request,
         edits,
         host_s,
+        preparing,
     )
 
 

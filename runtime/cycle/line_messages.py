@@ -90,3 +90,14 @@ def messages_on(port: str | None) -> LineMessages:
     if port is None or not os.path.realpath(port).startswith(PSEUDO_TERMINALS):
         return ROBOT_LINE
     return ProgramLine(f"the program at the other end of {port}", "start it again")
+
+
+def blind_reason(blind_s: float, line_problem: str | None, *, fires: bool) -> str:
+    """Return why the robot stops that has heard nothing usable for `blind_s` seconds."""
+    likely = line_problem or "check the ring's power and cable"
+    if not fires:
+        return f"the ring has not reported for {blind_s:.1f} s: {likely}, then re-arm"
+    return (
+        f"the ring fires, but no sensor has given a usable range for {blind_s:.1f} s, as all are masked or "
+        f"report faults: {likely}, then re-arm"
+    )

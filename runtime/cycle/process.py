@@ -7,6 +7,7 @@ are made in `runtime.cycle.step` and in the functions that it calls.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,13 +32,7 @@ from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.mode_log import ModeLog
 from runtime.cycle.modes import Mode, ModeState
-from runtime.cycle.preparation import (
-    Preparation,
-    prepared_state,
-    run_until_prepared,
-    unprepared_state,
-    unprepared_step,
-)
+from runtime.cycle.preparation import Preparation, RunningPreparation, prepared_state, unprepared_state
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary
 from runtime.support.health import Health, describe_exception
@@ -77,8 +72,6 @@ class Observers:
     """Gets the direction, the moment by the run's clock and by the host's, and the bytes that went over the line."""
     on_settings: Callable[[Settings], None] | None = None
     """Gets settings that changed while the robot runs, before the first cycle under them."""
-    on_unprepared_cycle: OnCycle | None = None
-    """Gets the cycles before recognition is ready, in place of `on_cycle`."""
 
 
 class RobotProcess:
@@ -129,7 +122,7 @@ class RobotProcess:
         self._notifier = SdNotifier() if notifier is None else notifier
         self.health = Health(log)
         self._driver = make_driver(settings)
-        self._preparation = preparation
+        self._preparation = RunningPreparation(preparation, log, self._on_prepared)
         self._state = prepared_state(settings) if preparation is None else unprepared_state(settings)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self.timing_monitor.timed
@@ -147,6 +140,7 @@ class RobotProcess:
         self._edits: list[Edit] = []
         self._drive_inputs = DriveInputs()
         self._arm_when_ready = False
+        self._footprint: Footprint | None = None
         self._stop = asyncio.Event()
 
     def request(self, request: Request, is_valid: Callable[[], bool] = always_valid) -> None:
@@ -204,7 +198,7 @@ class RobotProcess:
         arm : bool
             Arm once, as soon as the robot is ready.
         seconds : float, optional
-            Counted from the first cycle, by the run's clock.
+            Counted from the first cycle with recognition, by the run's clock.
 
         Raises
         ------
@@ -212,20 +206,20 @@ class RobotProcess:
             The port cannot be opened, or the robot does not answer as it should.
         """
         with self.health.catching_unhandled_errors():
+            await self._preparation.start(self._settings)
             await self._connection.connect(self._stop.is_set)
             self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             link_task = asyncio.create_task(self._link.run(), name="link")
             self.health.watch_task("link", link_task)
             for refusal in apply_realtime(self._settings.realtime):
                 self._log.warning(refusal)
-            footprint = Footprint(self._memory)
+            footprint = self._footprint = Footprint(self._memory)
             try:
                 self._arm_when_ready = arm
-                if self._preparation is None or await self._prepare(self._preparation):
-                    footprint = Footprint(self._memory)
-                    with self._memory.driving():
-                        await self._run_cycles(seconds)
+                with self._memory.driving():
+                    await self._run_cycles(seconds)
             finally:
+                await self._preparation.close()
                 process_row = footprint.close()
                 self._scheduler.close()
                 await self._shut_down(link_task)
@@ -234,40 +228,31 @@ class RobotProcess:
             self._mode_log.stop_reasons, self._mode_log.hold_reasons,
         )  # fmt: skip
 
-    async def _prepare(self, preparation: Preparation) -> bool:
-        """Run cycles without perception until recognition is ready, with an empty map; return whether it is."""
-        try:
-            await run_until_prepared(preparation, self._settings, self._unprepared_cycle, self._stop, self._log)
-        except Exception as error:  # noqa: BLE001 - as in a cycle of the run itself
-            self._fail(error)
-            return False
-        mode, self._state = self._state.mode, prepared_state(self._settings)
-        self._state.mode = mode
-        return True
-
-    def _unprepared_cycle(self, progress: str) -> None:
-        """Run a cycle before recognition is ready: the line is served, the echoes are shown, the robot stands."""
-        (run_s, host_s), before = self._clock.both(), self._state.mode
-        self._apply_live_settings()
-        record = unprepared_step(
-            self._state, self._gather(run_s, host_s), self._settings, progress, lambda c: self._carry_out(c, run_s)
-        )
-        self._report(record, before, self._observers.on_unprepared_cycle)
+    def _on_prepared(self) -> None:
+        """Recognition begins with this cycle: what it took is no part of the run's own footprint."""
+        self._memory.settle()
+        if self._footprint is not None:
+            self._footprint.begin()
 
     async def _run_cycles(self, seconds: float | None) -> None:
         """Run cycle after cycle until the run ends: sleep until one is due, run it, plan the next."""
         begin_run_s, scheduler = self._clock(), self._scheduler
+        recognised_run_s = math.inf if self._preparation.is_running else begin_run_s
         with scheduler.start(begin_run_s, command_gap_max_s(self._driver)):
             while not self._stop.is_set():
                 try:
                     now = await scheduler.wait()
                     if now is None:
                         continue
-                    if seconds is not None and now.run_s - begin_run_s >= seconds:
+                    if seconds is not None and now.run_s - recognised_run_s >= seconds:
                         return
                     self._cycle(now)
+                    if self._state.preparing is None:
+                        recognised_run_s = min(recognised_run_s, now.run_s)
                     end_run_s = self._clock()
-                    self._memory.cycle_done(scheduler.end(end_run_s))
+                    slack_s = scheduler.end(end_run_s)
+                    if not self._preparation.is_running:  # loading kernels leaves much garbage, and then all is kept
+                        self._memory.cycle_done(slack_s)
                     self._link.hold(scheduler.quiet_s(end_run_s))
                 except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stop first
                     self._fail(error)
@@ -305,7 +290,8 @@ class RobotProcess:
         overrun = self._budget.flood(run_s) or self._scheduler.overrun
         return gather_inputs(
             self._driver, run_s, request, echo_age_s=echo_age_s, overrun=overrun, fault=self.health.fault(),
-            edits=edits, drive_request=self._drive_inputs.take(), host_s=host_s, line_messages=self._line_messages,
+            edits=edits, drive_request=self._drive_inputs.take(), host_s=host_s,
+            preparing=self._preparation.progress(run_s), line_messages=self._line_messages,
         )  # fmt: skip
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:

@@ -39,6 +39,7 @@ from runtime.cycle.drive_requests import (
     is_same_drive,
     needs_map,
     needs_objects,
+    needs_recognition,
     needs_space,
     refusal,
     requested,
@@ -46,6 +47,7 @@ from runtime.cycle.drive_requests import (
 from runtime.cycle.driving import StepSettings, commit, drive
 from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
+from runtime.cycle.line_messages import blind_reason
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.stalled_drives import DriveMemory
@@ -120,6 +122,8 @@ class State:
     """The drive to a goal so far; None without a goal, or before its first cycle in DRIVE."""
     ring_problem: str | None = None
     """Why the readings of the newest firings cannot be true; None if they can. Made anew each cycle, not recorded."""
+    preparing: str | None = None
+    """How far the preparation of recognition is; None once it has started. Of the inputs, and not recorded."""
     percept: Percept | None = None
     """What the last cycle decided on; None if it did not drive. It is made anew each cycle and not recorded."""
     undos: tuple[Undo, ...] = ()
@@ -175,6 +179,9 @@ def step(
     mark : callable
         Called at the end of each phase; no decision depends on it.
     """
+    state.preparing, recognises = inputs.preparing, inputs.preparing is None
+    if state.perception.recognises is not recognises:
+        state.perception.recognise(settings.models, settings.perception, on=recognises)
     leaves_canyons = settings.behaviors.leave_canyon.leave_canyon_gain > 0.0
     state.perception.canyon_map.is_wanted = leaves_canyons and needs_space(state.drive_request)
     new_segments = _perceive(state, inputs, settings)
@@ -276,9 +283,8 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
 
 def _refusal(state: State, drive_request: DriveInput, settings: Settings) -> str | None:
     """Return why a drive request cannot be carried out, None if it can."""
-    if needs_map(drive_request) and state.perception.localized() is None:
-        return NO_MAP
-    return refusal(state.drive_request, drive_request) or goal_in_zone(drive_request, state.zones, settings)
+    no_map = NO_MAP if needs_map(drive_request) and settings.places_frame != "map" else None
+    return no_map or refusal(state.drive_request, drive_request) or goal_in_zone(drive_request, state.zones, settings)
 
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
@@ -318,13 +324,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     view, obstacles = state.perception.surroundings(now_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)
     blind_s = min(*view.sensor_ages_s.tolist(), now_s)  # numpy's call would take longer
     if blind_s > age_max_s:
-        likely = inputs.line_problem or "check the ring's power and cable"
-        if now_s - state.last_firing_robot_s > age_max_s:
-            return Stop(f"the ring has not reported for {blind_s:.1f} s: {likely}, then re-arm")
-        return Stop(
-            f"the ring fires, but no sensor has given a usable range for {blind_s:.1f} s, as all are masked or "
-            f"report faults: {likely}, then re-arm"
-        )
+        return Stop(blind_reason(blind_s, inputs.line_problem, fires=now_s - state.last_firing_robot_s <= age_max_s))
     clear_m = settings.body.radius_m + behaviors.arbiter.clearance_m
     lost_m = state.perception.unheard.take_ahead(odometry.pose, clear_m + LOST_AHEAD_M, clear_m)
     if lost_m is not None:
@@ -332,6 +332,9 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             f"the ring hears nothing any more, not even what stood {lost_m:.1f} m ahead: unless that is gone, check "
             f"the ring's power and cables, then re-arm"
         )
+    if inputs.preparing is not None and needs_recognition(state.drive_request):
+        state.hold_reason, state.drive_memory = inputs.preparing, DriveMemory()
+        return Drive(STANDSTILL)
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
@@ -394,6 +397,4 @@ def _refine(state: State, settings: Settings, may_refine: Callable[[int], bool])
         else:
             iterations += perception.refine()
         quanta += 1
-    if quanta == 0:
-        return quanta, iterations, "nothing"
-    return quanta, iterations, "converged" if perception.converged else "quota"
+    return quanta, iterations, "nothing" if quanta == 0 else "converged" if perception.converged else "quota"

@@ -153,6 +153,8 @@ class RunSummary(PerceivedRows):
     stop_reasons: list[str]
     hold_reasons: list[str]
     """Why the robot held or made no progress in DRIVE, in order."""
+    preparing: str | None
+    """How far the preparation of recognition was at the end; None if it had started."""
     timing: TimingSummary
     pose: NotRequired[PoseRow]
     """Of a run that corrects drift or has a map: the robot at the end. The objects are in odometry's frame."""
@@ -289,6 +291,7 @@ def run_summary(
         "mode": state.mode.mode.value,
         "stop_reasons": stop_reasons,
         "hold_reasons": hold_reasons,
+        "preparing": state.preparing,
         "timing": timing_monitor.summary(),
     }
     here = state.perception.localized()

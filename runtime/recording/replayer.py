@@ -93,11 +93,17 @@ class ReplayStep(NamedTuple):
     """If the message is a keyframe whose state cannot be taken over: which one, and why."""
 
 
-def fresh_state(settings: Settings) -> State:
-    """Return the state in which a run starts."""
+def fresh_state(settings: Settings, *, recognises: bool = True) -> State:
+    """Return the state in which a run starts, or one in which it does not recognise yet."""
     return State(
-        Perception(settings.ring, settings.models, settings.perception), drive_request=first_request(settings)
+        Perception(settings.ring, settings.models, settings.perception, recognises=recognises),
+        drive_request=first_request(settings),
     )
+
+
+def _recognises(arrays: Iterable[str]) -> bool:
+    """Return whether perception recognised when these arrays, by their names, were its state."""
+    return any(name.startswith("method.") for name in arrays)
 
 
 def adopt(frame: Keyframe, settings: Settings) -> State:
@@ -115,7 +121,7 @@ def adopt(frame: Keyframe, settings: Settings) -> State:
     ValueError, ArithmeticError, LookupError
         It is of other settings, a number in it is out of its bound, or its objects cannot be listed.
     """
-    state = fresh_state(settings)
+    state = fresh_state(settings, recognises=_recognises(array.name for array in frame.arrays))
     perception = state.perception
     fresh = perception.snapshot()
     snapshot = perception_snapshot(frame, fresh)
@@ -190,7 +196,7 @@ class Replayer:
             self._messages = self._since(None)
         elif isinstance(start, Checkpoint):
             self._apply_settings(start.settings)
-            self.state = fresh_state(self._settings)
+            self.state = fresh_state(self._settings, recognises=_recognises(start.snapshot))
             restore(self.state, start.state, start.snapshot)
             self._messages = self._after_cycle(start)
         else:

@@ -194,7 +194,7 @@ class ObjectList(TimedPayload):
 
 
 _HINTS: Final = get_type_hints(State)
-_MADE_ANEW: Final = frozenset({"perception", "percept", "step_settings", "undos", "zones"})
+_MADE_ANEW: Final = frozenset({"perception", "percept", "preparing", "step_settings", "undos", "zones"})
 """What a replay makes of the other fields, the settings and perception's own state."""
 _CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in _MADE_ANEW)
 _ADDED: Final = MappingProxyType(

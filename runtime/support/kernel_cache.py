@@ -44,14 +44,16 @@ PAPER: Final = "paper"
 BAYES: Final = "bayes"
 POLYGONS: Final = "polygons"
 EMULATOR: Final = "emulator"
+RING: Final = "ring"
 LOCALIZATION: Final = "localization"
 KNOWN_ROOM: Final = "known_room"
 VALLEY: Final = "valley"
 GRIDS: Final = ("directed", "moravec_elfes", "elfes")
-PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, *GRIDS)
-"""What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, the
-emulator, the correction of drift, finding the robot in a known room, the choice of a valley, and each kind of
-evidence grid. A file with the name of a part in the cache folder says that it is compiled."""
+PARTS: Final = (EMULATOR, RING, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, *GRIDS)
+"""What is compiled separately: what keeps the ring's echoes and finds false ones, without which no robot drives; a
+method by its name, what the Bayesian method needs beyond it for polygons, the emulator, the correction of drift,
+finding the robot in a known room, the choice of a valley, and each kind of evidence grid. A file with the name of a
+part in the cache folder says that it is compiled."""
 
 COMPILED_SUFFIX: Final = ".compiled"
 """Ending of empty files in the cache folder, one for each kernel that was compiled, from which progress is shown."""
@@ -128,12 +130,17 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     localization = (LOCALIZATION,) if settings.perception.localization.correct_drift else ()
     known_room = () if settings.perception.localization.known_room is None else (KNOWN_ROOM,)
     grid = () if settings.perception.grid.method == "off" else (settings.perception.grid.method,)
-    return (EMULATOR, settings.perception.method, *polygons, *localization, *known_room, VALLEY, *grid)
+    return (EMULATOR, RING, settings.perception.method, *polygons, *localization, *known_room, VALLEY, *grid)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:
     """Return those parts that are not yet compiled in the cache folder."""
     return [part for part in parts if not (folder / part).exists()]
+
+
+def is_compiled(part: str) -> bool:
+    """Return whether a part is compiled in the cache, or need not be as there is no compiler."""
+    return is_interpreted() or not uncompiled_parts(use_kernel_cache(), [part])
 
 
 def compiled_signatures() -> int:

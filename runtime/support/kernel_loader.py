@@ -1,15 +1,15 @@
 """Prepare kernels beside a running loop: another process compiles them, then a thread loads them.
 
-On the very first start nothing is compiled; the run begins nevertheless, and `KernelPreparation` prepares what it
-needs while the robot stands. The kernels for polygons are half of all, so a run whose models are all round leaves
-them out; if a polygon is added later, `KernelLoader` prepares them before the new settings take effect.
+A run begins before its kernels are loaded, on the very first start before they are compiled: `KernelPreparation`
+prepares them while the robot drives without recognition. The kernels for polygons are half of all, so a run whose
+models are all round leaves them out; if a polygon is added later, `KernelLoader` prepares them before the new
+settings take effect.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from types import MappingProxyType
@@ -26,6 +26,7 @@ from runtime.support.kernel_cache import (
     LOCALIZATION,
     PAPER,
     POLYGONS,
+    RING,
     VALLEY,
     compiled_signatures,
     is_interpreted,
@@ -33,7 +34,7 @@ from runtime.support.kernel_cache import (
     uncompiled_parts,
     use_kernel_cache,
 )
-from runtime.support.kernel_warmup import warm_up
+from runtime.support.kernel_warmup import compile_parts, warm_up
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -46,7 +47,7 @@ WARM_UP: Final = "runtime.support.kernel_warmup"
 """The module that compiles, run as a program."""
 
 KERNEL_COUNTS: Final = MappingProxyType({
-    BAYES: 211, POLYGONS: 65, PAPER: 7, LOCALIZATION: 14, KNOWN_ROOM: 26, VALLEY: 2,
+    BAYES: 244, POLYGONS: 65, PAPER: 7, LOCALIZATION: 14, KNOWN_ROOM: 26, VALLEY: 2,
     "directed": 13, "moravec_elfes": 6, "elfes": 6,
 })  # fmt: skip
 """Kernels of each part that no part before it has, as counted after compiling; for the display of progress only."""
@@ -54,11 +55,10 @@ KERNEL_COUNTS: Final = MappingProxyType({
 SHARE_MIN: Final = 0.1
 """Share of the kernels from which the time left is estimated."""
 
-COUNT_PERIOD_S: Final = 1.0
-"""Time between two counts of the compiled kernels."""
+COUNT_PERIOD_S: Final = 0.5
+"""Time between two looks at how many kernels are compiled."""
 
-LOOK_PERIOD_S: Final = 0.1
-"""Time between two looks at whether the compiling process is done."""
+PREPARING: Final = "recognition is being prepared"
 
 
 class KernelLoader:
@@ -109,9 +109,10 @@ class KernelLoader:
 
 
 class KernelPreparation:
-    """Compile and load the kernels of a run whose robot stands until they are ready.
+    """Compile and load the kernels of a run beside its cycles, which go on without recognition meanwhile.
 
-    The emulator runs uncompiled meanwhile; its kernels are compiled last, for the next start.
+    Another process compiles what never was, at low priority; then a thread loads all. The emulator runs uncompiled
+    meanwhile; its kernels are compiled last, for the next start.
 
     Parameters
     ----------
@@ -119,47 +120,66 @@ class KernelPreparation:
         Those of `PARTS` that the run needs, the emulator's among them if it has one.
     host_clock : callable
         Monotonic, s.
+
+    Attributes
+    ----------
+    progress : str
+        How many kernels are compiled, and how long the rest will take, or how far loading is.
     """
 
     def __init__(self, parts: Sequence[str], host_clock: Callable[[], float] = time.monotonic) -> None:
-        self._parts = [part for part in parts if part != EMULATOR]
+        self._parts = [part for part in parts if part not in {EMULATOR, RING}]
         self._all_parts = [*self._parts, EMULATOR]
         self._folder = use_kernel_cache()
         self._expected = sum(KERNEL_COUNTS[part] for part in self._parts)
         self._host_clock = host_clock
         self._begin_host_s = host_clock()
-        self._progress = "recognition is being prepared"
-        self._progress_host_s = -math.inf
+        self.progress = PREPARING
         self._process: asyncio.subprocess.Process | None = None
+        self._ring: asyncio.Task[None] | None = None
 
-    @property
-    def progress(self) -> str:
-        """How many kernels are compiled, and how long the rest will take; a new count every second."""
-        host_s = self._host_clock()
-        if host_s - self._progress_host_s >= COUNT_PERIOD_S:
-            self._progress_host_s = host_s
-            done = min(sum(1 for _ in self._folder.glob(f"*{COMPILED_SUFFIX}")), self._expected)
-            self._progress = progress_text(done, self._expected, host_s - self._begin_host_s)
-        return self._progress
+    def begin_ring(self, settings: Settings) -> asyncio.Task[None]:
+        """Begin to load what `ring` waits for, and return the task; it is started only once."""
+        if self._ring is None:
+            loading = asyncio.to_thread(compile_parts, settings, self._folder, [RING])
+            self._ring = asyncio.create_task(loading, name="kernels of the ring")
+        return self._ring
+
+    async def ring(self, settings: Settings) -> None:
+        """Return when the robot can drive: the kernels that keep and check the ring's echoes are loaded.
+
+        They are few, so this process compiles them itself, where they never were.
+        """
+        await self.begin_ring(settings)
 
     async def __call__(self, settings: Settings) -> None:
-        """Return when no kernel of the parts is left to compile or to load.
+        """Return when no kernel of the other parts is left to compile or to load.
 
         Raises
         ------
         UserError
             They could not be compiled.
         """
-        self._process = await start_child(WARM_UP, [",".join(self._all_parts), "whole"], pipes=False)
+        if uncompiled_parts(self._folder, self._all_parts):
+            self._process = await start_child(WARM_UP, [",".join(self._all_parts), "whole"], pipes=False,
+                                              low_priority=True)  # fmt: skip
         while uncompiled_parts(self._folder, self._parts):
-            if self._process.returncode is not None:
+            if self._process is None or self._process.returncode is not None:
                 raise UserError(
                     f"recognition could not be prepared: its kernels were not compiled into {self._folder}, "
                     "likely for lack of memory or disk space; make room, then start again",
                     FAILED,
                 )
-            await asyncio.sleep(LOOK_PERIOD_S)
-        await asyncio.to_thread(warm_up, settings, self._parts)
+            done = min(await asyncio.to_thread(self._compiled), self._expected)
+            self.progress = progress_text(done, self._expected, self._host_clock() - self._begin_host_s)
+            await asyncio.sleep(COUNT_PERIOD_S)
+        for number, part in enumerate(self._parts, 1):
+            self.progress = f"{PREPARING}: its kernels are being loaded, part {number} of {len(self._parts)}"
+            await asyncio.to_thread(warm_up, settings, [part])
+
+    def _compiled(self) -> int:
+        """Return how many kernels are compiled: a folder of a thousand files, in a thread."""
+        return sum(1 for _ in self._folder.glob(f"*{COMPILED_SUFFIX}"))
 
     async def close(self) -> None:
         """End a compilation in progress; the next start continues from there."""
@@ -168,11 +188,8 @@ class KernelPreparation:
 
 
 def begin_preparation(settings: Settings) -> KernelPreparation | None:
-    """Return the preparation of a run with these settings; None if there is nothing to compile."""
-    parts = needed_parts(settings)
-    if is_interpreted() or not uncompiled_parts(use_kernel_cache(), parts):
-        return None
-    return KernelPreparation(parts)
+    """Return the preparation of a run with these settings; None if there is no compiler."""
+    return None if is_interpreted() else KernelPreparation(needed_parts(settings))
 
 
 def progress_text(done: int, expected: int, elapsed_s: float) -> str:
@@ -185,10 +202,8 @@ def progress_text(done: int, expected: int, elapsed_s: float) -> str:
     elapsed_s : float
         Since the start, s.
     """
-    text = f"recognition is being prepared: {done} of {expected} kernels"
-    if done >= expected:
-        return f"{text}; they are being loaded"
-    if done < expected * SHARE_MIN:
+    text = f"{PREPARING}: {done} of {expected} kernels"
+    if done >= expected or done < expected * SHARE_MIN:
         return text
     return f"{text}, about {max(1.0, elapsed_s * (expected - done) / done):.0f} s left"
 

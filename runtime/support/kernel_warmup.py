@@ -29,6 +29,7 @@ from runtime.support.kernel_cache import (
     LOCALIZATION,
     PAPER,
     POLYGONS,
+    RING,
     VALLEY,
     is_interpreted,
     needed_parts,
@@ -82,6 +83,18 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS, *
     perception.segment_geometry()
     perception.surroundings(0.1 * firings, 0.0, 0.0, 1.0)
     perception.counts  # noqa: B018 - a property that runs kernels
+
+
+def _ring(settings: Settings) -> None:
+    """Drive past a wall without recognition, as at the start of a run."""
+    from drivers.messages import Pose
+    from perception.pipeline import Perception
+
+    perception = Perception(settings.ring, settings.models, settings.perception, recognises=False)
+    _drive(settings, perception, refines=False)
+    perception.steady_obstacles(0.1 * FIRINGS, 1.0)
+    perception.unheard.take_ahead(Pose(0.0, 0.0, 0.0), 1.0, 1.0)
+    perception.unheard.points()
 
 
 def _grid(settings: Settings, method: str) -> None:
@@ -233,8 +246,9 @@ def _valley(settings: Settings) -> None:
 
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
-    EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper, LOCALIZATION: _localization,
-    KNOWN_ROOM: _known_room, VALLEY: _valley, **{method: partial(_grid, method=method) for method in GRIDS},
+    EMULATOR: _emulator, RING: _ring, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper,
+    LOCALIZATION: _localization, KNOWN_ROOM: _known_room, VALLEY: _valley,
+    **{method: partial(_grid, method=method) for method in GRIDS},
 })  # fmt: skip
 """Runs each part once."""
 

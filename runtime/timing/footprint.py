@@ -48,6 +48,10 @@ class Footprint:
     def __init__(self, memory: MemoryPolicy) -> None:
         self._memory = memory
         self._start_s = age_s()
+        self.begin()
+
+    def begin(self) -> None:
+        """Measure from now; the time of the start stays."""
         self._signatures = compiled_signatures()
         self._own_mb = own_mb()
         self._begin_host_s = time.monotonic()

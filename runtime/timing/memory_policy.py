@@ -67,6 +67,12 @@ class MemoryPolicy:
                 gc.enable()
             gc.unfreeze()
 
+    def settle(self) -> None:
+        """Exclude what is alive now, as at the start."""
+        gc.freeze()
+        self._cycles = self._old_cycles = 0
+        self._settled = False
+
     def cycle_done(self, slack_s: float) -> None:
         """Collect what is due if the next cycle is `SLACK_MIN_S` away or more."""
         self._cycles += 1

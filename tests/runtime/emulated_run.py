@@ -14,10 +14,10 @@ from drivers.emulator.memory_transport import MemoryLine
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Firing, Pose
 from drivers.registry import make_device, make_driver
-from perception.pipeline import Perception
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import CycleRecord, State, apply_command, step
+from runtime.cycle.preparation import prepared_state, unprepared_state
+from runtime.cycle.step import CycleRecord, apply_command, step
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 FT = 0.3048
@@ -34,6 +34,8 @@ class Run:
     arms: bool = True
     """Whether the robot is armed as soon as it is ready."""
     clock_start_us: int = 0
+    preparing: str | None = None
+    """While recognition is not ready: how far it is."""
     records: list[CycleRecord] = field(default_factory=list)
     truths: list[GroundTruth] = field(default_factory=list)
     firings: list[Firing] = field(default_factory=list)
@@ -46,7 +48,7 @@ class Run:
         )
         self.driver = make_driver(settings)
         self.line = MemoryLine(self.driver, self.robot)
-        self.state = State(Perception(settings.ring, settings.models, settings.perception))
+        self.state = (unprepared_state if self.preparing else prepared_state)(settings)
 
     @property
     def run_s(self) -> float:
@@ -61,7 +63,7 @@ class Run:
         self.line.exchange(run_s)
         if self.arms and self.mode is Mode.READY:
             request = Request.ARM
-        inputs = gather_inputs(self.driver, run_s, request)
+        inputs = gather_inputs(self.driver, run_s, request, preparing=self.preparing)
         record = step(
             self.state, inputs, self.settings, lambda c: apply_command(self.driver, c), within_quanta_per_cycle
         )

@@ -27,8 +27,8 @@ from runtime.cli.tables import objects_table, timing_line, timing_table, walls_t
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
+from runtime.support.kernel_cache import EMULATOR, is_compiled
 from runtime.support.kernel_loader import KernelPreparation, begin_preparation
-from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, log_path, open_log
 from runtime.support.restart import Restart, restart_refusal
@@ -175,20 +175,20 @@ def run_robot(
             async with contextlib.AsyncExitStack() as running:
                 running.enter_context(ending_the_start())  # until `signals` takes over
                 run_settings = settings
-                loading = None
-                if preparation is None:  # beside the start of the emulator, which takes as long
-                    loading = asyncio.create_task(asyncio.to_thread(prepare_kernels, settings, console))
                 control: TimeControl = NoTimeControl()
                 line_messages = messages_on(port)
+                # Beside the start of the emulator, which takes as long.
+                importing = asyncio.create_task(asyncio.to_thread(import_rest))
+                if preparation is not None:
+                    preparation.begin_ring(settings)
                 if isinstance(clock, ScaledClock):
                     arguments = emulator.arguments(config, sets, robot)
                     emulated = await running.enter_async_context(
-                        start_emulator(arguments, clock, compiled=preparation is None)
+                        start_emulator(arguments, clock, compiled=is_compiled(EMULATOR))
                     )
                     run_settings, control = with_port(settings, emulated.port), emulated.control
                     line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
-                if loading is not None:
-                    await loading
+                await importing
                 return await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
@@ -227,6 +227,12 @@ def run_robot(
         raise UserError(summary["stop_reasons"][-1], FAILED)
     recording.raise_if_incomplete()
     return DONE
+
+
+def import_rest() -> None:
+    """Import what a run uses beside its cycles; that takes a third of a second."""
+    import runtime.cli.commands.serve_console
+    import runtime.cycle.process  # noqa: F401
 
 
 async def run_process(

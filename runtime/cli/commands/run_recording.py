@@ -80,7 +80,7 @@ class RunRecording:
                 view(record, state, stats, driver)
 
         on_firing = None if ring_log is None else ring_log.put
-        return Observers(on_cycle, on_firing, recorder.on_bytes, recorder.on_settings, view)
+        return Observers(on_cycle, on_firing, recorder.on_bytes, recorder.on_settings)
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
         """Record the summary of the run."""

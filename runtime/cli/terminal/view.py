@@ -99,7 +99,7 @@ class View:
             self._trail.append((pose.x, pose.y))
         localized = state.perception.localized()
         self._slot = Snapshot(
-            record.mode.mode.value, record.mode.reason if state.hold_reason is None else state.hold_reason, pose,
+            record.mode.mode.value, state.hold_reason or record.mode.reason or state.preparing, pose,
             list(self._trail), state.perception.segment_geometry(), state.perception.counts,
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
             stats.cycles, stats.late, stats.cycle_us(), stats.lag_us(), stats.missed, tuple(stats.causes.items()),

@@ -263,7 +263,7 @@ def robot_status(state: State, context: FrameContext) -> dict[str, Any]:
     return {
         "mode": state.mode.mode.value,
         "reason": state.mode.reason,
-        "hold_reason": state.hold_reason,
+        "hold_reason": state.hold_reason or state.preparing,
         "arming": state.mode.arming_run_s is not None,
         "clients": context.clients,
         "recording": None if context.recording is None else context.recording._asdict(),

@@ -9,7 +9,6 @@ import pytest
 from config.load import load_settings
 from drivers.emulator.faults import ConstantRing, Fault, FrozenRing, Outliers, SilentRing, StuckSensor, TurnedRing
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import unprepared_state
 from tests.runtime.emulated_run import Run
 
 pytestmark = [pytest.mark.promise("P8"), pytest.mark.compiled]
@@ -33,8 +32,7 @@ def driven(robot: str, *faults: Fault, until_s: float = 20.0) -> Run:
     settings = load_settings("room", robot=robot)
     assert settings.world is not None
     rough = settings.world.acoustics.model_copy(update={"model": "cone", "noise_relative": 0.01})
-    run = Run(settings, settings.world.model_copy(update={"acoustics": rough}), 1, faults)
-    run.state = unprepared_state(settings)
+    run = Run(settings, settings.world.model_copy(update={"acoustics": rough}), 1, faults, preparing="left out")
     while run.run_s < until_s and run.mode is not Mode.SAFE_STOP:
         run.cycle()
     return run

@@ -18,7 +18,6 @@ from drivers.firing_pattern import FiringError
 from drivers.messages import wrap_angle
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import unprepared_state
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.long_hall import long_hall
 from runtime.support.pattern_check import refuse_undrivable
@@ -39,8 +38,8 @@ class WatchedRun(Run):
     """A run without recognition that records every usable range, and how it truly moved."""
 
     def __post_init__(self) -> None:
+        self.preparing = "left out"
         super().__post_init__()
-        self.state = unprepared_state(self.settings)
         self.looks: deque[tuple[float, float]] = deque(maxlen=2400)
         """Bearing and time of each usable range or silence."""
         self.oldest_s = 0.0

@@ -1,4 +1,4 @@
-"""A process whose recognition is not ready yet: echoes are shown, the robot stands, and then the run begins."""
+"""A process whose recognition is not ready yet: the robot drives without it, and what needs it waits."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ import pytest
 import structlog
 from structlog.testing import LogCapture
 
+from behaviors.move_to_goal import Goal
+from behaviors.teleoperation import Teleoperate
 from config.errors import FAILED, UserError
 from config.load import load_settings
 from config.settings import Settings
-from drivers.driver import RobotDriver
-from perception.edits import ClearMap
-from perception.pipeline import Perception
-from runtime.cycle.inputs import Request
+from drivers.driver import LineState, Received, RobotDriver
+from runtime.cycle.drive_requests import NO_MAP, DriveRequest
+from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import NOTHING, REFUSED, NoMethod, prepared_state, unprepared_state
+from runtime.cycle.preparation import unprepared_state
 from runtime.cycle.process import Observers, RobotProcess
-from runtime.cycle.step import CycleRecord, State
+from runtime.cycle.step import CycleRecord, Refused, State, step
 from runtime.timing.cycle_stats import CycleStats
 from tests.runtime.virtual_time import in_virtual_time
 
@@ -37,7 +38,11 @@ class Preparation:
         self._error = error
         self.is_cancelled = False
 
+    async def ring(self, settings: Settings) -> None:
+        self.has_ring = settings.ring == SETTINGS.ring
+
     async def __call__(self, settings: Settings) -> None:
+        assert self.has_ring
         assert settings.ring == SETTINGS.ring
         try:
             await asyncio.sleep(self._seconds)
@@ -49,68 +54,123 @@ class Preparation:
 
 
 class Run:
-    """A run in virtual time that counts its cycles before and after recognition is ready."""
+    """A run in virtual time whose recognition is ready later than the robot."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, preparation: Preparation) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, preparation: Preparation, request: DriveRequest | None = None,
+        seconds: float | None = None,
+    ) -> None:  # fmt: skip
         self._monkeypatch = monkeypatch
         self._preparation = preparation
-        self.unprepared: list[CycleRecord] = []
+        self._request = request
+        self._seconds = seconds
         self.cycles: list[CycleRecord] = []
+        self.holds: list[str | None] = []
         self.speeds: list[float] = []
         self.log = LogCapture()
 
-    def drive(self, seconds: float, at: dict[float, Callable[[RobotProcess], None]] | None = None) -> None:
-        """Run for this long after recognition is ready; call each function at its time after the start."""
+    @property
+    def unprepared(self) -> list[CycleRecord]:
+        """The cycles before recognition began."""
+        return [record for record in self.cycles if record.inputs.preparing is not None]
 
-        def on_unprepared(record: CycleRecord, state: State, *_: CycleStats | RobotDriver) -> None:
-            assert state.perception.labelled_objects() == ()
-            self.unprepared.append(record)
+    def drive(self, seconds: float, at: dict[float, Callable[[RobotProcess], None]] | None = None) -> None:
+        """Run for this long, seen from the start; call each function at its time after that."""
+
+        def on_cycle(record: CycleRecord, state: State, *_: CycleStats | RobotDriver) -> None:
+            assert state.perception.recognises is (record.inputs.preparing is None)
+            if not state.perception.recognises:
+                assert state.perception.labelled_objects() == ()
+            self.cycles.append(record)
+            self.holds.append(state.hold_reason)
             self.speeds.append(robot.truth.twist.v)
 
         with in_virtual_time(self._monkeypatch) as (loop, settings, robot, _links):
             process = RobotProcess(
                 settings,
                 structlog.wrap_logger(None, processors=[self.log]),
-                Observers(lambda record, *_: self.cycles.append(record), on_unprepared_cycle=on_unprepared),
+                Observers(on_cycle),
                 loop.time,
                 preparation=self._preparation,
             )
+            if self._request is not None:
+                process.drive_request(self._request)
+            loop.call_later(seconds, process.stop)
             for moment_s, act in (at or {}).items():
                 loop.call_later(moment_s, act, process)
-            self.summary = loop.run_until_complete(process.run(arm=True, seconds=seconds))
+            self.summary = loop.run_until_complete(process.run(arm=True, seconds=self._seconds))
             self.last_speed = robot.truth.twist.v
 
 
 @pytest.mark.usefixtures("warm_kernels")  # it counts compilations
-def test_echoes_are_shown_and_the_robot_stands_until_recognition_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_robot_drives_before_recognition_is_ready_and_goes_on_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Run(monkeypatch, Preparation())
-    run.drive(3.0)
-    echoes = sum(len(record.inputs.received.firings) for record in run.unprepared)
-    assert len(run.unprepared) >= 0.8 * PREPARING_S * SETTINGS.cycle.rate_hz
-    assert echoes >= 0.8 * len(run.unprepared)
-    assert {record.mode.mode for record in run.unprepared} == {Mode.CONNECTING}
-    assert {record.mode.reason for record in run.unprepared} == {Preparation.progress}
-    assert set(run.speeds) == {0.0}
+    run.drive(6.0)
+    before = run.unprepared
+    assert before == run.cycles[: len(before)], "recognition begins once"
+    assert 0.8 * PREPARING_S * SETTINGS.cycle.rate_hz <= len(before) <= 1.2 * PREPARING_S * SETTINGS.cycle.rate_hz
+    assert sum(len(record.inputs.received.firings) for record in before) >= 0.8 * len(before)
+    assert run.speeds[len(before) - 1] > 0.1
+    assert {record.inputs.preparing for record in before} == {Preparation.progress}
     assert [entry["event"] for entry in run.log.entries].count(Preparation.progress) == 1
-    # The run itself begins with an empty map, and is timed and armed from there.
     assert [record.cycle for record in run.cycles] == list(range(1, len(run.cycles) + 1))
-    assert run.cycles[0].segments == 0
-    assert run.summary["cycles"] == len(run.cycles)
-    assert run.summary["mode"] == "DRIVE"
+    assert {record.segments for record in before} == {0}
+    assert run.cycles[-1].segments > 0
+    assert (run.summary["mode"], run.summary["preparing"]) == ("DRIVE", None)
     assert run.summary["process"]["compilations"] == 0
 
 
-def test_a_halt_before_recognition_is_ready_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = Run(monkeypatch, Preparation())
-    run.drive(1.0, {1.0: lambda process: process.request(Request.HALT)})
-    assert run.unprepared[-1].mode.mode is Mode.SAFE_STOP
-    assert {record.mode.mode for record in run.cycles} == {Mode.SAFE_STOP}, "it was armed although it was halted"
+@pytest.mark.usefixtures("warm_kernels")
+def test_a_goal_waits_for_recognition_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Run(monkeypatch, Preparation(), Goal(2.0, 0.0))
+    run.drive(6.0)
+    count = len(run.unprepared)
+    assert set(run.speeds[:count]) == {0.0}
+    modes = [record.mode.mode for record in run.unprepared]
+    assert {hold for hold, mode in zip(run.holds, modes, strict=False) if mode is Mode.DRIVE} == {
+        Preparation.progress
+    }
+    assert max(run.speeds) > 0.1
 
 
-def test_it_cannot_be_armed_before_recognition_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_goal_in_the_map_is_refused_only_where_there_will_be_no_map() -> None:
+    corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
+    goal = Goal(1.0, 0.0, frame="map")
+    inputs = Inputs(
+        0.0, LineState.DOWN, None, Received((), None, rebooted=False), drive_request=goal, preparing="3 of 10"
+    )
+    for settings, why in ((corrected, ()), (SETTINGS, (Refused(None, NO_MAP),))):
+        record = step(unprepared_state(settings), inputs, settings, lambda _command: None, lambda _done: False)
+        assert record.refused == why
+
+
+def test_the_length_of_a_run_counts_from_recognition(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a short run would recognise nothing on the first start."""
+    run = Run(monkeypatch, Preparation(), seconds=1.0)
+    run.drive(9.0)
+    assert len(run.cycles) - len(run.unprepared) == pytest.approx(SETTINGS.cycle.rate_hz, abs=2)
+
+
+def test_an_operator_steers_before_recognition_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Run(monkeypatch, Preparation(1e6))
+    steer = Teleoperate(0.2, 0.0, 0.4)
+    run.drive(4.0, {0.2 * k: lambda process: process.drive_request(steer) for k in range(20)})
+    assert max(run.speeds) > 0.15
+    assert run.summary["preparing"] == Preparation.progress
+
+
+def test_safety_is_in_force_before_recognition_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Run(monkeypatch, Preparation(1e6))
+    run.drive(6.0, {2.0: lambda process: process.request(Request.HALT)})
+    assert run.cycles[-1].mode.mode is Mode.SAFE_STOP
+    assert run.last_speed == 0.0
+    assert max(run.speeds) > 0.1
+
+
+def test_a_halt_before_the_first_cycle_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Run(monkeypatch, Preparation())
-    run.drive(0.5, {1.0: lambda process: process.request(Request.ARM)})
-    assert {record.mode.mode for record in run.unprepared} == {Mode.CONNECTING}
+    run.drive(4.0, {0.0: lambda process: process.request(Request.HALT)})
+    assert run.cycles[-1].mode.mode is Mode.SAFE_STOP, "it was armed although it was halted"
     assert set(run.speeds) == {0.0}
 
 
@@ -118,48 +178,12 @@ def test_a_run_can_end_before_recognition_is_ready(monkeypatch: pytest.MonkeyPat
     preparation = Preparation(seconds=1e6)
     run = Run(monkeypatch, preparation)
     run.drive(3.0, {1.0: RobotProcess.stop})
-    assert run.cycles == []
     assert preparation.is_cancelled
-    assert run.summary["mode"] == "CONNECTING"
+    assert run.summary["preparing"] == Preparation.progress
 
 
-def test_a_preparation_that_fails_ends_the_run_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_preparation_that_fails_halts_and_ends_the_run_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Run(monkeypatch, Preparation(error=UserError("no room", FAILED)))
-    run.drive(3.0)
-    assert run.cycles == []
+    run.drive(6.0)
+    assert run.last_speed == 0.0
     assert (run.summary["mode"], run.summary["stop_reasons"]) == ("FAULT", ["no room"])
-
-
-def test_a_fault_before_recognition_is_ready_is_a_reason_in_the_summary(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise RuntimeError("out of order")
-
-    run = Run(monkeypatch, Preparation())
-    run.drive(0.5, {1.0: lambda process: process.health.report("the view", ValueError("no screen"))})
-    assert run.summary["mode"] == "SAFE_STOP"
-    assert "the view (ValueError: no screen)" in run.summary["stop_reasons"][0]
-    run = Run(monkeypatch, Preparation())
-    run.drive(0.5, {1.0: lambda process: monkeypatch.setattr(process, "_gather", fail)})
-    assert (run.summary["mode"], run.cycles) == ("FAULT", [])
-    assert "the cycle failed (RuntimeError: out of order, " in run.summary["stop_reasons"][0]
-
-
-def test_the_empty_map_refuses_edits_and_changes_with_nothing() -> None:
-    state = unprepared_state(SETTINGS)
-    perception, before = state.perception, state.perception.segments()
-    assert isinstance(perception.method, NoMethod)
-    assert perception.edit(ClearMap()) == REFUSED
-    perception.apply_settings(SETTINGS.perception)
-    perception.set_models(())
-    perception.reset()
-    perception.method.drop_caches()
-    assert perception.segment_geometry().shape == (0, 5)
-    assert len(before.numbers) == len(before.times) == len(before.pinned) == 0
-    assert (perception.counts, perception.objects(), perception.evidence(1)) == (NOTHING, (), None)
-    assert (perception.can_refine, perception.refine(), perception.converged) == (False, 0, True)
-
-
-def test_the_prepared_state_recognises_with_the_method_of_the_settings() -> None:
-    state = prepared_state(SETTINGS)
-    assert type(state.perception) is Perception
-    assert not isinstance(state.perception.method, NoMethod)

@@ -19,8 +19,8 @@ from config.load import load_model, load_settings
 from config.settings import Settings
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_loader
-from runtime.support.kernel_cache import BAYES, COMPILED_SUFFIX, EMULATOR, POLYGONS, needed_parts
-from runtime.support.kernel_loader import KernelLoader, KernelPreparation
+from runtime.support.kernel_cache import BAYES, EMULATOR, POLYGONS, RING, needed_parts
+from runtime.support.kernel_loader import KernelLoader, KernelPreparation, progress_text
 from tests.hil.running import ROOT
 
 ROUND = load_settings("hallway")
@@ -133,8 +133,8 @@ class Compiler:
         monkeypatch.setattr(kernel_loader, "warm_up", lambda _settings, parts: self.loaded.append(tuple(parts)))
         self.loaded: list[tuple[str, ...]] = []
 
-    async def _start(self, module: str, words: Sequence[str], *, pipes: bool) -> Compiler:
-        assert (module, pipes) == ("runtime.support.kernel_warmup", False)
+    async def _start(self, module: str, words: Sequence[str], *, pipes: bool, low_priority: bool) -> Compiler:
+        assert (module, pipes, low_priority) == ("runtime.support.kernel_warmup", False, True)
         self.words = words
         self._task = asyncio.create_task(self._compile())
         return self
@@ -149,15 +149,15 @@ class Compiler:
         self.killed.append(process)
 
 
-def test_a_preparation_is_needed_only_where_something_is_uncompiled(
+def test_a_preparation_is_needed_wherever_there_is_a_compiler(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    """Also where all is compiled: loading takes longer than a robot should wait."""
     Compiler(monkeypatch, tmp_path, ())
     assert isinstance(kernel_loader.begin_preparation(ROUND), KernelPreparation)
     for part in needed_parts(ROUND):
         (tmp_path / part).touch()
-    assert kernel_loader.begin_preparation(ROUND) is None
-    assert isinstance(kernel_loader.begin_preparation(BOXES), KernelPreparation)
+    assert isinstance(kernel_loader.begin_preparation(ROUND), KernelPreparation)
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     assert kernel_loader.begin_preparation(BOXES) is None
 
@@ -166,12 +166,37 @@ async def test_a_preparation_compiles_in_another_process_and_loads_the_rest(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     compiler = Compiler(monkeypatch, tmp_path, (BAYES,))
-    preparation = KernelPreparation((EMULATOR, BAYES))
+    preparation = KernelPreparation((EMULATOR, RING, BAYES))
+    assert preparation.progress == kernel_loader.PREPARING
     await preparation(ROUND)
     assert compiler.words == ["bayes,emulator", "whole"], "what the robot waits for comes first"
     assert compiler.loaded == [(BAYES,)], "the emulator is another process"
+    assert preparation.progress.endswith("its kernels are being loaded, part 1 of 1")
     await preparation.close()
     assert compiler.killed == [compiler]
+
+
+async def test_where_all_is_compiled_no_process_is_started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    compiler = Compiler(monkeypatch, tmp_path, ())
+    for part in (EMULATOR, BAYES):
+        (tmp_path / part).touch()
+    preparation = KernelPreparation((EMULATOR, BAYES))
+    await preparation(ROUND)
+    await preparation.close()
+    assert (compiler.words, compiler.loaded, compiler.killed) == ((), [(BAYES,)], [])
+
+
+async def test_what_the_first_cycle_needs_is_compiled_in_a_thread_of_this_process(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    Compiler(monkeypatch, tmp_path, ())
+    happened: list[object] = []
+    monkeypatch.setattr(
+        kernel_loader, "compile_parts",
+        lambda *call: happened.append((*call, threading.current_thread() is threading.main_thread())),
+    )  # fmt: skip
+    await KernelPreparation((EMULATOR, RING, BAYES)).ring(ROUND)
+    assert happened == [(ROUND, tmp_path, [RING], False)]
 
 
 async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -180,24 +205,11 @@ async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.Monke
         await KernelPreparation((EMULATOR, BAYES))(ROUND)
 
 
-def test_progress_counts_kernels_and_shows_the_time_left(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    Compiler(monkeypatch, tmp_path, ())
-    host_s = 100.0
-    preparation = KernelPreparation((EMULATOR, BAYES), lambda: host_s)
-    count = kernel_loader.KERNEL_COUNTS[BAYES]
-    assert preparation.progress == f"recognition is being prepared: 0 of {count} kernels"
-    done = count // 5
-    for k in range(done):
-        (tmp_path / f"kernel{k}{COMPILED_SUFFIX}").touch()
-    host_s = 100.5
-    assert "0 of" in preparation.progress, "counted once a second"
-    host_s = 110.0
-    left_s = round(10.0 * (count - done) / done)
-    assert preparation.progress == f"recognition is being prepared: {done} of {count} kernels, about {left_s} s left"
-    for k in range(count + 5):
-        (tmp_path / f"kernel{k}{COMPILED_SUFFIX}").touch()
-    host_s = 120.0
-    assert preparation.progress.endswith(f"{count} of {count} kernels; they are being loaded")
+def test_progress_counts_kernels_and_shows_the_time_left() -> None:
+    text = "recognition is being prepared: {} of 100 kernels"
+    assert progress_text(0, 100, 3.0) == text.format(0)
+    assert progress_text(20, 100, 10.0) == f"{text.format(20)}, about 40 s left"
+    assert progress_text(100, 100, 30.0) == text.format(100)
 
 
 @pytest.mark.soak

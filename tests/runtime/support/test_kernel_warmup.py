@@ -130,13 +130,13 @@ def test_each_part_is_compiled_once_and_then_warmed_up(tmp_path: Path, monkeypat
     monkeypatch.setattr(kernel_warmup, "warm_up", lambda _settings, parts: happened.extend(parts))
     settings, console = load_settings("hallway"), Console(quiet=True)
     kernel_warmup.prepare_kernels(settings, console)
-    assert happened == ["compile emulator", "compile bayes", "compile valley"]
+    assert happened == ["compile emulator", "compile ring", "compile bayes", "compile valley"]
     happened.clear()
     kernel_warmup.prepare_kernels(settings, console)
-    assert happened == ["bayes", "valley"], "the emulator is another process"
+    assert happened == ["ring", "bayes", "valley"], "the emulator is another process"
     happened.clear()
     kernel_warmup.prepare_kernels(load_settings("hallway", models=["box"]), console)
-    assert happened == ["compile polygons", "bayes", "valley"]
+    assert happened == ["compile polygons", "ring", "bayes", "valley"]
     (tmp_path / kernels.BAYES).unlink()
     assert kernels.uncompiled_parts(tmp_path, kernels.PARTS) == [
         kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM, *kernels.GRIDS,
@@ -203,6 +203,14 @@ def signatures():
     return {(each.__module__, each.__name__, str(types)) for each in kernels.values() for types in each.overloads}
 
 before = signatures()
+"""
+UNPREPARED = """
+from tests.runtime.emulated_run import Run
+
+run = Run(settings, settings.world, 3, (), preparing="not at all")
+run.until(20.0)
+assert run.mode is Mode.DRIVE and run.truths[-1].pose.x > 0.0, run.state.mode
+print(*sorted(signatures() - before))
 """
 EDITED = """
 from perception.edits import (
@@ -280,6 +288,19 @@ def test_no_kernel_is_compiled_or_loaded_while_the_robot_drives_and_a_person_edi
     (tmp_path / "keg.toml").write_text(f'name = "keg"\nclosed = true\narc_radius_m = 1.0\nvertices_m = {hexagon}\n')
     further = str(tmp_path / further) if "." in further else further
     assert added_in(EDITED, sets, models, "hallway", further) == ""
+
+
+@pytest.mark.compiled
+@pytest.mark.usefixtures("warm_kernels")
+def test_a_drive_without_recognition_loads_the_kernels_of_the_ring_only() -> None:
+    """Those are compiled first, and the robot drives with them while all others are compiled."""
+    ring = "prepare_kernels(settings, Console(quiet=True), ['ring'])"
+    only = PREPARED.replace("prepare_kernels(settings, Console(quiet=True))", ring)
+    done = subprocess.run(
+        [sys.executable, "-c", only + UNPREPARED, "", "semicircle", "hallway"], cwd=ROOT, text=True,
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
 
 
 @pytest.mark.compiled

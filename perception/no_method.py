@@ -1,0 +1,78 @@
+"""What stands in for a method whose kernels are not compiled or loaded yet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from config.model import ModelConfig
+from config.settings import PerceptionConfig
+from drivers.messages import Firing, Floats
+from perception.detected_object import DetectedObject, MapCounts
+from perception.edits import Evidence, MapEdit, Segments
+
+NOT_READY: Final = "recognition is not ready yet: wait until it is"
+NOTHING: Final = MapCounts(segments=0, segments_total=0, hypotheses=0)
+
+
+class NoMethod:
+    """The method in place of one whose kernels are not ready: an empty map that refuses every edit."""
+
+    can_refine = False
+    converged = True
+    counts = NOTHING
+
+    def observe(self, firing: Firing) -> int:  # noqa: ARG002 - as of `perception.method.Method`
+        """Return 0: no segment was completed."""
+        return 0
+
+    def refine(self) -> int:
+        """Return 0: nothing was improved."""
+        return 0
+
+    def objects(self) -> tuple[DetectedObject, ...]:
+        """Return no objects."""
+        return ()
+
+    near_objects = labelled_objects = archived_objects = objects
+
+    def segment_geometry(self) -> Floats:
+        """Return no segments, shape (0, 5)."""
+        return np.zeros((0, 5))
+
+    def segments(self) -> Segments:
+        """Return no segments."""
+        numbers = np.zeros(0, np.int64)
+        return Segments(numbers, self.segment_geometry(), np.zeros(0), numbers)
+
+    def edit(self, edit: MapEdit) -> str | None:  # noqa: ARG002
+        """Return why no edit is possible."""
+        return NOT_READY
+
+    def kept(self, _number: int) -> str | None:
+        """Return None: there are no objects."""
+        return None
+
+    def evidence(self, number: int) -> Evidence | None:  # noqa: ARG002
+        """Return None: there are no objects."""
+        return None
+
+    def locate_echoes(self, bearings: Floats) -> None:
+        """Write nothing: there are no objects."""
+
+    def shift_object(self, number: int, dx: float, dy: float) -> None:
+        """Move nothing: there are no objects."""
+
+    def reset(self) -> None:
+        """Leave the empty map as it is."""
+
+    def apply_settings(self, config: PerceptionConfig) -> None:
+        """Ignore the settings: the method itself begins with those in force."""
+
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
+        """Ignore the models, likewise."""
+
+    def drop_caches(self) -> None:
+        """Do nothing: there are none."""

@@ -1,0 +1,61 @@
+"""The parts of perception that recognise and keep a map: all that is compiled, apart from what the ring hears.
+
+They are imported when recognition begins, as importing and loading them takes longer than a robot should wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from config.model import ModelConfig
+from config.robot import RingConfig
+from config.settings import PerceptionConfig
+from config.world import WorldConfig
+from perception.no_method import NoMethod
+
+if TYPE_CHECKING:
+    from perception.localization.known_room import KnownRoom
+    from perception.localization.map_frame import MapFrame
+    from perception.mapping.grid.evidence_grid import EvidenceGrid
+    from perception.method import Method
+
+
+class Recognition(NamedTuple):
+    """What begins when recognition does."""
+
+    method: Method
+    other: Method | None
+    """A second method, for the correction of drift."""
+    map_frame: MapFrame | None
+    known_room: KnownRoom | None
+    grid: EvidenceGrid | None
+
+
+NO_RECOGNITION: Final = Recognition(NoMethod(), None, None, None, None)
+
+
+def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Recognition:
+    """Return the parts that the settings name, with an empty map."""
+    from perception.localization.map_frame import MapFrame
+    from perception.mapping.grid.evidence_grid import EvidenceGrid
+    from perception.method import make_method
+
+    corrects = config.localization.correct_drift
+    return Recognition(
+        make_method(ring, models, config),
+        make_method(ring, models, config) if corrects else None,
+        MapFrame(ring, models) if corrects else None,
+        find_in_room(config.localization.known_room, ring),
+        None if config.grid.method == "off" else EvidenceGrid(ring, config.grid),
+    )
+
+
+def find_in_room(room: WorldConfig | None, ring: RingConfig) -> KnownRoom | None:
+    """Return what finds the robot in a room; None without a room."""
+    if room is None:
+        return None
+    from perception.localization.known_room import KnownRoom
+    from perception.localization.room import room_of
+
+    return KnownRoom(room_of(room), ring)
