@@ -122,7 +122,13 @@ def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", range(2, 42))
 def test_nothing_enters_a_zone_in_many_rooms(seed: int) -> None:
-    test_a_mission_arrives_at_its_places_and_enters_no_zone(seed)
+    places = random_places(np.random.default_rng(seed))
+    errand = mission(to_place("lift"), to_place("charger"))
+    gap_m, state = least_gap_m(with_mission(ROOM.model_copy(update={"places": places}), errand), seed, 150.0)
+    assert gap_m > -STOPPING_ERROR_M
+    assert isinstance(state.drive_request, Mission)
+    # Some draws leave no way between zones, walls and drums: the mission is held then, and says where it is stuck.
+    assert state.drive_request.progress.status in {"done", "held"}, state.hold_reason
     test_neither_wander_nor_an_operator_enters_a_zone(seed)
 
 
