@@ -262,7 +262,7 @@ class Console:
             limits=self._limits,
             log=self._console_log,
             files=files,
-            session=self._session,
+            session=lambda: {**self._session(), "history": self._publisher.history.listed()},
             on_message=self.dispatcher.receive,
             on_leave=self._on_leave,
             on_fault=self._run.health.report,

@@ -137,9 +137,9 @@ class FakeServer:
             with contextlib.suppress(ConnectionError):
                 await client.socket.send_str(json.dumps(message))
 
-    async def release(self) -> None:
-        """Answer the commands that were held back."""
-        self.holds.clear()
+    async def release(self, *still: str) -> None:
+        """Answer the commands that were held back; hold back commands of these kinds from now on."""
+        self.holds = set(still)
         held, self.held = self.held, []
         for client, answer in held:
             await client.socket.send_str(json.dumps(answer))

@@ -81,8 +81,7 @@ async def test_what_takes_long_shows_at_once_that_it_has_started(server: FakeSer
     server.holds = {"list_recordings", "make_files"}
     await page.locator("#map-make").click()
     await opened.says("#job-text", "Map of this run: looking for its recording")
-    await server.release()
-    server.holds = {"make_files"}
+    await server.release("make_files")
     await opened.says("#job-text", "Map of now.mcap: asked for")
     await opened.save_screenshot("map-started")
     await server.release()
@@ -186,3 +185,20 @@ async def test_the_bar_is_whole_whatever_stands_in_it(
         cut = await page.evaluate("(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)"
                                   "(document.getElementById('reason'))")  # fmt: skip
         assert cut <= 1, "the reason is read whole"
+
+
+async def test_after_a_reload_trail_and_plots_go_on_from_before(server: FakeServer, opener: Opener) -> None:
+    past = [{"robot_s": 0.1 * k, "pose": [0.01 * k, 0.0, 0.0], "twist": [0.4, 0.0], "ranges": [1.0] * 24}
+            for k in range(20)]  # fmt: skip
+    trail = [[0.01 * k, 0.0, 0.1 * k] for k in range(20)]
+    server.session = greeting() | {"history": {"samples": past, "trail": trail}}
+    opened = await opener.open(server.url)
+    page = opened.page
+    assert await opened.world("run.trail.length") >= 20
+    await opened.tab("Plot")
+    async with page.expect_download() as saved:
+        await page.get_by_role("button", name="Save as CSV").click()
+    lines = (await (await saved.value).path()).read_text("utf-8").splitlines()
+    assert len(lines) > 20
+    assert lines[1].split(",")[1] == "0.4"
+    assert await opened.world("run.session.history === undefined"), "it is not shown again with a recording"

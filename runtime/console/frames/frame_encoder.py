@@ -176,7 +176,7 @@ class FrameEncoder:
             "twist": [0.0, 0.0],
             "flags": [],
             "firing": sorted(self._fired),
-            "ranges": _json_numbers([NO_ECHO if r == math.inf else r for r in self._ranges_m], 4),
+            "ranges": self.ranges(),
             "age": _json_numbers([robot_s - fired_s for fired_s in self._fired_s], 3),
             "cross_paths": self._cross_paths.rows(),
             "clusters": self._cluster_boxes,
@@ -210,6 +210,10 @@ class FrameEncoder:
         if self._encode_archived(state.perception.archived_objects()):
             changes += b',"archived":%b' % self._archived_json
         return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], changes, self._whole)
+
+    def ranges(self) -> list[float | None]:
+        """Return the last range of each sensor, m: -1 where it heard nothing, None where it has not fired."""
+        return _json_numbers([NO_ECHO if r == math.inf else r for r in self._ranges_m], 4)
 
     def _take_firing(self, firing: Firing) -> None:
         # A list of 24 numbers: numpy's calls would take ten times as long, within the cycle.

@@ -15,6 +15,7 @@ from drivers.driver import RobotDriver
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.command import CommandContext
 from runtime.console.frames.frame_encoder import NO_LINK_COUNTS, FrameContext, FrameEncoder, robot_status
+from runtime.console.frames.run_history import RunHistory
 from runtime.console.protocols import Run
 from runtime.cycle.callbacks import CONSOLE_FRAME
 from runtime.cycle.step import CycleRecord, State
@@ -75,6 +76,8 @@ class FramePublisher:
         self._clock = clock
         self._on_stalled = on_stalled
         self._encoder = FrameEncoder(settings)
+        self.history = RunHistory()
+        """What a page that is opened now shows of the time before."""
         self.publish = run.timing_monitor.timed(CONSOLE_FRAME, self._publish)
         """Encodes a frame now; measured."""
         self._timed_tick = run.timing_monitor.timed(CONSOLE_FRAME, self._tick)
@@ -114,6 +117,11 @@ class FramePublisher:
             Counts of the link.
         """
         self._encoder.take(record)
+        if record.inputs.received.rebooted:
+            self.history.clear()
+        if state.odometry is not None:
+            last_cycle = self._run.timing_monitor.last_cycle
+            self.history.take(state.odometry, self._encoder.ranges, lambda: last_cycle().phases_s or {})
         self._last = (record, state, stats, driver)
         host_s = self._clock()
         # While cycles overrun, the idle period is enough: the display must not cost the robot more time.

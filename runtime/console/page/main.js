@@ -227,7 +227,10 @@ function fitUntouched(room = 0) {
 }
 
 watchGrid({ layer: layers.find(({ id }) => id === "evidence_grid"), run, connection, notifications, changed: () => scene.invalidate("back") });
-connection.on("session", (session) => run.beginSession(session));
+connection.on("session", ({ history: past = null, ...session }) => {
+  run.beginSession(session);
+  if (past !== null) run.takeHistory(past);
+});
 connection.on("state", (state) => run.apply(state, performance.now()));
 connection.on("robot", (status) => run.applyRobot(status, performance.now()));
 connection.on("log", (entry) => run.note(entry));

@@ -38,6 +38,9 @@ export class Plots {
     for (const [id, act] of Object.entries(acts)) byId(id).addEventListener("click", act);
     for (const lane of preferred("plot fields", ["twist.v", "ranges.0"])) if (typeof lane === "string") this.#addLane(...lane.split(SECOND));
     run.on("session", () => run.watchesRecording && this.#history.clear());
+    run.on("history", (samples) => {
+      for (const sample of samples) this.#history.add(sample.robot_s, sample);
+    });
     run.on("state", (state) => this.#take(state));
     units.on("changed", () => this.draw());
   }

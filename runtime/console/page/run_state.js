@@ -48,6 +48,14 @@ export class RunState extends Emitter {
     this.emit("session", session);
   }
 
+  // What the run was before the page was opened: its trail, and samples for the plots.
+  takeHistory({ trail, samples }) {
+    const before = trail.map(([x, y, t]) => ({ x, y, t })), last_s = before.at(-1)?.t ?? -Infinity;
+    this.trail = [...before, ...this.trail.filter(({ t }) => t > last_s)];
+    this.trailVersion++;
+    this.emit("history", samples);
+  }
+
   get watchesRecording() {
     return this.state.playback !== null;
   }
