@@ -91,7 +91,7 @@ async def test_what_takes_long_shows_at_once_that_it_has_started(server: FakeSer
     await page.locator("#file-play").click()
     await opened.says("#banners", "Opening 2026-01-02-first.mcap")
     await expect(page.locator("#file-play")).to_be_disabled()
-    await opened.run_for(30_000)
+    await opened.run_for(12_000)
     await server.release()
     await expect(page.locator("#banner-opening")).to_have_count(0)
 
