@@ -139,12 +139,15 @@ class FreshDriver:
         The robot's own driver.
     sensors
         Number of sensors.
+    set_size
+        Most sensors that fire at once: values are repeated only where firings have more.
     cycle_s
         Time in which each sensor fires once.
     """
 
-    def __init__(self, driver: RobotDriver, sensors: int, cycle_s: float) -> None:
+    def __init__(self, driver: RobotDriver, sensors: int, set_size: int, cycle_s: float) -> None:
         self._driver = driver
+        self._set_size = set_size
         self._detector = RepeatDetector(sensors)
         self._filter = RepeatFilter(sensors, cycle_s)
         self._is_latched = False
@@ -159,7 +162,7 @@ class FreshDriver:
         fresh = []
         for firing in received.firings:
             without = self._filter.fresh(firing)
-            if not self._is_latched:
+            if not self._is_latched and np.count_nonzero(~np.isnan(firing.ranges_m)) > self._set_size:
                 self._detector.add(firing.ranges_m)
                 self._is_latched = self._detector.period > 1
                 notes = (NOTE,) if self._is_latched else ()

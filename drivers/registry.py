@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Final, Protocol, TypedDict, cast
 from config.robot import CalibrationConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import DriverError
+from drivers.firing_pattern import firing_pattern, sensors
+from drivers.latched_ranges import FreshDriver
 from drivers.serial_port import OpenPort
 
 if TYPE_CHECKING:
@@ -69,6 +71,10 @@ class DriverFamily(Protocol):
         """
 
 
+GIVES_FIRINGS: Final = frozenset({"arcos", "denning", "rflex"})
+"""Drivers whose protocols name what fired; any other may be of a source that repeats last values."""
+
+
 def known_drivers() -> dict[str, EntryPoint]:
     """Return all installed drivers by name; a shipped driver takes precedence over another of its name."""
     return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **SHIPPED}
@@ -85,6 +91,12 @@ def make_driver(config: RobotConfig) -> RobotDriver:
         The robot or its protocol cannot carry out the firing pattern of `config`.
     """
     driver = _family(config.robot.driver).make_driver(config)
+    if config.robot.driver not in GIVES_FIRINGS:
+        pattern, count = firing_pattern(config.ring), len(config.ring.mounts)
+        set_size = max(len(sensors(mask)) for mask in pattern.masks)
+        if set_size < count:
+            cycle_s = len(pattern.masks) * pattern.step_period_s
+            driver = cast("RobotDriver", FreshDriver(driver, count, set_size, cycle_s))
     if config.calibration == CalibrationConfig():
         return driver
     return cast("RobotDriver", CalibratedDriver(driver, config.calibration, synchro=config.body.synchro))

@@ -83,7 +83,7 @@ class Scripted:
 def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fired() -> None:
     rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
     frozen = np.repeat(rows[-1:], 50, axis=0)
-    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
+    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS, 2, 0.0)  # type: ignore[arg-type]  # only what is used
     received = [driver.take_received() for _ in range(2050)]
     assert [note for one in received for note in one.notes] == [NOTE]
     late = np.array([one.firings[0].ranges_m for one in received])
@@ -94,7 +94,7 @@ def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fire
 def test_silence_of_a_live_source_is_passed_on() -> None:
     rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
     silent = np.full((50, SENSORS), np.inf)
-    driver = FreshDriver(Scripted(np.concatenate([rows, silent])), SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
+    driver = FreshDriver(Scripted(np.concatenate([rows, silent])), SENSORS, 2, 0.0)  # type: ignore[arg-type]  # only what is used
     got = np.array([driver.take_received().firings[0].ranges_m for _ in range(2050)])
     assert np.isposinf(got[2000:]).all()
 
@@ -102,6 +102,15 @@ def test_silence_of_a_live_source_is_passed_on() -> None:
 def test_a_frozen_ring_that_was_fresh_is_passed_on_for_the_monitor() -> None:
     rows = fresh_rows(1000, 0.001, 0.01, 3)
     frozen = np.repeat(rows[-1:], 500, axis=0)
-    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
+    driver = FreshDriver(Scripted(np.concatenate([rows, frozen])), SENSORS, 2, 0.0)  # type: ignore[arg-type]  # only what is used
     got = np.array([driver.take_received().firings[0].ranges_m for _ in range(1500)])
     np.testing.assert_array_equal(got, np.concatenate([rows, frozen]))
+
+
+def test_firings_of_no_more_sensors_than_fire_at_once_are_passed_on() -> None:
+    """A source that gives what fired, with a value that stands: nothing is old."""
+    rows = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
+    driver = FreshDriver(Scripted(rows), SENSORS, SENSORS, 0.0)  # type: ignore[arg-type]  # only what is used
+    received = [driver.take_received() for _ in range(2000)]
+    np.testing.assert_array_equal(np.array([one.firings[0].ranges_m for one in received]), rows)
+    assert not any(one.notes for one in received)

@@ -9,12 +9,13 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from config.load import load_robot
-from config.robot import DriverConfig, RobotConfig
+from config.robot import DriverConfig, FiringConfig, RobotConfig
 from config.world import WorldConfig
 from drivers import registry
 from drivers.denning.device import DenningDevice
 from drivers.denning.driver import DenningDriver
 from drivers.driver import DriverError
+from drivers.latched_ranges import FreshDriver
 from drivers.registry import GROUP, known_drivers, make_device, make_driver
 
 
@@ -56,7 +57,7 @@ def test_an_installed_package_adds_a_driver(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setitem(sys.modules, module.__name__, module)
     install(monkeypatch, "other", module.__name__)
     assert "other" in known_drivers()
-    assert make_driver(robot_with_driver("other")) is made
+    assert make_driver(robot_with_driver("other")).drive == made.drive
 
 
 def test_a_shipped_driver_takes_precedence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,3 +69,11 @@ def test_a_driver_that_cannot_be_loaded_is_refused_with_its_package_named(monkey
     install(monkeypatch, "broken", "a_package_that_is_not_there.robot")
     with pytest.raises(DriverError, match=r"cannot be loaded from a_package_that_is_not_there.robot"):
         make_driver(robot_with_driver("broken"))
+
+
+def test_an_installed_driver_may_repeat_last_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, "mine", "drivers.denning.family")
+    assert isinstance(make_driver(robot_with_driver("mine")), FreshDriver)
+    all_at_once = FiringConfig(sets=(tuple(range(24)),), step_period_s=0.1)
+    ring = load_robot("denning").ring.model_copy(update={"firing": all_at_once})
+    assert isinstance(make_driver(robot_with_driver("mine").model_copy(update={"ring": ring})), DenningDriver)
