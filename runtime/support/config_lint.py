@@ -40,4 +40,10 @@ def lint_settings(settings: Settings) -> list[str]:
             f"ring.firing: the pattern looks ahead so seldom that it limits the speed to {speed_m_s:.2f} m/s, below "
             f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; fire more sensors at a time"
         )
+    elif pattern_speed_m_s(settings, missed=1) == 0.0:
+        warnings.append(
+            "ring.firing: one reading that fails leaves the way unseen for longer than "
+            f"behaviors.avoid_static_obstacle.echo_age_max_s = {avoid.echo_age_max_s:g}: the robot stops until that "
+            "sensor answers again; fire more sensors at a time, or let beams overlap"
+        )
     return [*warnings, *blind_notes(settings)]

@@ -63,11 +63,19 @@ def refuse_undrivable(settings: Settings) -> None:
         )
 
 
-def pattern_speed_m_s(settings: Settings) -> float:
-    """Return the speed that the firing pattern allows on every leg, at its oldest looks, m/s."""
+def pattern_speed_m_s(settings: Settings, missed: int = 0) -> float:
+    """Return the speed that the firing pattern allows on every leg, at its oldest looks, m/s.
+
+    Parameters
+    ----------
+    settings
+        The robot and its settings.
+    missed
+        Readings in a row of each sensor that failed.
+    """
     clearance_m = settings.behaviors.arbiter.clearance_m
     courses = courses_rad(settings)
-    return min(seen_speed_m_s(oldest_percept(settings, c), settings.body, clearance_m) for c in courses)
+    return min(seen_speed_m_s(oldest_percept(settings, c, missed), settings.body, clearance_m) for c in courses)
 
 
 def courses_rad(settings: Settings) -> tuple[float, ...]:
@@ -82,7 +90,7 @@ def courses_rad(settings: Settings) -> tuple[float, ...]:
     return (out, out + math.pi) if ahead.distance_m is not None and ahead.at_end == "turn_back" else (out,)
 
 
-def oldest_percept(settings: Settings, course_rad: float) -> Percept:
+def oldest_percept(settings: Settings, course_rad: float, missed: int = 0) -> Percept:
     """Return what a robot in the open sees when every sensor's look is as old as the pattern lets it become.
 
     An echo arrives when its window has closed, and waits for a cycle at most.
@@ -93,11 +101,13 @@ def oldest_percept(settings: Settings, course_rad: float) -> Percept:
         The robot and its settings.
     course_rad
         Its heading in the ring's frame.
+    missed
+        Readings in a row of each sensor that failed.
     """
     ring = settings.ring
     pattern, mounts = firing_pattern(ring), mounts_array(ring.mounts)
     late_s = time_of_flight_s(pattern.window_m) + 1.0 / settings.cycle.rate_hz
-    axes, ages_s = mounts[:, 2].copy(), longest_gaps_s(pattern, len(mounts)) + late_s
+    axes, ages_s = mounts[:, 2].copy(), (1 + missed) * longest_gaps_s(pattern, len(mounts)) + late_s
     axes[list(ring.turning)] += course_rad
     view = FieldOfView(
         axes,

@@ -28,3 +28,10 @@ def test_a_cycle_much_slower_than_the_ring_is_named() -> None:
 def test_a_pattern_that_limits_the_speed_is_named() -> None:
     (warning,) = lint_settings(load_settings("hallway", ["ring.firing=single"]))
     assert warning.startswith("ring.firing: the pattern looks ahead so seldom that it limits the speed to 0.10 m/s")
+
+
+def test_a_ring_that_one_failed_reading_stops_is_named() -> None:
+    slow = ["ring.firing=single", "behaviors.arbiter.base_velocity_m_s=0.05"]
+    (warning,) = lint_settings(load_settings("hallway", slow))
+    assert "one reading that fails" in warning
+    assert lint_settings(load_settings("hallway", [*slow, "behaviors.avoid_static_obstacle.echo_age_max_s=4"])) == []
