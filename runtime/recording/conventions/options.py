@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, TypeAlias
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
 
@@ -49,11 +49,6 @@ class RingLogOptions:
     range_unit: LengthUnit = "auto"
     silence: str = "auto"
 
-    def settled(self) -> RingLogOptions:
-        """Return the options with the form's own conventions for what is left at auto."""
-        given: dict[str, Any] = {name: value for name, value in vars(self).items() if value != "auto"}
-        return replace(PLAIN, **given)
-
     def check(self) -> None:
         """Raise an error if `silence` is neither a word nor a number.
 
@@ -87,5 +82,3 @@ class RingLogOptions:
 
 
 AUTO: Final = RingLogOptions()
-PLAIN: Final = RingLogOptions("no", "ccw", "file", "rad", "s", "m", "m", "inf")
-"""The form's own conventions."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from config.errors import UserError
-from runtime.recording.conventions.options import AUTO, PLAIN, RingLogOptions
+from runtime.recording.conventions.options import AUTO, RingLogOptions
 
 
 @pytest.mark.parametrize("silence", ["auto", "inf", "nan", "max", "0", "-1", "7.6"])
@@ -17,11 +17,6 @@ def test_a_number_or_a_word_stands_for_silence(silence: str) -> None:
 def test_other_silence_is_refused(silence: str) -> None:
     with pytest.raises(UserError, match="give auto, inf, nan, max or a number"):
         RingLogOptions(silence=silence).check()
-
-
-def test_what_is_left_at_auto_is_settled_in_the_forms_own_way() -> None:
-    assert AUTO.settled() == PLAIN
-    assert RingLogOptions(heading="cw").settled().heading == "cw"
 
 
 def test_a_recording_takes_no_options() -> None:
