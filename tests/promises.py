@@ -50,8 +50,8 @@ LIMITS: Sequence[str] = (
     "since it is there after .33 s.",
     "Something that no beam meets, or that returns no echo: glass at a slant, cloth, what is above or below the "
     "beams.",
-    "A smooth wall whose normal lies in a blind side of the ring: a robot that only looks ahead hears nothing of it as "
-    "it draws near at a slant. `check` names the blind sides.",
+    "A smooth wall whose normal lies in a blind side of the ring: a robot that only looks ahead hears nothing of it "
+    "as it draws near at a slant. `check` names the blind sides.",
     "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",
     "Odometry that is wrong by less than a quarter: the map suffers, and the distances that are kept do not.",
 )
