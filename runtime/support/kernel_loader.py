@@ -70,6 +70,8 @@ class KernelLoader:
         Receives a line when kernels have to be compiled.
     compile_part : callable, optional
         Compiles a part in another process.
+    preparation : KernelPreparation, optional
+        Is waited for: else what it loads meanwhile would be counted twice.
 
     Attributes
     ----------
@@ -78,9 +80,13 @@ class KernelLoader:
     """
 
     def __init__(
-        self, log: FilteringBoundLogger, compile_part: Callable[[str], Awaitable[None]] | None = None
+        self,
+        log: FilteringBoundLogger,
+        compile_part: Callable[[str], Awaitable[None]] | None = None,
+        preparation: KernelPreparation | None = None,
     ) -> None:
         self._log = log
+        self._preparation = preparation
         self._compile_part = _compile_in_child if compile_part is None else compile_part
         self._lock = asyncio.Lock()
         self.loaded = 0
@@ -90,6 +96,8 @@ class KernelLoader:
         parts = [part for part in needed_parts(proposed) if part not in needed_parts(running)]
         if is_interpreted() or not parts:
             return None
+        if self._preparation is not None:
+            await self._preparation.is_over.wait()
         async with self._lock:
             folder = use_kernel_cache()
             for part in uncompiled_parts(folder, parts):
@@ -125,6 +133,8 @@ class KernelPreparation:
     ----------
     progress : str
         How many kernels are compiled, and how long the rest will take, or how far loading is.
+    is_over : asyncio.Event
+        Set when nothing is left to load, or loading has failed.
     """
 
     def __init__(self, parts: Sequence[str], host_clock: Callable[[], float] = time.monotonic) -> None:
@@ -137,6 +147,7 @@ class KernelPreparation:
         self.progress = PREPARING
         self._process: asyncio.subprocess.Process | None = None
         self._ring: asyncio.Task[None] | None = None
+        self.is_over = asyncio.Event()
 
     def begin_ring(self, settings: Settings) -> asyncio.Task[None]:
         """Begin to load what `ring` waits for, and return the task; it is started only once."""
@@ -160,6 +171,12 @@ class KernelPreparation:
         UserError
             They could not be compiled.
         """
+        try:
+            await self._load(settings)
+        finally:
+            self.is_over.set()
+
+    async def _load(self, settings: Settings) -> None:
         if uncompiled_parts(self._folder, self._all_parts):
             self._process = await start_child(WARM_UP, [",".join(self._all_parts), "whole"], pipes=False,
                                               low_priority=True)  # fmt: skip

@@ -310,7 +310,7 @@ async def run_process(
         )  # fmt: skip
         if preparation is not None:
             stack.push_async_callback(preparation.close)
-        kernel_loader = KernelLoader(log)
+        kernel_loader = KernelLoader(log, preparation=preparation)
         reloader = Reloader(process.live_settings, reload, log, kernel_loader)
         if settings.log.webhook is not None:
             from runtime.support.webhook import Webhook

@@ -138,6 +138,7 @@ export class SettingsFiles {
   async #save() {
     try {
       this.#hold(await this.connection.request({ type: "save_settings", file: this.#at, toml: byId("settings-text").value, digest: this.#held.digest }));
+      byId("settings-text").focus(); // the button that had the focus is disabled now
       setText(byId("settings-state"), "Saved. It counts once the run is started again.");
     } catch (error) {
       setText(byId("settings-state"), error.message);

@@ -119,6 +119,8 @@ def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
 
 
 DRIVES, CORRECTIONS, HELD_CYCLES = 40, 5, 3
+WITH_MAP = "perception.localization.correct_drift=true"
+"""A run without a map refuses goals in it."""
 
 
 @pytest.mark.promise("P30")
@@ -132,7 +134,7 @@ def test_no_correction_of_the_map_makes_the_drive_jump(
     steps, changes = list[float](), list[float]()
     for _ in range(DRIVES):  # short ones: this robot does not move, and the motion monitor stops it for that
         frame = Pose(0.0, 0.0, 0.0)
-        script = driving()
+        script = driving(WITH_MAP)
         script.request_drive(Goal(20.0, 0.0, frame="map"))
         places, turns = [GoalPlace(20.0, 0.0)], [0.0]
         for _ in range(CORRECTIONS):
@@ -161,7 +163,7 @@ def test_a_goal_in_the_map_is_driven_without_a_jump_and_only_where_the_place_is_
     frames: list[Pose | None] = [Pose(0.0, 0.0, 0.0)]
     monkeypatch.setattr(Perception, "known_map_frame", lambda _: frames[-1])
     monkeypatch.setattr(Perception, "localized", lambda _: "a place in the map")
-    script = driving()
+    script = driving(WITH_MAP)
     assert script.request_drive(Goal(3.0, 0.0, frame="map")).command == near(0.3, 0.0)
     frames.append(Pose(0.0, 1.0, 0.0))
     turns = [script.request_drive(None).command for _ in range(17)]

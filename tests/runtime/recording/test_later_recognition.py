@@ -73,7 +73,7 @@ def test_it_is_replayed_to_the_bit(kind: str, tmp_path: Path) -> None:
             for found in replayer:
                 if found.recorded is not None:
                     assert found.replayed == found.recorded
-            assert last[-1].replayed is None or last[-1].replayed == last[-1].recorded
+            assert not last or last[-1].replayed is None or last[-1].replayed == last[-1].recorded
 
 
 def test_inputs_that_an_older_version_did_not_know_are_no_difference(tmp_path: Path) -> None:

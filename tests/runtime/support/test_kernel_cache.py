@@ -164,17 +164,41 @@ def test_an_existing_setting_is_respected(home: Path, monkeypatch: pytest.Monkey
 
 def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     hallway = load_settings("hallway")
-    assert kernels.needed_parts(hallway) == (kernels.EMULATOR, kernels.BAYES, kernels.VALLEY)
+    assert kernels.needed_parts(hallway) == (kernels.EMULATOR, kernels.RING, kernels.BAYES, kernels.VALLEY)
     boxes = load_settings("hallway", models=["semicircle", "box"])
-    assert kernels.needed_parts(boxes) == (kernels.EMULATOR, kernels.BAYES, kernels.POLYGONS, kernels.VALLEY)
+    assert kernels.needed_parts(boxes) == (
+        kernels.EMULATOR,
+        kernels.RING,
+        kernels.BAYES,
+        kernels.POLYGONS,
+        kernels.VALLEY,
+    )
     paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
-    assert kernels.needed_parts(paper) == (kernels.EMULATOR, kernels.PAPER, kernels.VALLEY)
+    assert kernels.needed_parts(paper) == (kernels.EMULATOR, kernels.RING, kernels.PAPER, kernels.VALLEY)
     corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
-    assert kernels.needed_parts(corrected) == (kernels.EMULATOR, kernels.BAYES, kernels.LOCALIZATION, kernels.VALLEY)
+    assert kernels.needed_parts(corrected) == (
+        kernels.EMULATOR,
+        kernels.RING,
+        kernels.BAYES,
+        kernels.LOCALIZATION,
+        kernels.VALLEY,
+    )
     mapped = with_known_room(load_settings("hallway"), "irregular")
-    assert kernels.needed_parts(mapped) == (kernels.EMULATOR, kernels.BAYES, kernels.KNOWN_ROOM, kernels.VALLEY)
+    assert kernels.needed_parts(mapped) == (
+        kernels.EMULATOR,
+        kernels.RING,
+        kernels.BAYES,
+        kernels.KNOWN_ROOM,
+        kernels.VALLEY,
+    )
     with_grid = load_settings("hallway", ["perception.grid.method=directed"])
-    assert kernels.needed_parts(with_grid) == (kernels.EMULATOR, kernels.BAYES, kernels.VALLEY, "directed")
+    assert kernels.needed_parts(with_grid) == (
+        kernels.EMULATOR,
+        kernels.RING,
+        kernels.BAYES,
+        kernels.VALLEY,
+        "directed",
+    )
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 

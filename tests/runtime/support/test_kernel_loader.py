@@ -34,6 +34,8 @@ class Kernels:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
         self.folder = folder
+        self.preparation = KernelPreparation(())
+        self.preparation.is_over.set()
         self.fails = False
         self.compiled: list[str] = []
         self.loaded: list[tuple[str, ...]] = []
@@ -43,7 +45,8 @@ class Kernels:
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
         monkeypatch.setattr(kernel_loader, "warm_up", self._load)
         monkeypatch.setattr(kernel_loader, "compiled_signatures", lambda: 7 * len(self.loaded))
-        self.ready = KernelLoader(structlog.wrap_logger(None, processors=[self.log]), self._compile)
+        log = structlog.wrap_logger(None, processors=[self.log])
+        self.ready = KernelLoader(log, self._compile, self.preparation)
 
     async def _compile(self, part: str) -> None:
         await asyncio.sleep(0.0)
@@ -71,6 +74,17 @@ async def test_missing_kernels_are_compiled_once_and_loaded_by_a_thread(kernels_
     assert [entry["event"] for entry in kernels_stub.log.entries] == [
         "compiling the kernels for polygons, once; the change takes effect afterwards"
     ]
+
+
+async def test_what_a_preparation_loads_is_waited_for(kernels_stub: Kernels) -> None:
+    kernels_stub.preparation.is_over.clear()
+    loading = asyncio.create_task(kernels_stub.ready(ROUND, BOXES))
+    for _ in range(9):
+        await asyncio.sleep(0)
+    assert kernels_stub.compiled == []
+    kernels_stub.preparation.is_over.set()
+    assert await loading is None
+    assert kernels_stub.compiled == [POLYGONS]
 
 
 async def test_kernels_in_use_are_not_loaded_again(kernels_stub: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:

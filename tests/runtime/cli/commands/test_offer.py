@@ -119,7 +119,7 @@ def test_a_robot_that_was_offered_is_not_armed_whatever_the_command_line_says(te
     async def begins(settings: RobotConfig, *_: object, arm: bool, **__: object) -> None:
         raise RunStartedError(settings.link.port, arm)
 
-    terminal.setattr(run, "begin_preparation", lambda _: object())
+    terminal.setattr(run, "begin_preparation", lambda _: None)
     terminal.setattr(run, "run_process", begins)
     with pytest.raises(RunStartedError) as error:
         run_command(["run", "--arm", "--no-record", "--no-console"])

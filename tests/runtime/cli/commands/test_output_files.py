@@ -170,6 +170,7 @@ def test_every_command_that_writes_a_file_is_tried() -> None:
         "ring-test",
         "ros2",
         "foxglove",
+        "fleet",
         "--help",
         "-h",
         "--version",
