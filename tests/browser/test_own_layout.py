@@ -30,6 +30,21 @@ async def make_button(opened: Opened, action: str, key: str) -> None:
     await opened.page.get_by_role("button", name="Make a button").click()
 
 
+async def test_a_named_place_is_a_button(server: FakeServer, opener: Opener) -> None:
+    none: dict[str, Any] = {"frame": "odom", "place": [], "no_go_line": [], "no_go_area": [], "speed_area": []}
+    charger = {"name": "charger", "x_m": 1.0, "y_m": 2.0, "heading_deg": None}
+    server.session = greeting() | {"places": none | {"place": [charger]}}
+    opened = await opener.open(server.url)
+    await opened.tab("Drive")
+    await opened.page.locator("#buttons-part summary").click()
+    await make_button(opened, "place:charger", "g")
+    await opened.page.locator("#own-buttons button").click()
+    assert await server.wait("go_to_place") == {"name": "charger"}
+    await server.send({"type": "places", **none})
+    await opened.sync()
+    await expect(opened.page.locator("#own-buttons button")).to_be_disabled()
+
+
 async def test_a_mission_is_a_button_with_a_key_and_stays_after_a_reload(server: FakeServer, opener: Opener) -> None:
     opened = await with_missions(server, opener)
     page = opened.page

@@ -130,6 +130,7 @@ tabs = new Tabs((name) => {
 });
 const buttons = new Buttons({ run, notifications });
 buttons.offer("mission", () => (run.session?.missions ?? []).map(({ name }) => ({ id: name, name, act: () => connection.request({ type: "start_mission", name }) })));
+buttons.offer("place", () => places.all.place.map(({ name }) => ({ id: name, name, act: () => connection.request({ type: "go_to_place", name }) })));
 
 let instrumentsAsked = false;
 function drawInstruments() {
