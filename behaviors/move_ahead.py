@@ -51,7 +51,7 @@ def move_ahead(percept: Percept, leg: Leg, config: MoveAheadConfig) -> tuple[Res
     """
     direction = math.radians(config.move_ahead_direction_deg)
     ux, uy = math.cos(direction), math.sin(direction)
-    leg = _advance(leg, (percept.pose.x - leg.origin_x) * ux + (percept.pose.y - leg.origin_y) * uy, config)
+    leg = _advance(leg, _out_m(percept.pose, leg, ux, uy), config)
     if leg.done:
         return Response(SCHEMA, 0.0, 0.0), leg
     magnitude = config.move_ahead_gain if leg.outbound else -config.move_ahead_gain
@@ -61,8 +61,13 @@ def move_ahead(percept: Percept, leg: Leg, config: MoveAheadConfig) -> tuple[Res
 def along_m(pose: Pose, leg: Leg, config: MoveAheadConfig) -> float:
     """Return how far the robot is from the leg's start in the direction in which the leg leads now, m."""
     direction = math.radians(config.move_ahead_direction_deg)
-    along = (pose.x - leg.origin_x) * math.cos(direction) + (pose.y - leg.origin_y) * math.sin(direction)
-    return along if leg.outbound else -along
+    out = _out_m(pose, leg, math.cos(direction), math.sin(direction))
+    return out if leg.outbound else -out
+
+
+def _out_m(pose: Pose, leg: Leg, ux: float, uy: float) -> float:
+    """Return how far the robot is from the leg's start in the direction of the unit vector (ux, uy), m."""
+    return (pose.x - leg.origin_x) * ux + (pose.y - leg.origin_y) * uy
 
 
 def given_up(leg: Leg, config: MoveAheadConfig) -> Leg:

@@ -197,10 +197,7 @@ def _within_speed_areas(
             rest_m = max(0.0, float(zone.distances_m(here)) - kept_m)
             square = zone.speed_max_m_s * zone.speed_max_m_s + body.acceleration_max_m_s2 * rest_m
             limit = min(limit, math.sqrt(square))
-    if abs(asked.v) <= limit:
-        return asked
-    share = limit / abs(asked.v)
-    return Twist(share * asked.v, share * asked.w)
+    return asked.at_most(limit)
 
 
 def _braking_places(

@@ -27,9 +27,10 @@ from perception.bounds import PLACE, Bound
 from perception.snapshot import bounds_of, numbers_of
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import decode, encode
-from runtime.recording.replayer import adopt, fresh_state
+from runtime.recording.replayer import adopt
 from runtime.recording.schema import Keyframe, carried_state, keyframe
 from runtime.simulation.closed_loop import OperatorInput, simulate
 

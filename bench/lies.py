@@ -30,7 +30,7 @@ from drivers.messages import Pose
 from drivers.registry import make_device, make_driver
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import prepared_state, unprepared_state
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
 from runtime.cycle.unheard_limit import LOST, UNHEARD
 from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
@@ -245,7 +245,7 @@ def run_trial(
     faults = () if kind is None else (make_lie(kind, settings, begin_s),)
     device, driver = make_device(settings, drive.world, 1000 * seed + moment, faults=faults), make_driver(settings)
     line = MemoryLine(driver, device)
-    state = (prepared_state if recognises else unprepared_state)(settings)
+    state = fresh_state(settings, recognises=recognises)
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
     run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0

@@ -51,6 +51,16 @@ class FiringPattern:
     window_m: float
     listeners: tuple[int, ...] = ()
 
+    @property
+    def cycle_s(self) -> float:
+        """Time after which the same sensors fire again, s."""
+        return len(self.masks) * self.step_period_s
+
+    @property
+    def set_size(self) -> int:
+        """The most sensors that fire at once."""
+        return max(mask.bit_count() for mask in self.masks)
+
 
 def time_of_flight_s(window_m: float) -> float:
     """Return how long sound takes to the end of the window and back, s."""

@@ -75,6 +75,14 @@ class Twist:
     v: float
     w: float
 
+    def at_most(self, speed_m_s: float) -> Twist:
+        """Return this velocity, or a slower one on the same curve whose speed is `speed_m_s`."""
+        speed = abs(self.v)
+        if speed <= speed_m_s:
+            return self
+        share = speed_m_s / speed
+        return Twist(share * self.v, share * self.w)
+
 
 class Flags(IntFlag):
     """The base's status; a robot that lacks one of these never sets it."""

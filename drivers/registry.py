@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, Protocol, TypedDict, cast
 from config.robot import CalibrationConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import DriverError
-from drivers.firing_pattern import firing_pattern, sensors
+from drivers.firing_pattern import firing_pattern
 from drivers.latched_ranges import FreshDriver
 from drivers.serial_port import OpenPort
 
@@ -93,10 +93,8 @@ def make_driver(config: RobotConfig) -> RobotDriver:
     driver = _family(config.robot.driver).make_driver(config)
     if config.robot.driver not in GIVES_FIRINGS:
         pattern, count = firing_pattern(config.ring), len(config.ring.mounts)
-        set_size = max(len(sensors(mask)) for mask in pattern.masks)
-        if set_size < count:
-            cycle_s = len(pattern.masks) * pattern.step_period_s
-            driver = cast("RobotDriver", FreshDriver(driver, count, set_size, cycle_s))
+        if pattern.set_size < count:
+            driver = cast("RobotDriver", FreshDriver(driver, count, pattern.set_size, pattern.cycle_s))
     if config.calibration == CalibrationConfig():
         return driver
     return cast("RobotDriver", CalibratedDriver(driver, config.calibration, synchro=config.body.synchro))

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing
+from perception.angles import wrapped
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
 from perception.records import Records
@@ -62,13 +63,6 @@ def is_steady(points: Floats, times: Floats, heard: NDArray[np.bool_], px: float
 
 
 @kernel
-def angle_between(a: float, b: float) -> float:
-    """Return the angle between two directions, within [0, π], rad."""
-    turned = a - b
-    return abs(turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5))
-
-
-@kernel
 def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, heard: NDArray[np.bool_]) -> int:
     """Forget the echoes of a sensor that a new look replaces, and return which of its looks is the least use.
 
@@ -84,7 +78,7 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
     second = -1
     in_direction = 0
     for k in range(times.shape[0]):
-        turned = angle_between(bearing, bearings[k])
+        turned = abs(wrapped(bearing - bearings[k]))
         if times[k] > -math.inf and turned <= same:
             heard[k] = False
             if turned <= EQUAL_RAD:
@@ -151,7 +145,7 @@ def record_echoes(
         agreed[i] = is_echo and is_steady(points, times, heard, px, py, t)
         if r >= reach:
             for k in range(times.shape[1]):
-                if heard[i, k] and angle_between(bearing, bearings[i, k]) <= same:
+                if heard[i, k] and abs(wrapped(bearing - bearings[i, k])) <= same:
                     lose_echo(unheard[i], points[i, k, 0], points[i, k, 1], steady[i, k], x, y)
         k = forget_look(bearing, same, bearings[i], times[i], heard[i])
         bearings[i, k] = bearing

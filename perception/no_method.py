@@ -24,7 +24,7 @@ class NoMethod:
     converged = True
     counts = NOTHING
 
-    def observe(self, firing: Firing) -> int:  # noqa: ARG002 - as of `perception.method.Method`
+    def observe(self, _firing: Firing) -> int:
         """Return 0: no segment was completed."""
         return 0
 
@@ -47,7 +47,7 @@ class NoMethod:
         numbers = np.zeros(0, np.int64)
         return Segments(numbers, self.segment_geometry(), np.zeros(0), numbers)
 
-    def edit(self, edit: MapEdit) -> str | None:  # noqa: ARG002
+    def edit(self, _edit: MapEdit) -> str | None:
         """Return why no edit is possible."""
         return NOT_READY
 
@@ -55,7 +55,7 @@ class NoMethod:
         """Return None: there are no objects."""
         return None
 
-    def evidence(self, number: int) -> Evidence | None:  # noqa: ARG002
+    def evidence(self, _number: int) -> Evidence | None:
         """Return None: there are no objects."""
         return None
 

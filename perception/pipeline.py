@@ -19,17 +19,14 @@ from perception.area_edits import edit_areas, rejected
 from perception.bounds import CONSTANT, bounds
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
+    AreaEdit,
     ConfirmObject,
     Edit,
     Evidence,
-    LiftArea,
-    MarkVacant,
     MoveObject,
     PlaceModel,
     PlaceRobot,
-    RejectObject,
     RemoveObject,
-    RestoreArea,
     Segments,
     WithdrawConfirmation,
     invalid_edit,
@@ -259,7 +256,7 @@ class Perception:
             return NOT_READY
         if isinstance(edit, PlaceRobot):
             return place_robot(self.known_room, edit)
-        if isinstance(edit, RejectObject | MarkVacant | LiftArea | RestoreArea):
+        if isinstance(edit, AreaEdit):
             placed = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
             return edit_areas(self.vacant, placed, self._known, self._models)
         refused = invalid_edit(edit)

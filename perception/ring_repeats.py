@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_memory import EchoTrace, RingTrace, SensorPlace
@@ -16,12 +17,6 @@ STEP_MIN_M: Final = 0.06
 """See `REPEAT_NAT`, m: ten times the error of a short way's odometry and of a range in steps of a millimetre."""
 REPEATS_MAX: Final = 3.0
 """Such changes of one sensor that count: a single sensor may be stuck, which says nothing about the ring."""
-
-
-@kernel
-def wrapped(angle: float) -> float:
-    """Return an angle wrapped into [−π, π)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @kernel

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
-from perception.ring_repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat, wrapped
+from perception.ring_repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat
 from perception.sensor_wall import NOISE_SHARE
 
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)

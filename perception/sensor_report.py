@@ -17,6 +17,10 @@ TOO_NEAR: Final = 16
 """Bits of a sensor's fault word. A sensor may have several faults; the most severe one is reported."""
 
 
+ODDS_DIGITS_MAX: Final = 12
+"""Greater odds say no more: the looks are not independent."""
+
+
 @dataclass(frozen=True, slots=True)
 class SensorReport:
     """A sensor's most severe fault."""
@@ -30,7 +34,7 @@ class SensorReport:
 def odds(deaf_looks: int, miss_share: float) -> str:
     """Return the odds against a healthy sensor that misses so many looks by chance, as text."""
     digits = math.floor(-deaf_looks * math.log10(max(1e-3, min(0.999, miss_share))))
-    return f"10^{digits} to 1"
+    return f"10^{digits} to 1" if digits <= ODDS_DIGITS_MAX else f"more than 10^{ODDS_DIGITS_MAX} to 1"
 
 
 def describe_fault(

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.angles import wrapped
 from perception.kernel import kernel
 from perception.records import Records
 from perception.sensor_memory import LOOKS, RingMemory, SensorLook, SensorMemory
@@ -34,12 +35,6 @@ SAME_M: Final = 0.3
 """Echoes that differ by less than this come from the same place, m."""
 BESIDE_RAD: Final = math.radians(60.0)
 """Only echoes whose axes differ by less than this from that of a look are compared with it."""
-
-
-@kernel
-def angle(a: float, b: float) -> float:
-    """Return a − b, wrapped into [−π, π), rad."""
-    return (a - b + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @kernel
@@ -71,7 +66,7 @@ def was_audible(i: int, look: SensorLook, half_angle: float, near: float, sensor
                 other = sensors[k].looks[j]
                 if not other.range_m > 0.0:
                     continue
-                turned = angle(other.axis, look.axis)
+                turned = wrapped(other.axis - look.axis)
                 if abs(turned) >= BESIDE_RAD:
                     continue
                 dx = other.x + other.range_m * math.cos(other.axis) - look.x
@@ -119,7 +114,7 @@ def weigh_silence(
     if hears:
         c.deaf_looks, c.heard_looks = 0, c.looks_made
     last = c.looks[(c.looks_made - 1) % LOOKS]
-    is_new = math.hypot(x - last.x, y - last.y) >= APART_M or abs(angle(axis, last.axis)) >= 0.5 * half_angle
+    is_new = math.hypot(x - last.x, y - last.y) >= APART_M or abs(wrapped(axis - last.axis)) >= 0.5 * half_angle
     if c.looks_made > 0 and not is_new:
         if hears and last.range_m < 0.0:
             last.range_m = r
@@ -133,7 +128,11 @@ def weigh_silence(
         all_of.audible += 1
         all_of.misses += missed
         apart = math.hypot(past.x - c.deaf_x, past.y - c.deaf_y) >= AGAIN_M
-        if missed and judged >= c.heard_looks and (apart or abs(angle(past.axis, c.deaf_axis)) >= 2.0 * half_angle):
+        if (
+            missed
+            and judged >= c.heard_looks
+            and (apart or abs(wrapped(past.axis - c.deaf_axis)) >= 2.0 * half_angle)
+        ):
             c.deaf_looks += 1
             c.deaf_x, c.deaf_y, c.deaf_axis = past.x, past.y, past.axis
     new = c.looks[c.looks_made % LOOKS]

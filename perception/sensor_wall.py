@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.angles import wrapped
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.sensor_memory import SensorMemory
@@ -71,6 +72,6 @@ def beside_m(r: float, turn: float, side: float, mount: Floats, half_angle: floa
     half_angle : float
         Half the beam's width, rad.
     """
-    axis = side * ((turn + mount[2] + math.pi) % (2.0 * math.pi) - math.pi)
+    axis = side * wrapped(turn + mount[2])
     nearest = min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
     return float(side * (mount[0] * math.sin(turn) + mount[1] * math.cos(turn)) + r * math.sin(nearest))

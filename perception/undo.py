@@ -50,16 +50,16 @@ def edit_with_undo(edit: Edit, seen: Perception) -> tuple[str | None, Undo]:
     seen : Perception
         The map, updated. Walls are not put back after it was cleared: readings alone make them.
     """
-    areas, held = seen.vacant_areas(), seen.segments()
-    objects = _rows(seen, edit)
+    areas, objects = seen.vacant_areas(), _rows(seen, edit)
+    held = seen.segments() if isinstance(edit, DeleteSegments | PinSegments | ClearMap) else None
     refused = seen.edit(edit)
     undo: list[Edit] = []
     match edit:
-        case DeleteSegments(numbers):
+        case DeleteSegments(numbers) if held is not None:
             undo += _restored(held, set(numbers) - set(seen.segments().numbers.tolist()))
-        case PinSegments(numbers):
+        case PinSegments(numbers) if held is not None:
             undo += _pins(held, seen.segments(), set(numbers))
-        case ClearMap() if refused is None:
+        case ClearMap() if held is not None and refused is None:
             undo += _restored(held, set(held.numbers.tolist()))
         case PlaceModel() if refused is None:
             undo += [WithdrawPlacement(number) for number in _newest_placed(seen)]

@@ -111,10 +111,6 @@ class VacantAreas:
         rows = self.rows[: self.count].tolist()
         return tuple(VacantArea(number, x, y, radius, rejected) for x, y, radius, number, rejected in rows)
 
-    def containing(self, x: float, y: float) -> tuple[VacantArea, ...]:
-        """Return the areas that contain a place, m."""
-        return tuple(area for area, inside in zip(self.listed(), self._contain(x, y), strict=True) if inside)
-
     def hides(self, seen: DetectedObject) -> bool:
         """Return whether an object was rejected or lies in an area, a wall with both its ends; corners never do."""
         if seen.number is None:

@@ -18,13 +18,13 @@ from mcap.writer import CompressionType, Writer
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Pose
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CHANNELS, CYCLE, KEYFRAME, RawMessage, decode, encode, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, PROFILE
 from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import cycle_head, open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.replayer import fresh_state
 from runtime.recording.schema import FORMAT, Keyframe, keyframe, perception_snapshot, state_fields
 from runtime.recording.storage import RecordingTarget, SingleFile
 from runtime.recording.verification import ReplayResult, verify_recording

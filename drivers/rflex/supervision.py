@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Final
 
 from config.robot import RobotConfig
+from drivers.base_model import obeyed
 from drivers.messages import Twist
 from drivers.rflex.codec import BRAKE_RELEASE, BRAKE_SET, STATUS_REQUEST, Frame
 from drivers.rflex.wire_units import stop_commands
@@ -169,8 +170,7 @@ class StallMonitor:
 
     def __init__(self, config: RobotConfig) -> None:
         self.is_stalled = False
-        self._limits = (config.body.speed_max_m_s, config.body.turn_max_rad_s)
-        self._rates = (config.body.acceleration_max_m_s2, config.body.turn_acceleration_max_rad_s2)
+        self._body = config.body
         self._wanted = self._modelled = Twist(0.0, 0.0)
         self._run_s = 0.0
         self._history: deque[tuple[float, Twist]] = deque()
@@ -198,14 +198,7 @@ class StallMonitor:
     def _model(self, run_s: float) -> None:
         """Let the model obey until now, and keep its velocities of the last `_PUSHED_S`, and one before."""
         lasted_s, self._run_s = max(0.0, run_s - self._run_s), run_s
-        v, w = (
-            before + max(-rate * lasted_s, min(rate * lasted_s, max(-limit, min(limit, wanted)) - before))
-            for before, wanted, limit, rate in zip(
-                (self._modelled.v, self._modelled.w), (self._wanted.v, self._wanted.w), self._limits, self._rates,
-                strict=True,
-            )
-        )  # fmt: skip
-        self._modelled = Twist(v, w)
+        self._modelled = obeyed(self._modelled, self._wanted, self._body, lasted_s)
         self._history.append((run_s, self._modelled))
         while len(self._history) > 1 and self._history[1][0] <= run_s - _PUSHED_S:
             self._history.popleft()

@@ -14,11 +14,12 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Pose
 from runtime.cycle.modes import Mode
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import Command, CycleRecord, State, step
 from runtime.cycle.summary import ObjectRow, object_row
 from runtime.recording.channels import CYCLE
 from runtime.recording.reader import Recording, RecordingError
-from runtime.recording.replayer import Replayer, fresh_state
+from runtime.recording.replayer import Replayer
 from runtime.simulation.evaluation import DrumRow, match_drums
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import within_quanta_per_cycle

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +18,7 @@ from config.study import StudyConfig, Value
 from runtime import VERSION
 from runtime.batch.runs import Run
 from runtime.batch.worker import Row
+from runtime.support.whole_file import whole_file
 
 ROWS: Final = "rows"
 TABLE: Final = "runs.parquet"
@@ -63,23 +63,6 @@ class RowFolder:
                 if isinstance(row, dict) and row.get("key") == run.key and "status" in row:
                     found[run.key] = row
         return found
-
-
-@contextlib.contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Yield a path to write; afterwards the file is renamed to `path`, which is so never half written.
-
-    Raises
-    ------
-    OSError
-        It cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        yield part
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def table(study: StudyConfig, runs: Iterable[Run], rows: Mapping[str, Row]) -> dict[str, list[Any]]:

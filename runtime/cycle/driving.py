@@ -24,6 +24,7 @@ from behaviors.response import Response, summed
 from behaviors.schema_call import ODOM_FRAME, Scene
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
 from behaviors.turn import is_aligned
+from behaviors.way_progress import ENDED_S
 from config.mission import StepConfig
 from config.settings import Settings
 from drivers.messages import Pose, Twist
@@ -31,7 +32,7 @@ from perception.percept import Percept, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
 from runtime.cycle.escape_schemas import escape_schemas
 from runtime.cycle.goal_drive import GoalDrive, drive_through_valley, drive_to_goal
-from runtime.cycle.stalled_drives import ENDED_S, DriveMemory, observe_way
+from runtime.cycle.stalled_drives import DriveMemory, observe_way
 
 SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""

@@ -24,6 +24,7 @@ from enum import Enum
 from typing import Final
 
 from config.robot import BodyConfig
+from drivers.base_model import obeyed
 from drivers.messages import Odometry, Pose, Twist
 
 
@@ -229,9 +230,7 @@ class MotionMonitor:
         lasted_s = min(max(0.0, run_s - self.modelled_run_s), GAP_MAX_S)
         if before == target:
             return before, lasted_s
-        v = _approach(before.v, target.v, body.acceleration_max_m_s2 * lasted_s)
-        w = _approach(before.w, target.w, body.turn_acceleration_max_rad_s2 * lasted_s)
-        return Twist(v, w), lasted_s
+        return obeyed(before, target, body, lasted_s), lasted_s
 
     def _ask(self, modelled: Twist, lasted_s: float) -> tuple[float, float, Amount]:
         """Return for how long a base that stands has been commanded to drive and to turn, and the model's motion."""
@@ -255,10 +254,6 @@ def _asked(
         before_s, before = 0.0, 0.0
     moves = abs(modelled) >= crawl and modelled * commanded > 0.0
     return before_s + lasted_s, before + (lasted_s * modelled if moves else 0.0)
-
-
-def _approach(before: float, target: float, most: float) -> float:
-    return max(before - most, min(before + most, target))
 
 
 def _direction(

@@ -38,17 +38,10 @@ class Preparation(Protocol):
         """Return when recognition with these settings can run without compiling anything."""
 
 
-def prepared_state(settings: Settings) -> State:
-    """Return the state of a process that recognises from the start."""
+def fresh_state(settings: Settings, *, recognises: bool = True) -> State:
+    """Return the state in which a run starts: one that recognises, or one whose recognition is not ready."""
     return State(
-        Perception(settings.ring, settings.models, settings.perception), drive_request=first_request(settings)
-    )
-
-
-def unprepared_state(settings: Settings) -> State:
-    """Return the state of a process whose recognition is not ready."""
-    return State(
-        Perception(settings.ring, settings.models, settings.perception, recognises=False),
+        Perception(settings.ring, settings.models, settings.perception, recognises=recognises),
         drive_request=first_request(settings),
     )
 

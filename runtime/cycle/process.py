@@ -32,7 +32,7 @@ from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.mode_log import ModeLog
 from runtime.cycle.modes import Mode, ModeState
-from runtime.cycle.preparation import Preparation, RunningPreparation, prepared_state, unprepared_state
+from runtime.cycle.preparation import Preparation, RunningPreparation, fresh_state
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary
 from runtime.support.health import Health, describe_exception
@@ -123,7 +123,7 @@ class RobotProcess:
         self.health = Health(log)
         self._driver = make_driver(settings)
         self._preparation = RunningPreparation(preparation, log, self._on_prepared)
-        self._state = prepared_state(settings) if preparation is None else unprepared_state(settings)
+        self._state = fresh_state(settings, recognises=preparation is None)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self.timing_monitor.timed
         handlers = (timed(LINE_OPENED, self._on_opened), timed(LINK_RECEIVE, self._on_data))

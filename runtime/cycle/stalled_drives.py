@@ -15,8 +15,6 @@ from config.behaviors import MoveAheadConfig
 from perception.percept import Pose
 from runtime.cycle.drive_requests import DriveRequest
 
-__all__ = ["ENDED_S", "DriveMemory", "observe_way"]
-
 LEG_STALLED: Final = (
     f"no farther along the leg for {STALLED_S:.0f} s: something is in the way, or the schemas cancel one another; if "
     "that lasts, the leg turns back or ends"

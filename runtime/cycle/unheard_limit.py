@@ -41,8 +41,7 @@ def limit_unheard(
     is_ring_silent
         Whether the ring has heard nothing since; then it is slow everywhere, as a wall goes on beside its last echo.
     """
-    speed = abs(twist.v)
-    if speed <= CREEP_M_S or not len(unheard):
+    if abs(twist.v) <= CREEP_M_S or not len(unheard):
         return twist, None
     limit = CREEP_M_S
     if not is_ring_silent:
@@ -51,7 +50,5 @@ def limit_unheard(
         ahead = replace(percept, pose=replace(pose, theta=heading), obstacles=unheard)
         stoppable = stoppable_speed_m_s(ahead, settings.body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
         limit = max(CREEP_M_S, stoppable)
-    if speed <= limit:
-        return twist, None
-    share = limit / speed
-    return Twist(share * twist.v, share * twist.w), LOST if is_ring_silent else UNHEARD
+    slow = twist.at_most(limit)
+    return slow, None if slow == twist else LOST if is_ring_silent else UNHEARD

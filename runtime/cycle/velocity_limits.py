@@ -90,8 +90,7 @@ class ZoneLimits:
         if self.frame is None:
             if drive_request == TELEOPERATION_ENDED:
                 return asked, None
-            share = min(1.0, settings.behaviors.arbiter.cautious_velocity_m_s / max(abs(asked.v), 1e-9))
-            slow = Twist(share * asked.v, share * asked.w) if asked.v else asked
+            slow = asked.at_most(settings.behaviors.arbiter.cautious_velocity_m_s)
             return slow, VOID if self.is_void else UNKNOWN_PLACE_SLOW
         here = self.frame.inverse().compose(odometry.pose)
         delay_s = CYCLES / settings.cycle.rate_hz + age_s

@@ -18,9 +18,8 @@ from pydantic import ValidationError
 
 from config.reload import MAP, differences
 from config.settings import Settings
-from perception.pipeline import Perception
 from perception.snapshot import Snapshot, bounds_of
-from runtime.cycle.drive_requests import first_request
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, State, apply_settings, step
 from runtime.recording import channels
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, RawMessage, decode
@@ -91,14 +90,6 @@ class ReplayStep(NamedTuple):
     """Whether the message is a cycle that was only read, as was asked for."""
     refused: str | None = None
     """If the message is a keyframe whose state cannot be taken over: which one, and why."""
-
-
-def fresh_state(settings: Settings, *, recognises: bool = True) -> State:
-    """Return the state in which a run starts, or one in which it does not recognise yet."""
-    return State(
-        Perception(settings.ring, settings.models, settings.perception, recognises=recognises),
-        drive_request=first_request(settings),
-    )
 
 
 def _recognises(arrays: Iterable[str]) -> bool:

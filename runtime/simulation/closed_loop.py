@@ -18,10 +18,9 @@ from drivers.emulator.memory_transport import MemoryLine, OnBytes
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import LinkCounts, Pose
 from drivers.registry import make_device, make_driver
-from perception.pipeline import Perception
-from runtime.cycle.drive_requests import first_request
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, DriveInput, Edit, State, apply_command, apply_settings, step
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget, RefinementBudget
@@ -103,9 +102,7 @@ def simulate(
     robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
     driver = make_driver(settings)
     line = MemoryLine(driver, robot, on_bytes=on_bytes)
-    state = State(
-        Perception(settings.ring, settings.models, settings.perception), drive_request=first_request(settings)
-    )
+    state = fresh_state(settings)
     start = robot.truth.pose
     began = time.perf_counter()
     cycle_stats = CycleStats(late_after_s=math.inf, is_touched=True)

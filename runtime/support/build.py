@@ -48,7 +48,7 @@ def commit_of(root: Path) -> str | None:
         return None
     command = ["git", "-C", str(root), "describe", "--always", "--abbrev=10", "--dirty=+", "--exclude=*"]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=GIT_TIMEOUT_S, check=True)  # noqa: S603
+        done = subprocess.run(command, capture_output=True, text=True, timeout=GIT_TIMEOUT_S, check=True)  # noqa: S603 - a fixed command
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip() or None

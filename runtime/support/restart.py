@@ -72,4 +72,4 @@ def _restart(console: ConsoleBefore) -> NoReturn:
     sys.stdout.flush()
     sys.stderr.flush()
     os.environ[VARIABLE] = f"{console.port} {console.token}"
-    os.execv(sys.executable, [sys.executable, *(word for word in sys.orig_argv[1:] if word != "--arm")])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, *(word for word in sys.orig_argv[1:] if word != "--arm")])  # noqa: S606 - this very program

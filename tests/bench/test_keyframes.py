@@ -24,7 +24,7 @@ from bench.keyframes import (
 from config.errors import DONE
 from config.load import load_settings
 from perception.snapshot import bounds_of
-from runtime.recording.replayer import fresh_state
+from runtime.cycle.preparation import fresh_state
 
 pytestmark = pytest.mark.compiled
 

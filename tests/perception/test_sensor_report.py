@@ -30,3 +30,7 @@ def test_the_most_severe_fault_is_described(faults: int, name: str, text: str) -
     assert (report.sensor, report.fault) == (7, name)
     assert text in report.reason
     assert "\n" not in report.reason
+
+
+def test_odds_are_said_no_greater_than_they_mean_anything() -> None:
+    assert "the odds are more than 10^12 to 1" in describe_fault(7, SILENT, 1.25, [], 500, 0.2).reason

@@ -16,7 +16,7 @@ from drivers.messages import Firing, Pose
 from drivers.registry import make_device, make_driver
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import prepared_state, unprepared_state
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, apply_command, step
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
@@ -48,7 +48,7 @@ class Run:
         )
         self.driver = make_driver(settings)
         self.line = MemoryLine(self.driver, self.robot)
-        self.state = (unprepared_state if self.preparing else prepared_state)(settings)
+        self.state = fresh_state(settings, recognises=not self.preparing)
 
     @property
     def run_s(self) -> float:

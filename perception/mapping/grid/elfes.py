@@ -101,6 +101,8 @@ class ElfesGrid:
         The sensors.
     """
 
+    mirrors: Final = 1.0
+    """How far this is a place of mirrors: not known to this method, so as far as can be."""
     SCRATCH: Final = ("window", "_ring", "_half_angle", "_rounding_m", "_edges")
     BOUNDS: Final = bounds(log_odds=Bound(-LOG_ODDS_MAX, LOG_ODDS_MAX))
 
@@ -131,11 +133,6 @@ class ElfesGrid:
         """Return the probability of each cell."""
         del seen_from
         return (1.0 / (1.0 + np.exp(-self.window.unrolled(self.log_odds)))).astype(np.float32)
-
-    @property
-    def mirrors(self) -> float:
-        """How far this is a place of mirrors: not known to this method, so as far as can be."""
-        return 1.0
 
     def holding(self) -> NDArray[np.bool_]:
         """Return which cells of the torus are rather occupied."""

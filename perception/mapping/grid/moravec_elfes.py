@@ -108,6 +108,8 @@ class MoravecElfesGrid:
         The sensors.
     """
 
+    mirrors: Final = 1.0
+    """How far this is a place of mirrors: not known to this method, so as far as can be."""
     SCRATCH: Final = ("window", "_ring", "_half_angle", "_edges")
     BOUNDS: Final = bounds(cells=SHARE)
 
@@ -139,11 +141,6 @@ class MoravecElfesGrid:
         cells = self.window.unrolled(self.cells)
         empty, occupied = cells[..., EMPTY], cells[..., OCCUPIED]
         return (0.5 + 0.5 * np.where(occupied >= empty, occupied, -empty)).astype(np.float32)
-
-    @property
-    def mirrors(self) -> float:
-        """How far this is a place of mirrors: not known to this method, so as far as can be."""
-        return 1.0
 
     def holding(self) -> NDArray[np.bool_]:
         """Return which cells of the torus are rather occupied."""

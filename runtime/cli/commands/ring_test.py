@@ -248,7 +248,7 @@ class RingTest:
         ranges: list[list[float]] = [[] for _ in mounts]
         if len(pattern.masks) < len(mounts):
             self._write("this robot does not fire its sensors one by one: sensors that fire together may disturb\n")
-        deadline_s = self._clock() + rounds * len(pattern.masks) * pattern.step_period_s + SLACK_S
+        deadline_s = self._clock() + rounds * pattern.cycle_s + SLACK_S
         while any(len(each) < rounds for each in ranges) and self._clock() < deadline_s:
             for reported in await self._exchange():
                 for sensor, value in enumerate(reported.tolist()):

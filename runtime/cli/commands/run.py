@@ -232,7 +232,7 @@ def run_robot(
 def import_rest() -> None:
     """Import what a run uses beside its cycles; that takes a third of a second."""
     import runtime.cli.commands.serve_console
-    import runtime.cycle.process  # noqa: F401
+    import runtime.cycle.process  # noqa: F401 - for the modules alone
 
 
 async def run_process(

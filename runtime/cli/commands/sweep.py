@@ -235,7 +235,8 @@ def write_results(
     """
     from runtime.batch.outcome import combine
     from runtime.batch.report import page
-    from runtime.batch.rows import RowFolder, table, whole_file, write_table
+    from runtime.batch.rows import RowFolder, table, write_table
+    from runtime.support.whole_file import whole_file
 
     finished = RowFolder(folder).read(runs)
     combinations = combine(runs, finished)

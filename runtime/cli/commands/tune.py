@@ -228,8 +228,8 @@ def write_results(
     unfinished : sequence of Unfinished
         Runs that were given up.
     """
-    from runtime.batch.rows import whole_file
     from runtime.batch.tuning_report import changes_text, page, trials_text
+    from runtime.support.whole_file import whole_file
 
     texts = {PAGE: page(name, study, present, tuned, unfinished), TRIALS: trials_text(study, tuned)}
     if tuned.best.values:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import difflib
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +17,7 @@ from config.settings import Settings
 from config.toml_lines import located
 from runtime.console.commands.command_error import CommandError
 from runtime.support.config_lint import lint_settings
+from runtime.support.whole_file import whole_file
 
 KINDS: Final = MappingProxyType(
     {"runs": "run", "robots": "robot", "worlds": "world", "models": "model", "missions": "mission"}
@@ -174,14 +173,6 @@ class SettingsFiles:
 
 def _write(path: Path, text: str) -> None:
     """Replace a file by one with this text and the same permissions."""
-    fd, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    try:
-        with os.fdopen(fd, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fchmod(fd, path.stat().st_mode & 0o7777)
-            os.fsync(fd)
-        os.replace(temporary, path)  # noqa: PTH105 - beside os.fdopen
-    except BaseException:
-        os.unlink(temporary)  # noqa: PTH108 - beside os.fdopen
-        raise
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8", newline="")
+        part.chmod(path.stat().st_mode & 0o7777)

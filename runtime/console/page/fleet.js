@@ -1,6 +1,7 @@
 // The fleet page: a card for each run, HALT for one and for all. The server of `echolocate fleet` holds the connections.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
+import { takeToken } from "./token.js";
 
 const EVERY_MS = 200;
 const LOST_MS = 1000;
@@ -8,12 +9,7 @@ const HALT_WORDS = {
   none: "", sent: "HALT is sent", confirmed: "HALT confirmed", unconfirmed: "HALT not confirmed: use the robot's own stop",
 };
 
-const given = new URLSearchParams(location.search).get("token");
-if (given !== null) {
-  sessionStorage.setItem("fleet token", given);
-  history.replaceState(null, "", location.pathname);
-}
-const token = given ?? sessionStorage.getItem("fleet token") ?? "";
+const token = takeToken("fleet token");
 const cards = new Map();
 let rows = [], heard_ms = performance.now(), halt_ms = -Infinity, problem = "connecting";
 

@@ -5,13 +5,13 @@ import { el } from "./dom.js";
 const KEY = "token";
 
 // Remove the token from the address bar, where a projector would show it; session storage keeps it for a reload.
-export function takeToken() {
+export function takeToken(key = KEY) {
   const given = new URLSearchParams(location.search).get(KEY);
   if (given !== null) {
-    sessionStorage.setItem(KEY, given);
+    sessionStorage.setItem(key, given);
     history.replaceState(null, "", location.pathname);
   }
-  return given ?? sessionStorage.getItem(KEY) ?? "";
+  return given ?? sessionStorage.getItem(key) ?? "";
 }
 
 // Shows a field for the token, or for the whole address that the run printed, and loads the page again with it.

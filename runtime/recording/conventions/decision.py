@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig, RobotConfig
-from drivers.firing_pattern import FiringError, firing_pattern, sensors
+from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.latched_ranges import RepeatFilter
 from drivers.messages import CrossPaths, Firing, Floats, Pose
 from runtime.recording.conventions.headings import (
@@ -188,7 +188,7 @@ def _firing_limits(ring: RingConfig) -> tuple[int, float]:
         pattern = firing_pattern(ring)
     except FiringError:
         return len(ring.mounts), ring.firing.step_period_s
-    return max(len(sensors(mask)) for mask in pattern.masks), len(pattern.masks) * pattern.step_period_s
+    return pattern.set_size, pattern.cycle_s
 
 
 def _without_repeats(ranges: Floats) -> Floats:

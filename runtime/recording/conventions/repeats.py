@@ -57,8 +57,7 @@ def find_repeats(table: Table, set_size: int) -> float:
     expected = float((count * changed.mean(axis=0) ** 2).sum())
     if runs <= GLITCHES * count.sum() and expected - runs > RUNS_NAT:
         return 1.5  # each value stands for one row or two: no sensor changes three times in a row
-    moved = (np.diff(table.pose, axis=0) != 0.0).any(axis=1)
-    known = np.isfinite(ranges[1:]) & np.isfinite(ranges[:-1]) & moved[:, None]
+    known = np.isfinite(ranges[1:]) & np.isfinite(ranges[:-1]) & table.moved[1:, None]
     repeated = float((~changed[known]).mean()) if known.sum() >= ROWS_MIN * sensors else 0.0
     if repeated > REPEATED and set_size < sensors:
         raise RingLogError(

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.messages import Floats
 from runtime.recording.conventions.table import Table
@@ -113,7 +112,7 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
         return _one_value(float(negative[0]), finite)
     if np.isposinf(ranges).any():
         return Silence()
-    moved = ranges[_moved(table.pose)]
+    moved = ranges[table.moved]
     finite_moved = moved[np.isfinite(moved)]
     zeros = int(np.count_nonzero(finite == 0.0))
     if zeros > TOP_SHARE * len(finite):
@@ -178,13 +177,6 @@ def _one_value(value: float, finite: Floats) -> Silence:
         value, value, is_top=is_top, option=f"{value:.10g}",
         words=f"{100 * share:.0f} % of the ranges are exactly {value:g}, which is taken for silence (inf)",
     )  # fmt: skip
-
-
-def _moved(pose: Floats) -> NDArray[np.bool_]:
-    """Return the rows at another pose than the row before."""
-    moved = np.ones(len(pose), dtype=np.bool_)
-    moved[1:] = (np.diff(pose, axis=0) != 0.0).any(axis=1)
-    return moved
 
 
 def _top(finite: Floats) -> Silence | None:

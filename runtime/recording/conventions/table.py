@@ -6,6 +6,9 @@ import math
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from config.units import FOOT_M
 from drivers.messages import Floats
 
@@ -49,3 +52,10 @@ class Table(NamedTuple):
     """(n, 4): x, y, theta, ring_yaw."""
     ranges: Floats
     """(n, sensors): NaN did not fire, inf heard nothing; −inf where the file has the text nan."""
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """The rows at another pose than the row before, the first one included, shape (n,)."""
+        moved = np.ones(len(self.pose), dtype=np.bool_)
+        moved[1:] = (np.diff(self.pose, axis=0) != 0.0).any(axis=1)
+        return moved

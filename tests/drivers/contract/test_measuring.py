@@ -38,7 +38,7 @@ def test_firings_follow_the_pattern_and_their_times_grow(family: Family) -> None
     cable.run(0.2)
     cable.firings.clear()
     pattern = firing_pattern(family.robot.ring)
-    rotation_s = len(pattern.masks) * pattern.step_period_s
+    rotation_s = pattern.cycle_s
     cable.run(2.0 * rotation_s + 0.2)
     times = [firing.robot_s for firing in cable.firings]
     assert all(b > a for a, b in itertools.pairwise(times))

@@ -20,7 +20,7 @@ def test_it_connects_fires_drives_and_stops(name: str) -> None:
     family = replace(FAMILIES[robot.robot.driver], robot=robot)
     cable = family.driving()
     pattern = firing_pattern(robot.ring)
-    cable.run(len(pattern.masks) * pattern.step_period_s + 0.3)
+    cable.run(pattern.cycle_s + 0.3)
     assert {fired(firing) for firing in cable.firings} == sets_of(robot.ring)
     cable.driver.halt()
     cable.run(0.5)

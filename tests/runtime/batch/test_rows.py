@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pyarrow.parquet as pq
-import pytest
 
 from config.study import StudyConfig, VaryConfig
-from runtime.batch.rows import RowFolder, like_each_other, table, whole_file, write_table
+from runtime.batch.rows import RowFolder, like_each_other, table, write_table
 from runtime.batch.runs import Run
 from runtime.batch.worker import Row
 
@@ -25,20 +24,6 @@ def test_rows_are_found_again_and_a_damaged_one_is_none(tmp_path: Path) -> None:
     assert set(RowFolder(tmp_path).read(RUNS)) == {"k0", "k1"}
     rows.write({"key": "k2", "status": "done"})
     assert set(rows.read(RUNS)) == {"k0", "k1", "k2"}
-
-
-def test_a_file_is_whole_or_as_before(tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    path.write_text("before")
-
-    def interrupted() -> None:
-        with whole_file(path) as part:
-            part.write_text("half")
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        interrupted()
-    assert [file.read_text() for file in tmp_path.iterdir()] == ["before"]
 
 
 def test_the_table_has_a_row_a_run_and_a_column_a_setting(tmp_path: Path) -> None:

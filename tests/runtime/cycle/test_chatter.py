@@ -17,7 +17,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.messages import Twist
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import unprepared_state
+from runtime.cycle.preparation import fresh_state
 from tests.random_robots import random_furnished_room, random_robot
 from tests.runtime.emulated_run import Run
 
@@ -48,7 +48,7 @@ def changes_in(robot: int, room: int, request: str, seconds: float) -> Changes:
     settings = random_robot(robot)
     world = random_furnished_room(room, settings)
     run, scene = Run(settings, world, 100 * robot + room), compile_scene(world)
-    run.state = unprepared_state(settings)
+    run.state = fresh_state(settings, recognises=False)
     rng = np.random.default_rng([robot, room])
     mission = load_settings("room", mission="wander").mission
     if request == "wander":

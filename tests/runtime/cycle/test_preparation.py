@@ -18,7 +18,7 @@ from drivers.driver import LineState, Received, RobotDriver
 from runtime.cycle.drive_requests import NO_MAP, DriveRequest
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import unprepared_state
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, Refused, State, step
 from runtime.timing.cycle_stats import CycleStats
@@ -140,7 +140,9 @@ def test_a_goal_in_the_map_is_refused_only_where_there_will_be_no_map() -> None:
         0.0, LineState.DOWN, None, Received((), None, rebooted=False), drive_request=goal, preparing="3 of 10"
     )
     for settings, why in ((corrected, ()), (SETTINGS, (Refused(None, NO_MAP),))):
-        record = step(unprepared_state(settings), inputs, settings, lambda _command: None, lambda _done: False)
+        record = step(
+            fresh_state(settings, recognises=False), inputs, settings, lambda _command: None, lambda _done: False
+        )
         assert record.refused == why
 
 

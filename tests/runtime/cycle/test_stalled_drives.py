@@ -14,7 +14,7 @@ from config.load import load_settings
 from drivers.messages import Pose
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import unprepared_state
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import STANDSTILL
 from tests.random_robots import random_furnished_room, random_robot
 from tests.runtime.emulated_run import Run
@@ -39,7 +39,7 @@ def silent_s(robot: int, room: int, request: str, seconds: float) -> tuple[float
     """Return the longest time in DRIVE without progress and without a reason, s, and the reasons that were given."""
     settings = random_robot(robot)
     run = Run(settings, random_furnished_room(room, settings), 100 * robot + room)
-    run.state = unprepared_state(settings)
+    run.state = fresh_state(settings, recognises=False)
     if request == "wander":
         mission = load_settings("room", mission="wander").mission
         assert mission is not None
@@ -91,7 +91,7 @@ def test_legs_before_a_wall_are_given_up_and_say_so() -> None:
     """A robot that drives to and fro before a wall ends its leg, and stands with the reason."""
     settings = random_robot(0)
     run = Run(settings, random_furnished_room(0, settings), 5)
-    run.state = unprepared_state(settings)
+    run.state = fresh_state(settings, recognises=False)
     reasons = []
     while run.run_s < 90.0 and not (run.state.leg is not None and run.state.leg.done):
         run.cycle(Request.ARM if run.mode is Mode.SAFE_STOP else None)

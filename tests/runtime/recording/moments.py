@@ -11,9 +11,10 @@ from perception.bayes.bayes_method import BayesPerception
 from perception.bounds import Bound
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot, bounds_of, numbers_of
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import open_recording, parse_settings
-from runtime.recording.replayer import Replayer, fresh_state, replay_cycle
+from runtime.recording.replayer import Replayer, replay_cycle
 from runtime.recording.schema import StateFields, carried_state
 
 FOLLOWING = 7

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from config.load import load_settings, with_known_room
+from runtime.cycle.preparation import fresh_state
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
 from runtime.recording.reader import open_recording
 from runtime.recording.replayer import (
@@ -16,7 +17,6 @@ from runtime.recording.replayer import (
     KeyframeFinder,
     Replayer,
     ReplayStep,
-    fresh_state,
     keyframe_cycle,
     replay_from,
 )

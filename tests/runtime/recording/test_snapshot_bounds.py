@@ -21,10 +21,11 @@ from perception.bounds import Bound
 from perception.paper.outline_map import PINNED
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot, bounds_of, is_scratch, numbers_of
+from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import KEYFRAME, decode, encode
 from runtime.recording.reader import open_recording, parse_settings
-from runtime.recording.replayer import Replayer, fresh_state
+from runtime.recording.replayer import Replayer
 from runtime.recording.schema import Keyframe, carried_state, keyframe, perception_snapshot, state_fields
 from runtime.recording.snapshot_bounds import check_snapshot
 from runtime.simulation.closed_loop import simulate

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE
+from runtime.cycle.preparation import fresh_state
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
-from runtime.recording.replayer import fresh_state
 from runtime.recording.schema import Cycle, Keyframe, keyframe, perception_snapshot, state_fields
 from runtime.recording.verification import ABSENT, GAPS_MAX, ReplayResult, find_difference, refused_lines
 from tests.recorded import SECONDS, entries_of, hall, record, rewrite, spoil, verify_file

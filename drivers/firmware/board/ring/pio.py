@@ -17,17 +17,17 @@ _OVER = const(0xFFFFFFFF)
 @asm_pio(fifo_join=PIO.JOIN_NONE)
 def _pulse() -> None:
     """Count down from the number given while the pin is high, and push what is left."""
-    pull(block)  # noqa: F821 - instructions of the state machine are names that asm_pio provides, in all this function
-    mov(x, osr)  # noqa: F821
-    wait(1, pin, 0)  # noqa: F821
-    label("high")  # noqa: F821
-    jmp(pin, "more")  # noqa: F821
-    jmp("low")  # noqa: F821
-    label("more")  # noqa: F821
-    jmp(x_dec, "high")  # noqa: F821
-    label("low")  # noqa: F821
-    mov(isr, x)  # noqa: F821
-    push(noblock)  # noqa: F821
+    pull(block)
+    mov(x, osr)
+    wait(1, pin, 0)
+    label("high")
+    jmp(pin, "more")
+    jmp("low")
+    label("more")
+    jmp(x_dec, "high")
+    label("low")
+    mov(isr, x)
+    push(noblock)
 
 
 class PioTimer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.firing_pattern import firing_pattern, sensors
+from drivers.firing_pattern import firing_pattern
 from runtime.recording.conventions.repeats import find_repeats
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError
@@ -13,7 +13,7 @@ from tests.runtime.recording.conventions.tables import Drive, latched, make_driv
 
 
 def repeats(drive: Drive) -> float:
-    set_size = max(len(sensors(mask)) for mask in firing_pattern(drive.settings.ring).masks)
+    set_size = firing_pattern(drive.settings.ring).set_size
     return find_repeats(Table(drive.t, drive.pose, np.round(drive.ranges, 4)), set_size)
 
 

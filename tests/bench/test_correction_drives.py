@@ -6,12 +6,12 @@ import math
 
 import pytest
 
+from bench.correction_drives import ROBOTS, ROOMS, correction_drive
 from config.world import OdometryConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
 from drivers.messages import wrap_angle
 from runtime.recording.ring_log_replay import replay_firings, replay_localized
-from runtime.simulation.correction_trials import ROBOTS, ROOMS, correction_drive
 from runtime.simulation.drift_trials import LEVELS
 
 PERCEIVED = ("objects", "walls", "corners", "canyons", "segments", "clusters")
