@@ -12,14 +12,8 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from config.robot import RingConfig
-from config.units import FOOT_M
-from config.world import AcousticsConfig
-from drivers.emulator.scene import compile_scene
-from drivers.emulator.sonar import Sonar
-from drivers.messages import Floats
-from runtime.simulation.furnished_rooms import ACOUSTICS, FurnishedRoom, furnished_room
-from runtime.simulation.wall_trials import (
+from bench.trials.furnished_rooms import ACOUSTICS, FurnishedRoom, furnished_room
+from bench.trials.wall_trials import (
     CORNER_ECHOES_MIN,
     CORNER_WITHIN_M,
     HEARD_SIGMAS,
@@ -27,6 +21,12 @@ from runtime.simulation.wall_trials import (
     Corner,
     listen,
 )
+from config.robot import RingConfig
+from config.units import FOOT_M
+from config.world import AcousticsConfig
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Floats
 
 DISTINGUISHED_NAT: Final = 4.0
 """Evidence by which one kind is distinguished from another, nat."""

@@ -13,6 +13,8 @@ from typing import Final
 
 import numpy as np
 
+from bench.trials.drumless_rooms import drumless_room
+from bench.trials.furnished_rooms import furnished_room
 from config.load import load_settings, load_world
 from config.settings import Settings
 from config.world import AcousticsConfig, OdometryConfig, WorldConfig
@@ -22,8 +24,6 @@ from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Pose, wrap_angle
 from runtime.simulation.drift_trials import odometry_along
-from runtime.simulation.drumless_rooms import drumless_room
-from runtime.simulation.furnished_rooms import furnished_room
 
 ROBOTS: Final = (
     "p3dx",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Final, get_args
 
+from bench.trials.drumless_rooms import NOISE_RELATIVE, drumless_room
+from bench.trials.false_drum_trials import try_room
 from config.settings import Settings
 from config.world import AcousticsConfig
 from perception.localization.expected_ranges import Reflection
-from runtime.simulation.drumless_rooms import NOISE_RELATIVE, drumless_room
-from runtime.simulation.false_drum_trials import try_room
 
 MINUTE_S: Final = 60.0
 

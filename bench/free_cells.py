@@ -14,6 +14,8 @@ from typing import Final, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.trials.furnished_rooms import ACOUSTICS, FurnishedRoom, furnished_room
+from bench.trials.wall_trials import listen, reported_walls
 from config.robot import RingConfig
 from config.settings import Settings
 from config.units import FOOT_M
@@ -30,8 +32,6 @@ from perception.sensor_mounts import mounts_array
 from runtime.analysis.export.occupancy_image import FREE, FREE_MAX, RESOLUTION_M, occupancy_image
 from runtime.analysis.export.world_file import world_of
 from runtime.analysis.timeline import ECHO, Echoes
-from runtime.simulation.furnished_rooms import ACOUSTICS, FurnishedRoom, furnished_room
-from runtime.simulation.wall_trials import listen, reported_walls
 
 STEP_M: Final = 0.5 * FOOT_M
 """Way between two firings of one sensor."""

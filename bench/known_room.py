@@ -15,13 +15,8 @@ import numpy as np
 from rich.table import Table
 
 from bench.laser_rooms import RING, LaserLog, laser_drive, read_carmen, wall_map
-from config.robot import RingConfig
-from drivers.messages import Pose
-from perception.localization.expected_ranges import Reflection
-from perception.localization.known_room import KnownRoom
-from perception.localization.room import Room, room_of
-from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
-from runtime.simulation.known_room_trials import (
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
+from bench.trials.known_room_trials import (
     SURE,
     KnownDrive,
     Trace,
@@ -30,7 +25,12 @@ from runtime.simulation.known_room_trials import (
     follow,
     furnished_drive,
 )  # fmt: skip
-from runtime.simulation.large_building import Building
+from bench.trials.large_building import Building
+from config.robot import RingConfig
+from drivers.messages import Pose
+from perception.localization.expected_ranges import Reflection
+from perception.localization.known_room import KnownRoom
+from perception.localization.room import Room, room_of
 from runtime.timing.footprint import rss_mb
 
 LENGTH_M: Final = 10.0

@@ -18,12 +18,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.trials.known_room_trials import KnownDrive, drifting_odometry
 from config.errors import WRONG_CALL, UserError
 from config.robot import FiringConfig, RingConfig, SensorConfig
 from drivers.messages import Firing, Floats
 from perception.localization.expected_ranges import Reflection
 from perception.localization.room import Room, make_room
-from runtime.simulation.known_room_trials import KnownDrive, drifting_odometry
 
 AXES_DEG: Final = tuple(range(-75, 76, 15))
 RESOLUTION_M: Final = 0.03048

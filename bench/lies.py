@@ -19,6 +19,7 @@ import numpy as np
 from pydantic import TypeAdapter
 from rich.table import Table
 
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
 from config.load import load_settings
 from config.settings import Settings
 from config.world import StartConfig, WallConfig, WorldConfig
@@ -33,7 +34,6 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
 from runtime.cycle.unheard_limit import LOST, UNHEARD
-from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
 ROBOTS: Final = (

@@ -10,10 +10,10 @@ from typing import Final, get_args
 import numpy as np
 from rich.table import Table
 
+from bench.trials.localization_trials import figures, localize_once
+from bench.trials.random_rooms import ACOUSTICS
 from config.robot import RingConfig
 from perception.localization.expected_ranges import Reflection
-from runtime.simulation.localization_trials import figures, localize_once
-from runtime.simulation.random_rooms import ACOUSTICS
 
 COLUMNS: Final = ("trials", "right", "offered", "wrong_alone", "confidently_wrong", "lost", "median_m", "max_m",
                   "median_deg", "max_deg", "cpu_ms_p50", "cpu_ms_max", "other_maps", "answers_there")  # fmt: skip

@@ -19,12 +19,7 @@ from bench.laser_rooms import WALL_M, LaserLog, read_carmen, wall_map
 from bench.peers.nav2_recovery import Nav2Recovery
 from bench.peers.playerproject_vfh import PlayerprojectVfh
 from bench.peers.vff import Vff
-from config.load import load_settings
-from config.settings import Settings
-from config.world import WallConfig, WorldConfig
-from drivers.messages import Floats, Pose
-from runtime.cycle import goal_drive
-from runtime.simulation.navigation_trials import (
+from bench.trials.navigation_trials import (
     ACOUSTICS,
     ODOMETRY,
     MakeController,
@@ -37,7 +32,12 @@ from runtime.simulation.navigation_trials import (
     random_trial,
     run_trial,
 )
-from runtime.simulation.shortest_way import free_space
+from bench.trials.shortest_way import free_space
+from config.load import load_settings
+from config.settings import Settings
+from config.world import WallConfig, WorldConfig
+from drivers.messages import Floats, Pose
+from runtime.cycle import goal_drive
 
 SCANS_MAX: Final = 400
 """Scans of a recording that its map is made of, evenly spaced."""

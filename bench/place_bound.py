@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bench.known_room import Rows, carried_drive
 from bench.laser_rooms import RING, read_carmen, wall_map
+from bench.trials.known_room_trials import KnownDrive, Trace, figures, follow
 from config.robot import RingConfig
 from drivers.messages import Firing, Floats, Pose, wrap_angle
 from perception.localization.drift_correction import Status
@@ -27,7 +28,6 @@ from perception.localization.particle_update import TEMPER
 from perception.localization.pose_grid import CELL_M, DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.room import Room
-from runtime.simulation.known_room_trials import KnownDrive, Trace, figures, follow
 
 HEADINGS: Final = 72
 STEP_RAD: Final = math.tau / HEADINGS

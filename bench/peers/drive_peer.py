@@ -12,17 +12,17 @@ from typing import Final
 import numpy as np
 
 from behaviors.move_to_goal import Goal
+from bench.trials.navigation_trials import Outcome
 from config.settings import Settings
 from drivers.driver import LineState, RobotDriver
 from drivers.messages import Firing, Flags, Floats, Odometry, Pose, Twist, wrap_angle
-from runtime.simulation.navigation_trials import Outcome
 
 RELEASED_S: Final = 0.5
 """Time after the release before the first velocity, s."""
 
 
 class DrivePeer(ABC):
-    """A controller of `runtime.simulation.navigation_trials` without our cycle.
+    """A controller of `bench.trials.navigation_trials` without our cycle.
 
     Parameters
     ----------

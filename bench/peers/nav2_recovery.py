@@ -11,6 +11,7 @@ from typing import Final
 
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
+from bench.trials.navigation_trials import Outcome
 from config.settings import Settings
 from drivers.driver import RobotDriver
 from perception.pipeline import Perception
@@ -18,7 +19,6 @@ from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State, apply_command, step
-from runtime.simulation.navigation_trials import Outcome
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
 MOVED_M: Final = 0.5

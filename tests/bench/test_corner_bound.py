@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from bench.corner_bound import POST_M, best, echoes_of_corners, judge, to_circle, to_line
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
+from bench.trials.wall_trials import Corner, listen
 from config.load import load_robot
 from config.units import FOOT_M
 from drivers.messages import Floats
-from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
-from runtime.simulation.wall_trials import Corner, listen
 
 CORNER = Corner(1.0, 0.5, is_edge=True)
 

@@ -7,6 +7,8 @@ import math
 import numpy as np
 
 from bench.free_cells import beams_of, echoes_of, reachable, with_late_strays
+from bench.trials.furnished_rooms import furnished_room
+from bench.trials.wall_trials import listen
 from config.load import load_settings
 from config.world import WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
@@ -14,8 +16,6 @@ from drivers.messages import Firing, Pose
 from perception.mapping.grid.window import Ring
 from perception.sensor_mounts import mounts_array
 from runtime.analysis.export.occupancy_image import FREE, RESOLUTION_M, occupancy_image
-from runtime.simulation.furnished_rooms import furnished_room
-from runtime.simulation.wall_trials import listen
 
 SETTINGS = load_settings("hallway")
 RING = Ring(

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from bench.navigation import METHODS, laser_trials, measure
+from bench.trials.navigation_trials import ACOUSTICS, Trial
 from config.load import load_settings
 from config.world import StartConfig, WallConfig, WorldConfig
-from runtime.simulation.navigation_trials import ACOUSTICS, Trial
 
 SETTINGS = load_settings("hallway", ["perception.method=paper"])
 

@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import furnished_room
+from bench.trials.wall_trials import listen, recognise
 from config.load import load_settings
 from config.settings import Settings
 from config.world import AcousticsConfig
@@ -17,8 +19,6 @@ from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
-from runtime.simulation.furnished_rooms import furnished_room
-from runtime.simulation.wall_trials import listen, recognise
 
 STEP_M = 0.1
 SURE = 0.99

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.trials.furnished_rooms import furnished_room
 from config.load import load_robot
 from config.robot import FiringConfig, RingConfig, SensorConfig
 from config.world import AcousticsConfig
@@ -17,7 +18,6 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Pose
-from runtime.simulation.furnished_rooms import furnished_room
 
 ACOUSTICS = (
     AcousticsConfig(model="specular"),

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.messages import Firing, Pose
 from perception.calibration.calibrate import calibrate
-from runtime.simulation.calibration_drive import DRUM, CalibrationErrors, calibration_drive, calibration_errors
+from tests.calibration_drive import DRUM, CalibrationErrors, calibration_drive, calibration_errors
 
 
 def errors(seed: int, model: str, drift: float, pace: float) -> CalibrationErrors:

@@ -8,7 +8,7 @@ import pytest
 from perception.calibration.drive import Scales, drive_of
 from perception.calibration.geometry_fit import Geometry, Priors, RangeNoise, fit_geometry
 from perception.calibration.surfaces import Echoes, Surfaces
-from runtime.simulation.calibration_drive import DRUM, WALL, calibration_drive
+from tests.calibration_drive import DRUM, WALL, calibration_drive
 
 
 def test_the_fit_returns_from_the_nominal_robot_to_the_true_one() -> None:

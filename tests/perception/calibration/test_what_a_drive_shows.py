@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import furnished_room
 from config.world import AcousticsConfig, OdometryConfig, WorldConfig
 from drivers.emulator.body import Body
 from drivers.emulator.scene import compile_scene
@@ -14,7 +15,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, Twist
 from perception.calibration.calibrate import Calibration, calibrate
 from perception.calibration.drive import Scales
-from runtime.simulation.calibration_drive import (
+from tests.calibration_drive import (
     BODY,
     DRUM,
     SENSORS,
@@ -23,7 +24,6 @@ from runtime.simulation.calibration_drive import (
     CalibrationDrive,
     calibration_drive,
 )
-from runtime.simulation.furnished_rooms import furnished_room
 
 pytestmark = pytest.mark.compiled
 

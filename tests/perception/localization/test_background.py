@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import furnished_room
 from perception.localization.background import Background
 from perception.localization.mixed_reflection import LearnedShares
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import make_room, room_of
 from perception.localization.surroundings import make_surroundings
-from runtime.simulation.furnished_rooms import furnished_room
 from tests.perception.localization.rooms import HALF_ANGLE
 
 MODEL = RangeModel(0.03, 5.0)

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.random_rooms import random_room
 from config.world import AcousticsConfig
 from drivers.messages import Pose
 from perception.localization.barrier import blocked_share
 from perception.localization.expected_ranges import Reflection
-from runtime.simulation.random_rooms import random_room
 from tests.perception.localization.rooms import HALF_ANGLE, beams_of, panorama_of, stand
 
 

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.random_rooms import random_room
 from config.world import AcousticsConfig
 from drivers.messages import Firing, Pose
 from perception.localization.contour import ContourSegment, contour_segments
 from perception.localization.expected_ranges import Reflection
 from perception.localization.range_likelihood import RangeModel
-from runtime.simulation.random_rooms import random_room
 from tests import naive
 from tests.perception.localization.rooms import EXACT, HALF_ANGLE, RECTANGLE, RING, panorama_of, stand, world_of
 

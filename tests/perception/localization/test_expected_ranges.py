@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import drive, furnished_room
+from bench.trials.random_rooms import random_room
 from config.world import WorldConfig
 from drivers.emulator.acoustics import SIGHT_SLACK_M
 from drivers.messages import Pose
 from perception.localization.expected_ranges import EDGE_REACH_M, Beams, Reflection, crossed, expected_ranges
 from perception.localization.room import make_room, room_of
-from runtime.simulation.furnished_rooms import drive, furnished_room
-from runtime.simulation.random_rooms import random_room
 from tests import naive_acoustics
 from tests.perception.localization.rooms import HALF_ANGLE, RING, beams_of, panorama_of, stand
 

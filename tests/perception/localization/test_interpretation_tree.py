@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.random_rooms import random_room
 from config.world import AcousticsConfig
 from drivers.messages import Pose
 from perception.localization import interpretation_tree
@@ -24,7 +25,6 @@ from perception.localization.interpretation_tree import (
 )
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room, make_room
-from runtime.simulation.random_rooms import random_room
 from tests import naive
 from tests.perception.localization.rooms import HALF_ANGLE, RING, panorama_of, stand
 

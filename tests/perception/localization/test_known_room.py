@@ -13,6 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
+from bench.trials.known_room_trials import NOTICE_M, SURE, KnownDrive, figures, follow, furnished_drive
 from config.world import AcousticsConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
@@ -21,8 +23,6 @@ from perception.localization.expected_ranges import Reflection
 from perception.localization.known_room import TRACKING, KnownRoom
 from perception.localization.room import room_of
 from perception.snapshot import put_back, snapshot_of
-from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
-from runtime.simulation.known_room_trials import NOTICE_M, SURE, KnownDrive, figures, follow, furnished_drive
 from tests.perception.localization.rooms import CROOKED, RECTANGLE, RING, world_of
 
 pytestmark = pytest.mark.compiled

@@ -12,14 +12,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from bench.trials.localization_trials import figures, localize_once
+from bench.trials.random_rooms import ACOUSTICS, random_room
 from config.world import AcousticsConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.expected_ranges import Reflection
 from perception.localization.localize import PoseCandidate, localize
-from runtime.simulation.localization_trials import figures, localize_once
-from runtime.simulation.random_rooms import ACOUSTICS, random_room
 from tests.perception.localization.rooms import CROOKED, RECTANGLE, RING, stand, world_of
 
 pytestmark = pytest.mark.compiled

@@ -9,14 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from config.load import load_settings
-from config.robot import RingConfig
-from config.world import WorldConfig
-from drivers.messages import Firing, Pose, wrap_angle
-from perception.localization.known_room import KnownRoom
-from perception.localization.room import room_of
-from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
-from runtime.simulation.known_room_trials import (
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
+from bench.trials.known_room_trials import (
     RIGHT_M,
     RIGHT_RAD,
     SURE,
@@ -24,6 +18,12 @@ from runtime.simulation.known_room_trials import (
     furnished_drive,
     heard_on_the_way,
 )
+from config.load import load_settings
+from config.robot import RingConfig
+from config.world import WorldConfig
+from drivers.messages import Firing, Pose, wrap_angle
+from perception.localization.known_room import KnownRoom
+from perception.localization.room import room_of
 from tests.perception.localization.rooms import RECTANGLE, RING, world_of
 
 pytestmark = pytest.mark.compiled

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.random_rooms import ACOUSTICS
 from drivers.messages import Pose
 from perception.kernel import Floats
 from perception.localization.mixed_reflection import SHARES
@@ -15,7 +16,6 @@ from perception.localization.pose_particles import HEADINGS, ParticleScratch, co
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.surroundings import make_surroundings
 from perception.records import records, zeros
-from runtime.simulation.random_rooms import ACOUSTICS
 from tests.naive_known_room import naive_update
 from tests.perception.localization.rooms import CROOKED, HALF_ANGLE, RING, panorama_of, stand, world_of
 from tests.perception.localization.test_mixed_reflection import shares_of

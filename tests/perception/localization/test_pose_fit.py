@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.random_rooms import random_room
 from config.world import AcousticsConfig
 from drivers.messages import Pose
 from perception.localization.expected_ranges import Reflection
@@ -14,7 +15,6 @@ from perception.localization.panorama import all_readings
 from perception.localization.pose_fit import PRIOR_SIGMA_M, Stand, fit_poses
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import make_room
-from runtime.simulation.random_rooms import random_room
 from tests.perception.localization.rooms import EXACT, HALF_ANGLE, RING, panorama_of, pose_row, stand
 
 

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import furnished_room
+from bench.trials.random_rooms import ACOUSTICS
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
@@ -16,8 +18,6 @@ from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room, room_of
 from perception.localization.surroundings import FRINGE_RAD, make_surroundings
 from perception.snapshot import put_back, snapshot_of
-from runtime.simulation.furnished_rooms import furnished_room
-from runtime.simulation.random_rooms import ACOUSTICS
 from tests.perception.localization.rooms import CROOKED, HALF_ANGLE, RING, panorama_of, stand, world_of
 
 pytestmark = pytest.mark.compiled

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.random_rooms import ACOUSTICS
 from drivers.messages import Firing, Pose
 from perception.localization import pose_track
 from perception.localization.background import Background
@@ -25,7 +26,6 @@ from perception.localization.pose_track import (
 )
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.surroundings import make_surroundings
-from runtime.simulation.random_rooms import ACOUSTICS
 from tests.perception.localization.rooms import CROOKED, HALF_ANGLE, RING, stand, world_of
 
 pytestmark = pytest.mark.compiled

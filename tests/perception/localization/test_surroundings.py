@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench.trials.furnished_rooms import furnished_room
 from perception.localization.expected_ranges import Beams, Expected, Reflection, expected_ranges
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import make_room, room_of
@@ -21,7 +22,6 @@ from perception.localization.surroundings import (
     look_around,
     make_surroundings,
 )
-from runtime.simulation.furnished_rooms import furnished_room
 from tests.perception.localization.rooms import HALF_ANGLE, RING
 
 MODEL = RangeModel.of_ring(RING)

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import furnished_room
+from bench.trials.known_room_trials import furnished_drive
 from config.load import load_settings
 from config.units import FOOT_M
 from perception.localization.drift_correction import LocalizedPose
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer, replay_firings, replay_in_known_room
-from runtime.simulation.furnished_rooms import furnished_room
-from runtime.simulation.known_room_trials import furnished_drive
 
 PAPER = load_settings("hallway", ["perception.method=paper"])
 START_FT = -6.0

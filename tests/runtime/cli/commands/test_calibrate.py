@@ -13,7 +13,7 @@ from config.errors import DONE, FAILED, WRONG_CALL
 from config.load import load_robot
 from runtime.cli.app import run_command
 from runtime.recording.ring_log import write_ring_log
-from runtime.simulation.calibration_drive import DRUM, CalibrationDrive, calibration_drive
+from tests.calibration_drive import DRUM, CalibrationDrive, calibration_drive
 
 
 @pytest.fixture(scope="module")

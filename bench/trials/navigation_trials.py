@@ -14,6 +14,8 @@ from typing import Final, Literal, Protocol, TypeAlias
 import numpy as np
 
 from behaviors.move_to_goal import Goal
+from bench.trials.random_rooms import random_room
+from bench.trials.shortest_way import FreeSpace, Place, free_space, length_m, shortest_way
 from config.settings import Settings
 from config.world import AcousticsConfig, DrumConfig, OdometryConfig, StartConfig, WorldConfig
 from drivers.driver import RobotDriver
@@ -27,8 +29,6 @@ from perception.pipeline import Perception
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State, apply_command, step
-from runtime.simulation.random_rooms import random_room
-from runtime.simulation.shortest_way import FreeSpace, Place, free_space, length_m, shortest_way
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
 ACOUSTICS: Final = AcousticsConfig(model="specular", noise_relative=0.01, dropout=0.05)

@@ -10,11 +10,11 @@ from typing import Final
 
 import numpy as np
 
+from bench.trials.furnished_rooms import FurnishedRoom
 from config.units import FOOT_M
 from config.world import AcousticsConfig, BoxConfig, DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
-from runtime.simulation.furnished_rooms import FurnishedRoom
 
 NOISE_RELATIVE: Final = 0.003
 WIDTH_M: Final = (5.0, 8.0)

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import pytest
 
+from bench.trials.shortest_way import CELL_M, free_space, length_m, shortest_way
 from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
-from runtime.simulation.shortest_way import CELL_M, free_space, length_m, shortest_way
 
 ROOM = PolygonConfig(vertices_m=((0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0)))
 

@@ -7,10 +7,7 @@ import math
 import pytest
 
 from behaviors.move_to_goal import Goal
-from config.load import load_settings
-from config.settings import Settings
-from config.world import DrumConfig, WallConfig, WorldConfig
-from runtime.simulation.navigation_trials import (
+from bench.trials.navigation_trials import (
     ACOUSTICS,
     ODOMETRY,
     OurCycle,
@@ -20,6 +17,9 @@ from runtime.simulation.navigation_trials import (
     random_trial,
     run_trial,
 )
+from config.load import load_settings
+from config.settings import Settings
+from config.world import DrumConfig, WallConfig, WorldConfig
 
 
 @pytest.mark.compiled

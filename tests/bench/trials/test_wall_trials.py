@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.detected_object import DetectedObject
-from runtime.simulation.wall_trials import (
+from bench.trials.wall_trials import (
     Corner,
     CornerTrial,
     Segment,
@@ -21,6 +20,7 @@ from runtime.simulation.wall_trials import (
     spans_of,
     true_corners,
 )
+from perception.detected_object import DetectedObject
 
 
 def segment(x1: float, y1: float, x2: float, y2: float) -> Segment:

@@ -13,6 +13,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from bench.trials.furnished_rooms import FurnishedRoom, drive
 from config.robot import RingConfig
 from config.settings import Settings
 from config.units import FOOT_M
@@ -22,7 +23,6 @@ from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
-from runtime.simulation.furnished_rooms import FurnishedRoom, drive
 
 Spans: TypeAlias = list[tuple[float, float]]
 """Parts of a line from low to high in ascending order, m."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from bench.trials.false_wall_trials import STEPS_M, FalseWallTrial, drive_hall, drum_hall, try_hall
 from config.load import load_settings
 from perception.detected_object import DetectedObject
-from runtime.simulation.false_wall_trials import STEPS_M, FalseWallTrial, drive_hall, drum_hall, try_hall
 from runtime.simulation.random_halls import ACOUSTICS
 
 SETTINGS = load_settings("hallway", ["perception.method=bayes"])

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from bench.trials.furnished_rooms import FurnishedRoom, drive
 from config.settings import Settings
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
@@ -18,7 +19,6 @@ from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
-from runtime.simulation.furnished_rooms import FurnishedRoom, drive
 from runtime.simulation.open_loop import perceive
 
 SURE: Final = 0.95

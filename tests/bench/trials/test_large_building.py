@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.large_building import Building
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
-from runtime.simulation.large_building import Building
 
 
 def test_it_has_rooms_with_a_doorway_to_each_neighbour_and_a_drum() -> None:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
+from bench.trials.drumless_rooms import NOISE_RELATIVE, drumless_room
+from bench.trials.false_drum_trials import FalseDrumTrial, try_room
 from config.load import load_settings
 from config.world import AcousticsConfig
 from perception.detected_object import DetectedObject
-from runtime.simulation.drumless_rooms import NOISE_RELATIVE, drumless_room
-from runtime.simulation.false_drum_trials import FalseDrumTrial, try_room
 
 pytestmark = pytest.mark.promise("P27")
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from bench.trials.drumless_rooms import APART_M, drumless_room
+from bench.trials.furnished_rooms import CLEAR_M, drive
 from config.world import AcousticsConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
-from runtime.simulation.drumless_rooms import APART_M, drumless_room
-from runtime.simulation.furnished_rooms import CLEAR_M, drive
 
 DRUM_M = 0.3048
 

@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from bench.trials.furnished_rooms import ACOUSTICS
 from config.world import AcousticsConfig, DrumConfig, WallConfig, WorldConfig
 from drivers.messages import Floats
-from runtime.simulation.furnished_rooms import ACOUSTICS
 
 ROOM_M: Final = 8.0
 """Distance between the walls of a room, …"""

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from runtime.simulation.calibration_drive import SENSORS, WAY_M, CalibrationErrors, calibration_drive
+from tests.calibration_drive import SENSORS, WAY_M, CalibrationErrors, calibration_drive
 
 
 def test_a_drive_reports_wrong_distances_turns_and_ranges() -> None:

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from bench.trials.false_canyon_trials import DOORWAY_M, ENDS, FalseCanyonTrial, corridor, try_path
+from bench.trials.false_wall_trials import drum_hall
 from config.load import load_settings
 from config.world import WallConfig, WorldConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
 from perception.percept import Canyon
-from runtime.simulation.false_canyon_trials import DOORWAY_M, ENDS, FalseCanyonTrial, corridor, try_path
-from runtime.simulation.false_wall_trials import drum_hall
 from runtime.simulation.random_halls import ACOUSTICS
 
 SETTINGS = load_settings("hallway", ["perception.method=bayes"])

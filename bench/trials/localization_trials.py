@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from bench.trials.random_rooms import ACOUSTICS, random_room
 from config.robot import RingConfig
 from config.units import FOOT_M
 from config.world import AcousticsConfig
@@ -17,7 +18,6 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.localize import PoseCandidate, localize
 from perception.localization.room import room_of
-from runtime.simulation.random_rooms import ACOUSTICS, random_room
 
 RIGHT_M: Final = 0.3 * FOOT_M
 RIGHT_RAD: Final = math.radians(3.0)

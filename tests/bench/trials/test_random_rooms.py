@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from bench.trials.random_rooms import ACROSS_M, CLEAR_MIN_M, WALL_MIN_M, random_room
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
-from runtime.simulation.random_rooms import ACROSS_M, CLEAR_MIN_M, WALL_MIN_M, random_room
 
 
 def crossings_to_the_right(corners: np.ndarray, pose: Pose) -> int:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from bench.trials.furnished_rooms import CLEAR_M, drive, furnished_room, with_moved_wall
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
-from runtime.simulation.furnished_rooms import CLEAR_M, drive, furnished_room, with_moved_wall
 
 
 def test_drives_stay_clear_and_keep_their_step() -> None:

@@ -11,6 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.trials.furnished_rooms import ACOUSTICS, drive, furnished_room, with_moved_wall
+from bench.trials.large_building import Building
 from config.robot import RingConfig
 from config.world import AcousticsConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
@@ -20,8 +22,6 @@ from drivers.messages import Firing, Floats, Pose, wrap_angle
 from perception.localization.drift_correction import Status
 from perception.localization.known_room import KnownRoom
 from perception.localization.room import Room, room_of
-from runtime.simulation.furnished_rooms import ACOUSTICS, drive, furnished_room, with_moved_wall
-from runtime.simulation.large_building import Building
 
 STEP_M: Final = 0.03
 """Way between two firings of a part of the ring."""

@@ -1,0 +1,1 @@
+"""Trials of the whole process or of a part in generated rooms, compared with the truth."""
