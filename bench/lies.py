@@ -29,6 +29,7 @@ from drivers.emulator.memory_transport import MemoryLine
 from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
 from drivers.registry import make_device, make_driver
+from runtime.cycle.drive_requests import first_request, needs_recognition
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
@@ -236,7 +237,7 @@ def run_trial(
     robot, room, kind, seed, moment
         As in `TrialResult`.
     recognises
-        Whether recognition runs as well; it takes most of the time.
+        Whether recognition runs also where the drive does not wait for it; it takes most of the time.
     """
     drive = make_drive(robot, room, seed)
     settings = drive.settings
@@ -245,6 +246,7 @@ def run_trial(
     faults = () if kind is None else (make_lie(kind, settings, begin_s),)
     device, driver = make_device(settings, drive.world, 1000 * seed + moment, faults=faults), make_driver(settings)
     line = MemoryLine(driver, device)
+    recognises = recognises or needs_recognition(first_request(settings))
     state = fresh_state(settings, recognises=recognises)
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)

@@ -98,8 +98,8 @@ def needs_space(drive_request: DriveRequest) -> bool:
 
 
 def needs_recognition(drive_request: DriveRequest) -> bool:
-    """Return whether a request waits while recognition is being prepared; legs and teleoperation do not."""
-    return isinstance(drive_request, Goal | Mission)
+    """Return whether a request waits while recognition is being prepared; what needs no map does not."""
+    return needs_map(drive_request) or needs_objects(drive_request) or needs_space(drive_request)
 
 
 def is_same_drive(before: DriveRequest, after: DriveRequest) -> bool:

@@ -9,10 +9,11 @@ import pytest
 import structlog
 from structlog.testing import LogCapture
 
+from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.errors import FAILED, UserError
-from config.load import load_settings
+from config.load import load_mission, load_settings
 from config.settings import Settings
 from drivers.driver import LineState, Received, RobotDriver
 from runtime.cycle.drive_requests import NO_MAP, DriveRequest
@@ -131,6 +132,14 @@ def test_a_goal_waits_for_recognition_and_says_so(monkeypatch: pytest.MonkeyPatc
         Preparation.progress
     }
     assert max(run.speeds) > 0.1
+
+
+def test_a_mission_that_needs_no_map_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    wander = Mission(load_mission("wander"))
+    run = Run(monkeypatch, Preparation(1e6), wander)
+    run.drive(4.0)
+    assert max(run.speeds) > 0.1
+    assert run.summary["preparing"] == Preparation.progress
 
 
 def test_a_goal_in_the_map_is_refused_only_where_there_will_be_no_map() -> None:
