@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import functools
+import importlib
 import io
 import json
 import re
@@ -51,6 +53,48 @@ def test_the_walk_names_functions_that_exist() -> None:
         assert named, module
         unknown = set(named) - definitions(ROOT / module)
         assert not unknown, f"{module} does not define {sorted(unknown)}"
+
+
+def defined(name: str) -> object:
+    """Return what a dotted name stands for: a module, or something in one; a field of a record is its annotation.
+
+    Raises
+    ------
+    AttributeError
+        Nothing has that name.
+    """
+    parts = name.split(".")
+    for k in range(len(parts), 0, -1):
+        with contextlib.suppress(ModuleNotFoundError):
+            return functools.reduce(member, parts[k:], importlib.import_module(".".join(parts[:k])))
+    raise AttributeError(name)
+
+
+def member(of: object, name: str) -> object:
+    """Return an attribute, or the annotation of a field that only has one."""
+    fields = {key: kind for base in getattr(of, "__mro__", ()) for key, kind in vars(base).get("__annotations__", {}).items()}
+    return fields[name] if name in fields and not hasattr(of, name) else getattr(of, name)
+
+
+@pytest.mark.parametrize("page", ["estimator.md", "estimator-notes.md"])
+def test_the_estimator_names_what_exists(page: str) -> None:
+    named = re.findall(r"`((?:perception|runtime)\.[\w.]+)`", (ROOT / "docs" / page).read_text("utf-8"))
+    assert len(named) >= (100 if page == "estimator.md" else 1)
+    missing = []
+    for name in sorted(set(named)):
+        try:
+            defined(name)
+        except AttributeError:
+            missing.append(name)
+    assert not missing, f"{page} names what is not there (moved or renamed?): {missing}"
+
+
+def test_the_estimator_gives_the_values_of_the_program() -> None:
+    text = (ROOT / "docs" / "estimator.md").read_text("utf-8")
+    rows = re.findall(r"\| (-?[\d.]+) \| `(perception\.[\w.]+)` \|$", text, re.MULTILINE)
+    assert len(rows) >= 10
+    stale = {name: defined(name) for value, name in rows if defined(name) != pytest.approx(float(value), rel=1e-3)}
+    assert not stale
 
 
 def test_the_site_lists_every_document() -> None:
