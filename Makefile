@@ -94,17 +94,19 @@ mutants: $(VENV)/test.stamp
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tests.mutation.campaign
 
 # Compares our methods with libraries, then measures timing; at last pytest checks what depends on the wall clock.
-# BENCH=--quick shortens the comparison, TIMING="--against earlier.json" adds the figures of an earlier run.
+# BENCH=--quick shortens the comparison, TIMING="--against earlier.json" adds the figures of an earlier run. What the
+# result files hold enters docs/figures.md.
 bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench $(BENCH)
 	@$(BIN)/python -m bench timing $(TIMING)
 	@$(BIN)/python -m bench waking
-	@$(BIN)/python -m bench localization
+	@$(BIN)/python -m bench localization --first 20000
 	@$(BIN)/python -m bench map
 	@$(BIN)/python -m bench walls --seeds 10
 	@$(BIN)/python -m bench recording
 	@$(BIN)/python -m bench console
 	$(BIN)/python -m pytest -q bench/wallclock
+	@$(BIN)/python -m bench figures --results .
 
 # The documentation as a site in build/site; a link that leads nowhere is an error.
 docs: $(VENV)/docs.stamp

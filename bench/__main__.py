@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Final, TypeAlias
 
 from cyclopts import App, Parameter
@@ -15,6 +16,7 @@ from bench.console import figures as figures_of
 from bench.console import measure as measure_console
 from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
 from bench.estimator import Peer
+from bench.figures import PAGE, renew
 from bench.lie_commands import lies
 from bench.map_commands import (
     corner_bound,
@@ -234,6 +236,20 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
             f"{count} busy": figures(measure_waking(max(1, turns), count, status.update)) for count in (0, busy)
         }
     return report(json, by_load, waking_table(by_load))
+
+
+@app.command(name="figures")
+def figures_page(*, results: Path | None = None) -> int:
+    """Write docs/figures.md from bench/figures.toml.
+
+    Parameters
+    ----------
+    results
+        Folder of result files (JSON) whose values are taken in before.
+    """
+    changed = renew(results)
+    Console(stderr=True).print(f"bench: {changed} measured values changed; wrote {PAGE}", markup=False)
+    return 0
 
 
 for command in (

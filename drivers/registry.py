@@ -1,7 +1,8 @@
 """The registry of robot drivers: the shipped ones, and those that installed packages add.
 
-No other module names them. A package adds a driver with an entry point of the group
-`echolocate.drivers`, whose name is what a robot file gives as `[robot] driver`::
+No other module imports a driver's package; `config` describes the shipped ones' sections of a robot file. A package
+adds a driver with an entry point of the group `echolocate.drivers`, whose name is what a robot file gives as
+`[robot] driver`::
 
     [project.entry-points."echolocate.drivers"]
     myrobot = "my_package.myrobot"

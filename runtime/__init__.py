@@ -1,3 +1,3 @@
 """The running program: the perception-action cycle, its modes, recordings, the console and the command line."""
 
-VERSION = "0.1.0"
+VERSION = "1.0.0"

@@ -14,9 +14,10 @@ from pathlib import Path
 import pytest
 
 from config.reference import markdown
+from tests import command_page
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
 ROOMS = ("behaviors/", "bench/", "config/", "docs/", "drivers/", "perception/", "runtime/", "tests/")
 ROW = re.compile(r"^\| `(?P<module>[\w/]+\.py)` \| (?P<functions>.+?) \|", re.MULTILINE)
 
@@ -66,13 +67,15 @@ def defined(name: str) -> object:
     parts = name.split(".")
     for k in range(len(parts), 0, -1):
         with contextlib.suppress(ModuleNotFoundError):
-            return functools.reduce(member, parts[k:], importlib.import_module(".".join(parts[:k])))
+            module: object = importlib.import_module(".".join(parts[:k]))
+            return functools.reduce(member, parts[k:], module)
     raise AttributeError(name)
 
 
 def member(of: object, name: str) -> object:
     """Return an attribute, or the annotation of a field that only has one."""
-    fields = {key: kind for base in getattr(of, "__mro__", ()) for key, kind in vars(base).get("__annotations__", {}).items()}
+    annotated = (vars(base).get("__annotations__", {}) for base in getattr(of, "__mro__", ()))
+    fields = {field: kind for of_base in annotated for field, kind in of_base.items()}
     return fields[name] if name in fields and not hasattr(of, name) else getattr(of, name)
 
 
@@ -105,6 +108,18 @@ def test_the_site_lists_every_document() -> None:
 def test_the_page_of_settings_is_that_of_the_models() -> None:
     """Renew it with `echolocate settings --out docs/settings.md --force`."""
     assert (ROOT / "docs" / "settings.md").read_text("utf-8") == markdown()
+
+
+def test_the_page_of_commands_is_that_of_the_program() -> None:
+    """Renew it with `python -m tests.command_page`."""
+    assert command_page.words(command_page.PAGE.read_text("utf-8")) == command_page.words(command_page.page())
+
+
+@pytest.mark.parametrize(
+    ("document", "most"), [("README.md", 150), ("docs/figures.md", 200), ("docs/estimator.md", 300)]
+)
+def test_what_is_read_first_stays_short(document: str, most: int) -> None:
+    assert len((ROOT / document).read_text("utf-8").splitlines()) <= most
 
 
 @pytest.mark.compiled

@@ -18,7 +18,7 @@ GIT_TIMEOUT_S: Final = 2.0
 
 
 def describe_build() -> str:
-    """Return the version in one line, as in ``0.1.0 (commit 1a2b3c4d5e, Python 3.11.9, numba 0.68.1)``."""
+    """Return the version in one line, as in ``1.0.0 (commit 1a2b3c4d5e, Python 3.11.9, numba 0.68.1)``."""
     commit = commit_of(ROOT) or kept_commit(KEPT)
     parts = [f"commit {commit}"] if commit else []
     parts.append(f"Python {platform.python_version()}")

@@ -51,7 +51,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
     drum = [[round(RADIUS * math.cos(a), 6), round(RADIUS * math.sin(a), 6)] for a in turn]
     half = RADIUS
     return {
-        "type": "session", "version": "0.1.0", "role": role, "name": "denning", "emulated": True, "recording": True,
+        "type": "session", "version": "1.0.0", "role": role, "name": "denning", "emulated": True, "recording": True,
         "units": "ft",
         "ring": {"mounts": [[0.381 * math.cos(a), 0.381 * math.sin(a), a] for a in angles],
                  "half_angle": math.radians(12.0), "range_min": 0.1524, "range_max": 7.7724},
