@@ -16,6 +16,7 @@ from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.settings import Settings
+from config.strict import description
 from config.study import StudyConfig
 from config.world import WorldConfig
 
@@ -85,7 +86,7 @@ def _settings(file: str, model: type[BaseModel], table: str, leave_out: set[str]
     help_text = ""
     described = {}
     for name in reversed(own):  # one description after several keys is that of all of them
-        help_text = " ".join((own[name].description or help_text).split())
+        help_text = " ".join((description(model, name) or help_text).split())
         described[name] = help_text
     for name, field in own.items():
         yield Setting(

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from llvmlite.binding import Linkage
 from numba.core import compiler, event, sigutils, typed_passes, types, typing, untyped_passes
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import _FunctionCompiler
@@ -136,6 +137,28 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]
         return key, compiled.signature
 
 
+class _KernelCache:
+    """The files of a kernel that Python calls; numba's own looks for them before anybody has called it."""
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        self._function = function
+
+    @functools.cached_property
+    def _files(self) -> FunctionCache:
+        return FunctionCache(self._function)
+
+    def load_overload(self, sig: Untyped, target_context: Untyped) -> Untyped:
+        """Return the compiled code for a signature, None if it is not there.
+
+        Numba's own first loads everything that compiling needs, which takes a fifth of a second.
+        """
+        return self._files._load_overload(sig, target_context)
+
+    def save_overload(self, sig: Untyped, compiled: Untyped) -> None:
+        """Keep the compiled code for a signature."""
+        self._files.save_overload(sig, compiled)
+
+
 @functools.cache
 def _record_type(dtype: np.dtype[np.void]) -> Untyped:
     """Return numba's type of a record; with records in it, that takes numba milliseconds, for each array again."""
@@ -149,7 +172,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         super().__init__(function, targetoptions={"nopython": True, **options})
         self._compiler = _Compiler(function, self.targetdescr, self.targetoptions, self.locals, _Pipeline)
         self._inner: dict[Args, tuple[object, Untyped]] = {}
-        self.enable_caching()
+        self._cache = _KernelCache(function)
 
     def typeof_pyval(self, val: object) -> Untyped:
         """Return the type of an argument."""

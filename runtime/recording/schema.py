@@ -16,7 +16,7 @@ import numpy as np
 import zstandard
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-from pydantic_core import core_schema
+from pydantic_core import core_schema, to_jsonable_python
 
 from perception.snapshot import Snapshot, fixed_shape
 from runtime.cycle.clock_monitor import ClockMonitor
@@ -49,7 +49,7 @@ class Payload(BaseModel):
     """The content of one message. Reading validates every value; writing does not, as the values are our own."""
 
     model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64",
-                              val_json_bytes="base64", use_attribute_docstrings=True)  # fmt: skip
+                              val_json_bytes="base64")  # fmt: skip
 
     VALUES_MAX: ClassVar[int] = 300_000
     """Most values in a message; one of more is not parsed, as each may take a kilobyte until the message is refused.
@@ -334,6 +334,10 @@ def state_fields(frame: Keyframe) -> StateFields:
 
 class PayloadSchema(GenerateJsonSchema):
     """JSON schemas of what is really written: non-finite numbers are strings, flags are integers."""
+
+    def encode_default(self, dft: object) -> object:
+        """Return a default as JSON has it; pydantic's own makes a serializer for each."""
+        return to_jsonable_python(dft)
 
     def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:
         """Return the schema of a number that may be infinite or NaN."""

@@ -53,8 +53,7 @@ class MemoryPolicy:
     @contextlib.contextmanager
     def driving(self) -> Iterator[None]:
         """Exclude what is alive now, and collect only in `cycle_done` inside this context."""
-        gc.collect()
-        gc.freeze()
+        gc.freeze()  # without a collection first: it takes a tenth of a second, and imports leave little garbage
         self._old_cycles, self._settled = 0, False
         was_enabled = gc.isenabled()
         gc.disable()

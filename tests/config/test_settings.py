@@ -9,6 +9,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from config.settings import SegmentsConfig, Settings
+from config.strict import description
 from tests.config.toml_text import MODEL, RUN
 
 
@@ -49,4 +50,4 @@ def test_every_setting_of_a_section_is_described() -> None:
         assert section.__doc__, path
         for name, field in section.model_fields.items():
             is_section = isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)
-            assert is_section or field.description, f"{path}.{name}"
+            assert is_section or description(section, name), f"{path}.{name}"

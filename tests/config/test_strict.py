@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from config.strict import Point, Strict, TomlList
+from config.strict import Point, Strict, TomlList, description
 
 
 class Example(Strict):
@@ -58,4 +58,4 @@ def test_defaults_are_validated_and_docstrings_describe_fields() -> None:
 
     with pytest.raises(ValidationError):
         Wrong()
-    assert Example.model_fields["size_m"].description == "A length, m."
+    assert description(Example, "size_m") == "A length, m."

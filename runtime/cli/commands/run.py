@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from runtime.cycle.reloader import Reloader
     from runtime.cycle.step import CycleRecord, State
     from runtime.cycle.summary import RunSummary
+    from runtime.simulation.emulator_process import EmulatorHandle
     from runtime.timing.cycle_stats import CycleStats
     from runtime.timing.time_control import TimeControl
 
@@ -154,42 +155,46 @@ def run_robot(
                 stack.enter_context(file_lock(Path(path), f"{option} {path}"))
         refuse_existing(own_files, force=force)  # another run may have written them while kernels were prepared
         clock = ScaledClock() if port is None else RunClock()
-        recording = stack.enter_context(
-            open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)
-        )
-        log = stack.enter_context(
-            open_log(settings.log, terminal=not live, listener=recording.on_log, status=log_status)
-        )
-        log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
-        for text in lint_settings(settings):
-            log.warning(text)
-        if port is None and plugged:
-            runs = f"`echolocate probe` names the robot, `echolocate run --port {plugged[0]}` runs it"
-            log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
 
-        async def run() -> RunSummary:
-            from runtime.cycle.line_messages import ProgramLine, messages_on
+        async def run() -> tuple[RunSummary, RunRecording]:
             from runtime.simulation.emulator_process import start_emulator
             from runtime.timing.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
                 running.enter_context(ending_the_start())  # until `signals` takes over
+                emulator_start: asyncio.Task[EmulatorHandle] | None = None
+                if isinstance(clock, ScaledClock):  # first of all: it takes as long as what follows
+                    arguments = emulator.arguments(config, sets, robot)
+                    starting = start_emulator(arguments, clock, compiled=is_compiled(EMULATOR))
+                    emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
+                    running.push_async_callback(_end_task, emulator_start)
+                    await asyncio.sleep(0.0)
+                recording = stack.enter_context(
+                    open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)
+                )
+                log = stack.enter_context(
+                    open_log(settings.log, terminal=not live, listener=recording.on_log, status=log_status)
+                )
+                log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
+                for text in lint_settings(settings):
+                    log.warning(text)
+                if port is None and plugged:
+                    runs = f"`echolocate probe` names the robot, `echolocate run --port {plugged[0]}` runs it"
+                    log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
+                from runtime.cycle.line_messages import ProgramLine, messages_on
+
                 run_settings = settings
                 control: TimeControl = NoTimeControl()
                 line_messages = messages_on(port)
-                # Beside the start of the emulator, which takes as long.
                 importing = asyncio.create_task(asyncio.to_thread(import_rest))
                 if preparation is not None:
                     preparation.begin_ring(settings)
-                if isinstance(clock, ScaledClock):
-                    arguments = emulator.arguments(config, sets, robot)
-                    emulated = await running.enter_async_context(
-                        start_emulator(arguments, clock, compiled=is_compiled(EMULATOR))
-                    )
+                await importing
+                if emulator_start is not None:
+                    emulated = await emulator_start
                     run_settings, control = with_port(settings, emulated.port), emulated.control
                     line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
-                await importing
-                return await run_process(
+                summary = await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
                     foxglove=foxglove, restart=restart, emulated=port is None, preparation=preparation,
@@ -199,8 +204,9 @@ def run_robot(
                         robot=robot, map_file=map_file, mission=mission, goal=goal, no_console=no_console,
                     ),
                 )  # fmt: skip
+                return summary, recording
 
-        summary = asyncio.run(run())
+        summary, recording = asyncio.run(run())
         recording.on_summary(summary)
     if recording.summary_row is not None:
         summary["recording"] = recording.summary_row
@@ -227,6 +233,12 @@ def run_robot(
         raise UserError(summary["stop_reasons"][-1], FAILED)
     recording.raise_if_incomplete()
     return DONE
+
+
+async def _end_task(task: asyncio.Task[EmulatorHandle]) -> None:
+    """End a start that failed while another did too; its own error, if it has one, has been raised."""
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
 
 
 def import_rest() -> None:

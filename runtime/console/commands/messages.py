@@ -7,6 +7,7 @@ JSON object of `id`, `type` (the command's name) and the arguments, and of `chal
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType
@@ -339,12 +340,13 @@ class MessageReader:
         return Message(wire.id, wire.type, arguments, wire.challenge)
 
 
-def _arguments(of: type) -> dict[str, Any]:
+@functools.cache
+def _arguments(of: type) -> Mapping[str, Any]:
     """Return the default of each field that a message gives; `...` where it must be given."""
     hints = get_type_hints(of, include_extras=True)
     required = {f.name: ... for f in fields(of) if f.default is MISSING and f.default_factory is MISSING}
     optional = {f.name: f.default for f in fields(of) if f.name not in required and _has_bounds(hints[f.name])}
-    return {**required, **optional}
+    return MappingProxyType({**required, **optional})
 
 
 def _has_bounds(hint: Any) -> bool:  # noqa: ANN401 - any type hint

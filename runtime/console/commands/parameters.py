@@ -18,6 +18,7 @@ from pydantic.fields import FieldInfo
 from config.layers import Location
 from config.reload import Difference
 from config.settings import Settings
+from config.strict import description
 
 KINDS: Final = ((bool, "bool"), (int, "int"), (float, "float"), (str, "text"))
 """Plain types and their names on the wire; bool precedes int, of which it is a subclass."""
@@ -53,7 +54,7 @@ def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
         if isinstance(value, BaseModel):
             yield from _within(value, location)
         elif Difference(location, None, None).live and (found := _parameter(location, field, value)) is not None:
-            found["help"] = " ".join((field.description or type(model).__doc__ or "").split())
+            found["help"] = " ".join((description(type(model), name) or type(model).__doc__ or "").split())
             yield found
 
 
