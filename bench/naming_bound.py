@@ -22,7 +22,7 @@ from bench.stand_bound import SIGMA_M, apart
 from config.robot import RingConfig
 from config.units import FOOT_M
 from config.world import DrumConfig
-from perception.bayes.echo_kind import half_paths_over_circle
+from perception.echo_kind import half_paths_over_circle
 from runtime.simulation.first_fix import EARLY_FIX_M
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls

@@ -16,7 +16,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import cross_pairs, firing_pattern, sensors
 from drivers.messages import Pose
-from perception.bayes.echo_kind import EchoKind, echo_kind
+from perception.echo_kind import EchoKind, echo_kind
 
 Scene: TypeAlias = Literal["wall", "corner", "edge", "drum", "post"]
 SCENES: Final[tuple[Scene, ...]] = ("wall", "corner", "edge", "drum", "post")

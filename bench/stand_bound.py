@@ -16,7 +16,7 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.emulator.sonar import LISTENING_LOBE
 from drivers.firing_pattern import pattern_pairs
-from perception.bayes.echo_kind import half_paths_over_circle
+from perception.echo_kind import half_paths_over_circle
 from perception.kernel import Floats
 
 SIGMA_M: Final = math.hypot(1e-3, 1e-3 / math.sqrt(12.0))

@@ -31,7 +31,6 @@ from perception.edits import (
     WithdrawConfirmation,
     invalid_edit,
 )
-from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
 from perception.localization.drift_correction import LocalizedPose
 from perception.localization.equal_edit import edit_equally
@@ -41,14 +40,15 @@ from perception.mapping.canyons import ENDS_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method
 from perception.no_method import NOT_READY, NoMethod
+from perception.obstacle_echoes.fresh_echoes import FreshEchoes
+from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
 from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room
-from perception.ring_monitor import RingMonitor
-from perception.sensor_monitor import SensorMonitor
+from perception.ring_faults.monitor import RingMonitor
+from perception.sensor_faults.monitor import SensorMonitor
+from perception.sensor_faults.report import SensorReport
 from perception.sensor_mounts import mounts_array, reach_m
-from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
-from perception.unheard_echoes import UnheardEchoes
 from perception.vacant_areas import VacantArea, VacantAreas
 
 __all__ = ["DetectedObject", "Perception"]

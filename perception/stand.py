@@ -1,6 +1,6 @@
 """The surfaces around a robot that stands: kind, place and bearing of each, from times of flight at one place alone.
 
-`perception.bayes.echo_kind` takes the readings of one surface; here they are found. The nearest own echo that belongs
+`perception.echo_kind` takes the readings of one surface; here they are found. The nearest own echo that belongs
 to no surface yet begins one, and every path that ends on it, echo or cross path, is taken with it.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
-from perception.bayes.echo_kind import EchoKind, echo_kind
+from perception.echo_kind import EchoKind, echo_kind
 from perception.kernel import Floats
 from perception.sensor_mounts import mounts_array, mounts_at
 

@@ -9,7 +9,7 @@ from drivers.token_bucket import LineLimit
 from perception.localization.drift_correction import Status
 from perception.localization.known_room import KnownRoom
 from perception.pipeline import Perception
-from perception.sensor_report import SensorReport
+from perception.sensor_faults.report import SensorReport
 from runtime.cycle.step import State
 
 LINES_PER_S: Final = 1.0

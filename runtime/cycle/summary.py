@@ -113,7 +113,7 @@ class LinkRow(TypedDict):
 
 
 class SensorRow(TypedDict):
-    """A sensor whose ranges are not used, and why; `fault` as in `perception.sensor_report`."""
+    """A sensor whose ranges are not used, and why; `fault` as in `perception.sensor_faults.report`."""
 
     sensor: int
     fault: str

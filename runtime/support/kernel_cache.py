@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 
 PACKAGES: Final = (
     "perception",
+    "perception.sensor_faults",
+    "perception.ring_faults",
+    "perception.obstacle_echoes",
     "perception.paper",
     "perception.bayes",
     "perception.localization",

@@ -10,7 +10,7 @@ import pytest
 
 from bench.lies import KINDS, ROBOTS, Plan, TrialResult, honest, lies_table, make_lie, measure, run_trial, trials
 from config.load import load_robot, load_settings
-from perception.ring_monitor import REASONS as RING_REASONS
+from perception.ring_faults.monitor import REASONS as RING_REASONS
 from runtime.cycle.modes import CLOCK_REASONS
 
 pytestmark = pytest.mark.compiled

@@ -9,7 +9,7 @@ from typing import Any
 from drivers.driver import Received
 from drivers.messages import Pose
 from perception.detected_object import MapCounts
-from perception.sensor_report import SensorReport
+from perception.sensor_faults.report import SensorReport
 from runtime.cycle.alerts import LINES_BURST, LINES_PER_S, Alerts
 
 NOTHING = Received((), None, rebooted=False)

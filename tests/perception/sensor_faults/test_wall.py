@@ -9,8 +9,8 @@ import pytest
 
 from perception.kernel import Floats
 from perception.records import records, zeros
-from perception.sensor_memory import SensorMemory
-from perception.sensor_wall import BESIDE_MIN_M, beside_m, is_along_wall
+from perception.sensor_faults.memory import SensorMemory
+from perception.sensor_faults.wall import BESIDE_MIN_M, beside_m, is_along_wall
 
 HALF = math.radians(12.0)
 RADIUS_M = 0.381

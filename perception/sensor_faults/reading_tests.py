@@ -1,4 +1,4 @@
-"""The kernels behind `perception.sensor_monitor`: tests of each reading for stuck, silent and cross-talking sensors.
+"""The kernels behind `perception.sensor_faults.monitor`: each reading tested for a stuck, silent or disturbed sensor.
 
 Each test compares a sensor's readings with those that a healthy sensor would have given. It requires several kinds of
 evidence: the path of the base, the neighbours' readings in the meantime, and the rest of the ring.
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
-from perception.sensor_crosstalk import count_short_readings, find_set, is_doubtful
-from perception.sensor_memory import TOO_NEAR_READINGS, RingMemory, SensorMemory
-from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
-from perception.sensor_silence import weigh_silence
-from perception.sensor_wall import NOISE_SHARE, is_along_wall
+from perception.sensor_faults.crosstalk import count_short_readings, find_set, is_doubtful
+from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, SensorMemory
+from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
+from perception.sensor_faults.silence import weigh_silence
+from perception.sensor_faults.wall import NOISE_SHARE, is_along_wall
 
-# The thresholds below were tuned on the simulated halls of tests/perception/test_sensor_monitor.py: no healthy sensor
-# is masked in any hall, and every faulty one is found.
+# The thresholds below were tuned on the simulated halls of tests/perception/sensor_faults/test_monitor.py: no healthy
+# sensor is masked in any hall, and every faulty one is found.
 
 APPROACH_MIN_M: Final = 1.0
 """Stuck: the base has come at least this much nearer to the reflecting surface, wherever in the beam it is, m."""

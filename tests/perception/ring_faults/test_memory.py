@@ -9,8 +9,8 @@ import numpy as np
 from config.load import load_settings
 from drivers.messages import Firing, Pose
 from perception.records import zeros
-from perception.ring_memory import EchoTrace, RingTrace
-from perception.ring_monitor import RingMonitor
+from perception.ring_faults.memory import EchoTrace, RingTrace
+from perception.ring_faults.monitor import RingMonitor
 from perception.snapshot import put_back, snapshot_of
 
 

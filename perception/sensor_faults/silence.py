@@ -18,7 +18,7 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import kernel
 from perception.records import Records
-from perception.sensor_memory import LOOKS, RingMemory, SensorLook, SensorMemory
+from perception.sensor_faults.memory import LOOKS, RingMemory, SensorLook, SensorMemory
 
 DEAF_NAT: Final = math.log(1e8)
 """Evidence that names a sensor, nat: a day has some 10⁵ such looks of each of two dozen sensors."""

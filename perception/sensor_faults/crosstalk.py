@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.sensor_memory import RingMemory, SensorMemory
+from perception.sensor_faults.memory import RingMemory, SensorMemory
 
 REGULARITY_GAIN: Final = 0.05
 """Weight of the newest firing in the regularity of the firing pattern."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR, describe_fault
+from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR, describe_fault
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose
-from perception.ring_monitor import REASONS, RingMonitor
-from perception.ring_tests import REPEATED, SCATTERED, TURNED, VANISHED
+from perception.ring_faults.monitor import REASONS, RingMonitor
+from perception.ring_faults.motion_tests import REPEATED, SCATTERED, TURNED, VANISHED
 from runtime.simulation.random_halls import random_hall
 
 pytestmark = [pytest.mark.compiled]

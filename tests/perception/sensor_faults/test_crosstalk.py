@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.sensor_crosstalk import SHORT_READINGS_MAX, count_short_readings, find_set, is_doubtful
-from perception.sensor_memory import RingMemory, SensorMemory
+from perception.sensor_faults.crosstalk import SHORT_READINGS_MAX, count_short_readings, find_set, is_doubtful
+from perception.sensor_faults.memory import RingMemory, SensorMemory
 
 
 def sensor(readings: int = 2, last_m: float = 4.0, before_last_m: float = 4.0) -> Records[SensorMemory]:

@@ -1,4 +1,4 @@
-"""The kernels behind `perception.ring_monitor`: sequential tests of a ring's readings against its own motion.
+"""The kernels behind `perception.ring_faults.monitor`: sequential tests of a ring's readings against its own motion.
 
 Each test sums the logarithms of likelihood ratios, never below zero (CUSUM, Page 1954): how much better a reading is
 explained by a ring that lies than by an honest one among objects that stand still. The sum is compared with
@@ -13,9 +13,9 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
-from perception.ring_repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat
-from perception.sensor_wall import NOISE_SHARE
+from perception.ring_faults.memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
+from perception.ring_faults.repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat
+from perception.sensor_faults.wall import NOISE_SHARE
 
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
 """A sum of evidence that convicts the ring, nat: a day has some 10⁷ readings, and at most two days in a

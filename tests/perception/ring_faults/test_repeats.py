@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_memory import SILENCE_M, EchoTrace, RingTrace
-from perception.ring_repeats import REPEAT_NAT, REPEATS_MAX, changes_due, is_parallel_wall, mark, weigh_repeat
+from perception.ring_faults.memory import SILENCE_M, EchoTrace, RingTrace
+from perception.ring_faults.repeats import REPEAT_NAT, REPEATS_MAX, changes_due, is_parallel_wall, mark, weigh_repeat
 
 MOUNTS = np.array([[0.0, 0.0, math.radians(15.0 * k)] for k in range(24)])
 HALF = math.radians(12.0)

@@ -1,7 +1,7 @@
 """Detection of a ring whose readings contradict its own motion: a ring that lies as a whole.
 
-`perception.sensor_monitor` finds single sensors that differ from their neighbours. What the whole ring says can only
-be compared with how it moves. An honest ring among objects that stand still is compared with these:
+`perception.sensor_faults.monitor` finds single sensors that differ from their neighbours. What the whole ring says
+can only be compared with how it moves. An honest ring among objects that stand still is compared with these:
 
 - *Repeating.* Every sensor that looks ahead repeats its last reading to the bit, although the odometry brings it
   nearer to whatever answers. A wall along the path explains equal readings. A robot whose wheels slip looks the same,
@@ -10,8 +10,8 @@ be compared with how it moves. An honest ring among objects that stand still is 
   ranges are. How often an honest ring misses a known echo is learned on the way.
 - *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°.
 
-Each is a sequential test with one threshold, `perception.ring_tests.EVIDENCE_NAT`. A lie that agrees with the motion,
-as ranges that are all too long by the same amount do, cannot be found in this way.
+Each is a sequential test with one threshold, `perception.ring_faults.motion_tests.EVIDENCE_NAT`. A lie that agrees
+with the motion, as ranges that are all too long by the same amount do, cannot be found in this way.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.bounds import CONSTANT, bounds, index_of
 from perception.records import records, zeros
-from perception.ring_memory import QUARTERS, EchoTrace, RingTrace
-from perception.ring_tests import NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
-from perception.sensor_monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
+from perception.ring_faults.memory import QUARTERS, EchoTrace, RingTrace
+from perception.ring_faults.motion_tests import NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
+from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
 from perception.sensor_mounts import mounts_array, turn_mounts
 
 _TURNED: Final = (

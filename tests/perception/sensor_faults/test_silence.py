@@ -11,9 +11,9 @@ import pytest
 from config.load import load_robot
 from config.robot import RingConfig
 from perception.records import Records, records, zeros
-from perception.sensor_memory import LOOKS, RingMemory, SensorMemory
-from perception.sensor_monitor import SensorMonitor
-from perception.sensor_silence import DEAF_NAT, MISS_MIN, miss_share, was_audible, weigh_silence
+from perception.sensor_faults.memory import LOOKS, RingMemory, SensorMemory
+from perception.sensor_faults.monitor import SensorMonitor
+from perception.sensor_faults.silence import DEAF_NAT, MISS_MIN, miss_share, was_audible, weigh_silence
 from tests.perception.wandering import Wandering, ring_of, ring_with_gaps
 
 pytestmark = [pytest.mark.compiled]

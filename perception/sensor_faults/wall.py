@@ -8,7 +8,7 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
-from perception.sensor_memory import SensorMemory
+from perception.sensor_faults.memory import SensorMemory
 
 BESIDE_MIN_M: Final = 0.5
 """Stuck: a wall along the path is looked for once the base has moved so far, m."""

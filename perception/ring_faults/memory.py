@@ -1,4 +1,4 @@
-"""Records of what is remembered of each sensor and of the ring, for the tests of `perception.ring_tests`."""
+"""Records of what is remembered of each sensor and of the ring, for `perception.ring_faults.motion_tests`."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
-from perception.fresh_echoes import LOOKS, FreshEchoes
+from perception.obstacle_echoes.fresh_echoes import LOOKS, FreshEchoes
 from perception.pipeline import Perception
 from tests.perception.halls import settings
 

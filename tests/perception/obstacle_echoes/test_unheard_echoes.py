@@ -10,9 +10,9 @@ import pytest
 
 from config.load import load_robot
 from drivers.messages import Firing, Floats, Pose
-from perception.fresh_echoes import FreshEchoes
+from perception.obstacle_echoes.fresh_echoes import FreshEchoes
+from perception.obstacle_echoes.unheard_echoes import AWAY_M
 from perception.sensor_mounts import mounts_array
-from perception.unheard_echoes import AWAY_M
 
 MOUNTS = np.array([[0.4, 0.0, 0.0], [0.0, 0.4, math.pi / 2]])
 BEAM = math.radians(12.0)

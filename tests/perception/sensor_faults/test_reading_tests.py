@@ -9,9 +9,8 @@ import pytest
 
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
-from perception.sensor_memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, SensorMemory
-from perception.sensor_report import FAILING, STUCK, TOO_NEAR
-from perception.sensor_tests import (
+from perception.sensor_faults.memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, SensorMemory
+from perception.sensor_faults.reading_tests import (
     EQUAL_READINGS_MIN,
     FAULTS_CHANGED,
     LESS_POSSIBLE,
@@ -28,6 +27,7 @@ from perception.sensor_tests import (
     others_changed,
     update_run_faults,
 )
+from perception.sensor_faults.report import FAILING, STUCK, TOO_NEAR
 
 COUNT = 4
 NEIGHBOURS = np.array([[1, 3], [2, 0], [3, 1], [0, 2]])

@@ -1,4 +1,4 @@
-"""The test of whether a ring repeats old readings; see `perception.ring_tests`."""
+"""The test of whether a ring repeats old readings; see `perception.ring_faults.motion_tests`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_memory import EchoTrace, RingTrace, SensorPlace
-from perception.sensor_wall import NOISE_SHARE
+from perception.ring_faults.memory import EchoTrace, RingTrace, SensorPlace
+from perception.sensor_faults.wall import NOISE_SHARE
 
 REPEAT_NAT: Final = math.log(100.0)
 """Evidence of a reading that repeats, to the bit, what it should have changed by `STEP_MIN_M` or three tolerances."""

@@ -9,8 +9,16 @@ import pytest
 
 from perception.kernel import Floats
 from perception.records import records, zeros
-from perception.ring_memory import EchoTrace, RingTrace
-from perception.ring_tests import EVIDENCE_NAT, NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
+from perception.ring_faults.memory import EchoTrace, RingTrace
+from perception.ring_faults.motion_tests import (
+    EVIDENCE_NAT,
+    NOTHING,
+    REPEATED,
+    SCATTERED,
+    TURNED,
+    VANISHED,
+    check_motion,
+)
 
 COUNT = 24
 MOUNTS = np.array([[0.0, 0.0, math.tau * k / COUNT] for k in range(COUNT)])

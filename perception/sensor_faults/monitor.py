@@ -7,8 +7,8 @@ A single reading proves nothing; how readings change while the robot moves and w
   along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
   or those of the whole ring do not.
 - *Silent.* The sensor hears nothing of what others heard where it looks, from both sides of its axis
-  (`perception.sensor_silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
-  still counts as a look (`perception.fresh_echoes`), which has no echo.
+  (`perception.sensor_faults.silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
+  still counts as a look (`perception.obstacle_echoes.fresh_echoes`), which has no echo.
 - *Too near.* The sensor answers ranges below the least that it can measure.
 - *Failing.* The sensor should fire and reports no range, however often the ring fires.
 - *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not depend on which other sensors fired. A
@@ -34,11 +34,11 @@ from drivers.messages import CrossPaths, Firing
 from perception.bounds import CONSTANT, COUNT, FLAG, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
-from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
+from perception.sensor_faults.memory import SETS_MAX, RingMemory, SensorMemory
+from perception.sensor_faults.reading_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
+from perception.sensor_faults.report import SILENT, SensorReport, describe_fault
+from perception.sensor_faults.silence import miss_share
 from perception.sensor_mounts import mounts_array
-from perception.sensor_report import SILENT, SensorReport, describe_fault
-from perception.sensor_silence import miss_share
-from perception.sensor_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
 """Largest angle between neighbours' axes, two places of a ring of 24 and some slack; beyond it sensors see different

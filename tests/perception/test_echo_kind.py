@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.echo_kind import KINDS, EchoKind, echo_kind, half_paths_over_circle
+from perception.echo_kind import KINDS, EchoKind, echo_kind, half_paths_over_circle
 from perception.kernel import Floats
 
 RADIUS_M, STEP = 0.381, math.radians(15.0)

@@ -6,8 +6,8 @@ import numpy as np
 
 from drivers.messages import Firing, Pose
 from perception.records import zeros
-from perception.sensor_memory import LOOKS, SETS_MAX, NeighbourCounts, RingMemory, SensorMemory
-from perception.sensor_monitor import SensorMonitor
+from perception.sensor_faults.memory import LOOKS, SETS_MAX, NeighbourCounts, RingMemory, SensorMemory
+from perception.sensor_faults.monitor import SensorMonitor
 from perception.snapshot import put_back, snapshot_of
 from tests.perception.halls import settings
 

@@ -8,8 +8,8 @@ has not looked: its last echo ages.
 A look whose echo is replaced still counts as a look. Neighbours whose beams just touch fire one after the other:
 while the ring turns, only the looks before close the gap that the turn leaves between their newest ones.
 
-Steady echoes that fall silent as the robot comes nearer are kept apart (`perception.unheard_echoes`). While no sensor
-hears anything, they stay obstacles and do not age.
+Steady echoes that fall silent as the robot comes nearer are kept apart (`perception.obstacle_echoes.unheard_echoes`).
+While no sensor hears anything, they stay obstacles and do not age.
 """
 
 from __future__ import annotations
@@ -24,9 +24,16 @@ from drivers.messages import Firing
 from perception.angles import wrapped
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
+from perception.obstacle_echoes.unheard_echoes import (
+    ALONE,
+    UnheardEcho,
+    UnheardEchoes,
+    contradict_echoes,
+    keep_sudden,
+    lose_echo,
+)
 from perception.records import Records
 from perception.sensor_mounts import mounts_at
-from perception.unheard_echoes import ALONE, UnheardEcho, UnheardEchoes, contradict_echoes, keep_sudden, lose_echo
 
 LOOKS: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""

@@ -1,4 +1,4 @@
-"""Records of what is remembered of each sensor and of the ring, for the tests of `perception.sensor_tests`."""
+"""Records of what is remembered of each sensor and of the ring, for `perception.sensor_faults.reading_tests`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Final
 from perception.bounds import FINITE, FLAG, PLACE, Count, Place, Share, index_of, up_to
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
-from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
+from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 
 SETS_MAX: Final = 32
 """Sets of sensors that fire together that are distinguished; a firing pattern has at most 24."""
@@ -20,7 +20,7 @@ RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 
 
 LOOKS: Final = 16
-"""Looks of each sensor that are kept, `sensor_silence.APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
+"""Looks of each sensor that are kept, `silence.APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
 
 
 class NeighbourCounts(Record):
@@ -82,7 +82,7 @@ class SensorMemory(Record):
     too_near: Annotated[int, up_to(TOO_NEAR_READINGS)]
     """Readings below the least range, less the others."""
     faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK | TOO_NEAR)]
-    """Fault bits of `perception.sensor_report`."""
+    """Fault bits of `perception.sensor_faults.report`."""
     short_readings: Annotated[Floats, SETS_MAX, FINITE]
     """For each set, short readings less those that were not."""
     is_crossed: Annotated[Ints, SETS_MAX, FLAG]

@@ -1,0 +1,1 @@
+"""Detection of sensors that lie one by one: stuck, failing, silent and cross-talking ones are found and masked."""
