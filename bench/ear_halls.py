@@ -21,7 +21,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import cross_pairs, firing_pattern, sensors
 from drivers.messages import CrossPaths, Firing, Pose
-from perception.bayes.parameters import NAMED_SIGMA_MAX_M
+from perception.bayes.memory.parameters import NAMED_SIGMA_MAX_M
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
 from runtime.simulation.evaluation import GATE_M

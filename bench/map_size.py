@@ -18,8 +18,8 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Pose
-from perception.bayes.archived_tracks import archived_dtype
-from perception.bayes.state import CircleTrack
+from perception.bayes.memory.state import CircleTrack
+from perception.bayes.tracks.archived_tracks import archived_dtype
 from perception.pipeline import Perception
 from runtime.simulation.long_hall import ACOUSTICS, START, long_hall_drums
 

@@ -47,7 +47,7 @@ WITHOUT_TEST: Final = MappingProxyType(
         "config/units.py": "one constant",
         "drivers/arcos/frames.py": "dataclasses and constants",
         "drivers/rflex/diagnostics.py": "messages",
-        "perception/bayes/job_records.py": "records and constants",
+        "perception/bayes/memory/job_records.py": "records and constants",
         "perception/localization/landmark_state.py": "records and constants",
         "runtime/console/commands/command.py": "dataclasses and an enumeration",
         "runtime/console/commands/command_error.py": "an exception with one attribute",

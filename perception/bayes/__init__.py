@@ -5,20 +5,19 @@ whether the object is a drum at all. Here segments only *propose* a body, and re
 ranges alone decide:
 
 =======================  ============================================================================================
-`parameters`             the numbers that tune the method; those of polygons are in `polygon_parameters`
-`state`                  the memory, as records with named fields
-`settings_record`        the settings in the same form; `kernel_settings` fills them in
-`likelihood`             log likelihood of one range: rounding box, noise and outliers, as a table
-`segment_pairs`          segments from pairs of readings, with their uncertainty, in a map of fixed size
-`range_fit`              circle and line: predicted range, evidence, robust fit
-`circle_posterior`       mean and covariance of a circle's centre under the exact likelihood
-`corner_model`           two faces and their edge: a box's corner, the drum's closest rival
-`polygon_likelihood`     polygon: predicted range, evidence, search for the pose
-`polygon_posterior`      mean and covariance of a polygon's pose
-`polygon_job`            work in quanta: a longer job continues in the next quantum
+`memory`                 the records of what is remembered and of the settings, and the numbers that tune the method
+`inference`              what every explanation shares: likelihood of a range, noise, prediction, kept readings
+`segments`               outline segments from pairs of readings: they propose bodies
+`circles`, `polygons`    initiation, fit, alternatives on the same readings, and posterior of the two kinds of bodies
+`walls`                  walls and corners of the whole drive
+`tracks`                 observed, refined in quanta, named, archived, edited by the operator
+`reports`                objects for those outside, what explains an echo, and evidence
 =======================  ============================================================================================
 
-Ranges and poses are in the odometry frame; a range ≥ `range_fit.FAR` means no echo. Evidence is in nats:
+Each imports only from those above it; `segments`, `circles`, `polygons` and `walls` know nothing of each other (a
+contract in pyproject.toml).
+
+Ranges and poses are in the odometry frame; a range ≥ `inference.range_fit.FAR` means no echo. Evidence is in nats:
 the log ratio of the readings' likelihood under an explanation to that of an echo from something else, anywhere in
 range. Kernels are pure and allocate nothing.
 """

@@ -16,15 +16,22 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import QUANTA_MAX, BayesConfig, PerceptionConfig
 from drivers.messages import Firing
-from perception.bayes.echo_sources import locate_echoes
-from perception.bayes.elements import MAX_POLYGONS
-from perception.bayes.evidence import evidence_of
-from perception.bayes.job_records import NO_JOB, REFINEMENT
-from perception.bayes.kept_tracks import kept_track, restore_track
-from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
-from perception.bayes.map_edits import edit_memory, row_of
-from perception.bayes.naming import Reported, report_circles, sure_polygons
-from perception.bayes.object_report import (
+from perception.bayes.inference.kernel_settings import (
+    apply_config,
+    apply_library,
+    circle_models,
+    copied,
+    make_settings,
+)
+from perception.bayes.memory.elements import MAX_POLYGONS
+from perception.bayes.memory.job_records import NO_JOB, REFINEMENT
+from perception.bayes.memory.polygon_parameters import POLYGON_PROBABILITY
+from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
+from perception.bayes.memory.state_migration import migrate
+from perception.bayes.polygons.association import associate_polygons
+from perception.bayes.reports.echo_sources import locate_echoes
+from perception.bayes.reports.evidence import evidence_of
+from perception.bayes.reports.object_report import (
     alternative_labels,
     archived_models,
     circle_object,
@@ -33,17 +40,16 @@ from perception.bayes.object_report import (
     polygon_object,
     rival_label,
 )
-from perception.bayes.observe import associate, hear_crosses, observe
-from perception.bayes.pinned_segments import Pins
-from perception.bayes.polygon_association import associate_polygons
-from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
-from perception.bayes.polygon_tracks import polygon_quantum
-from perception.bayes.refine import quantum
-from perception.bayes.segment_list import count_again, count_map, drawn, mapped_segments
-from perception.bayes.state import ESTABLISHED, FREE, Memory
-from perception.bayes.state_migration import migrate
-from perception.bayes.track_archive import TrackArchive
-from perception.bayes.wall_map import update_walls
+from perception.bayes.segments.pinned_segments import Pins
+from perception.bayes.segments.segment_list import count_again, count_map, drawn, mapped_segments
+from perception.bayes.tracks.kept_tracks import kept_track, restore_track
+from perception.bayes.tracks.map_edits import edit_memory, row_of
+from perception.bayes.tracks.naming import Reported, report_circles, sure_polygons
+from perception.bayes.tracks.observe import associate, hear_crosses, observe
+from perception.bayes.tracks.polygon_tracks import polygon_quantum
+from perception.bayes.tracks.refine import quantum
+from perception.bayes.tracks.track_archive import TrackArchive
+from perception.bayes.walls.wall_map import update_walls
 from perception.bounds import CONSTANT, Bound, bounds, index_of, up_to
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (

@@ -17,7 +17,7 @@ import numpy as np
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
-from perception.bayes.object_report import worst_sigma
+from perception.bayes.reports.object_report import worst_sigma
 from perception.detected_object import DetectedObject
 from perception.edits import (
     AreaEdit,

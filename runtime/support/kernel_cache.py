@@ -35,13 +35,20 @@ PACKAGES: Final = (
     "perception.ring_faults",
     "perception.obstacle_echoes",
     "perception.paper",
-    "perception.bayes",
+    "perception.bayes.memory",
+    "perception.bayes.inference",
+    "perception.bayes.segments",
+    "perception.bayes.circles",
+    "perception.bayes.polygons",
+    "perception.bayes.walls",
+    "perception.bayes.tracks",
+    "perception.bayes.reports",
     "perception.localization",
     "perception.mapping.grid",
     "behaviors.valley",
     "drivers.emulator",
 )
-"""Packages that hold kernels."""
+"""Packages that hold kernels, or what is compiled into them."""
 
 PAPER: Final = "paper"
 BAYES: Final = "bayes"

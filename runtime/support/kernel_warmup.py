@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
     from config.model import ModelConfig
     from config.settings import Settings
-    from perception.bayes.settings_record import SettingsRecord
-    from perception.bayes.state import Memory
+    from perception.bayes.memory.settings_record import SettingsRecord
+    from perception.bayes.memory.state import Memory
     from perception.pipeline import Perception
 
 FIRINGS: Final = 24
@@ -156,9 +156,9 @@ def observe_only(settings: Settings) -> None:
 
 
 def _circles(settings: Settings) -> None:
-    from perception.bayes.kernel_settings import make_settings
-    from perception.bayes.state import Memory
-    from perception.bayes.wall_bins import bin_of
+    from perception.bayes.inference.kernel_settings import make_settings
+    from perception.bayes.memory.state import Memory
+    from perception.bayes.walls.bins import bin_of
 
     _drive_and_edit(settings, BAYES, settings.models)
     bin_of(0.0)  # the report on walls calls it by itself
@@ -171,7 +171,7 @@ def _look_for_points(memory: Memory, constants: SettingsRecord) -> None:
     """Look for corners and edges on the line of a wall, as where mirrors are known."""
     import numpy as np
 
-    from perception.bayes.wall_points import CELLS, count_cuts, enter_point_of_line
+    from perception.bayes.walls.points import CELLS, count_cuts, enter_point_of_line
 
     count_cuts(memory.s, constants, 0, np.zeros((2, CELLS)))
     enter_point_of_line(memory.s, constants, 0, 0.0, False)  # noqa: FBT003 - a kernel takes no keywords
@@ -292,14 +292,14 @@ def compile_in_parallel(part: str) -> Iterator[None]:
 def compile_refinement(part: str) -> None:
     """Compile the refinement of a part, for circles also edits and walls, by calls on an empty state."""
     from config.load import load_settings
-    from perception.bayes.kernel_settings import make_settings
-    from perception.bayes.polygon_tracks import polygon_quantum
-    from perception.bayes.refine import quantum
-    from perception.bayes.state import Memory
-    from perception.bayes.wall_corners import find_corners
-    from perception.bayes.wall_initiation import best_line
-    from perception.bayes.wall_merging import drop_explained
-    from perception.bayes.wall_review import review
+    from perception.bayes.inference.kernel_settings import make_settings
+    from perception.bayes.memory.state import Memory
+    from perception.bayes.tracks.polygon_tracks import polygon_quantum
+    from perception.bayes.tracks.refine import quantum
+    from perception.bayes.walls.corners import find_corners
+    from perception.bayes.walls.initiation import best_line
+    from perception.bayes.walls.merging import drop_explained
+    from perception.bayes.walls.review import review
 
     settings = load_settings(None)
     bayes = settings.perception.bayes

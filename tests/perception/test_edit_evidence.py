@@ -116,7 +116,7 @@ def test_evidence_agrees_with_the_objects_and_changes_nothing(seen: Perception) 
 def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -> None:
     """A track that resembles a post is labelled as one and cannot be confirmed as a model."""
     from perception.bayes.bayes_method import BayesPerception
-    from perception.bayes.state import ESTABLISHED
+    from perception.bayes.memory.state import ESTABLISHED
 
     seen = reached_drums
     method = seen.method

@@ -12,8 +12,8 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Firing
-from perception.bayes import refine
 from perception.bayes.bayes_method import BayesPerception
+from perception.bayes.tracks import refine
 from perception.pipeline import Perception
 from runtime.cycle.step import CycleRecord, State, step
 from runtime.simulation.closed_loop import simulate

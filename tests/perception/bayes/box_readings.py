@@ -7,18 +7,18 @@ import math
 import numpy as np
 
 from config.load import load_model, load_settings
-from perception.bayes.elements import POLYGON_BEARING_BINS
-from perception.bayes.kernel_settings import make_settings
-from perception.bayes.polygon_likelihood import score_polygon
-from perception.bayes.range_fit import FAR
-from perception.bayes.scratch import Score
-from perception.bayes.settings_record import PolygonSide
-from perception.bayes.state import Memory
+from perception.bayes.inference.kernel_settings import make_settings
+from perception.bayes.inference.range_fit import FAR
+from perception.bayes.memory.elements import POLYGON_BEARING_BINS
+from perception.bayes.memory.scratch import Score
+from perception.bayes.memory.settings_record import PolygonSide
+from perception.bayes.memory.state import Memory
+from perception.bayes.polygons.likelihood import score_polygon
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
 from tests import naive_polygon
 from tests.naive_polygon import Rule
-from tests.perception.bayes.tracks import numbers, readings_of
+from tests.perception.bayes.random_tracks import numbers, readings_of
 
 SETTINGS = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)

@@ -8,11 +8,11 @@ import math
 import numpy as np
 
 from config.load import load_robot
-from perception.bayes.elements import Reading
-from perception.bayes.kernel_settings import make_settings
+from perception.bayes.inference.kernel_settings import make_settings
+from perception.bayes.memory.elements import Reading
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
-from tests.perception.bayes.tracks import SETTINGS, numbers
+from tests.perception.bayes.random_tracks import SETTINGS, numbers
 
 P = make_settings(load_robot("ears").ring, SETTINGS.models, SETTINGS.perception.bayes)
 RING_M, STEP = 0.381, math.radians(15.0)

@@ -8,15 +8,15 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from perception.bayes import range_fit
-from perception.bayes.elements import Reading
-from perception.bayes.likelihood import build_levels, build_table
-from perception.bayes.settings_record import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
+from perception.bayes.inference import range_fit
+from perception.bayes.inference.likelihood import build_levels, build_table
+from perception.bayes.memory.elements import Reading
+from perception.bayes.memory.settings_record import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
 from perception.kernel import Floats
 from perception.records import Record, Records, array_of, records, zeros
 from tests import naive_bayes
-from tests.perception.bayes.tracks import P as SHIPPED
-from tests.perception.bayes.tracks import changed, numbers, pair, readings_of
+from tests.perception.bayes.random_tracks import P as SHIPPED
+from tests.perception.bayes.random_tracks import changed, numbers, pair, readings_of
 
 R = TypeVar("R", bound=Record)
 

@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from perception.bayes.elements import Reading
-from perception.bayes.reservoir import copy_reading
-from perception.bayes.state import CircleTrack, Memory
-from perception.bayes.wall_bins import HALF
-from perception.bayes.wall_fit import fit_walls
-from perception.bayes.wall_records import IS_FREE, MAX_WALLS, Wall, WallMap
+from perception.bayes.inference.reservoir import copy_reading
+from perception.bayes.memory.elements import Reading
+from perception.bayes.memory.state import CircleTrack, Memory
+from perception.bayes.memory.wall_records import IS_FREE, MAX_WALLS, Wall, WallMap
+from perception.bayes.walls.bins import HALF
+from perception.bayes.walls.fit import fit_walls
 from perception.records import records, zeros
 from tests.naive_walls import Array
-from tests.perception.bayes.tracks import P, S, new_memory
+from tests.perception.bayes.random_tracks import P, S, new_memory
 
 SIGMA = 0.01
 """Noise of the readings, m, and the noise that the map assumes."""

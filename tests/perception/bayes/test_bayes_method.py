@@ -14,18 +14,18 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
-from perception.bayes import naming
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.object_report import CIRCLE_FIELDS, circle_object
-from perception.bayes.range_fit import FAR
-from perception.bayes.segment_list import count_again
-from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE
+from perception.bayes.inference.range_fit import FAR
+from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE
+from perception.bayes.reports.object_report import CIRCLE_FIELDS, circle_object
+from perception.bayes.segments.segment_list import count_again
+from perception.bayes.tracks import naming
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import ConfirmObject, PinSegments, PlaceModel
 from perception.kernel import Floats, kernel
 from perception.records import records, zeros
 from runtime.simulation.scenes import halls, readings
-from tests.perception.bayes.tracks import BOXES, NOISES, SENSORS, SETTINGS
+from tests.perception.bayes.random_tracks import BOXES, NOISES, SENSORS, SETTINGS
 
 
 def fresh_report(perception: BayesPerception) -> list[DetectedObject]:

@@ -11,12 +11,12 @@ import pytest
 from config.load import load_settings
 from config.world import AcousticsConfig, BoxConfig, StartConfig, WorldConfig
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.object_report import polygon_covariance
+from perception.bayes.reports.object_report import polygon_covariance
 from perception.kernel import Floats
 from perception.pipeline import Perception
 from runtime.simulation.open_loop import HallOutcome, angle_error, match_objects, perceive, run_scene
 from runtime.simulation.scenes import PLACES_FT, Hall, readings
-from tests.perception.bayes.tracks import examples
+from tests.perception.bayes.random_tracks import examples
 
 pytestmark = pytest.mark.compiled
 

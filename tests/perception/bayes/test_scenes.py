@@ -13,7 +13,7 @@ from config.load import load_model, load_settings
 from config.world import DrumConfig, WorldConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.segment_list import put_segment
+from perception.bayes.segments.segment_list import put_segment
 from perception.pipeline import Perception
 from runtime.simulation.first_fix import summarise_fixes
 from runtime.simulation.open_loop import HallOutcome, perceive, run_hall, run_scene

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -83,14 +84,20 @@ def test_kernels_with_checked_bounds_are_kept_apart(home: Path, monkeypatch: pyt
     assert plain.is_relative_to(home)
 
 
-def test_every_package_with_kernels_is_hashed() -> None:
-    holders = {
-        path.parent
+def test_every_package_that_kernels_read_is_hashed() -> None:
+    """Constants and records of what a kernel imports are compiled into it."""
+    sources = {
+        path.relative_to(ROOT).with_suffix("").as_posix().replace("/", "."): path.read_text("utf-8")
         for room in ("perception", "drivers", "behaviors", "runtime")
         for path in (ROOT / room).rglob("*.py")
-        if "@kernel" in path.read_text("utf-8") or "njit" in path.read_text("utf-8")
     }
-    assert holders == {ROOT.joinpath(*name.split(".")) for name in kernels.PACKAGES}
+    holders = {name for name, source in sources.items() if "@kernel" in source or "njit" in source}
+    read = {
+        name
+        for holder in holders
+        for name in re.findall(r"^from (perception[\w.]*) import", sources[holder], re.MULTILINE)
+    }
+    assert {name.rpartition(".")[0] for name in holders | read} == set(kernels.PACKAGES)
 
 
 def private(folder: Path, home: Path) -> bool:

@@ -19,7 +19,8 @@ from rich.console import Console
 from behaviors.valley import polar_histogram
 from config.load import load_settings
 from config.settings import Settings
-from perception.bayes import polygon_tracks, refine, wall_points
+from perception.bayes.tracks import polygon_tracks, refine
+from perception.bayes.walls import points as wall_points
 from perception.localization import drift_correction, landmark_tracker, pose_grid, pose_track
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
@@ -66,7 +67,9 @@ def test_each_compiled_kernel_leaves_a_mark(tmp_path: Path) -> None:
         pass
     with event.trigger_event("numba:compile", other):
         pass
-    assert [path.name for path in tmp_path.iterdir()] == [f"perception.bayes.refine.quantum{kernels.COMPILED_SUFFIX}"]
+    assert [path.name for path in tmp_path.iterdir()] == [
+        f"perception.bayes.tracks.refine.quantum{kernels.COMPILED_SUFFIX}"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,346 @@
+"""Circle hypotheses: where an unexplained segment suggests a model's body.
+
+The paper starts hypotheses from clusters of segments; but a cluster joins drums that stand a foot apart, and splits a
+drum seen from two sides. As in the paper, relaxation (§3.4) moves the body onto the outline map; the raw readings
+then decide whether it is an object, against every alternative.
+"""
+
+from __future__ import annotations
+
+import math
+
+from perception.bayes.circles.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
+from perception.bayes.inference.cross_path import is_crossed
+from perception.bayes.inference.lines import add_line
+from perception.bayes.inference.noise_estimation import noise_variance
+from perception.bayes.inference.occlusion import keep_relevant
+from perception.bayes.inference.range_fit import fit_circle
+from perception.bayes.inference.reservoir import gather_history, keep_reading
+from perception.bayes.inference.track_labels import assign_number, clear_track, is_rejected
+from perception.bayes.memory.elements import ATTRACTING_MAX, MappedSegment
+from perception.bayes.memory.parameters import (
+    ATTRACTING_MIN,
+    CELL_M,
+    CENTRE_VARIANCE_MAX_M2,
+    CIRCLE_AROUND_M,
+    CIRCLE_EVIDENCE_MIN_NAT,
+    CIRCLE_READINGS_MIN,
+    CIRCLE_RESTS_M,
+    CIRCLE_RESTS_RAD,
+    FACING_RADII,
+    FIRST_FIT_SOFTNESS,
+    FIT_SOFTNESS,
+    INITIATION_STEPS,
+    LINE_LENGTH_MIN_M,
+    NEW_LINE_HITS_MIN,
+    RELAXATION_GAMMA,
+    RIVAL_OVER_UNKNOWN_NAT,
+    SWITCH_LEAD_NAT,
+)
+from perception.bayes.memory.settings_record import SettingsRecord
+from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, CircleTrack, CircleTracks, StateRecord
+from perception.bayes.segments.segment_pairs import segments_near
+from perception.kernel import Floats, kernel
+from perception.records import Records
+from perception.relaxation import relax
+
+
+@kernel
+def free_track(tracks: Records[AnyTrack]) -> int:
+    """Return a free track, else the unmarked tentative one with the least evidence, else −1."""
+    worst = math.inf
+    slot = -1
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status == FREE:
+            return t
+        if track.status == TENTATIVE and track.log_likelihood_ratio < worst and track.marks == 0:
+            worst = track.log_likelihood_ratio
+            slot = t
+    return slot
+
+
+@kernel
+def enter_attracting(segment: MappedSegment, row: Floats) -> None:
+    """Write a mapped segment as the relaxation takes it, (5,) float: it has a middle and a normal, and no ends."""
+    row[0] = segment.x
+    row[1] = segment.y
+    row[2] = segment.x
+    row[3] = segment.y
+    row[4] = math.atan2(segment.normal_y, segment.normal_x)
+
+
+@kernel
+def is_known(tracks: CircleTracks, p: SettingsRecord, x: float, y: float, shift: float, nx: float, ny: float) -> bool:
+    """Return whether a track explains the surface of a body at (x, y).
+
+    Parameters
+    ----------
+    tracks, p
+        The circles and the settings.
+    x, y : float
+        The body's centre, m.
+    shift : float
+        A track of radius ρ is compared at the centre that a body of this radius with the same surface would have;
+        where negative, at its own.
+    nx, ny : float
+        Normal of the surface.
+    """
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status != FREE:
+            k = shift - track.radius if shift >= 0.0 else 0.0
+            if math.hypot(x - k * nx - track.x, y - k * ny - track.y) < p[0].merge_m:
+                return True
+    return False
+
+
+@kernel
+def relax_hypothesis(
+    s: StateRecord, sides: Floats, attracting: int, negligible_m: float, negligible_rad: float, steps: int
+) -> None:  # fmt: skip
+    """Move the scratch's hypothesis by the paper's relaxation (§3.4).
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    sides : (n, 4) float
+        The model's sides, as `perception.relaxation` takes them.
+    attracting : int
+        How many of the scratch's attracting segments there are.
+    negligible_m, negligible_rad, steps
+        As for `perception.relaxation.relax`.
+    """
+    scratch = s[0].scratch
+    hypothesis = scratch.hypothesis
+    pose = scratch.pose[:]
+    pose[0] = hypothesis.x
+    pose[1] = hypothesis.y
+    pose[2] = hypothesis.heading
+    relax(
+        sides, scratch.attracting[:], scratch.attracting_rows[:attracting], RELAXATION_GAMMA, negligible_m,
+        negligible_rad, steps, pose,
+    )  # fmt: skip
+    hypothesis.x = pose[0]
+    hypothesis.y = pose[1]
+    hypothesis.heading = pose[2]
+
+
+@kernel
+def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
+    """Move the scratch's hypothesis of a circle by relaxation (paper §3.4) onto the mapped segments that face it.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    kind : int
+        Index of the circle.
+    """
+    scratch = s[0].scratch
+    x, y = scratch.hypothesis.x, scratch.hypothesis.y
+    radius = p[0].circles[kind].radius_m
+    near = segments_near(s[0].buckets, CELL_M, x, y, radius + CIRCLE_AROUND_M, scratch.near)
+    attracting = 0
+    for j in range(near):
+        segment = scratch.near[j]
+        deep = segment.normal_x * (x - segment.x) + segment.normal_y * (y - segment.y)
+        if deep > FACING_RADII * radius:
+            enter_attracting(segment, scratch.attracting[attracting])
+            attracting += 1
+            if attracting == ATTRACTING_MAX:
+                break
+    if attracting >= ATTRACTING_MIN:
+        relax_hypothesis(
+            s, p[0].circles[kind].chords[:], attracting, CIRCLE_RESTS_M, CIRCLE_RESTS_RAD, INITIATION_STEPS
+        )
+
+
+@kernel
+def reset_circle(track: CircleTrack) -> None:
+    """Set a circle's track to zero, but for its number, its marks and the readings beyond the counts of its bins."""
+    clear_track(track)
+    track.kind = 0
+    track.alternative = 0
+    track.is_named = 0
+    track.radius = 0.0
+    track.root_xx = 0.0
+    track.root_yx = 0.0
+    track.root_yy = 0.0
+    track.covariance_xx = 0.0
+    track.covariance_xy = 0.0
+    track.covariance_yy = 0.0
+    track.misses = 0.0
+    track.dispersion = 0.0
+    track.unknown_nat = 0.0
+    track.misfit = 0.0
+    track.outline_lead = 0.0
+    track.round_lead = 0.0
+    track.room_lead = 0.0
+    track.sides = 0
+    track.is_confirmed = 0
+    track.leads[:] = 0.0
+    track.noise_nat[:] = 0.0
+
+
+@kernel
+def restart_circle(
+    s: StateRecord, track: CircleTrack, kind: int, radius: float, x: float, y: float, n: int
+) -> None:  # fmt: skip
+    """Set a track to a tentative one on the first `n` readings of the scratch.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    track : CircleTrack
+        Updated, but for its number and its marks.
+    kind, radius, x, y
+        Index of the circle, its radius and its centre, m.
+    n : int
+        Readings.
+    """
+    reset_circle(track)
+    track.status = TENTATIVE
+    track.kind = kind
+    track.unseen = n
+    track.x = x
+    track.y = y
+    track.radius = radius
+    for j in range(n):
+        if not is_crossed(s[0].scratch.readings[j]):
+            keep_reading(track, x, y, s[0].scratch.readings[j])
+
+
+@kernel
+def start_circle(
+    s: StateRecord, tracks: CircleTracks, kind: int, radius: float, x: float, y: float, n: int
+) -> int:  # fmt: skip
+    """Start a tentative track on the first `n` readings of the scratch; return its index, or −1 without a free track.
+
+    Parameters
+    ----------
+    s, tracks
+        Memory and circles, updated.
+    kind, radius, x, y, n
+        As for `restart_circle`.
+    """
+    t = free_track(tracks)
+    if t < 0:
+        return -1
+    restart_circle(s, tracks[t], kind, radius, x, y, n)
+    assign_number(s, tracks[t])
+    return t
+
+
+@kernel
+def gather_relevant(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, x: float, y: float, radius: float
+) -> int:  # fmt: skip
+    """Copy the remembered readings that bear on a new circle to the scratch; return their number.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles and settings.
+    x, y, radius : float
+        The circle, m.
+    """
+    return keep_relevant(s, tracks, p, gather_history(s, p, x, y, radius), x, y, radius, -1)
+
+
+@kernel
+def initiate_circle(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float, nx: float, ny: float
+) -> int:  # fmt: skip
+    """Try a circle behind a segment and start a track if the readings support it; return 1 if that took work.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    kind : int
+        Index of the circle.
+    x, y, nx, ny : float
+        The segment's middle (m) and unit normal, away from the sensors.
+    """
+    scratch = s[0].scratch
+    fit = scratch.circle_fit
+    radius = p[0].circles[kind].radius_m
+    hypothesis = scratch.hypothesis
+    hypothesis.x = x + radius * nx
+    hypothesis.y = y + radius * ny
+    hypothesis.heading = 0.0
+    if is_known(tracks, p, hypothesis.x, hypothesis.y, radius, nx, ny):
+        return 0
+    relax_onto_map(s, p, kind)
+    n = gather_relevant(s, tracks, p, hypothesis.x, hypothesis.y, radius)
+    if n < CIRCLE_READINGS_MIN:
+        return 0
+    var0, rel2 = noise_variance(s, p)
+    if not fit_circle(
+        scratch.readings[:n],
+        hypothesis.x,
+        hypothesis.y,
+        radius,
+        p,
+        FIRST_FIT_SOFTNESS,
+        var0,
+        rel2,
+        INITIATION_STEPS,
+        scratch.predicted,
+        fit,
+    ):
+        return 0
+    n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
+    if not fit_circle(
+        scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, scratch.predicted,
+        fit,
+    ):  # fmt: skip
+        return 0
+    x, y = fit.x, fit.y
+    h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
+    llr = score(s, p, n, x, y, radius)
+    near = scratch.score.near
+    if scratch.score.hits < CIRCLE_READINGS_MIN or llr < CIRCLE_EVIDENCE_MIN_NAT:
+        return 1
+    prior = p[0].model_prior_nat
+    ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
+    own = llr + (prior if kind < p[0].model_count else 0.0)
+    if fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
+        line = scratch.line_score
+        if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
+            add_line(s, scratch.line_fit, x, y, line)
+        return 1
+    chosen = kind
+    best = own
+    best_x = x
+    best_y = y
+    for k in range(p[0].circle_count):
+        if k != kind:
+            v = fit_other_circle(s, p, n, x, y, radius, ux, uy, p[0].circles[k].radius_m, INITIATION_STEPS) + (
+                prior if k < p[0].model_count else 0.0
+            )
+            if v > best + SWITCH_LEAD_NAT:
+                best = v
+                chosen = k
+                best_x = fit.x
+                best_y = fit.y
+    if chosen == kind and llr < p[0].unknown_nat * near:
+        return 1
+    if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:
+        return 1
+    if is_known(tracks, p, best_x, best_y, -1.0, nx, ny) or is_rejected(s, best_x, best_y, chosen, best):
+        return 1
+    t = start_circle(s, tracks, chosen, p[0].circles[chosen].radius_m, best_x, best_y, n)
+    if t < 0:
+        return 1
+    det = h00 * h11 - h01 * h01
+    track = tracks[t]
+    track.log_likelihood_ratio = llr
+    track.covariance_xx = min(h11 / det, CENTRE_VARIANCE_MAX_M2) if det > 0.0 else CENTRE_VARIANCE_MAX_M2
+    track.covariance_yy = min(h00 / det, CENTRE_VARIANCE_MAX_M2) if det > 0.0 else CENTRE_VARIANCE_MAX_M2
+    track.root_xx = math.sqrt(track.covariance_xx)
+    track.root_yy = math.sqrt(track.covariance_yy)
+    return 1

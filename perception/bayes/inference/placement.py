@@ -1,0 +1,106 @@
+"""The readings of a firing in the odometry frame, and which of them are evidence: what repeats itself is left out."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.inference.range_fit import FAR
+from perception.bayes.inference.reservoir import copy_reading
+from perception.bayes.memory.parameters import STILL_COS, STILL_M
+from perception.bayes.memory.scratch import UNEXPLAINED
+from perception.bayes.memory.settings_record import SettingsRecord
+from perception.bayes.memory.state import Sensor, StateRecord
+from perception.kernel import Floats, kernel
+
+COORDINATE_MAX_M: Final = 0.5 * FAR
+"""A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""
+STANDING_M: Final = 0.005
+"""A sensor that moved less is where it was; odometry trembles by less than this."""
+CHANGED_MIN: Final = 3
+"""So many readings in turn that differ from the last one say that the surroundings have changed: of drop-outs of 10 %
+one in a thousand series is so long."""
+
+
+@kernel
+def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
+    """Return whether a reading from the place of the sensor's last one is evidence; count it.
+
+    The errors of readings from one place are not independent: what their mean is off by stays, however many they are.
+    So the first, second, fourth, eighth and so on count, whatever they read. If those that repeat the last range were
+    left out instead, ranges that vary by a count would outnumber silences, and after minutes the surroundings would
+    seem to answer at any angle. When several in turn are different, the surroundings have changed, and counting
+    begins anew.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Updated.
+    range_m : float
+        The range, m.
+    tolerance : float
+        Greatest difference between two ranges of one surface, m.
+    """
+    sensor.looks += 1
+    sensor.changed = sensor.changed + 1 if abs(range_m - sensor.last.range_m) > tolerance else 0
+    if sensor.changed >= CHANGED_MIN:
+        sensor.looks = 1
+        sensor.changed = 0
+    return bool(sensor.looks & (sensor.looks - 1) == 0)
+
+
+@kernel
+def place_readings(
+    s: StateRecord, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
+) -> int:  # fmt: skip
+    """Write the fired readings to the scratch in the odometry frame; return how many of them are not redundant.
+
+    An invalid pose or range is left out, because it would corrupt every sum.
+
+    Parameters
+    ----------
+    s, p, mounts, px, py, yaw, ranges
+        As for `associate`.
+    """
+    s[0].scratch.crosses = 0
+    if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
+        return 0
+    scratch = s[0].scratch
+    var0, rel2 = noise_variance(s, p)
+    half_box = p[0].half_resolution_m
+    c = math.cos(yaw)
+    sn = math.sin(yaw)
+    m = 0
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if not r >= 0.0:  # also true for NaN
+            continue
+        if r >= p[0].range_max_m:
+            r = 2.0 * FAR
+        x = px + c * mounts[i, 0] - sn * mounts[i, 1]
+        y = py + sn * mounts[i, 0] + c * mounts[i, 1]
+        ux = math.cos(yaw + mounts[i, 2])
+        uy = math.sin(yaw + mounts[i, 2])
+        sensor = s[0].sensors[i]
+        last = sensor.last
+        moved = math.hypot(x - last.x, y - last.y)
+        is_near = moved < STILL_M and ux * last.axis_x + uy * last.axis_y > STILL_COS
+        if is_near and moved < STANDING_M:
+            if not says_new(sensor, r, tolerance_m(2.0 * half_box, 2.0 * (var0 + rel2 * min(r, last.range_m) ** 2))):
+                continue
+        elif is_near and abs(r - last.range_m) <= half_box:
+            continue
+        else:
+            sensor.looks = 1
+            sensor.changed = 0
+        last.x = x
+        last.y = y
+        last.axis_x = ux
+        last.axis_y = uy
+        last.range_m = r
+        copy_reading(last, scratch.fired[m])
+        scratch.fired_sensors[m] = i
+        scratch.explained_by[m] = UNEXPLAINED
+        m += 1
+    return m

@@ -1,0 +1,96 @@
+"""Numbers of tracks, and what a user confirmed, placed or rejected.
+
+A track gets its number when it starts and keeps it; a user's mark on it lasts until it is withdrawn, however little
+the readings say: the track yields to no alternative explanation, and to no other track in its place. Where a user
+rejected an object, none like it starts before the new evidence exceeds that of the rejected one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from perception.bayes.memory.elements import REJECTIONS_MAX
+from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, StateRecord
+from perception.kernel import kernel
+
+
+@kernel
+def assign_number(s: StateRecord, track: AnyTrack) -> None:
+    """Assign the next number to a new track, and clear its marks."""
+    s[0].objects_numbered += 1
+    track.number = s[0].objects_numbered
+    track.marks = 0
+
+
+@kernel
+def clear_track(track: AnyTrack) -> None:
+    """Set what all tracks have in common to zero, except number, marks and the readings in the bins."""
+    track.status = FREE
+    track.unseen = 0
+    track.reservoir = 0
+    track.refinements = 0
+    track.idle_firings = 0
+    track.final_refinements = 0
+    track.passed_over = 0
+    track.x = 0.0
+    track.y = 0.0
+    track.log_likelihood_ratio = 0.0
+    track.hits = 0.0
+    track.near = 0.0
+    track.probability = 0.0
+    for b in range(len(track.bins)):
+        track.bins[b].count = 0
+
+
+@kernel
+def drop_track(track: AnyTrack) -> bool:
+    """Free a track, or make it tentative where a user marked it; return whether it was freed."""
+    if track.marks == 0:
+        track.status = FREE
+        return True
+    track.status = TENTATIVE
+    return False
+
+
+@kernel
+def outlives(track: AnyTrack, other: AnyTrack, has_more: bool) -> bool:
+    """Return whether the first of two tracks in one place stays; the one that stays gets the older number.
+
+    Parameters
+    ----------
+    track, other
+        The tracks, updated. One that a user marked stays, and keeps its number.
+    has_more : bool
+        Whether the first has more evidence.
+    """
+    if (track.marks != 0) != (other.marks != 0):
+        return track.marks != 0
+    if track.marks == 0:
+        older = min(track.number, other.number)
+        if has_more:
+            track.number = older
+        else:
+            other.number = older
+    return has_more
+
+
+@kernel
+def is_rejected(s: StateRecord, x: float, y: float, what: int, evidence_nat: float) -> bool:
+    """Return whether a user rejected such an object at (x, y), and the evidence is too little to start it again.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    x, y : float
+        m.
+    what : int
+        Index of a circle, or `POLYGON` plus that of a polygon model.
+    evidence_nat : float
+        Evidence for it.
+    """
+    for k in range(min(s[0].rejection_count, REJECTIONS_MAX)):
+        it = s[0].rejections[k]
+        if it.what == what and evidence_nat < it.evidence_nat and math.hypot(x - it.x, y - it.y) < it.radius:
+            return True
+    return False

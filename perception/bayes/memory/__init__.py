@@ -1,0 +1,1 @@
+"""What the Bayesian method remembers and is given: its records, their bounds, and the numbers that tune it."""

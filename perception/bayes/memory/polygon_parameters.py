@@ -1,0 +1,196 @@
+"""The numbers that tune the polygon tracks of the Bayesian method; `parameters` has the others.
+
+Where a value gives no other source, it was tuned on random halls with the Denning's ring. A unit stands at the end of
+the name or in the line below; a plain number is a count, a factor or a share.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from config.units import FOOT_M
+from perception.bayes.memory.parameters import MAY_ANSWER_DEG
+
+# --- What a polygon answers ----------------------------------------------------------------------------------------
+
+POLYGON_UNKNOWN_NAT: Final = 2.9
+"""Evidence of an unknown object for each near reading, against a polygon."""
+DOUBTFUL_ANSWER_NAT: Final = 0.7
+"""Price of an answer that a mirror may give or not: about log 2. At a side's end or the beam's edge it costs nothing:
+all the readings of a sensor may then be heard, or none, and a price for each would turn the body until they must."""
+EDGE_REACH_M: Final = 1.0
+EDGE_NAT_PER_M: Final = 3.0 / FOOT_M
+"""A convex edge scatters 20 to 30 dB below a mirror's echo: an echo from beyond this costs this much per metre."""
+SIDE_END_MARGIN_M: Final = 0.12 * FOOT_M
+"""A foot this near the end of its side need not answer: the accuracy of a pose."""
+GRAZING_COS: Final = 0.05
+"""An edge of the beam that is more parallel to a side than this does not meet it."""
+
+# --- Searches for a pose -------------------------------------------------------------------------------------------
+
+SEARCH_TURN_RAD_PER_M: Final = 0.7 / FOOT_M
+"""Ratio of a search's turn to its shift: it moves the side of a body of 1.4 ft as far as the shift."""
+SEARCH_SHRINK: Final = 0.5
+"""Factor on the steps when no move gains."""
+SEARCH_GAIN_MIN_NAT: Final = 1e-6
+"""Smallest score gain that counts as progress."""
+SEARCH_FINEST_M: Final = 0.005 * FOOT_M
+"""Step below which a search ends: a tenth of the resolution, narrower than the likelihood's plateau."""
+SEARCH_EVERY: Final = 4
+"""A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
+WIDE_SEARCHES_FIRST: Final = 4
+WIDE_SEARCH_EVERY: Final = 8
+"""The search is wide in this many first refinements, then once in this many, …"""
+FITTING_SHARE: Final = 0.85
+"""… and every other time while less than this share of the near readings is explained."""
+COARSE_READINGS: Final = 96
+"""Greatest number of readings that a wide search scores."""
+WIDE_STEP_M: Final = 0.3 * FOOT_M
+WIDE_ROUNDS: Final = 14
+"""First step and rounds of a wide search."""
+NARROW_STEP_M: Final = 0.05 * FOOT_M
+NARROW_ROUNDS: Final = 6
+"""First step and rounds of a search near by."""
+RESTART_SHIFTS: Final = (0.5, -0.5, 1.0, -1.0)
+"""Shifts of the restarts along and across, in inner radii, …"""
+RESTART_TURNS: Final = (-0.5, 0.5)
+"""… turns, in π over the order of the symmetry, …"""
+RESTART_ROLLS_MAX: Final = 12
+"""… and greatest number of other sides that they are rolled onto."""
+RESTART_STEP_M: Final = 0.1 * FOOT_M
+RESTART_ROUNDS: Final = 5
+"""First step and rounds of their searches."""
+RESTART_GAIN_NAT: Final = 1.0
+"""Gain required of another maximum."""
+
+# --- New polygon tracks --------------------------------------------------------------------------------------------
+
+REQUEST_SAME_M: Final = 0.25 * FOOT_M
+REQUEST_SAME_COS: Final = 0.98
+"""A segment this near to another one, and this parallel, makes the same request."""
+POLYGON_AROUND_M: Final = 0.3 * FOOT_M
+"""Segments up to this far off the farthest vertex may attract the body."""
+POLYGON_RELAXATION_STEPS: Final = 3
+POLYGON_RESTS_M: Final = 0.01 * FOOT_M
+POLYGON_RESTS_RAD: Final = 0.01
+"""Greatest number of relaxation steps; the relaxation ends with increments below both limits."""
+SIDE_SHIFTS: Final = (-0.3, 0.0, 0.3)
+"""Where on a side the segment is laid, from its middle, in lengths of the side."""
+TRIAL_READINGS_MIN: Final = 8
+"""Least readings of a trial."""
+TRIAL_READINGS_MAX: Final = 80
+"""Greatest number of readings that a trial scores: it is only compared with the other trials."""
+TRIAL_STEP_M: Final = 0.2 * FOOT_M
+TRIAL_ROUNDS: Final = 8
+"""First step and rounds of a trial's search."""
+TRIAL_EVIDENCE_MIN_NAT: Final = 15.0
+"""Least evidence of the best trial."""
+FINE_STEP_M: Final = 0.1 * FOOT_M
+FINE_ROUNDS: Final = 10
+"""First step and rounds of the search from the best trial."""
+POLYGON_HITS_MIN: Final = 6.0
+"""Least hits of a new track."""
+WHOLE_SHARE: Final = 0.9
+"""A track that explains this share of its near readings keeps its place …"""
+APART_WHOLE: Final = 1.5
+APART: Final = 0.5
+"""… and no like track starts this near, in inner radii; for any other track the distance is less."""
+CHALLENGE_UNSEEN: Final = 8
+"""Unseen readings that a challenger counts as."""
+
+AXES: Final = 3
+"""Axes of a search: along and across the body, and turn."""
+
+# --- The lattice of a polygon's posterior --------------------------------------------------------------------------
+
+LATTICE_PITCH: Final = 1.3
+"""The lattice's pitch, in expected standard deviations, …"""
+LATTICE_RADIUS2: Final = 6
+"""… and its squared radius, in pitches: 81 points."""
+LATTICE_ATTEMPTS: Final = 5
+"""Greatest number of lattices laid for a track: the bound on the work."""
+LATTICE_LEAD_MAX_NAT: Final = 40.0
+"""Greatest lead of a point over the middle that counts."""
+LATTICE_OFF_CENTRE: Final = 0.7
+"""The lattice is laid again when the mean is this many pitches off its middle, …"""
+LATTICE_NARROW: Final = 0.7
+LATTICE_WIDE: Final = 1.4
+"""… or a variance lies outside these shares of the expected one."""
+LATTICE_THINNEST: Final = 0.1
+"""Least variance that the next lattice assumes, in the same shares: a narrower peak falls between the points."""
+LATTICE_CORRELATION_SHARE: Final = 0.95
+"""Share of a correlation that the next lattice assumes, so that it never collapses."""
+LATTICE_PITCHES_M: Final = (1e-4, 0.15)
+LATTICE_PITCHES_RAD: Final = (1e-4, 0.4)
+"""Least and greatest pitch."""
+FIRST_SIGMA_M: Final = 0.01
+FIRST_SIGMA_RAD: Final = 0.02
+"""Standard deviations assumed for a track's first lattice."""
+
+# --- The life of a polygon track -----------------------------------------------------------------------------------
+
+POLYGON_EVIDENCE_MIN_NAT: Final = 5.0
+POLYGON_UNKNOWN_LEAD_NAT: Final = 8.0
+"""A track ends with evidence below the first, or below an unknown object's by the second."""
+POLYGON_ESTABLISH_PROBABILITY: Final = 0.9
+POLYGON_ESTABLISH_HITS: Final = 10.0
+POLYGON_ESTABLISH_SURE: Final = 3.0
+"""Least probability, hits and sure hits to establish a track: corners alone fit anywhere. …"""
+MANY_HITS: Final = 20.0
+MANY_HITS_SURE: Final = 2.0
+"""… From so many hits on, so many sure ones suffice."""
+POLYGON_DOUBT_PROBABILITY: Final = 0.3
+POLYGON_DOUBT_SHARE: Final = 0.75
+"""A track less probable, or that explains less of its near readings, is tentative again."""
+TWIN_RADII: Final = 0.4
+"""Two bodies whose centres are nearer than this, in inner radii, are one."""
+OVERLAP_RADII: Final = 1.8
+"""Two bodies whose centres are nearer than this, in inner radii, cannot both exist."""
+
+# --- Walls and circles in a polygon's place ------------------------------------------------------------------------
+
+POLYGON_WALL_ECHOES_MIN: Final = 12.0
+"""Least echoes of a line that replaces a body."""
+POLYGON_WALL_LENGTH_RADII: Final = 3.0
+"""Least length of such a wall, in inner radii."""
+POLYGON_WALL_BEHIND: Final = -1.15
+POLYGON_WALL_FRONT: Final = 0.7
+"""A body whose centre is this many inner radii behind a wall's face, or before it, is the wall, …"""
+POLYGON_WALL_SHARE: Final = 0.6
+"""… if the wall explains this many readings per hit of the body. (Bodies in a row have a line in common.)"""
+POLYGON_WALL_BEYOND_M: Final = 2.0 * FOOT_M
+"""Distance beyond the ends of a line at which a body may still be a part of it."""
+CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
+"""Circles whose centres lie no farther than this off the farthest vertex stand in the same place."""
+OVER_CIRCLE_LEAD_NAT: Final = 6.0
+"""Lead at which an established polygon removes a circle in its place."""
+CIRCLE_FIT_STEPS: Final = 4
+"""Steps of such a circle's fit."""
+
+# --- Which polygons are reported, and how --------------------------------------------------------------------------
+
+POLYGON_PROBABILITY: Final = 0.9
+"""A polygon is reported from this probability on, or from the user's `report_probability` if that is less."""
+POLYGON_NEAR_M: Final = 6.5 * FOOT_M
+POLYGON_DISPERSION_MIN: Final = 0.02
+"""Nearest sensor, and least dispersion of the axes: a single face seen from afar may belong to any wall."""
+POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
+"""Greatest standard deviation of its position along either axis."""
+POLYGON_NAMED_HITS: Final = 20.0
+POLYGON_NAMED_HITS_SWEPT: Final = 12.0
+POLYGON_SWEPT_READINGS: Final = 80
+"""Least hits; fewer suffice where so many readings, silences included, bear on it and fit it."""
+POLYGON_INFLATION: Final = 1.15
+"""Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
+POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)
+"""Least standard deviation of its heading: that of the beam's edges, since an echo at an edge turns a body."""
+
+# --- Effort --------------------------------------------------------------------------------------------------------
+
+QUANTUM_COST: Final = 22_000
+"""Cost of a quantum, in predicted ranges of one side, or what takes as long."""
+READING_COST: Final = 3
+"""Cost of a reading, in sides, besides the model's own sides."""
+COLLECTING_COST: Final = 800
+"""Cost of collecting the readings, in the same unit."""

@@ -1,0 +1,248 @@
+"""Records that kernels overwrite before each use: segments, scores and fits of one firing or one object."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from config.robot import SENSORS_MAX
+from config.settings import TRACKS_MAX
+from perception.bayes.memory.elements import (
+    ATTRACTING_MAX,
+    BEARING_BINS,
+    BIN_CAPACITY,
+    CROSS_HISTORY,
+    GRID_CELLS,
+    PAIRS_PER_SENSOR,
+    READINGS_MAX,
+    MappedSegment,
+    Pose,
+    Reading,
+)
+from perception.bayes.memory.wall_records import RECENT_MAX, WALL_BINS
+from perception.kernel import Floats, Ints
+from perception.records import Record, Records
+
+UNEXPLAINED: Final = -1
+ON_LINE: Final = -2
+PROPOSED: Final = -100
+POLYGON: Final = 1000
+"""Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
+Other values are circle tracks."""
+TAKES_NOTHING, TAKES_BETTER, TAKES_ALL = range(3)
+"""Values of `OtherCircle.takes`: none, as a part of the same body; the readings that it explains better; all that it
+explains, as it has a name and that circle has none."""
+
+
+class PairSegment(Record):
+    """An outline segment from a pair of readings."""
+
+    x: float
+    """Its middle point, m."""
+    y: float
+    normal_x: float
+    normal_y: float
+    length: float
+    sigma_normal: float
+    """Standard deviation along the normal, m."""
+    sigma_direction: float
+    """Standard deviation of the direction, rad."""
+    reading: int
+    """Index of the fired reading it came from."""
+
+
+class LinearReading(Record):
+    """A reading's error near a circle, and its slope along the axes of the posterior's frame."""
+
+    error: float
+    """m"""
+    slope_a: float
+    """Fall of the error per unit of the first axis, m."""
+    slope_b: float
+    bins_per_m: float
+    level: int
+    """Row of `Settings.table`."""
+
+
+class Predictions(Record):
+    """What a circle predicts of each reading, field by field, so that the processor computes several at a time."""
+
+    error: Annotated[Floats, READINGS_MAX]
+    """Range, or half a cross path, less the predicted one, m."""
+    slope_x: Annotated[Floats, READINGS_MAX]
+    """Derivatives of the predicted range by the circle's centre."""
+    slope_y: Annotated[Floats, READINGS_MAX]
+    distance: Annotated[Floats, READINGS_MAX]
+    """Of the centre from the sensor that fired, m."""
+    ahead: Annotated[Floats, READINGS_MAX]
+    """The same along the sensor's axis, m."""
+
+
+class NearReadings(Record):
+    """The recent readings that may bear on a new wall, field by field, and what each says of a line."""
+
+    x: Annotated[Floats, RECENT_MAX]
+    """As in `Reading`."""
+    y: Annotated[Floats, RECENT_MAX]
+    axis_x: Annotated[Floats, RECENT_MAX]
+    axis_y: Annotated[Floats, RECENT_MAX]
+    range_m: Annotated[Floats, RECENT_MAX]
+    is_free: Annotated[Floats, RECENT_MAX]
+    """1 for an echo that nothing explains, 0 for others."""
+    weight: Annotated[Floats, RECENT_MAX]
+    """For a line, or against it."""
+
+
+class OtherCircle(Record):
+    """An established circle other than the one whose readings are asked for."""
+
+    x: float
+    y: float
+    radius: float
+    root_xx: float
+    """As in `CircleTrack`, m."""
+    is_named: int
+    takes: int
+    """Which readings it takes from that circle; see `TAKES_NOTHING`."""
+
+
+class Score(Record):
+    """The evidence of readings for a circle or a polygon."""
+
+    log_likelihood_ratio: float
+    hits: float
+    misses: float
+    """Readings that should have hit and passed through."""
+    near: float
+    """Readings within the gate."""
+    shorts: float
+    """Readings that ended before it."""
+    closest: float
+    """Least range of a hit, m."""
+    dispersion: float
+    """Dispersion of the axes of the sensors that heard it."""
+    sure_hits: float
+    """Hits where an echo was certain to be heard; of a polygon only."""
+
+
+class LineScore(Record):
+    """The evidence of readings for a line."""
+
+    log_likelihood_ratio: float
+    hits: float
+    misses: float
+    low: float
+    """Extent of the hits along the line, m."""
+    high: float
+
+
+class CircleFit(Record):
+    """A fitted centre and its information."""
+
+    x: float
+    y: float
+    information_xx: float
+    """1/m²"""
+    information_xy: float
+    information_yy: float
+
+
+class LineFit(Record):
+    """A fitted line: unit normal and distance from the fit's origin."""
+
+    normal_x: float
+    normal_y: float
+    distance: float
+
+
+class CornerFit(Record):
+    """Two faces and the edge in which they meet, if they do."""
+
+    faces: Annotated[Records[LineFit], 2]
+    edge_x: float
+    edge_y: float
+
+
+class CirclePosterior(Record):
+    """Mean, lower Cholesky root of the expected covariance, and covariance of a circle's centre; m, m²."""
+
+    x: float
+    y: float
+    root_xx: float
+    root_yx: float
+    root_yy: float
+    covariance_xx: float
+    covariance_xy: float
+    covariance_yy: float
+
+
+class BearingErrors(Record):
+    """The errors of a circle's readings from one bearing."""
+
+    count: int
+    errors: Annotated[Floats, BIN_CAPACITY]
+    """Ascending, m."""
+    variance: float
+    """Sum of their variances, m²."""
+    mean: float
+    """m"""
+    accuracy: float
+    """Inverse of the mean's standard deviation, 1/m; 0 with too few readings."""
+    whitened: float
+
+
+class Scratch(Record):
+    """Values that kernels overwrite before each use."""
+
+    fired: Annotated[Records[Reading], SENSORS_MAX]
+    """The readings of this firing: echoes, then cross paths."""
+    crosses: int
+    """Number of cross paths among them."""
+    crosses_found: Annotated[Ints, CROSS_HISTORY]
+    """Places of the remembered cross paths that a circle may explain."""
+    fired_sensors: Annotated[Ints, SENSORS_MAX]
+    explained_by: Annotated[Ints, SENSORS_MAX]
+    """Explanation of each fired reading; see `UNEXPLAINED`."""
+    near_recent: Annotated[Ints, RECENT_MAX]
+    """Places of the recent readings that may bear on a new wall, …"""
+    near_readings: NearReadings
+    """… and those readings."""
+    wall_evidence: Annotated[Floats, WALL_BINS]
+    """Evidence that a wall covers each of its bins, nat."""
+    wall_covered: Annotated[Ints, WALL_BINS]
+    """Whether the bin before is covered: 1 if so where this one is open, plus 2 if so where this one is covered."""
+    segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
+    """The segments of this firing."""
+    readings: Annotated[Records[Reading], READINGS_MAX]
+    """The readings of one object."""
+    face_readings: Annotated[Records[Reading], READINGS_MAX]
+    facing: Annotated[Ints, READINGS_MAX]
+    """Places of those readings that end near the circle with which a corner is compared."""
+    others: Annotated[Records[OtherCircle], TRACKS_MAX]
+    """The established circles other than one."""
+    predicted: Predictions
+    """Of the circle that was last asked for."""
+    own: Predictions
+    """Of the circle that is refined, where it is now."""
+    linear: Annotated[Records[LinearReading], READINGS_MAX]
+    cells: Annotated[Floats, GRID_CELLS]
+    """Log likelihood of each cell of a posterior's grid, nat."""
+    sides: Annotated[Ints, BEARING_BINS]
+    """1 for each bearing bin from which an object was heard."""
+    bearings: Annotated[Records[BearingErrors], BEARING_BINS]
+    outline_root: Annotated[Floats, BEARING_BINS, BEARING_BINS]
+    """Lower Cholesky root of an unknown outline's covariance; see `perception.bayes.circles.outline_check`."""
+    near: Annotated[Records[MappedSegment], 32]
+    """Segments near a place."""
+    attracting: Annotated[Floats, ATTRACTING_MAX, 5]
+    """Segments as `perception.relaxation` takes them: ends x, y, x, y (m) and normal (rad)."""
+    attracting_rows: Annotated[Ints, ATTRACTING_MAX]
+    """0, 1, 2, …"""
+    pose: Annotated[Floats, 3]
+    """x, y (m), heading (rad), as `perception.relaxation` takes a pose."""
+    hypothesis: Pose
+    score: Score
+    line_score: LineScore
+    circle_fit: CircleFit
+    line_fit: LineFit
+    corner_fit: CornerFit
+    posterior: CirclePosterior

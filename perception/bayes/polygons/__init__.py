@@ -1,0 +1,1 @@
+"""Polygons: initiation, likelihood, search for the pose, and its posterior."""

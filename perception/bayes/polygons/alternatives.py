@@ -1,0 +1,174 @@
+"""Alternative explanations of a polygon's readings: a wall, a round object, an unknown object."""
+
+from __future__ import annotations
+
+import math
+
+from perception.bayes.inference.cross_path import over_line
+from perception.bayes.inference.likelihood import bounded_exp
+from perception.bayes.inference.lines import off_and_along, reaches
+from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.inference.range_fit import fit_circle, score_circle
+from perception.bayes.memory.elements import MAX_LINES, Reading
+from perception.bayes.memory.parameters import FIT_SOFTNESS
+from perception.bayes.memory.polygon_parameters import (
+    CIRCLE_FIT_STEPS,
+    CIRCLE_NEAR_M,
+    OVER_CIRCLE_LEAD_NAT,
+    POLYGON_WALL_BEHIND,
+    POLYGON_WALL_BEYOND_M,
+    POLYGON_WALL_ECHOES_MIN,
+    POLYGON_WALL_FRONT,
+    POLYGON_WALL_LENGTH_RADII,
+    POLYGON_WALL_SHARE,
+)
+from perception.bayes.memory.settings_record import SettingsRecord
+from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTracks, Line, PolygonTrack, StateRecord
+from perception.kernel import kernel
+from perception.records import Records
+
+
+@kernel
+def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight: float) -> int:
+    """Return the number of readings that a line explains.
+
+    Parameters
+    ----------
+    readings : (n,) Reading
+        Raw ranges.
+    line : Line
+        The line.
+    cos_may : float
+        As in `Settings`.
+    tight : float
+        Greatest error of an explained range, m.
+    """
+    explained = 0
+    for j in range(len(readings)):
+        q = readings[j]
+        ahead, _ = off_and_along(line, q.x, q.y)
+        towards = line.normal_x * q.axis_x + line.normal_y * q.axis_y
+        side = 1.0 if ahead > 0.0 else -1.0
+        half, _, _ = over_line(q, side * line.normal_x, side * line.normal_y, abs(ahead))
+        if abs(towards) >= cos_may and towards * ahead > 0.0 and abs(q.range_m - half) < tight:
+            explained += 1
+    return explained
+
+
+@kernel
+def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
+    """Return whether a polygon's track is part of a wall: it lies on a line that explains the job's readings as well.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The track.
+    """
+    inner = p[0].polygons[track.model].inner_radius_m
+    readings = s[0].job_readings[: s[0].job.reading_count]
+    var0, rel2 = noise_variance(s, p)
+    for k in range(MAX_LINES):
+        line = s[0].lines[k]
+        if line.echoes > POLYGON_WALL_ECHOES_MIN and line.high - line.low > max(
+            p[0].associating_line_m, POLYGON_WALL_LENGTH_RADII * inner
+        ):
+            off, along = off_and_along(line, track.x, track.y)
+            if (
+                reaches(line, along, POLYGON_WALL_BEYOND_M)
+                and POLYGON_WALL_BEHIND * inner < off < POLYGON_WALL_FRONT * inner
+            ):
+                tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * off * off)
+                if count_on_line(readings, line, p[0].cos_may_answer, tight) >= POLYGON_WALL_SHARE * track.hits:
+                    return True
+    return False
+
+
+@kernel
+def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float:
+    """Return the log ratio (nat, prior included) of the circle that best explains the job's readings.
+
+    An edge, a post or a drum seen from a few places looks like a polygon's corner, and the circle track in that place
+    may have ended. So circles are scored on the same readings that support the polygon.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The polygon in whose place circles are fitted.
+    """
+    scratch = s[0].scratch
+    readings = s[0].job_readings[: s[0].job.reading_count]
+    outline = p[0].polygons[track.model]
+    x = track.x
+    y = track.y
+    ux = 0.0
+    uy = 0.0
+    for j in range(len(readings)):
+        q = readings[j]
+        dx = x - q.x
+        dy = y - q.y
+        d = math.hypot(dx, dy)
+        if d > 0.0 and abs(q.range_m - d) < outline.outer_radius_m:
+            ux += dx / d
+            uy += dy / d
+    length = math.hypot(ux, uy)
+    if length == 0.0:
+        return -math.inf
+    var0, rel2 = noise_variance(s, p)
+    best = -math.inf
+    for k in range(p[0].circle_count):
+        radius = p[0].circles[k].radius_m
+        behind = (radius - outline.inner_radius_m) / length
+        if fit_circle(
+            readings,
+            x + behind * ux,
+            y + behind * uy,
+            radius,
+            p,
+            FIT_SOFTNESS,
+            var0,
+            rel2,
+            CIRCLE_FIT_STEPS,
+            scratch.predicted,
+            scratch.circle_fit,
+        ):
+            score_circle(
+                readings, scratch.circle_fit.x, scratch.circle_fit.y, radius, p, s[0].job.noise_level,
+                scratch.predicted, scratch.score,
+            )  # fmt: skip
+            prior = p[0].model_prior_nat if k < p[0].model_count else 0.0
+            best = max(best, scratch.score.log_likelihood_ratio + prior)
+    return best
+
+
+@kernel
+def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, track: PolygonTrack) -> None:
+    """Update a polygon's probability against nothing, an unknown object and the circles in its place.
+
+    Circles that are far less likely than an established polygon are removed.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    track : PolygonTrack
+        Updated.
+    """
+    own = track.log_likelihood_ratio + p[0].model_prior_nat
+    around = p[0].polygons[track.model].outer_radius_m + CIRCLE_NEAR_M
+    total = 1.0 + bounded_exp(-own)
+    total += bounded_exp(p[0].unknown_polygon_nat * track.near + p[0].model_prior_nat - own)
+    total += bounded_exp(best_circle(s, p, track) - own)
+    for k in range(len(tracks)):
+        circle = tracks[k]
+        if circle.status != FREE and math.hypot(circle.x - track.x, circle.y - track.y) < around:
+            prior = p[0].model_prior_nat if circle.kind < p[0].model_count else 0.0
+            v = circle.log_likelihood_ratio + prior
+            if v < own - OVER_CIRCLE_LEAD_NAT and track.status == ESTABLISHED and circle.marks == 0:
+                circle.status = FREE
+            elif circle.status == ESTABLISHED:
+                total += bounded_exp(v - own)
+    track.probability = 1.0 / total

@@ -1,0 +1,1 @@
+"""Results for those outside: objects, what explains an echo, and the evidence for an object."""

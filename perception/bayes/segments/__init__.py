@@ -1,0 +1,1 @@
+"""Outline segments from pairs of readings, and the map that holds them."""

@@ -1,0 +1,1 @@
+"""Tracks of objects: observed, refined, named, archived, and edited by the operator."""

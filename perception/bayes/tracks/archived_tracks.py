@@ -1,0 +1,122 @@
+"""Tracks as archived records: everything but the readings as it is, and of the readings the newest of each bearing.
+
+A track takes up to 30 kB, nearly all of it readings; an archived record takes less than 1.8 kB. Readings are kept in
+single precision about the object's centre, which is exact to a micrometre. Cross paths are not kept.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.bayes.memory.state import CircleTrack, PolygonTrack
+from perception.bounds import FLAG, PLACE, Fields, up_to
+from perception.kernel import Floats
+
+READINGS_KEPT: Final = 48
+"""Readings of an archived track: one of each bearing, and some more."""
+BINS: Final = "bins"
+
+
+def archived_dtype(track: type[CircleTrack | PolygonTrack]) -> np.dtype[Any]:
+    """Return the dtype of an archived track.
+
+    Besides the track's own fields it has `is_reported` (int; 1 where it is reported as a model), `kept` (int), and
+    `readings`: x and y of the sensor about the track's centre (m), direction of its axis (rad) and range (m).
+    """
+    fields = [(name, track.DTYPE[name]) for name in (track.DTYPE.names or ())[:-1]]  # the last are the readings
+    readings = ("readings", np.float32, (READINGS_KEPT, 4))
+    return np.dtype((np.record, [*fields, ("is_reported", np.int64), ("kept", np.int64), readings]))
+
+
+def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
+    """Return the bounds of the fields of an archived track."""
+    own = {name: bound for name, bound in track.BOUNDS.items() if name != BINS}
+    return {**own, "is_reported": FLAG, "kept": up_to(READINGS_KEPT), "readings": PLACE}
+
+
+def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDArray[Any]:
+    """Return a track as an archived record, shape (1,).
+
+    Parameters
+    ----------
+    track : (1,) record of `CircleTrack` or `PolygonTrack`
+        The track.
+    dtype : dtype
+        From `archived_dtype`.
+    is_reported : bool
+        Whether it is reported as a model.
+    """
+    row = np.zeros(1, dtype)
+    _copy_numbers(track, row)
+    readings = newest_readings(track[BINS][0])
+    row["is_reported"], row["kept"] = is_reported, len(readings)
+    kept = row["readings"][0, : len(readings)]
+    kept[:, 0], kept[:, 1] = readings["x"] - track["x"], readings["y"] - track["y"]
+    kept[:, 2], kept[:, 3] = np.arctan2(readings["axis_y"], readings["axis_x"]), readings["range_m"]
+    return row
+
+
+def unpack(row: NDArray[Any], track: NDArray[Any]) -> None:
+    """Write an archived record to a track.
+
+    Parameters
+    ----------
+    row : (1,) record of `archived_dtype`
+        The archived track.
+    track : (1,) record of `CircleTrack` or `PolygonTrack`
+        Overwritten.
+    """
+    _copy_numbers(row, track)
+    bins = track[BINS][0]
+    kept = row["readings"][0, : int(row["kept"][0])][::-1].astype(np.float64)  # the oldest first
+    b = bearing_bins(kept, len(bins))
+    order = np.argsort(b, kind="stable")
+    # They were binned about earlier centres: about this one a bin may get more than it holds, and keeps the newest.
+    order = order[np.searchsorted(b[order], b[order], "right") - np.arange(len(b)) <= bins["readings"].shape[1]]
+    b, kept = b[order], kept[order]
+    bins["count"] = np.bincount(b, minlength=len(bins))
+    in_bin, readings = np.arange(len(b)) - np.searchsorted(b, b), bins["readings"]
+    readings["x"][b, in_bin], readings["y"][b, in_bin] = row["x"] + kept[:, 0], row["y"] + kept[:, 1]
+    readings["axis_x"][b, in_bin], readings["axis_y"][b, in_bin] = np.cos(kept[:, 2]), np.sin(kept[:, 2])
+    readings["range_m"][b, in_bin] = kept[:, 3]
+    readings["listener_x"][b, in_bin] = readings["listener_y"][b, in_bin] = 0.0
+
+
+def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:
+    """Return the newest echo of each bearing bin, then the second newest of each, and so on: (≤ 48,) `Reading`.
+
+    Parameters
+    ----------
+    bins : (n,) record of `CircleBin` or `PolygonBin`
+        The bins.
+    """
+    counts, capacity = bins["count"], bins["readings"].shape[1]
+    rank = np.arange(capacity)[:, None]
+    ranks, which = np.nonzero(rank < counts)
+    found: NDArray[Any] = bins["readings"][which, (counts[which] - 1 - ranks) % capacity]
+    echoes: NDArray[Any] = found[(found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)]
+    return echoes[:READINGS_KEPT]
+
+
+def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:
+    """Return the bearing bins of places about the centre, as `reservoir.keep_reading` computes them; shape (n,).
+
+    Parameters
+    ----------
+    places : (n, ≥ 2) float
+        x and y about the centre, m.
+    count : int
+        Number of bins of the full circle.
+    """
+    turns = np.arctan2(places[:, 1], places[:, 0]) / (2.0 * math.pi) + 0.5
+    return (turns * count).astype(np.int64) % count
+
+
+def _copy_numbers(source: NDArray[Any], target: NDArray[Any]) -> None:
+    """Copy all fields before the readings; a track and an archived record begin with the same ones."""
+    (size,) = (one.dtype.fields[BINS][1] for one in (source, target) if one.dtype.fields and BINS in one.dtype.fields)
+    target.view(np.uint8)[:size] = source.view(np.uint8)[:size]

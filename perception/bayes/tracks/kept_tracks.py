@@ -1,0 +1,82 @@
+"""Tracks as text, so that an operator's undo puts an object back exactly, with the readings kept for it.
+
+The text is part of an edit, and an edit may come from a file. So each number is checked against its bound before it
+becomes part of the memory, which compiled kernels read without checks.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.bayes.memory.state import FREE, Memory
+from perception.bayes.tracks.manual_tracks import leave_job
+from perception.bounds import Bound, check_values
+from perception.edits import ObjectRow, not_restorable
+from perception.snapshot import numbers_of
+
+CIRCLE: Final = "circle"
+POLYGON: Final = "polygon"
+BOUNDED: Final = MappingProxyType({CIRCLE: "memory.circles", POLYGON: "memory.state.polygons"})
+"""The names by which the numbers of a track have their bounds."""
+
+
+def kept_track(memory: Memory, row: int) -> str:
+    """Return a track as text; its row is as of `map_edits.row_of`."""
+    t = row - len(memory.circles)
+    kind, tracks, at = (CIRCLE, memory.circles, row) if t < 0 else (POLYGON, memory.polygons, t)
+    packed = zlib.compress(tracks[at].tobytes(), 1)
+    return f"{kind}:{base64.b64encode(packed).decode()}"
+
+
+def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -> str | None:
+    """Put a track back, in place of the one of its number or of a free one; return None, or why that is impossible.
+
+    Parameters
+    ----------
+    memory : Memory
+        Updated.
+    row : ObjectRow
+        The object; its place is that of the track.
+    bounds : mapping
+        As of `perception.snapshot.bounds_of`.
+    """
+    kind, _, text = row.kept.partition(":")
+    tracks = {CIRCLE: memory.circles, POLYGON: memory.polygons}.get(kind)
+    track = None if tracks is None else _unpacked(text, tracks.dtype)
+    if tracks is None or track is None or track["number"][0] != row.number:
+        return not_restorable(row.number)
+    try:
+        for name, values in numbers_of({BOUNDED[kind]: track}):
+            check_values(name, values, bounds[name])
+    except ValueError:
+        return not_restorable(row.number)
+    if row.number > int(memory.state["objects_numbered"][0]) or track["status"][0] == FREE:
+        return not_restorable(row.number)
+    is_free = tracks["status"] == FREE
+    places = np.flatnonzero(~is_free & (tracks["number"] == row.number))
+    places = places if len(places) else np.flatnonzero(is_free)
+    if not len(places):
+        return f"no room to put object {row.number} back: reject another one first"
+    if kind == POLYGON:
+        leave_job(memory.s, int(places[0]))
+    tracks[places[0]] = track[0]
+    return None
+
+
+def _unpacked(text: str, dtype: np.dtype[Any]) -> NDArray[Any] | None:
+    """Return the record in a text, shape (1,); None if it holds none of this type."""
+    try:
+        packed = base64.b64decode(text, validate=True)
+        unpacker = zlib.decompressobj()
+        data = unpacker.decompress(packed, dtype.itemsize + 1)
+    except (binascii.Error, ValueError, zlib.error):
+        return None
+    return np.frombuffer(data, dtype).copy() if len(data) == dtype.itemsize else None

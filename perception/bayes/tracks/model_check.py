@@ -1,0 +1,187 @@
+"""Whether a model is right where it is the best explanation so far, and how much the surroundings ask for.
+
+The alternatives of `perception.bayes.circles.alternatives` are not all there is: a wall that answers from the beam's
+edge is none of them, and then the model wins by default. `perception.bayes.circles.outline_check` compares it with
+bodies of any outline. Three more checks need no alternative: the readings must scatter about the model as the ranges'
+noise does; the mapped walls and corners must not explain them; and where an echo says little about the shape, the
+object must have been heard from all over its front.
+
+An echo says little where everything echoes, because then it may come from anywhere in the beam; and a short look
+says little where names that it gave were withdrawn and no model was confirmed for a while.
+"""
+
+from __future__ import annotations
+
+import math
+
+from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
+from perception.bayes.inference.likelihood import level_of, log_likelihood
+from perception.bayes.inference.range_fit import FAR
+from perception.bayes.memory.elements import BEARING_BINS, Reading
+from perception.bayes.memory.parameters import (
+    APART_RADII,
+    CONFIRMED_SIDES,
+    ROOM_MARGIN_M,
+    SILENCE_MEMORY,
+    TRUSTED_M,
+    VARIANCE_MIN_NAT2,
+)
+from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
+from perception.bayes.memory.state import ESTABLISHED, CircleTrack, CircleTracks, StateRecord
+from perception.bayes.memory.wall_records import CORNERS_MAX, MAX_WALLS, WallMap
+from perception.bayes.walls.contact import BEAM_EDGE, FOOT, NOWHERE, contact, edges_answer, is_on_span, wall_normal
+from perception.kernel import kernel
+
+
+@kernel
+def count_surroundings(s: StateRecord, m: int, moved_m: float) -> None:
+    """Count which of the first `m` fired readings heard nothing, older ones less and less; and the way, m."""
+    s[0].unconfirmed_m += moved_m
+    for i in range(m):
+        s[0].heard *= SILENCE_MEMORY
+        s[0].silent *= SILENCE_MEMORY
+        if s[0].scratch.fired[i].range_m >= FAR:
+            s[0].silent += 1.0
+        else:
+            s[0].heard += 1.0
+
+
+@kernel
+def everything_echoes(s: StateRecord, p: SettingsRecord) -> bool:
+    """Return whether surfaces answer at any angle here: the beams hear more than mirrors would let them."""
+    return s[0].silent < p[0].silent_share_min * (s[0].heard + s[0].silent) or edges_answer(s[0].room)
+
+
+@kernel
+def is_careful(s: StateRecord, p: SettingsRecord) -> bool:
+    """Return whether a model must have been heard from all over its front to be named."""
+    return everything_echoes(s, p) or (s[0].names_withdrawn > 0 and s[0].unconfirmed_m > TRUSTED_M)
+
+
+@kernel
+def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edges: bool) -> float:
+    """Return the greatest log likelihood ratio (nat) of a range under the mapped walls and corners.
+
+    Parameters
+    ----------
+    room, q, p
+        Walls and corners, the reading and the settings.
+    level : int
+        Its noise level.
+    edges : bool
+        Whether walls answer from the beam's edge.
+    """
+    best = float(p[0].table[level, TABLE_BINS - 1])
+    for k in range(MAX_WALLS):
+        wall = room.walls[k]
+        if wall.weight > 0.0:
+            kind, expected, along, _ = contact(wall, q, p)
+            if is_crossed(q):
+                if kind != FOOT:
+                    continue
+                nx, ny = wall_normal(wall)
+                expected, _, _ = over_line(q, nx, ny, expected)
+                along += 0.5 * (nx * q.listener_y - ny * q.listener_x)
+            if kind != NOWHERE and (kind != BEAM_EDGE or edges) and is_on_span(wall, along, ROOM_MARGIN_M):
+                best = max(best, log_likelihood(p, level, q.range_m - expected))
+    for c in range(CORNERS_MAX):
+        corner = room.corners[c]
+        if corner.is_used == 1:
+            dx = corner.x - q.x
+            dy = corner.y - q.y
+            d = math.sqrt(dx * dx + dy * dy)
+            if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d:
+                e = circle_error(q, dx, dy, d, 0.0)
+                if is_crossed(q) and corner.is_edge == 0:  # twice the way to the middle between both
+                    e = q.range_m - math.hypot(dx - 0.5 * q.listener_x, dy - 0.5 * q.listener_y)
+                best = max(best, log_likelihood(p, level, e))
+    return best
+
+
+@kernel
+def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
+    """Update a track's misfit, the lead of the mapped room, and from how many sides it was heard.
+
+    The worst reading does not count for the misfit: one in so many may come from something else.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Its readings, the first of the scratch, and what it predicts of them its `own`.
+    """
+    scratch, room = s[0].scratch, s[0].room
+    sides = scratch.sides
+    sides[:] = 0
+    edges = edges_answer(room)
+    shortfall = 0.0
+    worst = 0.0
+    variance = 0.0
+    lead = 0.0
+    for j in range(n):
+        q = scratch.readings[j]
+        e = scratch.own.error[j]
+        if abs(e) > p[0].gate_m or scratch.own.ahead[j] < p[0].cos_half_angle * scratch.own.distance[j]:
+            continue
+        level = level_of(p, s[0].noise_level, q.range_m)
+        v = log_likelihood(p, level, e)
+        missing: float = p[0].expected_nat[level] - v
+        shortfall += missing
+        worst = max(worst, missing)
+        variance += max(VARIANCE_MIN_NAT2, p[0].variance_nat2[level])
+        lead += room_evidence(room, q, p, level, edges) - v
+        if v > 0.0:
+            dx = track.x - q.x
+            dy = track.y - q.y
+            sides[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * BEARING_BINS) % BEARING_BINS] = 1
+    track.misfit = (shortfall - worst) / math.sqrt(max(variance, VARIANCE_MIN_NAT2))
+    track.room_lead = lead
+    track.sides = 0
+    for b in range(BEARING_BINS):
+        track.sides += sides[b]
+
+
+@kernel
+def is_named_near(tracks: CircleTracks, x: float, y: float, apart: float) -> bool:
+    """Return whether a named circle's centre lies within `apart` of (x, y), m."""
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status == ESTABLISHED and track.is_named == 1 and math.hypot(track.x - x, track.y - y) < apart:
+            return True
+    return False
+
+
+@kernel
+def leads_alone(track: CircleTrack, p: SettingsRecord) -> bool:
+    """Return whether a model leads without its prior: this cannot confirm a name that rests on it alone."""
+    best = track.outline_lead  # 0, so not confirmed, where the outline was not compared
+    for k in range(p[0].circle_count + 2):
+        if k != track.kind and track.leads[k] != 0.0:
+            best = max(best, track.leads[k])
+    return best < -p[0].model_prior_nat
+
+
+@kernel
+def count_names(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
+    """Count the name of a track that was named before its refinement: as confirmed, as withdrawn, or not yet.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track.
+    x, y : float
+        Where it was before, m.
+    """
+    track = tracks[t]
+    if track.status == ESTABLISHED and track.is_named == 1:
+        if track.sides >= CONFIRMED_SIDES and leads_alone(track, p):
+            track.is_confirmed = 1
+            s[0].names_withdrawn = 0
+            s[0].unconfirmed_m = 0.0
+    elif track.is_confirmed == 0 and not is_named_near(tracks, x, y, max(p[0].merge_m, APART_RADII * track.radius)):
+        s[0].names_withdrawn += 1

@@ -1,0 +1,341 @@
+"""The walls that are sure, with their ends: a segment for each span, as far as the corners in which it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.bayes.memory.state import ESTABLISHED, Memory
+from perception.bayes.memory.wall_records import MAX_WALLS
+from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
+from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
+from perception.bayes.walls.crossing import CORNER_INSIDE_M, CORNER_REACH_M
+from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
+from perception.bayes.walls.numbers import SPAN_MIN_M
+from perception.bayes.walls.straight import Straight, straight, straighten
+from perception.kernel import Floats
+from perception.records import Record
+
+WALL_CHI2_MIN: Final = 14.0
+"""Least evidence of the best span, or of all together, where there are walls, …"""
+FIRST_CHI2_MIN: Final = 40.0
+"""… and of the best span of the first one: where nothing but drums stands, thousands of their tangents are tried."""
+SPAN_WEIGHT_MIN: Final = 3.0
+"""Least weight of a span that is reported, …"""
+MISFIT_MAX: Final = 2.5
+LIGHT_MISFIT_MAX: Final = 2.0
+LIGHT_WEIGHT: Final = 20.0
+"""Greatest χ² of a wall's line for each degree of freedom, and that of a wall of less weight, which may be the side
+of a barrel that was heard from a few places."""
+CORNER_NEAR_M: Final = 1.0
+"""Distance from the ends of both walls within which a corner need not be heard …"""
+DOORWAY_MIN_M: Final = 1.05
+"""A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
+CORNER_PASSED_SHARE: Final = 0.2
+"""… if no more than this share of the ranges towards it went on."""
+WALL_WEIGHT_MIN: Final = 12.0
+"""… and weight of a wall's heaviest one."""
+TOGETHER_WEIGHT_MIN: Final = 5.0
+"""Weight of two spans, at least, that are evidence together."""
+PRIOR_NAT: Final = -2.0
+"""Log prior odds of a line that passed the tests, before its evidence."""
+PROVEN_WEIGHT_MIN: Final = 6.0
+"""… of a wall that a corner proves …"""
+SPAN_DENSITY: Final = 4.0
+"""… and least weight for each metre."""
+PROOF_ECHOES: Final = 5.0
+PROOF_LEAD: Final = 3.0
+"""Echoes of a corner that proves its walls, and so many times its passes; …"""
+PROOF_SINE: Final = 0.8
+"""… least sine of the angle between them: a line across a corner meets its walls at half of theirs."""
+EDGE_SIGMA_MAX_M: Final = 0.05
+"""Greatest uncertainty of a sure edge."""
+EDGE_LEAD_MIN: Final = 2.0
+"""Least lead of echoes over passes, of an edge where a sure wall ends."""
+EDGE_NEAR_M: Final = 0.18
+"""Ranges that passed so near the end of a span, three bins, may have passed beyond the edge."""
+CORNER_MET_M: Final = 0.3
+"""A corner is reported if both walls come so near it, …"""
+ALONE_ECHOES: Final = 8.0
+ALONE_EDGE_ECHOES: Final = 5.0
+ROUGH_LEAD: Final = 5.0
+"""… or if so many echoes come from it, and so many times its passes, whatever is known of its walls: from an inside
+corner between mirrors, from afar, or from an edge, of which between mirrors fewer are enough: it is heard from near
+alone. Where slanting walls answer, some of them may be a wall's."""
+POINT_PRIOR_NAT: Final = 0.0
+POINT_ECHO_NAT: Final = 1.0
+"""Log prior odds of a corner where walls end, and evidence of each echo."""
+THROUGH: Final = 0.8
+"""A wall this near to the middle of a named object, as a share of its radius, would go through it."""
+SIDE_M: Final = 0.08
+"""A wall no longer than an object is wide, this near to touching it, is the object's side."""
+TINY_M: Final = 1e-6
+EVIDENCE_MAX_NAT: Final = 12.0
+"""Greatest evidence that is believed: readings are not independent."""
+
+
+class WallSegment(Record):
+    """A reported wall: one span, from end to end."""
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    variance_across: float
+    """Of its middle, across the wall, m²."""
+    variance_turn: float
+    """rad²"""
+    echoes: float
+    log_odds: float
+    number: int
+
+
+class CornerPoint(Record):
+    """A reported corner."""
+
+    x: float
+    y: float
+    covariance_xx: float
+    """m²"""
+    covariance_xy: float
+    covariance_yy: float
+    is_edge: int
+    """1 where it juts out, 0 for an inside corner."""
+    echoes: float
+    log_odds: float
+
+
+def wall_segments(memory: Memory) -> NDArray[Any]:
+    """Return the walls that are sure, one segment for each span, as records of `WallSegment`, shape (n,)."""
+    return room_report(memory)[0]
+
+
+def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
+    with np.errstate(all="ignore"):  # numbers of a damaged recording
+        room, are_mirrors, are_rough = memory.state["room"][0], has_mirrors(memory), edges_answer(memory)
+        corners, edges = room["corners"].copy(), room["edges"].copy()
+        if are_rough:
+            # An inside corner is the farthest of its walls from any sensor: what seems to come from it is theirs.
+            for points in (corners, edges):
+                points["echoes"][points["is_edge"] == 0] = 0.0
+        walls = sure_walls(room["walls"][:MAX_WALLS], corners)
+        if are_rough:
+            for of in walls.values():
+                of.hold_to_review()
+            walls = {number: of for number, of in walls.items() if len(of.ends)}
+        corners, edges = straighten(walls, corners, edges)
+        found = [*reach_corners(walls, corners, are_mirrors), *end_at_edges(walls, edges, are_mirrors)]
+        bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
+        segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
+        return np.array(segments, WallSegment.DTYPE), np.array(found, CornerPoint.DTYPE)
+
+
+def has_mirrors(memory: Memory) -> bool:
+    """Return whether the walls are known to be mirrors, as `contact.are_mirrors` does in compiled code."""
+    return float(memory.state["room"]["edge_silences"][0]) >= MIRRORS_SILENCES and not edges_answer(memory)
+
+
+def edges_answer(memory: Memory) -> bool:
+    """Return whether slanting walls answer from the beam's edge, as `contact.edges_answer` does."""
+    echoes, silences, is_loud = (
+        float(memory.state["room"][name][0]) for name in ("edge_echoes", "edge_silences", "is_loud")
+    )
+    return echoes > EDGES_SHARE * silences + (-EDGES_LEAD if is_loud == 1.0 else EDGES_LEAD)
+
+
+def is_of_body(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
+    """Return whether a segment goes through a round object or is the side of one.
+
+    Drums in a row have a line along them, and no wall.
+
+    Parameters
+    ----------
+    segment : tuple of float
+        Begins with its ends x, y, x, y, m.
+    bodies : (n,) record of `CircleTrack`
+        The objects.
+    """
+    x1, y1, x2, y2 = segment[:4]
+    tx, ty = x2 - x1, y2 - y1
+    length = max(math.hypot(tx, ty), TINY_M)
+    dx, dy, radius = bodies["x"] - x1, bodies["y"] - y1, bodies["radius"]
+    share = np.clip((dx * tx + dy * ty) / length**2, 0.0, 1.0)
+    away = np.hypot(dx - share * tx, dy - share * ty)
+    is_side = (length < 2.0 * radius) & (np.abs(away - radius) < SIDE_M)
+    return bool(((away < THROUGH * radius) | is_side).any())
+
+
+def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
+    variance, covariance, variance_turn = of.variances
+    columns = (of.ends.tolist(), *(of.spans[name] for name in ("weight", "chi2", "number")))
+    for (low, high), weight, chi2, number in zip(*columns, strict=True):
+        middle = 0.5 * (low + high)
+        across = variance + 2.0 * middle * covariance + middle * middle * variance_turn
+        evidence = min(EVIDENCE_MAX_NAT, 0.5 * max(of.wall["chi2"], chi2))
+        yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence, number)
+
+
+def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight]:
+    """Return the walls that are sure, by their number: alone, or as a sure wall's neighbour at a corner.
+
+    Parameters
+    ----------
+    walls : (n,) record of `Wall`
+        All walls.
+    corners : (n,) record of `RoomCorner`
+        All corners.
+    """
+    found: dict[int, Straight] = {}
+    misfit_max = np.where(walls["weight"] < LIGHT_WEIGHT, LIGHT_MISFIT_MAX, MISFIT_MAX)
+    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < misfit_max)).tolist()
+    heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
+    heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
+    first, second = walls[heard["first"]], walls[heard["second"]]
+    sine = first["normal_x"] * second["normal_y"] - first["normal_y"] * second["normal_x"]
+    pairs = np.column_stack([heard["first"], heard["second"]])[np.abs(sine) > PROOF_SINE]
+    spans = walls["spans"][fitting]
+    is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
+    is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= WALL_WEIGHT_MIN)
+    if not (spans["chi2"][is_long] >= FIRST_CHI2_MIN).any():
+        return found
+    for is_neighbour in (False, True):
+        proven = {int(b if a in found else a) for a, b in pairs if (a in found) != (b in found)}
+        for number in fitting if not is_neighbour else sorted(proven.intersection(fitting)):
+            wall = walls[number]
+            spans = wall["spans"][: wall["span_count"]]
+            spans = spans[sure_spans(spans, wall["chi2"], is_neighbour)]
+            if len(spans):
+                found[number] = straight(wall, spans)
+    return found
+
+
+def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.bool_]:
+    """Return which spans of a wall can be reported: none unless it is a wall, by its best span or by all together.
+
+    Parameters
+    ----------
+    spans : (n,) record of `Span`
+        All spans of the wall.
+    chi2 : float
+        Evidence of all together.
+    is_proven : bool
+        Whether a corner proves that it is a wall.
+    """
+    length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
+    least = PROVEN_WEIGHT_MIN if is_proven else SPAN_WEIGHT_MIN
+    dense = (weight >= np.maximum(least, SPAN_DENSITY * length)) & (straight > SPAN_CHI2_MIN)
+    sure = dense & (length >= SPAN_MIN_M)
+    if sure.any() and not is_proven:
+        together = chi2 if np.count_nonzero(dense & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
+        is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
+        sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
+    return np.asarray(sure)
+
+
+def reach_corners(
+    walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool
+) -> list[tuple[float, ...]]:  # fmt: skip
+    """Move the ends of walls to the corners in which they end, unless ranges passed there.
+
+    A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
+    an inside corner answers from afar, and elsewhere only an edge: that one is sure whatever is known of its walls.
+
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their ends are updated.
+    corners : (n,) record of `RoomCorner`
+        All corners.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors.
+
+    Returns
+    -------
+    list of tuple
+        The corners that are sure, as `CornerPoint` has them.
+    """
+    found = []
+    for corner in corners[corners["is_used"] == 1]:
+        x, y, echoes, passes, ended = (float(corner[name]) for name in ("x", "y", "echoes", "passes", "ended"))
+        owners = [walls[number] for number in (int(corner["first"]), int(corner["second"])) if number in walls]
+        places = [owner.beyond(x, y) for owner in owners]
+        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
+        is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
+        is_near = is_near and passes < CORNER_PASSED_SHARE * ended
+        is_met = len(owners) == 2
+        for owner, (along, gap, at) in zip(owners, places, strict=True):
+            end = owner.ends[at]
+            if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_REACH_M and not owner.is_passed(along, end):
+                owner.ends[at] = along
+            is_met = is_met and abs(owner.ends[at] - along) < CORNER_MET_M
+        far = float(corner["far_echoes"])
+        lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
+        is_proven = far >= ALONE_ECHOES and far > lead * passes and corner["is_edge"] != are_mirrors
+        if is_proven or (is_met and (is_heard or is_near)):
+            # Ranges that end at both walls speak for their corner, whether it answers or not.
+            found.append(_point(corner, max(echoes, CORNER_PASSED_SHARE * ended) if is_met and is_near else echoes))
+    return found
+
+
+def end_at_edges(
+    walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: bool
+) -> list[tuple[float, ...]]:  # fmt: skip
+    """Move the ends of walls to the edges that are heard there.
+
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their ends are updated.
+    edges : (n,) record of `RoomCorner`
+        All edges.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors; an edge is heard from near then.
+
+    Returns
+    -------
+    list of tuple
+        The edges that are sure, as `CornerPoint` has them.
+    """
+    found = []
+    for edge in edges[edges["is_used"] == 1]:
+        echoes, passes, owner = float(edge["echoes"]), float(edge["passes"]), walls.get(int(edge["first"]))
+        if are_mirrors and edge["is_edge"] == 1:
+            echoes -= float(edge["far_echoes"])
+        variance = float(edge["covariance_xx"] + edge["covariance_yy"])
+        if echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2:
+            continue
+        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ALONE_ECHOES
+        is_sure = echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
+        if owner is not None:
+            along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
+            reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_MIN_M
+            beyond = (along - owner.ends[:, side]) * (2 * side - 1)
+            span = int(np.abs(beyond).argmin())
+            is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)
+            is_near = abs(beyond[span]) < EDGE_NEAR_M
+            is_end = echoes >= EDGE_ECHOES_MIN or is_near
+            if is_own and is_end and (is_near or not owner.is_passed(along, owner.ends[span, side])):
+                owner.ends[span, side] = along
+                is_sure = True
+        if is_sure:
+            found.append(_point(edge, float(edge["echoes"])))
+    return found
+
+
+def _point(corner: NDArray[Any], signs: float) -> tuple[float, ...]:
+    """Return a corner as `CornerPoint` has it; `signs` of it, as an echo is one, against the ranges that passed."""
+    log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (signs - float(corner["passes"]))
+    place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))
+    clipped = min(max(log_odds, -EVIDENCE_MAX_NAT), EVIDENCE_MAX_NAT)
+    return (*place, int(corner["is_edge"]), float(corner["echoes"]), clipped)
+
+
+def wall_ends(memory: Memory) -> Floats:
+    """Return the ends x, y, x, y (m) of the walls that are sure, shape (n, 4)."""
+    segments = wall_segments(memory)
+    return np.column_stack([segments[name] for name in ("x1", "y1", "x2", "y2")])

@@ -1,0 +1,126 @@
+"""Tracks as archived records, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from perception.bayes.inference import reservoir
+from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY, Reading
+from perception.bayes.memory.state import CircleTrack, Memory, PolygonTrack
+from perception.bayes.tracks.archived_tracks import (
+    READINGS_KEPT,
+    archived_dtype,
+    bearing_bins,
+    newest_readings,
+    pack,
+    unpack,
+)
+from perception.records import records, zeros
+from tests.perception.bayes.random_tracks import new_memory, random_track
+
+BYTES_MAX = 2000
+
+
+def filled(seed: int, readings: int) -> Memory:
+    """Return a memory whose first circle holds so many random readings."""
+    memory, rng = new_memory(), np.random.default_rng(seed)
+    random_track(rng, memory, 0)
+    track = memory.tracks[0]
+    memory.circles["bins"]["count"][0] = 0
+    one = zeros(Reading, 1)
+    for _ in range(readings):
+        turn = rng.uniform(-np.pi, np.pi)
+        one[0] = (
+            *(np.array([track.x, track.y]) + rng.uniform(-6.0, 6.0, 2)),
+            np.cos(turn),
+            np.sin(turn),
+            3.0,
+            0.0,
+            0.0,
+        )
+        reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
+    return memory
+
+
+@pytest.mark.parametrize("readings", [0, 3, READINGS_KEPT, 400])
+def test_a_track_comes_back_as_it_was_but_for_its_older_readings(readings: int) -> None:
+    memory = filled(readings, readings)
+    before = memory.circles[0].copy()
+    row = pack(memory.circles[:1], archived_dtype(CircleTrack), is_reported=True)
+    unpack(row, memory.circles[1:2])
+    after = memory.circles[1]
+    for name in CircleTrack.DTYPE.names or ():
+        if name != "bins":
+            assert np.array_equal(after[name], before[name]), name
+    kept = np.minimum(before["bins"]["count"], BIN_CAPACITY)
+    counts = after["bins"]["count"]
+    assert counts.sum() == min(kept.sum(), READINGS_KEPT)
+    assert (counts <= kept).all()
+    assert (counts[kept > 0] > 0).all() or kept.sum() > READINGS_KEPT
+    for b, count in enumerate(counts.tolist()):
+        newest = [int(before["bins"]["count"][b] - 1 - k) % BIN_CAPACITY for k in range(count)][::-1]
+        for field in ("x", "y", "axis_x", "axis_y", "range_m"):
+            held = after["bins"]["readings"][b, :count][field]
+            assert held == pytest.approx(before["bins"]["readings"][b, newest][field], abs=2e-6)
+
+
+def test_a_bearing_that_gets_more_than_it_holds_keeps_the_newest() -> None:
+    memory = filled(2, 400)
+    memory.circles["x"][0] -= 500.0  # the fit moved since the readings were kept: all lie at one bearing now
+    memory.circles["y"][0] -= 100.0
+    newest = newest_readings(memory.circles["bins"][0])[:BIN_CAPACITY][::-1]
+    unpack(pack(memory.circles[:1], archived_dtype(CircleTrack), is_reported=True), memory.circles[1:2])
+    bins = memory.circles["bins"][1]
+    (b,) = np.flatnonzero(bins["count"]).tolist()
+    assert bins["count"][b] == BIN_CAPACITY < READINGS_KEPT
+    assert bins["readings"]["x"][b] == pytest.approx(newest["x"], abs=1e-4)
+    assert bins["readings"]["y"][b] == pytest.approx(newest["y"], abs=1e-4)
+
+
+def test_of_many_readings_each_bearing_keeps_its_newest() -> None:
+    bins = filled(1, 400).circles["bins"][0]
+    kept = newest_readings(bins)
+    assert len(kept) == READINGS_KEPT
+    assert READINGS_KEPT >= BEARING_BINS
+    for b in np.flatnonzero(bins["count"]).tolist():
+        newest = bins["readings"][b, (bins["count"][b] - 1) % BIN_CAPACITY]
+        assert newest.tobytes() in {one.tobytes() for one in kept}
+
+
+def test_bearings_are_those_of_the_reservoir() -> None:
+    rng = np.random.default_rng(3)
+    places = rng.normal(size=(200, 2))
+    memory = new_memory()
+    track, one = memory.tracks[0], zeros(Reading, 1)
+    for place, b in zip(places.tolist(), bearing_bins(places, BEARING_BINS).tolist(), strict=True):
+        before = memory.circles["bins"]["count"][0].copy()
+        one["x"], one["y"] = place
+        reservoir.keep_reading(track, 0.0, 0.0, records(Reading, one)[0])
+        assert np.flatnonzero(memory.circles["bins"]["count"][0] - before).tolist() == [b]
+
+
+def test_a_polygon_comes_back_too() -> None:
+    memory = new_memory()
+    track = memory.polygons[0]
+    track["x"], track["y"], track["heading"], track["number"], track["covariance"]["hh"] = 3.0, -2.0, 0.7, 12, 0.01
+    track["bins"]["count"][5] = 1
+    track["bins"]["readings"][5, 0] = (1.0, 0.5, 0.6, 0.8, 2.5, 0.0, 0.0)
+    unpack(pack(memory.polygons[:1], archived_dtype(PolygonTrack), is_reported=False), memory.polygons[-1:])
+    back = memory.polygons[-1]
+    assert (back["x"], back["heading"], back["number"], back["covariance"]["hh"]) == (3.0, 0.7, 12, 0.01)
+    assert back["bins"]["count"].sum() == 1
+
+
+def test_an_archived_object_takes_less_than_2_kb() -> None:
+    assert max(archived_dtype(kind).itemsize for kind in (CircleTrack, PolygonTrack)) < BYTES_MAX
+
+
+def test_cross_paths_are_left_out_of_an_archived_track() -> None:
+    memory, one = filled(3, 0), zeros(Reading, 1)
+    track = memory.tracks[0]
+    for k in range(30):
+        one[0] = (track.x + 2.0, track.y, -1.0, 0.0, 1.0 + k, 0.1 * (k % 3), 0.0)
+        reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
+    kept = newest_readings(memory.circles["bins"][0])
+    assert kept["range_m"].tolist() == [1.0 + k for k in range(29, 9, -1) if k % 3 == 0]

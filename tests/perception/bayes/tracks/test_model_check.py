@@ -1,0 +1,142 @@
+"""Checks of models against oracles on random cases, and when they are careful."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.bayes.inference.range_fit import FAR
+from perception.bayes.memory.parameters import CONFIRMED_SIDES, TRUSTED_M
+from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
+from perception.bayes.tracks import model_check
+from perception.records import array_of
+from tests import naive_bayes, naive_naming, naive_walls
+from tests.naive_walls import Array
+from tests.perception.bayes.random_tracks import (
+    COSINES,
+    P,
+    S,
+    around,
+    enter_readings,
+    examples,
+    new_memory,
+    noises,
+    pair,
+    place_of,
+    predict_own,
+    random_track,
+)
+from tests.perception.bayes.rooms import fill, new_room, place_wall
+
+SPAN = (-1.2, 1.5)
+"""Ends of the only span of each wall, m."""
+LEAST = math.log(0.03)
+"""Log ratio of an outlier, nat."""
+
+
+def room_evidence(w: Array, walls: list[tuple[float, float]], corner: Array, edges: bool, level: int) -> Array:
+    """Return the best log ratio of each reading under walls (normal, distance) with one span, and a corner."""
+    noise, best = noises()[level], np.full(len(w), LEAST)
+    for j, q in enumerate(w):
+        axis, found = math.atan2(q[3], q[2]), []
+        for normal, distance in walls:
+            off = abs((axis - normal + math.pi) % (2.0 * math.pi) - math.pi)
+            ahead = distance - q[:2] @ (math.cos(normal), math.sin(normal))
+            if ahead <= 0.0 or math.cos(off) < 0.25 or (off > S.half_angle_rad and not edges):
+                continue
+            reach, along = naive_walls.answer(q[:2], axis, S.half_angle_rad, normal, distance)
+            if SPAN[0] - 0.2 <= along <= SPAN[1] + 0.2:
+                found.append(reach)
+        seen = naive_bayes.look(w[j : j + 1], corner)
+        if seen.cos[0] >= COSINES[0]:
+            found.append(float(seen.d[0]))
+        for reach in found:
+            best[j] = max(best[j], naive_bayes.evidence(noise, q[None, 4], q[None, 4] - reach)[0])
+    return best
+
+
+@examples(40, 400)
+def test_misfit_room_and_sides_are_those_of_the_hits(examples: int) -> None:
+    rng, wide, explained = np.random.default_rng(60), 0, 0
+    expected, variance = (array_of(P)[name][0] for name in ("expected_nat", "variance_nat2"))
+    for _ in range(examples):
+        memory, room = new_room()
+        memory.state["noise_level"] = level = int(rng.integers(4, 20))
+        walls = [(float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(0.2, 1.0))) for _ in range(2)]
+        for k, (normal, distance) in enumerate(walls):
+            place_wall(room.walls[k], np.zeros(2), normal, distance)
+            fill(memory, room.walls[k], *SPAN)
+        corner = rng.uniform(-1.0, 1.0, 2)
+        room.corners[0].is_used, (room.corners[0].x, room.corners[0].y) = 1, pair(corner)
+        edges = bool(rng.random() < 0.5)
+        room.edge_echoes = 9.0 * edges
+        random_track(rng, memory, 0, ESTABLISHED)
+        track, centre, rho = memory.tracks[0], place_of(memory, 0), float(memory.tracks[0].radius)
+        w = around(rng, 60, centre, rho)
+        enter_readings(memory, w)
+        predict_own(memory, len(w), centre, rho)
+        model_check.check_model(memory.s, P, track, len(w))
+        seen = naive_bayes.look(w, centre)
+        e = w[:, 4] - (seen.d - rho)
+        w, e, seen_u = (a[(np.abs(e) <= S.gate_m) & (seen.cos >= COSINES[1])] for a in (w, e, seen.u))
+        levels = noises()[level].levels[np.minimum((w[:, 4] * noises()[level].per_metre).astype(int), 10_000)]
+        by_room = room_evidence(w, walls, corner, edges, level)
+        want = naive_naming.model_check(
+            naive_bayes.evidence(noises()[level], w[:, 4], e), by_room,
+            expected[levels], variance[levels], np.arctan2(seen_u[:, 1], seen_u[:, 0]),
+        )  # fmt: skip
+        assert (track.misfit, track.room_lead) == pytest.approx(want[:2], rel=1e-6, abs=1e-6)
+        assert track.sides == want[2]
+        wide += want[2] >= CONFIRMED_SIDES
+        explained += int((by_room > 0.0).sum())
+    assert 0.1 * examples < wide < examples
+    assert explained > 0.5 * examples
+
+
+def hear(memory: Memory, ranges: list[float], moved_m: float = 0.0) -> None:
+    """Count a firing's ranges, after the ring has moved."""
+    for i, range_m in enumerate(ranges):
+        memory.s[0].scratch.fired[i].range_m = range_m
+    model_check.count_surroundings(memory.s, len(ranges), moved_m)
+
+
+def test_everything_echoes_where_hardly_a_beam_is_silent() -> None:
+    memory = new_memory()
+    assert not model_check.everything_echoes(memory.s, P), "nothing is known yet"
+    for _ in range(50):
+        hear(memory, [1.0] * 7 + [2.0 * FAR])
+    assert memory.s[0].silent / (memory.s[0].heard + memory.s[0].silent) == pytest.approx(0.125, abs=0.01)
+    assert model_check.everything_echoes(memory.s, P)
+    for _ in range(500):
+        hear(memory, [1.0] * 6 + [2.0 * FAR] * 2)
+    assert not model_check.everything_echoes(memory.s, P), "mirrors leave a quarter of the beams silent"
+    memory.state["room"]["edge_echoes"] = 9.0
+    assert model_check.everything_echoes(memory.s, P), "walls answer from the beam's edge"
+
+
+def test_a_withdrawn_name_makes_careful_until_a_model_is_confirmed() -> None:
+    memory = new_memory()
+    hear(memory, [1.0, 2.0 * FAR], TRUSTED_M + 1.0)
+    assert not model_check.is_careful(memory.s, P)
+    track = memory.tracks[0]
+    track.status, track.radius = FREE, 0.3
+    model_check.count_names(memory.s, memory.tracks, P, 0, 5.0, 5.0)
+    assert memory.s[0].names_withdrawn == 1
+    assert model_check.is_careful(memory.s, P)
+    other = memory.tracks[1]
+    other.status, other.is_named, other.x, other.y = ESTABLISHED, 1, 5.0, 5.1
+    model_check.count_names(memory.s, memory.tracks, P, 0, 5.0, 5.0)
+    assert memory.s[0].names_withdrawn == 1, "another track took over"
+    other.sides = CONFIRMED_SIDES - 1
+    model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
+    assert other.is_confirmed == 0
+    other.sides = CONFIRMED_SIDES
+    other.outline_lead, other.leads[1] = -9.0, -2.0
+    model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
+    assert other.is_confirmed == 0, "only its prior makes it likelier than the first alternative"
+    other.leads[1] = -4.0
+    model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
+    assert (other.is_confirmed, memory.s[0].names_withdrawn, memory.s[0].unconfirmed_m) == (1, 0, 0.0)
+    assert not model_check.is_careful(memory.s, P)

@@ -1,0 +1,103 @@
+"""What a firing leaves in the memory against its oracle: readings are placed, remembered, associated and kept."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
+from perception.bayes.memory.scratch import ON_LINE, UNEXPLAINED
+from perception.bayes.memory.state import ESTABLISHED, FREE
+from perception.bayes.tracks import observe
+from tests import naive_occlusion, naive_tracks
+from tests.naive_tracks import rows
+from tests.perception.bayes.random_tracks import (
+    NOISES,
+    SENSORS,
+    TRACKS,
+    P,
+    S,
+    around,
+    examples,
+    kept_by,
+    new_memory,
+    numbers,
+    place_of,
+    random_track,
+    sigma,
+)
+
+
+@examples(25, 400)
+def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_bear_on_keeps_them(
+    examples: int,
+) -> None:
+    rng, memory = np.random.default_rng(10), new_memory()
+    circles, scratch = memory.circles, memory.state["scratch"]
+    fired, explained_by = numbers(scratch["fired"][0])[:SENSORS, :5], scratch["explained_by"][0, :SENSORS]
+    taken = kept = 0
+    for _ in range(examples):
+        circles.view(np.uint8)[...] = 0
+        memory.s[0].noise_level = int(rng.integers(len(NOISES)))
+        for t in range(TRACKS):
+            random_track(rng, memory, t)
+        circles["idle_firings"], circles["unseen"] = 7, 2
+        t = int(rng.integers(TRACKS))
+        fired[...] = around(rng, SENSORS, place_of(memory, t), float(circles["radius"][t]))
+        explained_by[...] = UNEXPLAINED
+        observe.associate_circles(memory.s, memory.tracks, P, SENSORS)
+        established = [
+            (k, place_of(memory, k), float(circles["radius"][k]), float(circles["root_xx"][k]))
+            for k in np.flatnonzero(circles["status"] == ESTABLISHED).tolist()
+        ]
+        owner = [
+            naive_tracks.claimed_by(q, established, S.cos_may_answer, S.half_resolution_m, sigma(memory))
+            for q in fired
+        ]
+        assert explained_by.tolist() == owner
+        taken += sum(o >= 0 for o in owner)
+        explained_by[rng.random(SENSORS) < 0.2] = ON_LINE - 3
+        observe.keep_readings(memory.s, memory.tracks, P, SENSORS)
+        for k in range(TRACKS):
+            status, centre, radius = circles["status"][k], place_of(memory, k), float(circles["radius"][k])
+            same = {
+                o for o in range(TRACKS)
+                if not naive_occlusion.is_elsewhere(
+                    math.dist(centre, place_of(memory, o)), radius, circles["radius"][o],
+                    circles["kind"][o] < S.model_count, S.merge_m, S.gate_m,
+                )
+            }  # fmt: skip
+            want = [
+                q for q, o in zip(fired.copy(), explained_by.tolist(), strict=True)
+                if status != FREE and naive_tracks.bears_on(
+                    q, centre, radius, o == -1, o in (-1, k, *same) or (o < 0 and status == ESTABLISHED),
+                    S.cos_may_answer, S.cos_must_answer, S.gate_m, S.pair_range_max_m,
+                )
+            ]  # fmt: skip
+            bins, n = naive_tracks.Reservoir(BEARING_BINS, BIN_CAPACITY), len(want)
+            for q in want:
+                bins.put(centre, q)
+            assert rows(kept_by(memory, k)) == rows(q for room in bins.kept for q in room)
+            assert circles["unseen"][k] == 2 + n
+            assert circles["idle_firings"][k] == (0 if n else 7 + (status != FREE))
+            assert circles["final_refinements"][k] == (S.final_refinements if n else 0)
+            kept += n
+    assert taken > 2 * examples
+    assert kept > 7 * examples
+
+
+def test_the_surest_unexplained_segment_in_reach_is_proposed_first() -> None:
+    memory = new_memory()
+    scratch = memory.state["scratch"]
+    segments, explained_by = scratch["segments"][0], scratch["explained_by"][0]
+    segments["reading"][:5] = np.arange(5)
+    segments["sigma_direction"][:5] = (0.02, 0.03, 0.001, 0.2, 0.002)
+    numbers(scratch["fired"][0])[:5] = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
+    explained_by[:5] = UNEXPLAINED
+    explained_by[2] = 4
+    scratch["fired"]["range_m"][0, 4] = S.pair_range_max_m + 0.1
+    made = memory.s[0].scratch.segments[:5]
+    for chosen in (0, 1, -1):
+        assert observe.surest_segment(made, memory.s, P) == chosen
+        explained_by[chosen] = 7
