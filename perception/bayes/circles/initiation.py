@@ -14,10 +14,11 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.lines import add_line
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
+from perception.bayes.inference.outline_map import enter_attracting, relax_hypothesis, segments_near
 from perception.bayes.inference.range_fit import fit_circle
 from perception.bayes.inference.reservoir import gather_history, keep_reading
-from perception.bayes.inference.track_labels import assign_number, clear_track, is_rejected
-from perception.bayes.memory.elements import ATTRACTING_MAX, MappedSegment
+from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
+from perception.bayes.memory.elements import ATTRACTING_MAX
 from perception.bayes.memory.parameters import (
     ATTRACTING_MIN,
     CELL_M,
@@ -33,41 +34,12 @@ from perception.bayes.memory.parameters import (
     INITIATION_STEPS,
     LINE_LENGTH_MIN_M,
     NEW_LINE_HITS_MIN,
-    RELAXATION_GAMMA,
     RIVAL_OVER_UNKNOWN_NAT,
     SWITCH_LEAD_NAT,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
-from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, CircleTrack, CircleTracks, StateRecord
-from perception.bayes.segments.segment_pairs import segments_near
-from perception.kernel import Floats, kernel
-from perception.records import Records
-from perception.relaxation import relax
-
-
-@kernel
-def free_track(tracks: Records[AnyTrack]) -> int:
-    """Return a free track, else the unmarked tentative one with the least evidence, else −1."""
-    worst = math.inf
-    slot = -1
-    for t in range(len(tracks)):
-        track = tracks[t]
-        if track.status == FREE:
-            return t
-        if track.status == TENTATIVE and track.log_likelihood_ratio < worst and track.marks == 0:
-            worst = track.log_likelihood_ratio
-            slot = t
-    return slot
-
-
-@kernel
-def enter_attracting(segment: MappedSegment, row: Floats) -> None:
-    """Write a mapped segment as the relaxation takes it, (5,) float: it has a middle and a normal, and no ends."""
-    row[0] = segment.x
-    row[1] = segment.y
-    row[2] = segment.x
-    row[3] = segment.y
-    row[4] = math.atan2(segment.normal_y, segment.normal_x)
+from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
+from perception.kernel import kernel
 
 
 @kernel
@@ -93,38 +65,6 @@ def is_known(tracks: CircleTracks, p: SettingsRecord, x: float, y: float, shift:
             if math.hypot(x - k * nx - track.x, y - k * ny - track.y) < p[0].merge_m:
                 return True
     return False
-
-
-@kernel
-def relax_hypothesis(
-    s: StateRecord, sides: Floats, attracting: int, negligible_m: float, negligible_rad: float, steps: int
-) -> None:  # fmt: skip
-    """Move the scratch's hypothesis by the paper's relaxation (§3.4).
-
-    Parameters
-    ----------
-    s : (1,) State
-        Memory, updated.
-    sides : (n, 4) float
-        The model's sides, as `perception.relaxation` takes them.
-    attracting : int
-        How many of the scratch's attracting segments there are.
-    negligible_m, negligible_rad, steps
-        As for `perception.relaxation.relax`.
-    """
-    scratch = s[0].scratch
-    hypothesis = scratch.hypothesis
-    pose = scratch.pose[:]
-    pose[0] = hypothesis.x
-    pose[1] = hypothesis.y
-    pose[2] = hypothesis.heading
-    relax(
-        sides, scratch.attracting[:], scratch.attracting_rows[:attracting], RELAXATION_GAMMA, negligible_m,
-        negligible_rad, steps, pose,
-    )  # fmt: skip
-    hypothesis.x = pose[0]
-    hypothesis.y = pose[1]
-    hypothesis.heading = pose[2]
 
 
 @kernel

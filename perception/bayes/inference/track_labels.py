@@ -1,4 +1,4 @@
-"""Numbers of tracks, and what a user confirmed, placed or rejected.
+"""Numbers of tracks, which are free, and what a user confirmed, placed or rejected.
 
 A track gets its number when it starts and keeps it; a user's mark on it lasts until it is withdrawn, however little
 the readings say: the track yields to no alternative explanation, and to no other track in its place. Where a user
@@ -12,6 +12,22 @@ import math
 from perception.bayes.memory.elements import REJECTIONS_MAX
 from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, StateRecord
 from perception.kernel import kernel
+from perception.records import Records
+
+
+@kernel
+def free_track(tracks: Records[AnyTrack]) -> int:
+    """Return a free track, else the unmarked tentative one with the least evidence, else −1."""
+    worst = math.inf
+    slot = -1
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status == FREE:
+            return t
+        if track.status == TENTATIVE and track.log_likelihood_ratio < worst and track.marks == 0:
+            worst = track.log_likelihood_ratio
+            slot = t
+    return slot
 
 
 @kernel

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.circles.initiation import enter_attracting, free_track, relax_hypothesis
+from perception.bayes.inference.outline_map import enter_attracting, relax_hypothesis, segments_near
 from perception.bayes.inference.reservoir import copy_reading, keep_reading
-from perception.bayes.inference.track_labels import assign_number, clear_track, is_rejected
+from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
 from perception.bayes.memory.job_records import INITIATION
 from perception.bayes.memory.parameters import CELL_M
@@ -48,7 +48,6 @@ from perception.bayes.polygons.job import (
     start_search,
 )
 from perception.bayes.polygons.readings import gather_polygon_history
-from perception.bayes.segments.segment_pairs import segments_near
 from perception.kernel import kernel
 from perception.records import Records
 

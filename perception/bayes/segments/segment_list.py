@@ -8,10 +8,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.inference.outline_map import add_to_map, bucket_index
 from perception.bayes.memory.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.memory.parameters import CELL_M
 from perception.bayes.memory.state import FREE, CircleTracks, Memory, StateRecord
-from perception.bayes.segments.segment_pairs import add_to_map, bucket_index
 from perception.kernel import Floats, kernel
 from perception.records import Records, records, zeros
 
@@ -28,7 +28,7 @@ def put_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number
     s : (1,) State
         Memory, updated.
     x, y, nx, ny, number, time_s
-        As for `segment_pairs.add_to_map`.
+        As for `outline_map.add_to_map`.
     """
     buckets = s[0].buckets
     k = bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), len(buckets))

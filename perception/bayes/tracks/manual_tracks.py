@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from perception.bayes.circles.initiation import (
-    free_track,
     gather_relevant,
     relax_onto_map,
     restart_circle,
@@ -17,7 +16,7 @@ from perception.bayes.circles.initiation import (
 )
 from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.reservoir import copy_reservoir, gather_history
-from perception.bayes.inference.track_labels import assign_number
+from perception.bayes.inference.track_labels import assign_number, free_track
 from perception.bayes.memory.job_records import REFINEMENT
 from perception.bayes.memory.parameters import (
     CENTRE_VARIANCE_MAX_M2,

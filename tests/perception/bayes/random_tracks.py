@@ -12,6 +12,7 @@ import pytest
 from config.load import load_settings
 from perception.bayes.inference import reservoir
 from perception.bayes.inference.kernel_settings import make_settings
+from perception.bayes.inference.outline_map import bucket_index
 from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import BUCKETS, MAX_LINES, Reading
@@ -20,7 +21,6 @@ from perception.bayes.memory.scratch import Predictions
 from perception.bayes.memory.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.memory.state import Memory
 from perception.bayes.segments.segment_list import put_segment
-from perception.bayes.segments.segment_pairs import bucket_index
 from perception.kernel import Floats
 from perception.records import Records, array_of, records, zeros
 from perception.sensor_mounts import mounts_array

@@ -1,4 +1,4 @@
-"""Circle hypotheses: which track is free, what is known already, and a drum started from its segments."""
+"""Circle hypotheses: what is known already, and a drum started from its segments."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from perception.bayes.circles import initiation as track_initiation
+from perception.bayes.inference.outline_map import add_to_map
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
 from perception.bayes.memory.parameters import CELL_M, NEW_LINE_HITS_MIN
-from perception.bayes.memory.state import ESTABLISHED, FREE, PLACED, TENTATIVE, CircleTrack, Memory
-from perception.bayes.segments.segment_pairs import add_to_map
+from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, Memory
 from perception.records import records, zeros
 from tests.perception.bayes.random_tracks import (
     RADII,
@@ -28,23 +28,6 @@ from tests.perception.bayes.random_tracks import (
     random_track,
     unit,
 )
-
-
-@examples(200, 1000)
-def test_the_free_track_is_the_first_free_one_or_the_unmarked_tentative_one_with_the_least_evidence(
-    examples: int,
-) -> None:
-    rng, memory = np.random.default_rng(12), new_memory()
-    circles = memory.circles
-    for _ in range(examples):
-        for k in range(TRACKS):
-            random_track(rng, memory, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
-        circles["marks"] = rng.choice([0, PLACED], TRACKS, p=[0.7, 0.3])
-        free = np.flatnonzero(circles["status"] == FREE)
-        tentative = np.flatnonzero((circles["status"] == TENTATIVE) & (circles["marks"] == 0))
-        evidence = circles["log_likelihood_ratio"][tentative]
-        weakest = int(tentative[np.argmin(evidence)]) if len(tentative) else -1
-        assert track_initiation.free_track(memory.tracks) == (free[0] if len(free) else weakest)
 
 
 def test_a_reset_track_keeps_only_its_number_its_marks_and_readings_beyond_the_counts() -> None:

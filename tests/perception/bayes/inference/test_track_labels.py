@@ -9,7 +9,24 @@ from perception.bayes.inference import track_labels
 from perception.bayes.memory.elements import REJECTIONS_MAX
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.bayes.tracks import refine
-from tests.perception.bayes.random_tracks import P, around, keep, new_memory, place_of, random_track
+from tests.perception.bayes.random_tracks import TRACKS, P, around, examples, keep, new_memory, place_of, random_track
+
+
+@examples(200, 1000)
+def test_the_free_track_is_the_first_free_one_or_the_unmarked_tentative_one_with_the_least_evidence(
+    examples: int,
+) -> None:
+    rng, memory = np.random.default_rng(12), new_memory()
+    circles = memory.circles
+    for _ in range(examples):
+        for k in range(TRACKS):
+            random_track(rng, memory, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
+        circles["marks"] = rng.choice([0, PLACED], TRACKS, p=[0.7, 0.3])
+        free = np.flatnonzero(circles["status"] == FREE)
+        tentative = np.flatnonzero((circles["status"] == TENTATIVE) & (circles["marks"] == 0))
+        evidence = circles["log_likelihood_ratio"][tentative]
+        weakest = int(tentative[np.argmin(evidence)]) if len(tentative) else -1
+        assert track_labels.free_track(memory.tracks) == (free[0] if len(free) else weakest)
 
 
 def test_every_new_track_gets_the_next_number_and_no_mark() -> None:

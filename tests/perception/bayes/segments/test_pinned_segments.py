@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from perception.bayes.inference.outline_map import bucket_index
 from perception.bayes.memory.elements import BUCKET_CAPACITY, BUCKETS
 from perception.bayes.memory.parameters import CELL_M
 from perception.bayes.memory.state import Memory
 from perception.bayes.segments.pinned_segments import Pins, delete, places_of, restore
 from perception.bayes.segments.segment_list import drawn, mapped_segments
-from perception.bayes.segments.segment_pairs import bucket_index
 from tests.perception.bayes.random_tracks import TRACKS, add_segment, examples
 
 
