@@ -15,8 +15,22 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from perception.kernel import Floats
-from perception.localization.landmark_filter import add_landmark, correct, innovation_variance, propagate, rows_used
-from perception.localization.landmark_state import FIRST, ODOMETER, RANGE, ROWS_MAX, TURN, Estimate, EstimateRecord
+from perception.localization.drift.landmark_filter import (
+    add_landmark,
+    correct,
+    innovation_variance,
+    propagate,
+    rows_used,
+)
+from perception.localization.drift.landmark_state import (
+    FIRST,
+    ODOMETER,
+    RANGE,
+    ROWS_MAX,
+    TURN,
+    Estimate,
+    EstimateRecord,
+)
 from perception.records import records, zeros
 
 RANGE_SIGMA_M: Final = 0.5

@@ -10,7 +10,7 @@ import numpy as np
 from bench.trials.false_canyon_trials import FalseCanyonTrial, corridor, try_path
 from bench.trials.false_wall_trials import STEPS_M, drum_hall
 from config.settings import Settings
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 from runtime.simulation.random_halls import ACOUSTICS
 
 Row = dict[str, float]

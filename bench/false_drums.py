@@ -9,7 +9,7 @@ from bench.trials.drumless_rooms import NOISE_RELATIVE, drumless_room
 from bench.trials.false_drum_trials import try_room
 from config.settings import Settings
 from config.world import AcousticsConfig
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 
 MINUTE_S: Final = 60.0
 

@@ -7,7 +7,7 @@ from typing import Final, get_args
 
 from bench.trials.false_wall_trials import STEPS_M, FalseWallTrial, drive_hall, try_hall
 from config.settings import Settings
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 from runtime.simulation.random_halls import ACOUSTICS
 
 Row = dict[str, float]

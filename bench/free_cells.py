@@ -25,7 +25,7 @@ from drivers.emulator.scene import Scene, compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Floats
 from perception.kernel import kernel
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 from perception.mapping.grid.window import Ring, placed
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array

@@ -22,7 +22,7 @@ from config.errors import WRONG_CALL, UserError
 from config.robot import RingConfig, SensorConfig
 from config.settings import GridConfig
 from drivers.messages import Firing, Floats, Pose
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 
 CELL_M: Final = 0.1

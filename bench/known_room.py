@@ -28,9 +28,9 @@ from bench.trials.known_room_trials import (
 from bench.trials.large_building import Building
 from config.robot import RingConfig
 from drivers.messages import Pose
-from perception.localization.expected_ranges import Reflection
-from perception.localization.known_room import KnownRoom
-from perception.localization.room import Room, room_of
+from perception.localization.known_room.known_room import KnownRoom
+from perception.localization.room.expected_ranges import Reflection
+from perception.localization.room.room import Room, room_of
 from runtime.timing.footprint import rss_mb
 
 LENGTH_M: Final = 10.0

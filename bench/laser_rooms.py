@@ -22,8 +22,8 @@ from bench.trials.known_room_trials import KnownDrive, drifting_odometry
 from config.errors import WRONG_CALL, UserError
 from config.robot import FiringConfig, RingConfig, SensorConfig
 from drivers.messages import Firing, Floats
-from perception.localization.expected_ranges import Reflection
-from perception.localization.room import Room, make_room
+from perception.localization.room.expected_ranges import Reflection
+from perception.localization.room.room import Room, make_room
 
 AXES_DEG: Final = tuple(range(-75, 76, 15))
 RESOLUTION_M: Final = 0.03048

@@ -13,7 +13,7 @@ from rich.table import Table
 from bench.trials.localization_trials import figures, localize_once
 from bench.trials.random_rooms import ACOUSTICS
 from config.robot import RingConfig
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 
 COLUMNS: Final = ("trials", "right", "offered", "wrong_alone", "confidently_wrong", "lost", "median_m", "max_m",
                   "median_deg", "max_deg", "cpu_ms_p50", "cpu_ms_max", "other_maps", "answers_there")  # fmt: skip

@@ -20,14 +20,14 @@ from bench.laser_rooms import RING, read_carmen, wall_map
 from bench.trials.known_room_trials import KnownDrive, Trace, figures, follow
 from config.robot import RingConfig
 from drivers.messages import Firing, Floats, Pose, wrap_angle
-from perception.localization.drift_correction import Status
-from perception.localization.expected_ranges import Beams, Reflection, expected_ranges, surfaces_near
-from perception.localization.known_room import KnownRoom
-from perception.localization.mixed_reflection import LATE_M, WILD_HEARD
-from perception.localization.particle_update import TEMPER
-from perception.localization.pose_grid import CELL_M, DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
-from perception.localization.range_likelihood import HEARD_SHARE
-from perception.localization.room import Room
+from perception.localization.known_room.known_room import KnownRoom
+from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
+from perception.localization.known_room.particle_update import TEMPER
+from perception.localization.known_room.pose_grid import CELL_M, DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
+from perception.localization.localized_pose import Status
+from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges, surfaces_near
+from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.room import Room
 
 HEADINGS: Final = 72
 STEP_RAD: Final = math.tau / HEADINGS
@@ -205,7 +205,7 @@ def _log_ratios(grid: Grid, ranges_m: Floats, ring: RingConfig, reflection: Refl
 def _ratios(range_m: float, window_m: float, specular: float) -> Floats:
     """Return a reading's likelihood ratio for each code by `cone` and by `specular`, shape (CODES + 1, CODES + 1).
 
-    The mixture of `perception.localization.mixed_reflection`.
+    The mixture of `perception.localization.known_room.mixed_reflection`.
     """
     expected = np.append((np.arange(CODES) + 0.5) * (window_m / CODES), math.inf)
     answers, heard = np.isfinite(expected), math.isfinite(range_m)

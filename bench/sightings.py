@@ -16,8 +16,14 @@ import numpy as np
 
 from bench.beacons import errors_when_aligned
 from perception.kernel import Floats
-from perception.localization.landmark_filter import add_landmark, correct, innovation_variance, propagate, rows_used
-from perception.localization.landmark_state import FIRST, ODOMETER, ROWS_MAX, TURN, Estimate, EstimateRecord
+from perception.localization.drift.landmark_filter import (
+    add_landmark,
+    correct,
+    innovation_variance,
+    propagate,
+    rows_used,
+)
+from perception.localization.drift.landmark_state import FIRST, ODOMETER, ROWS_MAX, TURN, Estimate, EstimateRecord
 from perception.records import records, zeros
 
 RANGE_SIGMA: Final = 0.04
@@ -189,8 +195,8 @@ def _enter(e: EstimateRecord, covariance: Floats, landmark: int, distance: float
     """Correct the estimate by a sighting; return the squared innovation over its covariance.
 
     Turned into the map frame, a sighting measures the landmark's place less the ring's, and its derivative by the
-    heading's error is zero (see `perception.localization.landmark_filter`). It is entered along its direction, then
-    across.
+    heading's error is zero (see `perception.localization.drift.landmark_filter`). It is entered along its direction,
+    then across.
     """
     est = e[0]
     row, axis = FIRST + 2 * landmark, est.heading + bearing

@@ -12,7 +12,7 @@ from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
 from bench.trials.wall_trials import figures, try_room
 from config.settings import Settings
 from config.units import FOOT_M
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 
 COLUMNS: Final = ("rooms", "walls", "found", "false", "lines_a_wall", "offset_mean_m", "offset_p95_m",
                   "angle_mean_deg", "angle_p95_deg", "corners", "corners_found", "corner_mean_m", "corner_p95_m",

@@ -32,9 +32,9 @@ from perception.edits import (
     invalid_edit,
 )
 from perception.kernel import Floats
-from perception.localization.drift_correction import LocalizedPose
 from perception.localization.equal_edit import edit_equally
-from perception.localization.known_room import KnownRoom, place_robot
+from perception.localization.known_room.known_room import KnownRoom, place_robot
+from perception.localization.localized_pose import LocalizedPose
 from perception.localization.map_frame import MapFrame
 from perception.mapping.canyons import ENDS_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid

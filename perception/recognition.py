@@ -15,7 +15,7 @@ from config.world import WorldConfig
 from perception.no_method import NoMethod
 
 if TYPE_CHECKING:
-    from perception.localization.known_room import KnownRoom
+    from perception.localization.known_room.known_room import KnownRoom
     from perception.localization.map_frame import MapFrame
     from perception.mapping.grid.evidence_grid import EvidenceGrid
     from perception.method import Method
@@ -55,7 +55,7 @@ def find_in_room(room: WorldConfig | None, ring: RingConfig) -> KnownRoom | None
     """Return what finds the robot in a room; None without a room."""
     if room is None:
         return None
-    from perception.localization.known_room import KnownRoom
-    from perception.localization.room import room_of
+    from perception.localization.known_room.known_room import KnownRoom
+    from perception.localization.room.room import room_of
 
     return KnownRoom(room_of(room), ring)

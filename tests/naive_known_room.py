@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from perception.kernel import Floats
-from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.mixed_reflection import LATE_M, WILD_HEARD
-from perception.localization.particle_update import FIT_STEPS, TEMPER
-from perception.localization.range_likelihood import HEARD_SHARE, RangeModel
-from perception.localization.room import Room
-from perception.localization.surroundings import FRINGE_RAD
+from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
+from perception.localization.known_room.particle_update import FIT_STEPS, TEMPER
+from perception.localization.known_room.surroundings import FRINGE_RAD
+from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
+from perception.localization.room.range_likelihood import HEARD_SHARE, RangeModel
+from perception.localization.room.room import Room
 
 
 class Causes(NamedTuple):

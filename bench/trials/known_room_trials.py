@@ -19,9 +19,9 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose, wrap_angle
-from perception.localization.drift_correction import Status
-from perception.localization.known_room import KnownRoom
-from perception.localization.room import Room, room_of
+from perception.localization.known_room.known_room import KnownRoom
+from perception.localization.localized_pose import Status
+from perception.localization.room.room import Room, room_of
 
 STEP_M: Final = 0.03
 """Way between two firings of a part of the ring."""

@@ -16,8 +16,8 @@ from config.world import AcousticsConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
-from perception.localization.localize import PoseCandidate, localize
-from perception.localization.room import room_of
+from perception.localization.drumheller.localize import PoseCandidate, localize
+from perception.localization.room.room import room_of
 
 RIGHT_M: Final = 0.3 * FOOT_M
 RIGHT_RAD: Final = math.radians(3.0)

@@ -1,1 +1,1 @@
-"""Where the robot is in a known room of walls: Drumheller's method (1987), with the likelihood of all raw ranges."""
+"""Where the robot is: in a known room, by Drumheller's method or firing by firing, or by what it recognised."""

@@ -1,7 +1,7 @@
 """The map frame of perception: firings are entered at corrected poses, results are turned back to odometry's frame.
 
 What perception holds is in the filter's frame, so that drift does not smear it; the map frame differs from that by a
-turn and a shift (`perception.localization.drift_correction`). Odometry's frame, in which the robot
+turn and a shift (`perception.localization.drift.drift_correction`). Odometry's frame, in which the robot
 drives, stays continuous whatever is corrected: there, the objects move.
 """
 
@@ -32,7 +32,8 @@ from perception.edits import (
     RestoreSegments,
 )
 from perception.kernel import Floats
-from perception.localization.drift_correction import DriftCorrection, LandmarkPlace, LocalizedPose, SeenObject
+from perception.localization.drift.drift_correction import DriftCorrection, LandmarkPlace, SeenObject
+from perception.localization.localized_pose import LocalizedPose
 from perception.vacant_areas import VacantArea
 
 SHIFT_MIN_M: Final = 0.002

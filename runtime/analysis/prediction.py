@@ -19,9 +19,9 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Firing, Floats
 from perception.detected_object import DetectedObject
-from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.range_likelihood import RangeModel, log_ratio
-from perception.localization.room import room_of
+from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
+from perception.localization.room.range_likelihood import RangeModel, log_ratio
+from perception.localization.room.room import room_of
 from perception.sensor_mounts import mounts_array, mounts_at
 from runtime.analysis.export.world_file import world_of
 from runtime.cycle.summary import PerceivedRows

@@ -6,8 +6,8 @@ from typing import Final
 
 from drivers.driver import Received
 from drivers.token_bucket import LineLimit
-from perception.localization.drift_correction import Status
-from perception.localization.known_room import KnownRoom
+from perception.localization.known_room.known_room import KnownRoom
+from perception.localization.localized_pose import Status
 from perception.pipeline import Perception
 from perception.sensor_faults.report import SensorReport
 from runtime.cycle.step import State

@@ -13,7 +13,7 @@ import orjson
 from config.errors import FAILED, UserError
 from drivers.driver import RobotDriver
 from drivers.messages import Pose
-from perception.localization.drift_correction import LocalizedPose, Status
+from perception.localization.localized_pose import LocalizedPose, Status
 from perception.localization.map_frame import turned_object
 from perception.pipeline import DetectedObject, Perception
 from runtime.cycle.step import State

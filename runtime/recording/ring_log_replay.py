@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from config.settings import LocalizationConfig, Settings
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject
-from perception.localization.drift_correction import LocalizedPose
+from perception.localization.localized_pose import LocalizedPose
 from perception.pipeline import Perception
 from runtime.cycle.summary import perceived_rows, pose_row
 from runtime.recording.replay_summary import ReplaySummary

@@ -204,7 +204,7 @@ def _localization(settings: Settings) -> None:
     import numpy as np
 
     from drivers.messages import Firing, Pose
-    from perception.localization.drift_correction import DriftCorrection, SeenObject
+    from perception.localization.drift.drift_correction import DriftCorrection, SeenObject
 
     drift = DriftCorrection(settings.ring)
     objects = [SeenObject(k, 2.0 * math.cos(k), 2.0 * math.sin(k), 0.3) for k in range(1, 5)]
@@ -219,8 +219,8 @@ def _known_room(settings: Settings) -> None:
     import numpy as np
 
     from drivers.messages import Firing, Pose
-    from perception.localization.known_room import SEARCH_M, KnownRoom
-    from perception.localization.room import make_room
+    from perception.localization.known_room.known_room import SEARCH_M, KnownRoom
+    from perception.localization.room.room import make_room
 
     walls = np.array([[-1.0, -1.0, 2.0, -1.0], [2.0, -1.0, 2.0, 1.0], [2.0, 1.0, -1.0, 1.0]])
     known_room = KnownRoom(make_room(walls, np.array([[1.0, 0.5, 0.2]])), settings.ring)

@@ -11,10 +11,10 @@ from bench.laser_rooms import RING
 from bench.place_bound import CODES, HEADINGS, STEP_RAD, _moved, _ratios, follow_exactly, make_grid
 from bench.trials.known_room_trials import KnownDrive
 from drivers.messages import Firing, Pose
-from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.mixed_reflection import WILD_HEARD
-from perception.localization.range_likelihood import HEARD_SHARE
-from perception.localization.room import make_room
+from perception.localization.known_room.mixed_reflection import WILD_HEARD
+from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
+from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.room import make_room
 
 ROOM = make_room(np.array([
     [0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 4.0], [6.0, 4.0, 3.0, 4.0], [3.0, 4.0, 3.0, 5.5], [3.0, 5.5, 0.0, 5.5],

@@ -17,8 +17,8 @@ from config.world import WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
-from perception.localization.keyframes import Keyframes
-from perception.localization.panorama import panoramas
+from perception.localization.drumheller.panorama import panoramas
+from perception.localization.known_room.keyframes import Keyframes
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array, turned_mounts
 

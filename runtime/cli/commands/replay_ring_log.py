@@ -22,7 +22,7 @@ TRAJECTORY_HEADER: Final = "t,x,y,theta,sxx,sxy,syy,stt,status"
 
 if TYPE_CHECKING:
     from drivers.messages import Firing
-    from perception.localization.drift_correction import LocalizedPose
+    from perception.localization.localized_pose import LocalizedPose
 
 
 def replay_log(

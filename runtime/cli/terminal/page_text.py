@@ -13,7 +13,7 @@ from perception.detected_object import DetectedObject
 from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
-    from perception.localization.drift_correction import LocalizedPose
+    from perception.localization.localized_pose import LocalizedPose
 
 BEHIND_M: Final = 0.1
 """An object in front of a wall may touch it."""

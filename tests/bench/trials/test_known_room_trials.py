@@ -9,7 +9,7 @@ import pytest
 
 from bench.trials.known_room_trials import SCALE_ERROR, STEP_M, Trace, figures, furnished_drive
 from config.load import load_settings
-from perception.localization.drift_correction import Status
+from perception.localization.localized_pose import Status
 
 pytestmark = pytest.mark.compiled
 RING = load_settings("hallway").ring

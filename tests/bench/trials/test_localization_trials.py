@@ -9,7 +9,7 @@ import pytest
 from bench.trials.localization_trials import RIGHT_M, RIGHT_RAD, Trial, figures, localize_once
 from config.load import load_settings
 from drivers.messages import Pose
-from perception.localization.localize import PoseCandidate
+from perception.localization.drumheller.localize import PoseCandidate
 
 TRUTH = Pose(1.0, 2.0, math.pi - 0.01)
 RIGHT = Pose(1.0, 2.0 + 0.5 * RIGHT_M, -math.pi + 0.01)

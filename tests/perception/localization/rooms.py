@@ -13,10 +13,10 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
 from perception.kernel import Floats
-from perception.localization.expected_ranges import Beams
-from perception.localization.panorama import Panorama, panoramas
-from perception.localization.pose_fit import beams_at
-from perception.localization.room import Room, room_of
+from perception.localization.drumheller.panorama import Panorama, panoramas
+from perception.localization.drumheller.pose_fit import beams_at
+from perception.localization.room.expected_ranges import Beams
+from perception.localization.room.room import Room, room_of
 
 RING: RingConfig = load_settings("hallway").ring
 HALF_ANGLE = math.radians(RING.beam_half_angle_deg)

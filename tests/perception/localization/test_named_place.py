@@ -22,8 +22,8 @@ from config.load import load_settings
 from config.robot import RingConfig
 from config.world import WorldConfig
 from drivers.messages import Firing, Pose, wrap_angle
-from perception.localization.known_room import KnownRoom
-from perception.localization.room import room_of
+from perception.localization.known_room.known_room import KnownRoom
+from perception.localization.room.room import room_of
 from tests.perception.localization.rooms import RECTANGLE, RING, world_of
 
 pytestmark = pytest.mark.compiled

@@ -12,7 +12,7 @@ import pytest
 
 from config.errors import FAILED, UserError
 from drivers.messages import Pose
-from perception.localization.drift_correction import LocalizedPose
+from perception.localization.localized_pose import LocalizedPose
 from perception.percept import Canyon
 from perception.pipeline import DetectedObject, Perception
 from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, perceived_rows, pose_row, write_json

@@ -11,7 +11,7 @@ from bench.trials.furnished_rooms import furnished_room
 from bench.trials.known_room_trials import furnished_drive
 from config.load import load_settings
 from config.units import FOOT_M
-from perception.localization.drift_correction import LocalizedPose
+from perception.localization.localized_pose import LocalizedPose
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer, replay_firings, replay_in_known_room
 

@@ -21,7 +21,8 @@ from config.load import load_settings
 from config.settings import Settings
 from perception.bayes.tracks import polygon_tracks, refine
 from perception.bayes.walls import points as wall_points
-from perception.localization import drift_correction, landmark_tracker, pose_grid, pose_track
+from perception.localization.drift import drift_correction, landmark_tracker
+from perception.localization.known_room import pose_grid, pose_track
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_warmup

@@ -17,7 +17,7 @@ from perception.bayes.tracks.observe import associate_circles
 from perception.bayes.walls.report import wall_ends
 from perception.bayes.walls.wall_map import update_walls
 from perception.kernel import Floats
-from perception.localization.expected_ranges import Reflection
+from perception.localization.room.expected_ranges import Reflection
 from tests.perception.bayes.random_tracks import MOUNTS, NOISES, SENSORS, SETTINGS, P, new_memory
 
 ROOM = (

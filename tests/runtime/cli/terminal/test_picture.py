@@ -12,7 +12,7 @@ from rich.console import Console
 from config.load import load_settings
 from drivers.messages import Floats, LinkCounts, Pose, Twist
 from perception.detected_object import DetectedObject, MapCounts
-from perception.localization.drift_correction import LocalizedPose
+from perception.localization.localized_pose import LocalizedPose
 from runtime.cli.terminal.page_text import localized_place
 from runtime.cli.terminal.picture import CORNERED_M, Picture, Scale, Snapshot
 

@@ -17,7 +17,7 @@ from config.load import load_settings
 from drivers.driver import LineState, Received
 from drivers.messages import CrossPaths, Firing, Pose
 from perception.detected_object import DetectedObject
-from perception.localization.drift_correction import SeenObject
+from perception.localization.drift.drift_correction import SeenObject
 from perception.percept import Canyon
 from perception.pipeline import Perception
 from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, FrameContext, FrameEncoder, _canyon, _object

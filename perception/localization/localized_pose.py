@@ -1,0 +1,24 @@
+"""What every localization reports: the robot in the map frame, and how sure that is."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, TypeAlias
+
+from drivers.messages import Pose
+from perception.kernel import Floats
+
+Status: TypeAlias = Literal["tracking", "localizing", "lost"]
+
+
+class LocalizedPose(NamedTuple):
+    """The robot in the map frame."""
+
+    pose: Pose
+    """Position (m) and direction of travel (rad)."""
+    ring_yaw: float
+    """Direction of the ring's sensor 0, rad."""
+    covariance: Floats
+    """Of x, y (m) and heading (rad), shape (3, 3)."""
+    status: Status
+    probability: float
+    """Share of the expected echoes that came lately: near 1 where pose and map are right."""
