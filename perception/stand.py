@@ -80,6 +80,19 @@ def stand_of(firings: Sequence[Firing], robot_s: float = math.inf) -> Sequence[F
     return firings[first:end]
 
 
+def last_round(stand: Sequence[Firing]) -> Sequence[Firing]:
+    """Return the last firings of a stand in which no sensor fires twice.
+
+    What a surface answers from one place is the same in each round: rounds that are repeated add no evidence.
+    """
+    fired = np.zeros(len(stand[-1].ranges_m) if stand else 0, dtype=np.bool_)
+    first = len(stand)
+    while first > 0 and not (fired & ~np.isnan(stand[first - 1].ranges_m)).any():
+        first -= 1
+        fired |= ~np.isnan(stand[first].ranges_m)
+    return stand[first:]
+
+
 def _is_still(one: Firing, other: Firing) -> bool:
     turned = max(abs(one.ring_yaw - other.ring_yaw), abs(one.pose.theta - other.pose.theta))
     return math.dist((one.pose.x, one.pose.y), (other.pose.x, other.pose.y)) < STILL_M and turned < STILL_RAD

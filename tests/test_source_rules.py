@@ -15,6 +15,8 @@ from typing import Final
 
 import pytest
 
+from drivers.registry import SHIPPED
+
 ROOT: Final = Path(__file__).resolve().parents[1]
 PACKAGES: Final = ("config", "drivers", "perception", "behaviors", "runtime")
 PURE: Final = ("perception/", "behaviors/")
@@ -192,6 +194,34 @@ def test_every_module_has_a_test_at_the_mirrored_path() -> None:
     elsewhere = {path for paths in TESTED_ELSEWHERE.values() for path in paths}
     assert not modules - tested - WITHOUT_TEST.keys() - elsewhere
     assert not tested & (WITHOUT_TEST.keys() | elsewhere), "it has a test of its own by now"
+
+
+def named_modules(path: str, source: str) -> Iterator[str]:
+    """Yield the modules that a module imports, or names in a text as `module` or `module:function`."""
+    for node in ast.walk(ast.parse(source, path)):
+        if isinstance(node, ast.ImportFrom) and node.module is not None:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value.partition(":")[0]
+
+
+def test_every_module_is_reached_from_an_entry_point() -> None:
+    """Tests and measurements alone are no reason for a module of the product; firmware is read as files."""
+    modules = {path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): path for path in MODULES}
+    sources = {name: MODULES[path] for name, path in modules.items() if "firmware/board/" not in path}
+    library = (ROOT / "echolocate.py").read_text("utf-8")
+    left = [*named_modules("echolocate.py", library), "runtime.cli.__main__", "runtime.cli.terminal.__main__"]
+    left += [family.module for family in SHIPPED.values()]
+    reached: set[str] = set()
+    while left:
+        name = left.pop()
+        if name in sources and name not in reached:
+            reached.add(name)
+            left += [*named_modules(name, sources[name]), name.rpartition(".")[0]]
+    assert sources.keys() - reached == set()
 
 
 @pytest.mark.parametrize(

@@ -340,16 +340,20 @@ def stand(
     /,
     *,
     at: float | None = None,
+    map_file: Annotated[str | None, Parameter(name="--map")] = None,
     robot: RobotFile = None,
     json: JsonFile = None,
     force: Force = False,
     units: UnitsOption = "m",
     options: LogOptions = AUTO,
 ) -> int:
-    """List what a robot heard where it stood: kind, place and bearing of each surface, odds of the kinds.
+    """List what a robot heard where it stood, surface by surface, or with --map where in a known room it stood.
 
     To name kinds takes sensors that listen while others fire (robot file `ears`) and fine ranges. What the readings
     leave open is unknown, or convex if it may be an edge or a cylinder.
+
+    With --map each pose that the readings of one round fit is given, the most probable first: a symmetric room gives
+    several. This is Drumheller's method (1987); a drive says more: see `replay --localize --map`.
 
     Parameters
     ----------
@@ -357,10 +361,12 @@ def stand(
         Recording or ring log.
     at
         A moment of the stand by the robot's clock, s; by default the end.
+    map_file
+        The known room: a world file, or the name of a shipped one; its acoustics say how surfaces reflect.
     robot
         Ring logs: robot file, or the name of a shipped one; None for the default.
     json
-        File for the surfaces (JSON).
+        File for the surfaces or the poses (JSON).
     force
         Overwrite it if it exists already.
     units
@@ -368,6 +374,12 @@ def stand(
     options
         The conventions of a ring log.
     """
+    if map_file is not None:
+        from runtime.cli.commands.stand_in_room import locate_stand
+
+        return locate_stand(
+            file, map_file, at, robot=robot, json_file=json, force=force, units=units, options=options
+        )
     from runtime.cli.commands.stand import show_stand
 
     return show_stand(file, at, robot=robot, json_file=json, force=force, units=units, options=options)

@@ -16,7 +16,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import cross_pairs, firing_pattern, sensors
 from drivers.messages import CrossPaths, Firing, Pose
-from perception.stand import stand_of, surfaces_of_stand
+from perception.stand import last_round, stand_of, surfaces_of_stand
 
 RING = load_settings("hallway", robot="ears").ring
 BEARING, RANGE_M = 0.4, 1.4
@@ -91,3 +91,12 @@ def test_a_stand_ends_where_the_robot_moves() -> None:
     firings = at((0.0, 0.0), (0.001, 0.0), (0.1, 0.0), (0.2, 0.0), (0.2, 0.001), (0.2, 0.1))
     for robot_s, times in ((0.0, [0, 1]), (2.9, [2]), (3.0, [3, 4]), (math.inf, [5]), (-1.0, [])):
         assert [firing.robot_s for firing in stand_of(firings, robot_s)] == times
+
+
+def test_the_last_round_of_a_stand_is_what_no_sensor_fires_twice_in() -> None:
+    firings = heard(scene("wall"), rounds=2)
+    half = len(firings) // 2
+    assert last_round(firings) == firings[half:]
+    assert last_round(firings[: half + 1]) == firings[1 : half + 1]
+    assert last_round(firings[:2]) == firings[:2]
+    assert last_round([]) == []

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from perception.bayes.memory.elements import REJECTIONS_MAX
-from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, StateRecord
+from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, CircleTrack, StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -110,3 +110,20 @@ def is_rejected(s: StateRecord, x: float, y: float, what: int, evidence_nat: flo
         if it.what == what and evidence_nat < it.evidence_nat and math.hypot(x - it.x, y - it.y) < it.radius:
             return True
     return False
+
+
+@kernel
+def may_become(s: StateRecord, track: CircleTrack, k: int, evidence_nat: float) -> bool:
+    """Return whether a track may become another circle: neither a user's mark nor a rejection prevents it.
+
+    Parameters
+    ----------
+    s, track
+        Memory, in whose scratch the other circle is fitted, and the track.
+    k : int
+        Index of the other circle.
+    evidence_nat : float
+        Its evidence.
+    """
+    fit = s[0].scratch.circle_fit
+    return track.marks == 0 and not is_rejected(s, fit.x, fit.y, k, evidence_nat)

@@ -21,7 +21,7 @@ from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.range_fit import fit_circle, score_circle
 from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
-from perception.bayes.inference.track_labels import drop_track, is_rejected, outlives
+from perception.bayes.inference.track_labels import drop_track, may_become, outlives
 from perception.bayes.memory.parameters import (
     ALTERNATIVE_STEPS,
     APART_RADII,
@@ -201,19 +201,6 @@ def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, e
     track.unseen += SWITCH_UNSEEN
     track.root_xx = max(track.root_xx, SWITCH_ROOT_M)
     track.root_yy = max(track.root_yy, SWITCH_ROOT_M)
-
-
-@kernel
-def may_become(s: StateRecord, track: CircleTrack, k: int, evidence_nat: float) -> bool:
-    """Return whether a track may become another circle: neither a user's mark nor a rejection prevents it.
-
-    Parameters
-    ----------
-    s, track, k, evidence_nat
-        As for `change_kind`; nothing is updated.
-    """
-    fit = s[0].scratch.circle_fit
-    return track.marks == 0 and not is_rejected(s, fit.x, fit.y, k, evidence_nat)
 
 
 @kernel

@@ -16,7 +16,10 @@ from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.support.length_format import Units, format_length, format_point
 
 if TYPE_CHECKING:
-    from drivers.messages import Pose
+    from collections.abc import Sequence
+
+    from config.settings import Settings
+    from drivers.messages import Firing, Pose
     from perception.stand import StandSurface
 
 
@@ -37,15 +40,9 @@ def show_stand(
         The file cannot be read or written, or no surface was heard often enough.
     """
     from drivers.messages import Pose
-    from perception.stand import stand_of, surfaces_of_stand
+    from perception.stand import surfaces_of_stand
 
-    settings, firings = read_firings(
-        file, robot, lambda: check_outputs({"--json": json_file}, (file,), force=force), options
-    )
-    stand = stand_of(firings, math.inf if at_s is None else at_s)
-    if not stand:
-        first = f" the first firing is at {firings[0].robot_s:.2f} s" if firings else " it holds no firing"
-        raise UserError(f"{file}: nothing was fired up to --at {at_s} by the robot's clock;{first}", FAILED)
+    settings, stand = read_stand(file, at_s, robot, json_file, force=force, options=options)
     surfaces = surfaces_of_stand(settings.ring, stand)
     last = stand[-1]
     ring = Pose(last.pose.x, last.pose.y, last.ring_yaw)
@@ -61,6 +58,22 @@ def show_stand(
     output.print(stand_table(surfaces, ring, last.pose, units))
     output.print(f"{len(stand)} firings from {stand[0].robot_s:.2f} to {last.robot_s:.2f} s by the robot's clock")
     return DONE
+
+
+def read_stand(
+    file: str, at_s: float | None, robot: str | None, json_file: str | None, *, force: bool, options: RingLogOptions
+) -> tuple[Settings, Sequence[Firing]]:
+    """Return the settings, and the firings at the place where the robot was; arguments and errors of `show_stand`."""
+    from perception.stand import stand_of
+
+    settings, firings = read_firings(
+        file, robot, lambda: check_outputs({"--json": json_file}, (file,), force=force), options
+    )
+    stand = stand_of(firings, math.inf if at_s is None else at_s)
+    if not stand:
+        first = f" the first firing is at {firings[0].robot_s:.2f} s" if firings else " it holds no firing"
+        raise UserError(f"{file}: nothing was fired up to --at {at_s} by the robot's clock;{first}", FAILED)
+    return settings, stand
 
 
 def stand_table(surfaces: tuple[StandSurface, ...], ring: Pose, robot: Pose, units: Units) -> Table:
