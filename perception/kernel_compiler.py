@@ -138,7 +138,7 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]
 
 
 class _KernelCache:
-    """The files of a kernel that Python calls; numba's own looks for them before anybody has called it."""
+    """The files of a kernel that allocates nothing; numba's own looks for them before anybody has called it."""
 
     def __init__(self, function: Callable[..., object]) -> None:
         self._function = function
@@ -172,7 +172,10 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
         super().__init__(function, targetoptions={"nopython": True, **options})
         self._compiler = _Compiler(function, self.targetdescr, self.targetoptions, self.locals, _Pipeline)
         self._inner: dict[Args, tuple[object, Untyped]] = {}
-        self._cache = _KernelCache(function)
+        if options.get("_nrt", True):
+            self.enable_caching()  # numba's own also sets up its allocator
+        else:
+            self._cache = _KernelCache(function)
 
     def typeof_pyval(self, val: object) -> Untyped:
         """Return the type of an argument."""

@@ -17,11 +17,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 def kernel(function: F) -> F:
     """Return `function` compiled at its first call, or loaded from numba's cache on disk."""
     try:
-        compiled = numba.njit(cache=True)(function)
+        return cast(F, numba.njit(cache=True)(function))
     except RuntimeError as error:
         if "cannot cache" not in str(error):
             raise
         return cast(F, numba.njit(function))
-    if compiled is not function:  # numba's own loads everything that compiling needs first, a fifth of a second
-        compiled._cache.load_overload = compiled._cache._load_overload
-    return cast(F, compiled)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
@@ -13,6 +16,7 @@ from numba.core import event
 from numba.core.caching import NullCache
 
 from perception.kernel import Floats, kernel
+from runtime.support.child_process import child_environment
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -89,6 +93,35 @@ def test_an_error_in_a_kernel_for_kernels_names_it() -> None:
 
     with pytest.raises(numba.NumbaError, match="no_such_attribute"):
         calls_wrong(1.0)
+
+
+LOADS: Final = """
+import numpy as np
+from perception.kernel import kernel, owning_kernel
+
+@owning_kernel
+def ramp(count):
+    return np.arange(count) + 0.5
+
+@kernel
+def total(values):
+    found = 0.0
+    for k in range(values.shape[0]):
+        found += values[k]
+    return found
+
+print(total(ramp(1000)), sum(ramp._cache_hits.values()), sum(total._cache_hits.values()))
+"""
+"""A program that computes the same whether its kernels are compiled or loaded."""
+
+
+def test_kernels_are_loaded_without_the_compiler_and_those_that_allocate_with_their_allocator(tmp_path: Path) -> None:
+    program = tmp_path / "loads.py"
+    program.write_text(LOADS)
+    environment = {**child_environment(), "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    runs = [subprocess.run([sys.executable, program], env=environment, check=True, capture_output=True, text=True)
+            for _ in range(2)]  # fmt: skip
+    assert [run.stdout.split() for run in runs] == [["500000.0", "0", "0"], ["500000.0", "1", "1"]]
 
 
 @kernel
