@@ -11,8 +11,10 @@ import pytest
 
 from bench import recording, timing, waking
 from bench.__main__ import OURS
+from bench.__main__ import app as bench_app
 from bench.figures import COLUMNS, PAGE, RESULT, ROW, SHOWN, SOURCE, by_name, page, taken_in
 from config.errors import UserError
+from runtime.cli.app import app
 
 LINES_MAX = 200
 LINE = '  ["drums", "6", "5", "`x`", "a.json", "{results[ours][found]}; {late[p99.9]:.1f} ms"],\n'
@@ -62,3 +64,15 @@ def test_what_the_page_shows_is_what_the_benches_write() -> None:
             names = set(re.findall(r"\[([^\]]+)\]", row[SHOWN]))
             bare = {name.removesuffix(timing.CONTROL) for name in names}
             assert bare & known[row[RESULT]], row
+
+
+def test_each_command_of_the_page_exists() -> None:
+    commands = " ".join(json.loads(line)[3] for line in ROW.findall(SOURCE.read_text("utf-8")))
+    for name in re.findall(r"python -m bench ([a-z][\w-]*)", commands):
+        assert bench_app[name]
+    for name in re.findall(r"echolocate ([a-z][\w-]*)", commands):
+        assert app[name]
+    named = re.findall(r"((?:tests|bench)/[\w/.]+)", commands)
+    named += [f"{name.replace('.', '/')}.py" for name in re.findall(r"python -m (bench\.\w+)", commands)]
+    assert len(named) > 10
+    assert [path for path in named if not (SOURCE.parents[1] / path).exists()] == []
