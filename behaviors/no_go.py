@@ -262,6 +262,7 @@ def with_no_go(percept: Percept, zones: Zones, frame: Pose, radius_m: float) -> 
         obstacles=np.concatenate([percept.obstacles.reshape(-1, 2), seen]),
         steady=None if percept.steady is None else np.concatenate([percept.steady.reshape(-1, 2), seen]),
         occupancy=None if window is None else _with_points(window, placed),
+        no_go=len(seen),
     )
 
 

@@ -62,3 +62,36 @@ def is_expired(requested: Teleoperate, age_s: float, config: TeleoperationConfig
         Its `message_age_max_s` limits the validity.
     """
     return not 0.0 <= age_s < min(requested.valid_s, config.message_age_max_s)
+
+
+def blocked_by(percept: Percept, v: float, body_radius_m: float) -> str | None:
+    """Return what is nearest on the way of an operator's velocity, and what to do; None if nothing is on that side.
+
+    Parameters
+    ----------
+    percept
+        Pose and obstacles of this cycle.
+    v
+        The operator's speed, m/s: its sign says to which side.
+    body_radius_m
+        The robot's edge is this far from its pose, m.
+    """
+    pose, sign, nearest = percept.pose, math.copysign(1.0, v), None
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    for number, (x, y) in enumerate(percept.obstacles.tolist()):
+        dx, dy = x - pose.x, y - pose.y
+        ahead, left = c * dx + s * dy, c * dy - s * dx
+        if sign * ahead > 0.0:
+            distance_m = math.hypot(dx, dy)
+            # What lies aside pushes less against the way.
+            found = (distance_m * distance_m / abs(ahead), distance_m, math.degrees(math.atan2(left, ahead)), number)
+            nearest = found if nearest is None else min(nearest, found)
+    if nearest is None:
+        return None
+    _, distance_m, bearing_deg, number = nearest
+    what = "a no-go line" if number >= len(percept.obstacles) - percept.no_go else "an echo"
+    side, other = ("left" if bearing_deg >= 0.0 else "right"), ("back" if v > 0.0 else "forward")
+    return (
+        f"blocked by {what} {max(0.0, distance_m - body_radius_m):.2f} m from the robot's edge, "
+        f"{abs(bearing_deg):.0f}° {side} of its front: turn away, or drive {other}"
+    )

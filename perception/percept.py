@@ -123,6 +123,8 @@ class Percept:
         The box canyons near the robot.
     steady : (m, 2) float or None
         Those obstacles with which another look agrees, m; None where no schema needs them.
+    no_go : int
+        So many of the obstacles, the last ones, stand for no-go lines.
     """
 
     pose: Pose
@@ -132,3 +134,4 @@ class Percept:
     occupancy: OccupancyWindow | None = None
     canyons: tuple[Canyon, ...] = ()
     steady: Floats | None = None
+    no_go: int = 0

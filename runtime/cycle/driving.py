@@ -22,7 +22,7 @@ from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response, summed
 from behaviors.schema_call import ODOM_FRAME, Scene
-from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, blocked_by, is_expired, teleoperation
 from behaviors.turn import is_aligned
 from behaviors.way_progress import ENDED_S
 from config.mission import StepConfig
@@ -32,6 +32,7 @@ from perception.percept import Percept, wrap_angle
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
 from runtime.cycle.escape_schemas import escape_schemas
 from runtime.cycle.goal_drive import GoalDrive, drive_through_valley, drive_to_goal
+from runtime.cycle.motion_monitor import CRAWL
 from runtime.cycle.stalled_drives import DriveMemory, observe_way
 
 SUM: Final = "sum"
@@ -189,10 +190,11 @@ def _teleoperate(
     requested = Twist(drive_request.v, drive_request.w)
     decision = limit_velocity(requested, responses, percept, body, behaviors.arbiter, expected)
     hold_reason = NO_CONTROL if drive_request == TELEOPERATION_ENDED else None
-    if hold_reason is None and requested.v != 0.0 and isinstance(decision, Drive) and decision.twist.v == 0.0:
+    # Before an obstacle the speed falls towards zero without reaching it.
+    if hold_reason is None and isinstance(decision, Drive) and abs(decision.twist.v) < min(CRAWL.along, abs(requested.v)):
         way = percept.pose.theta + (0.0 if requested.v > 0.0 else math.pi)
         unseen = unseen_way(percept, way, body, behaviors.arbiter.clearance_m)
-        hold_reason = None if unseen is None else unseen.reason
+        hold_reason = blocked_by(percept, requested.v, body.radius_m) if unseen is None else unseen.reason
     return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from behaviors.arbiter import Drive, Stop, limit_velocity
 from behaviors.response import Response
-from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, blocked_by, is_expired, teleoperation
 from config.behaviors import ArbiterConfig, TeleoperationConfig
 from config.robot import BodyConfig
 from perception.percept import Percept, Pose, Twist
@@ -160,3 +161,17 @@ def test_a_request_expires() -> None:
     assert is_expired(Teleoperate(0.1, 0.0), -0.001, config), "a clock that went backwards"
     assert is_expired(Teleoperate(0.1, 0.0), math.nan, config)
     assert (TELEOPERATION_ENDED.v, TELEOPERATION_ENDED.w) == (0.0, 0.0)
+
+
+@HEADINGS
+def test_what_blocks_an_operator_is_named_with_its_place(heading: float) -> None:
+    """Of three points within reach only those on the side to which the robot is driven count."""
+    seen = at(heading, (0.7, 0.0), (0.3, 0.3), (-0.4, -0.4))
+    assert blocked_by(seen, 0.2, 0.4) == (
+        "blocked by an echo 0.02 m from the robot's edge, 45° left of its front: turn away, or drive back"
+    )
+    assert blocked_by(seen, -0.2, 0.4) == (
+        "blocked by an echo 0.17 m from the robot's edge, 135° right of its front: turn away, or drive forward"
+    )
+    assert (blocked_by(replace(seen, no_go=1), -0.2, 0.4) or "").startswith("blocked by a no-go line 0.17 m")
+    assert blocked_by(at(heading, (-0.4, 0.1)), 0.2, 0.4) is None
