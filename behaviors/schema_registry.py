@@ -29,13 +29,14 @@ from behaviors.wander import wander
 from config.mission_step import (
     AvoidPastUse,
     FollowValleyUse,
+    Frame,
     LeaveCanyonUse,
     MoveAheadUse,
     MoveToGoalUse,
     NoiseUse,
     SwirlUse,
 )
-from config.places import no_such_place
+from config.places import PlacesConfig, no_such_place
 
 Schema: TypeAlias = Callable[[Scene, Memory, Any], Answer]
 """A schema: what it sees, what it has kept, and its settings in the step, of the type that has its name."""
@@ -73,7 +74,7 @@ def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
         The place, its frame, the final heading and the gain.
     """
     still, before = Response(TO_GOAL, 0.0, 0.0), GoalPlace(memory.x, memory.y) if memory.is_set else None
-    asked = _goal_of(use, scene)
+    asked = goal_of(use, scene.places, scene.places_frame)
     if asked is None:
         return Answer(still, Memory(memory.index), waits_for=no_such_place(use.place or "", scene.places))
     frame, goal = scene.frame(asked.frame), replace(asked, reached=memory.index == 1)
@@ -94,18 +95,18 @@ def to_goal_in_step(scene: Scene, memory: Memory, use: MoveToGoalUse) -> Answer:
     return Answer(still, memory, is_aligned(scene.percept.pose, direction), 0.0, direction)
 
 
-def _goal_of(use: MoveToGoalUse, scene: Scene) -> Goal | None:
+def goal_of(use: MoveToGoalUse, places: PlacesConfig, places_frame: Frame) -> Goal | None:
     """Return the goal of a step in its frame; None if it names a place that there is not."""
+    heading_deg = use.heading_deg
     if use.point is not None:
         (x, y), frame = use.point, use.frame
-        heading_rad = None if use.heading_deg is None else math.radians(use.heading_deg)
     else:
-        place = scene.places.named(use.place or "")
+        place = places.named(use.place or "")
         if place is None:
             return None
-        x, y, frame = place.x_m, place.y_m, scene.places_frame
-        heading_rad = place.heading_rad if use.heading_deg is None else math.radians(use.heading_deg)
-    return Goal(x, y, frame=frame, heading=heading_rad)
+        x, y, frame = place.x_m, place.y_m, places_frame
+        heading_deg = place.heading_deg if heading_deg is None else heading_deg
+    return Goal(x, y, frame=frame, heading=None if heading_deg is None else math.radians(heading_deg))
 
 
 def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveCanyonUse) -> Answer:

@@ -34,6 +34,7 @@ from runtime.cycle.escape_schemas import escape_schemas
 from runtime.cycle.goal_drive import GoalDrive, drive_through_valley, drive_to_goal
 from runtime.cycle.motion_monitor import CRAWL
 from runtime.cycle.stalled_drives import DriveMemory, observe_way
+from runtime.cycle.velocity_limits import ZoneLimits, zone_of_goal
 
 SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""
@@ -100,7 +101,7 @@ def drive(
     drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
     place: GoalPlace | None = None, goal_drive: GoalDrive | None = None, map_frame: Pose | None = None,
     cycle_s: float = 0.0, trail: Trail = (), step_settings: StepSettings | None = None,
-    memory: DriveMemory = NO_MEMORY,
+    memory: DriveMemory = NO_MEMORY, zones: ZoneLimits | None = None,
 ) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
@@ -130,6 +131,8 @@ def drive(
         Of the cycle before, for a mission.
     memory : DriveMemory, optional
         Of the cycle before.
+    zones : ZoneLimits, optional
+        A goal in one is given up at once.
     """
     commitment = memory.commitment
     match drive_request:
@@ -137,12 +140,12 @@ def drive(
             result = _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings)
         case Goal():
             result = _to_goal(
-                drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame, commitment
+                drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame, commitment, zones
             )
         case Mission():
             result = _on_mission(
                 drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s, step_settings,
-                commitment,
+                commitment, zones,
             )  # fmt: skip
         case _:
             result = _along_legs(drive_request, run_s, leg, percept, settings, trail, commitment)
@@ -190,8 +193,10 @@ def _teleoperate(
     requested = Twist(drive_request.v, drive_request.w)
     decision = limit_velocity(requested, responses, percept, body, behaviors.arbiter, expected)
     hold_reason = NO_CONTROL if drive_request == TELEOPERATION_ENDED else None
-    # Before an obstacle the speed falls towards zero without reaching it.
-    if hold_reason is None and isinstance(decision, Drive) and abs(decision.twist.v) < min(CRAWL.along, abs(requested.v)):
+    least_m_s = min(
+        CRAWL.along, abs(requested.v)
+    )  # before an obstacle the speed falls towards zero without reaching it
+    if hold_reason is None and isinstance(decision, Drive) and abs(decision.twist.v) < least_m_s:
         way = percept.pose.theta + (0.0 if requested.v > 0.0 else math.pi)
         unseen = unseen_way(percept, way, body, behaviors.arbiter.clearance_m)
         hold_reason = blocked_by(percept, requested.v, body.radius_m) if unseen is None else unseen.reason
@@ -201,6 +206,7 @@ def _teleoperate(
 def _to_goal(
     drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
     percept: Percept, settings: Settings, trail: Trail, map_frame: Pose | None, commitment: Commitment,
+    zones: ZoneLimits | None,
 ) -> DriveResult:  # fmt: skip
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
     if place is None and not drive_request.reached:
@@ -209,7 +215,14 @@ def _to_goal(
     way_rad = math.atan2(there.y - percept.pose.y, there.x - percept.pose.x)
     others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
     there, goal_drive, responses, decision, hold_reason = drive_to_goal(
-        there, goal_drive, percept, run_s, others, settings, commitment
+        there,
+        goal_drive,
+        percept,
+        run_s,
+        others,
+        settings,
+        commitment,
+        None if drive_request.reached else zone_of_goal(there, zones, settings),
     )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
@@ -285,6 +298,7 @@ def _along_legs(
 def _on_mission(
     mission: Mission, run_s: float, leg: Leg, goal_drive: GoalDrive | None, percept: Percept, settings: Settings,
     map_frame: Pose | None, cycle_s: float, step_settings: StepSettings | None, commitment: Commitment,
+    zones: ZoneLimits | None,
 ) -> DriveResult:  # fmt: skip
     """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
     behaviors, body = settings.behaviors, settings.body
@@ -310,7 +324,14 @@ def _on_mission(
     if asked.goal is not None:
         beside = (r for r in (*asked.leads, *asked.helpers) if r.schema not in {TO_GOAL, VALLEY, CANYON})
         _, goal_drive, responses, decision, hold_reason = drive_to_goal(
-            asked.goal, goal_drive, percept, run_s, tuple(beside), settings, commitment
+            asked.goal,
+            goal_drive,
+            percept,
+            run_s,
+            tuple(beside),
+            settings,
+            commitment,
+            zone_of_goal(asked.goal, zones, settings),
         )
         if goal_drive.progress.fault is not None:
             mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")

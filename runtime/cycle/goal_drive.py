@@ -54,7 +54,7 @@ class GoalDrive:
 
 def drive_to_goal(
     goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, beside: tuple[Response, ...],
-    settings: Settings, commitment: Commitment | None = None,
+    settings: Settings, commitment: Commitment | None = None, forbidden: str | None = None,
 ) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
     """Return the goal and the drive for the next cycle, the responses, the decision, and why the robot holds.
 
@@ -74,10 +74,15 @@ def drive_to_goal(
         The run's.
     commitment : Commitment, optional
         Of the command before.
+    forbidden : str, optional
+        The no-go line or area in which the goal lies: it is given up at once.
     """
     behaviors, body = settings.behaviors, settings.body
     distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
     now = GoalDrive(Progress.starting_at(percept.pose, distance_m, run_s)) if before is None else before
+    if forbidden is not None and now.progress.given_up is None:
+        why = f"the goal is unreachable: it lies in or beside {forbidden}"
+        now = replace(now, progress=replace(now.progress, given_up=why, fault="unreachable"))
     response, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
     around, hold_reason, room_m = None, None, None
     if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:

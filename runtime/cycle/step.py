@@ -351,7 +351,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             return Drive(STANDSTILL)
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
-        state.goal_drive, map_frame, gap_s, state.trail, state.step_settings, state.drive_memory,
+        state.goal_drive, map_frame, gap_s, state.trail, state.step_settings, state.drive_memory, zones,
     )  # fmt: skip
     state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
     state.trail, state.step_settings, state.percept = result.trail, result.step_settings, percept

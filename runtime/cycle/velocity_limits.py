@@ -13,7 +13,9 @@ from typing import Final
 from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
 from behaviors.no_go import Zones, limited, no_go_at, with_no_go, zones_of
+from behaviors.schema_registry import goal_of
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
+from config.mission_step import Frame
 from config.places import PlacesConfig
 from config.settings import Settings
 from drivers.messages import Odometry, Pose, Twist
@@ -47,6 +49,18 @@ class ZoneLimits:
     """Their frame in odometry's; None while it is not known."""
     is_void: bool
     """Whether odometry has started anew since they were set in its frame."""
+
+    def forbids(self, x: float, y: float, frame: Frame, zones_frame: Frame, radius_m: float) -> str | None:
+        """Return which no-go zone a body of this radius (m) overlaps at a place of a frame, None if it does not.
+
+        A place in another frame than that of the zones is not judged while theirs is not known.
+        """
+        if frame != zones_frame:
+            if self.frame is None:
+                return None
+            place = self.frame.inverse().compose(Pose(x, y, 0.0))
+            x, y = place.x, place.y
+        return no_go_at(self.zones, x, y, radius_m)
 
     def seen(self, percept: Percept, drive_request: DriveRequest, radius_m: float) -> tuple[Percept, str | None]:
         """Return the percept with no-go lines as obstacles, and why the robot must stand, None if it may drive.
@@ -126,15 +140,34 @@ def zone_limits(
 
 
 def goal_in_zone(asked: DriveInput, zones: ZoneLimits | None, settings: Settings) -> str | None:
-    """Return why a goal cannot be driven to because it lies in a no-go area; None if it does not, or is none."""
-    if zones is None or zones.frame is None or not isinstance(asked, Goal):
+    """Return why a request cannot be carried out because a goal of it lies in a no-go area; None if none does.
+
+    A mission's steps that say themselves where an unreachable goal leads are left to the drive.
+    """
+    if zones is None or zones.is_void:
         return None
-    x, y = asked.x, asked.y
-    if asked.frame == "odom":
-        place = zones.frame.inverse().compose(Pose(x, y, 0.0))
-        x, y = place.x, place.y
-    what = no_go_at(zones.zones, x, y, settings.body.radius_m)
-    return None if what is None else f"the goal lies in or beside {what}: set it elsewhere, or change the area"
+    radius_m, frame = settings.body.radius_m, settings.places_frame
+    if isinstance(asked, Goal):
+        what = zones.forbids(asked.x, asked.y, asked.frame, frame, radius_m)
+        return None if what is None else f"the goal lies in or beside {what}: set it elsewhere, or change the area"
+    for step in asked.plan.step if isinstance(asked, Mission) else ():
+        place = None if step.goal is None else goal_of(step.goal, settings.places, frame)
+        if place is None or any(condition.when in {"unreachable", "stuck"} for condition in step.conditions):
+            continue
+        what = zones.forbids(place.x, place.y, place.frame, frame, radius_m)
+        if what is not None:
+            return (
+                f"the goal of step {step.name} lies in or beside {what}: set it elsewhere, change the area, or give "
+                "the step a condition `unreachable`"
+            )
+    return None
+
+
+def zone_of_goal(goal: Goal, zones: ZoneLimits | None, settings: Settings) -> str | None:
+    """Return the no-go zone in which a goal of odometry's frame lies, None if in none."""
+    if zones is None:
+        return None
+    return zones.forbids(goal.x, goal.y, "odom", settings.places_frame, settings.body.radius_m)
 
 
 def wants_map(drive_request: DriveRequest, settings: Settings) -> bool:

@@ -14,7 +14,7 @@ from tests.hil.running import PATIENT, Running, running, start_url, wait_for
 from tests.hil.truth import Row, Truth
 
 STARTS: Final = 4
-"""On a busy machine the emulated robot may not answer in time; then the run ends, as it must, and is started again."""
+"""On a busy machine the emulated robot may not answer in time: the run ends, as it must, and is started again."""
 
 
 @dataclass
@@ -57,7 +57,8 @@ def has_robot(command: Running) -> bool:
     """Wait until the robot of a run has answered; return False if the run has ended for want of an answer."""
 
     def is_decided() -> bool:
-        return command.process.poll() is not None or any(event["event"] == "robot ready" for event in command.events())
+        found = {event["event"] for event in command.events()}
+        return "robot ready" in found or command.process.poll() is not None
 
     wait_for(is_decided, "a robot", lambda: command.err)
     return command.process.poll() is None

@@ -11,17 +11,17 @@ from behaviors.no_go import zones_of
 from behaviors.teleoperation import Teleoperate
 from config.load import load_settings, with_mission
 from config.mission import MissionConfig, StepConfig
-from config.mission_step import MoveToGoalUse, TimeCondition, WanderUse
+from config.mission_step import MoveToGoalUse, ReachedCondition, TimeCondition, UnreachableCondition, WanderUse
 from config.places import NoGoAreaConfig, NoGoLineConfig, PlaceConfig, PlacesConfig
 from config.settings import Settings
 from drivers.messages import Pose
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import CycleRecord, State
+from runtime.cycle.step import STANDSTILL, CycleRecord, State
 from runtime.cycle.velocity_limits import VOID
 from runtime.simulation.closed_loop import OperatorInput, simulate
-from tests.runtime.cycle.requested_robot import RequestedRobot, driving
+from tests.runtime.cycle.requested_robot import RequestedRobot, driving, hold_reason
 
 ROOM = load_settings("room", ["perception.method=paper"])
 STOPPING_ERROR_M = 0.0
@@ -150,6 +150,32 @@ def test_a_goal_in_an_area_is_refused_and_named() -> None:
         "the goal lies in or beside the no-go area rug: set it elsewhere, or change the area"
     ]
     assert not script.request_drive(Goal(4.0, 0.0)).refused
+
+
+def test_a_mission_with_a_step_into_an_area_is_refused_unless_the_step_says_what_follows() -> None:
+    script = with_area(driving())
+    step = StepConfig(name="visit", schemas=(MoveToGoalUse(name="move_to_goal", x_m=1.5, y_m=0.0),))
+    (refused,) = script.request_drive(Mission(mission(step))).refused
+    assert refused.why.startswith("the goal of step visit lies in or beside the no-go area rug: set it elsewhere")
+    until = (ReachedCondition(when="reached"), UnreachableCondition(when="unreachable", go="failed"))
+    assert not script.request_drive(Mission(mission(step.model_copy(update={"until": until})))).refused
+    script.request_drive(None)
+    assert isinstance(script.state.drive_request, Mission)
+    assert script.state.drive_request.progress.status == "failed"
+
+
+@pytest.mark.parametrize("is_mission", [False, True])
+def test_a_goal_over_which_an_area_is_drawn_is_given_up_at_once(is_mission: bool) -> None:
+    script = driving()
+    step = StepConfig(name="visit", schemas=(MoveToGoalUse(name="move_to_goal", x_m=1.5, y_m=0.0),))
+    script.request_drive(Mission(mission(step)) if is_mission else Goal(1.5, 0.0))
+    assert script.request_drive(None).command != STANDSTILL
+    with_area(script)
+    assert script.request_drive(None).command == STANDSTILL
+    assert "the goal is unreachable: it lies in or beside the no-go area rug" in hold_reason(script)
+    script.settings = script.settings.model_copy(update={"places": PlacesConfig()})
+    assert script.request_drive(None).command == STANDSTILL, "it does not set out again by itself"
+    assert "the no-go area rug" in hold_reason(script)
 
 
 def test_places_of_odometry_are_void_after_its_restart_until_they_are_set_again() -> None:
