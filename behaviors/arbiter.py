@@ -62,6 +62,7 @@ def arbitrate(
     expected: Sequence[str],
     turn_rad_s: tuple[float, float] = (-math.inf, math.inf),
     commitment: Commitment | None = None,
+    run_s: float | None = None,
 ) -> Decision:
     """Return the velocity for the sum of all responses, or a reason to stop.
 
@@ -85,7 +86,9 @@ def arbitrate(
     turn_rad_s
         The least and the greatest turning rate, rad/s; the base's limits hold as well.
     commitment
-        Of the command before, if any: the side to which the robot turns to a nearly opposite course.
+        Of the command before, if any: the side to which the robot turns.
+    run_s
+        Now, by the run's clock, s, where a turn to the other side waits a while; None where it does not.
 
     Returns
     -------
@@ -102,7 +105,7 @@ def arbitrate(
     course = math.atan2(y, x)
     angle = wrap_angle(course - percept.pose.theta)
     speed = magnitude * _course_speed_m_s(abs(angle), config)
-    w = config.turn_gain_per_s * (angle if commitment is None else commitment.kept_angle(angle))
+    w = config.turn_gain_per_s * (angle if commitment is None else commitment.kept_angle(angle, run_s))
     w = max(turn_rad_s[0], min(turn_rad_s[1], w))
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
     seen = seen_speed_m_s(percept, body, config.clearance_m, w)

@@ -88,6 +88,9 @@ class RestoreObjects:
     """Put objects back as they were before an edit, with their numbers and the readings kept for them."""
 
     rows: tuple[ObjectRow, ...]
+    walls: str = ""
+    """What the method keeps of walls and corners, as `perception.method.Method.kept_walls` returns it: they are put
+    in place of those that there are. Empty: those stay."""
     kind: Literal["restore_objects"] = "restore_objects"
 
 

@@ -86,6 +86,10 @@ class Method(Protocol):
         """
         ...
 
+    def kept_walls(self) -> str:
+        """Return what is kept of walls and corners as text, for `edits.RestoreObjects`; empty without any."""
+        ...
+
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""
         ...

@@ -55,6 +55,10 @@ class NoMethod:
         """Return None: there are no objects."""
         return None
 
+    def kept_walls(self) -> str:
+        """Return the empty text: there are no walls."""
+        return ""
+
     def evidence(self, _number: int) -> Evidence | None:
         """Return None: there are no objects."""
         return None

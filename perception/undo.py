@@ -48,9 +48,10 @@ def edit_with_undo(edit: Edit, seen: Perception) -> tuple[str | None, Undo]:
     edit : Edit
         The edit, which may be refused in part.
     seen : Perception
-        The map, updated. Walls are not put back after it was cleared: readings alone make them.
+        The map, updated.
     """
     areas, objects = seen.vacant_areas(), _rows(seen, edit)
+    walls = seen.method.kept_walls() if isinstance(edit, ClearMap) else ""
     held = seen.segments() if isinstance(edit, DeleteSegments | PinSegments | ClearMap) else None
     refused = seen.edit(edit)
     undo: list[Edit] = []
@@ -63,8 +64,8 @@ def edit_with_undo(edit: Edit, seen: Perception) -> tuple[str | None, Undo]:
             undo += _restored(held, set(held.numbers.tolist()))
         case PlaceModel() if refused is None:
             undo += [WithdrawPlacement(number) for number in _newest_placed(seen)]
-    if objects and refused is None:
-        undo.append(RestoreObjects(objects))
+    if (objects or walls) and refused is None:
+        undo.append(RestoreObjects(objects, walls))
     return refused, (*undo, *_areas(areas, seen.vacant_areas()))
 
 

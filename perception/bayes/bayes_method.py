@@ -42,7 +42,7 @@ from perception.bayes.reports.object_report import (
 )
 from perception.bayes.segments.pinned_segments import Pins
 from perception.bayes.segments.segment_list import count_again, count_map, drawn, mapped_segments
-from perception.bayes.tracks.kept_tracks import kept_track, restore_track
+from perception.bayes.tracks.kept_tracks import kept_track, kept_walls, restore_track, restore_walls
 from perception.bayes.tracks.map_edits import edit_memory, row_of
 from perception.bayes.tracks.naming import Reported, report_circles, sure_polygons
 from perception.bayes.tracks.observe import associate, hear_crosses, observe
@@ -272,8 +272,10 @@ class BayesPerception:
         """Apply a user's edit; return None, or the reason why it cannot be done."""
         self._objects = self._archived = self._archived_labels = None
         match edit:
-            case RestoreObjects(rows):
+            case RestoreObjects(rows, walls):
                 refusals = [self._restore(row) for row in rows]
+                if walls:
+                    refusals.append(restore_walls(self.memory, walls, bounds_of(self)))
                 return next((refused for refused in refusals if refused is not None), None)
             case (
                 MoveObject(number)
@@ -302,6 +304,10 @@ class BayesPerception:
         with self._archive.borrowed(self.memory, self.settings, number):
             row = row_of(self.memory, number)
             return None if row is None else kept_track(self.memory, row)
+
+    def kept_walls(self) -> str:
+        """Return walls and corners, and the readings by which they are reviewed, as text."""
+        return kept_walls(self.memory)
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence of each reading kept for an object; None for an unknown number."""

@@ -249,6 +249,10 @@ class PaperPerception:
         found = self.candidates.find(number)
         return None if found is None else f"{CANDIDATE}:{found[1]}"
 
+    def kept_walls(self) -> str:
+        """Return the empty text: this method finds no walls."""
+        return ""
+
     def _restore(self, row: ObjectRow) -> str | None:
         """Make an object again what it was, where it was."""
         kind, _, model = row.kept.partition(":")

@@ -173,6 +173,9 @@ class FileControl(Protocol):
     async def pin(self, file: str, *, pinned: bool) -> None:
         """Keep a recording when the folder is full, or no longer."""
 
+    async def undo(self) -> str:
+        """Take back the last new name or pin; return what is as before."""
+
     async def delete(self, file: str) -> None:
         """Delete a recording."""
 

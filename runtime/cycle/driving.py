@@ -169,7 +169,7 @@ def commit(result: DriveResult, twist: Twist, requested_run_s: float, run_s: flo
     if isinstance(request, Teleoperate):  # each message is a request: only another direction is a new one
         requested = (request.v > 0.0) - (request.v < 0.0)
     elif before.started_run_s is not None and before.started_run_s < requested_run_s:
-        before = replace(before, started_run_s=None)
+        before = replace(before, started_run_s=None, side=0, turned_run_s=None)
     decided, (twist, commitment) = twist, before.commit(twist, run_s, requested)
     hold_reason = result.hold_reason or (WAITS_TO_START if twist == STANDSTILL != decided else None)
     return twist, replace(result, hold_reason=hold_reason, memory=replace(result.memory, commitment=commitment))
@@ -285,7 +285,7 @@ def _along_legs(
     responses = (ahead, away, *others)
     expected = (AHEAD, AVOID, *(response.schema for response in others))
     decision = arbitrate(
-        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment
+        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment, run_s=run_s
     )
     if leg.gave_up and isinstance(decision, Drive):
         return DriveResult(Drive(STANDSTILL), (), drive_request, leg, LEG_GIVEN_UP, trail=trail)
@@ -346,8 +346,9 @@ def _on_mission(
     else:
         away = avoid_static_obstacle(others, body.radius_m, settings.behaviors.avoid_static_obstacle)
         responses = (*asked.leads, *asked.helpers, away)
+        expected = (*asked.schemas, AVOID)
         decision = arbitrate(
-            responses, percept, body, behaviors.arbiter, (*asked.schemas, AVOID), commitment=commitment
+            responses, percept, body, behaviors.arbiter, expected, commitment=commitment, run_s=run_s
         )
     if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:
         hold_reason = NO_WAY.format(step.name)

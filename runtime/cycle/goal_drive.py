@@ -150,7 +150,7 @@ def drive_through_valley(
     responses = (response, _pushes(percept, config.safety_m, settings), *beside)
     expected = tuple(r.schema for r in responses)
     decision = arbitrate(
-        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment
+        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment, run_s=run_s
     )
     is_closed = valley.direction_rad is None and math.hypot(way.x, way.y) > 0.0
     return replace(now, valley=valley), responses, decision, NO_VALLEY if is_closed else None

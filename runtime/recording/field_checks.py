@@ -214,7 +214,9 @@ def check_state(state: Mapping[str, Any]) -> None:
 def _memory(what: str, memory: DriveMemory) -> None:
     commitment, progress = memory.commitment, memory.progress
     _time(f"{what}.commitment.started_run_s", commitment.started_run_s)
+    _time(f"{what}.commitment.turned_run_s", commitment.turned_run_s)
     _bounded(f"{what}.commitment.requested", commitment.requested, 1.0)
+    _bounded(f"{what}.commitment.side", commitment.side, 1.0)
     _bounded(f"{what}.commitment.turn_rad_s", commitment.turn_rad_s, SPEED_MAX)
     _count(f"{what}.progress.part", progress.part)
     _time(f"{what}.progress.run_s", progress.run_s)

@@ -101,8 +101,8 @@ def rename_recording(folder: Path, name: str, to: str) -> str:
     return new.name
 
 
-def pin_recording(folder: Path, name: str, *, pinned: bool) -> None:
-    """Keep a recording when the folder is full, or no longer; one that is being written may be kept too.
+def pin_recording(folder: Path, name: str, *, pinned: bool) -> bool:
+    """Keep a recording when the folder is full, or no longer, also one being written; return whether it was kept.
 
     Raises
     ------
@@ -110,6 +110,7 @@ def pin_recording(folder: Path, name: str, *, pinned: bool) -> None:
         There is no such recording, or the disk refuses.
     """
     path = _found(folder, name)
+    was_pinned = is_pinned(path)
     try:
         if pinned:
             pin_of(path).touch()
@@ -117,6 +118,7 @@ def pin_recording(folder: Path, name: str, *, pinned: bool) -> None:
             pin_of(path).unlink(missing_ok=True)
     except OSError as error:
         raise _refused(name, "pinned" if pinned else "unpinned", error) from error
+    return was_pinned
 
 
 def delete_recording(folder: Path, name: str) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 
 import pytest
 
-from behaviors.commitment import OPPOSITE_RAD, START_S, Commitment
+from behaviors.commitment import FAINT_RAD_S, OPPOSITE_RAD, START_S, TURN_S, Commitment
 from perception.percept import Twist
 
 CYCLE_S = 0.05
@@ -69,3 +70,30 @@ def test_a_turn_to_an_opposite_course_keeps_its_side() -> None:
 def test_a_course_that_is_nearer_by_one_side_is_turned_to_by_that_side(angle_rad: float) -> None:
     for turn_rad_s in (-0.5, 0.5):
         assert Commitment(turn_rad_s=turn_rad_s).kept_angle(angle_rad) == angle_rad
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.2])
+def test_a_turn_to_the_other_side_waits_and_no_other_turn_does(speed_m_s: float) -> None:
+    """The course trembles about straight ahead, or from left to right; then it stays on one side."""
+    rng, commitment, sides, last = random.Random(2), Commitment(), list[float](), 0
+    for k in range(400):
+        run_s = k * CYCLE_S
+        angle = rng.uniform(-2.0, 2.0) if run_s < 15.0 else 1.0
+        w = 2.0 * commitment.kept_angle(angle, run_s)
+        assert speed_m_s == 0.0 or w in (0.0, 2.0 * angle)
+        twist, commitment = commitment.commit(Twist(speed_m_s, w), run_s)
+        side = (twist.w > FAINT_RAD_S) - (twist.w < -FAINT_RAD_S)
+        if side not in {0, last}:
+            last = side
+            sides.append(run_s)
+    assert all(b - a >= TURN_S for a, b in itertools.pairwise(sides))
+    assert len(sides) > 10
+    assert commitment.kept_angle(1.0, 20.0) == 1.0
+    assert commitment.turn_rad_s == 2.0
+
+
+def test_a_turn_waits_for_none_but_that_of_its_own_request() -> None:
+    _, commitment = Commitment().commit(Twist(0.2, 0.5), 10.0)
+    assert commitment.kept_angle(-0.5, 10.5) == 0.0
+    assert commitment.kept_angle(-0.5) == commitment.kept_angle(-0.5, 11.0) == -0.5
+    assert commitment.kept_angle(-0.5, 9.0) == -0.5, "a clock that went back"

@@ -28,7 +28,7 @@ from perception.edits import (
 )
 from perception.pipeline import Perception
 from perception.undo import Undo, edit_with_undo
-from tests.perception.edited import number_of
+from tests.perception.edited import is_bayes, number_of
 
 EDITS = 25
 NUMBER = [field.name for field in fields(DetectedObject)].index("number")
@@ -72,6 +72,8 @@ def any_edit(rng: random.Random, seen: Perception) -> Edit:
             RejectObject(one),
             MarkVacant(x, y, rng.uniform(0.1, 1.5)),
             LiftArea(rng.choice([*areas, GONE])),
+            # The paper's method forgets a candidate that a placed model hides once the map is cleared.
+            *([ClearMap()] if is_bayes(seen) and rng.random() < 0.3 else []),
         )
     )
 

@@ -1,4 +1,4 @@
-"""Tracks as text, so that an operator's undo puts an object back exactly, with the readings kept for it.
+"""Tracks and walls as text, so that an operator's undo puts them back exactly, with the readings kept for them.
 
 The text is part of an edit, and an edit may come from a file. So each number is checked against its bound before it
 becomes part of the memory, which compiled kernels read without checks.
@@ -26,14 +26,23 @@ CIRCLE: Final = "circle"
 POLYGON: Final = "polygon"
 BOUNDED: Final = MappingProxyType({CIRCLE: "memory.circles", POLYGON: "memory.state.polygons"})
 """The names by which the numbers of a track have their bounds."""
+ROOM: Final = "memory.state.room"
+"""The same of the walls' map."""
+WALLS_LOST: Final = "the walls cannot be put back: nothing valid was kept of them"
 
 
 def kept_track(memory: Memory, row: int) -> str:
     """Return a track as text; its row is as of `map_edits.row_of`."""
     t = row - len(memory.circles)
     kind, tracks, at = (CIRCLE, memory.circles, row) if t < 0 else (POLYGON, memory.polygons, t)
-    packed = zlib.compress(tracks[at].tobytes(), 1)
-    return f"{kind}:{base64.b64encode(packed).decode()}"
+    return f"{kind}:{_packed(tracks[at])}"
+
+
+def kept_walls(memory: Memory) -> str:
+    """Return the map of the walls as text; empty where it has none."""
+    room = memory.state["room"][0]
+    has_any = room["walls"]["weight"].any() or any(room[points]["is_used"].any() for points in ("corners", "edges"))
+    return _packed(room) if has_any else ""
 
 
 def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -> str | None:
@@ -53,10 +62,7 @@ def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -
     track = None if tracks is None else _unpacked(text, tracks.dtype)
     if tracks is None or track is None or track["number"][0] != row.number:
         return not_restorable(row.number)
-    try:
-        for name, values in numbers_of({BOUNDED[kind]: track}):
-            check_values(name, values, bounds[name])
-    except ValueError:
+    if not _is_valid(BOUNDED[kind], track, bounds):
         return not_restorable(row.number)
     if row.number > int(memory.state["objects_numbered"][0]) or track["status"][0] == FREE:
         return not_restorable(row.number)
@@ -69,6 +75,43 @@ def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -
         leave_job(memory.s, int(places[0]))
     tracks[places[0]] = track[0]
     return None
+
+
+def restore_walls(memory: Memory, text: str, bounds: Mapping[str, Bound]) -> str | None:
+    """Put the map of the walls back in place of the present one; return None, or why that is impossible.
+
+    Parameters
+    ----------
+    memory : Memory
+        Updated.
+    text : str
+        From `kept_walls`.
+    bounds : mapping
+        As of `perception.snapshot.bounds_of`.
+    """
+    room = _unpacked(text, memory.state["room"].dtype)
+    if room is None or not _is_valid(ROOM, room, bounds):
+        return WALLS_LOST
+    numbers = int(memory.state["objects_numbered"][0])
+    if max(room["walls"]["spans"]["number"].max(), room["walls"]["bins"]["number"].max()) > numbers:
+        return WALLS_LOST
+    memory.state["room"] = room
+    return None
+
+
+def _is_valid(name: str, record: NDArray[Any], bounds: Mapping[str, Bound]) -> bool:
+    """Return whether each number of a record that the memory holds under this name is within its bound."""
+    try:
+        for path, values in numbers_of({name: record}):
+            check_values(path, values, bounds[path])
+    except ValueError:
+        return False
+    return True
+
+
+def _packed(record: np.void) -> str:
+    """Return a record as text."""
+    return base64.b64encode(zlib.compress(record.tobytes(), 1)).decode()
 
 
 def _unpacked(text: str, dtype: np.dtype[Any]) -> NDArray[Any] | None:

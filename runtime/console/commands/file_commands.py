@@ -27,6 +27,11 @@ async def pin_recording(call: Call, given: PinRecording) -> None:
     await _files(call).pin(given.file, pinned=given.pinned)
 
 
+async def undo_file(call: Call, _: NoArguments) -> str:
+    """Take back the last new name or pin; return what is as before."""
+    return await _files(call).undo()
+
+
 async def delete_recording(call: Call, given: DeleteRecording) -> None:
     """Delete a recording for good."""
     await _files(call).delete(given.file)

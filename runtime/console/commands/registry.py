@@ -98,6 +98,7 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("close_recording", NoArguments, TOKEN, async_commands.close_recording),
     Command("rename_recording", arguments.RenameRecording, CONTROL, file_commands.rename_recording),
     Command("pin_recording", arguments.PinRecording, CONTROL, file_commands.pin_recording),
+    Command("undo_file", NoArguments, CONTROL, file_commands.undo_file),
     Command("delete_recording", arguments.DeleteRecording, CONTROL, file_commands.delete_recording),
     Command("make_files", arguments.MakeFiles, TOKEN, file_commands.make_files),
     Command("list_jobs", NoArguments, TOKEN, file_commands.list_jobs),

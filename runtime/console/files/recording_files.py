@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from config.errors import UserError
 from runtime.console.commands.command_error import CommandError
@@ -15,6 +16,9 @@ from runtime.recording.folder_files import delete_recording, pin_recording, rena
 from runtime.recording.storage import find_recording
 
 T = TypeVar("T")
+UNDO_MAX: Final = 50
+"""New names and pins that can be taken back."""
+NO_UNDO: Final = "there is no new name or pin of a recording to undo"
 
 
 class RecordingFiles:
@@ -33,6 +37,8 @@ class RecordingFiles:
     def __init__(self, folder: Path, current: Callable[[], str | None], jobs: Jobs) -> None:
         self._folder = folder
         self._current = current
+        self._undos: deque[tuple[str, Callable[[], object]]] = deque(maxlen=UNDO_MAX)
+        """What each takes back, in words, and how."""
         self.jobs = jobs
 
     async def find(self, file: str) -> Path:
@@ -57,7 +63,11 @@ class RecordingFiles:
             It was not done.
         """
         self._refuse_live(file)
-        return await _in_thread(partial(rename_recording, self._folder, file, to))
+        name = await _in_thread(partial(rename_recording, self._folder, file, to))
+        if name != file:
+            back = partial(rename_recording, self._folder, name, file)
+            self._undos.append((f"{name} is {file} again", back))
+        return name
 
     async def pin(self, file: str, *, pinned: bool) -> None:
         """Keep a recording when the folder is full, or no longer.
@@ -67,7 +77,24 @@ class RecordingFiles:
         CommandError
             It was not done.
         """
-        await _in_thread(partial(pin_recording, self._folder, file, pinned=pinned))
+        was_pinned = await _in_thread(partial(pin_recording, self._folder, file, pinned=pinned))
+        if was_pinned is not pinned:
+            back = partial(pin_recording, self._folder, file, pinned=was_pinned)
+            self._undos.append((f"{file} is {'pinned' if was_pinned else 'unpinned'} again", back))
+
+    async def undo(self) -> str:
+        """Take back the last new name or pin that has not been taken back; return what is as before.
+
+        Raises
+        ------
+        CommandError
+            There is none, or the recording is no longer as it left it.
+        """
+        if not self._undos:
+            raise CommandError(NO_UNDO)
+        done, back = self._undos.pop()
+        await _in_thread(back)
+        return done
 
     async def delete(self, file: str) -> None:
         """Delete a recording.

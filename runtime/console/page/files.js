@@ -30,6 +30,7 @@ export class Files {
     Object.assign(this, { run, connection, notifications, address, play });
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("files-again", () => this.list(notifications.showError));
+    on("files-undo", () => this.undo());
     on("file-play", () => this.#play());
     on("file-report", () => this.make("report", this.#chosen));
     on("file-map", () => this.make("map", this.#chosen));
@@ -75,6 +76,7 @@ export class Files {
     if (shown === this.#shown) return;
     this.#shown = shown;
     const focused = document.activeElement?.id;
+    byId("files-undo").disabled = !controller;
     setText(byId("files-count"), String(this.#rows.length));
     byId("files-empty").hidden = this.#rows.length > 0;
     byId("files").replaceChildren(...this.#rows.map((row, i) => el("li", {}, el("button", { type: "button", class: "file", id: `file-row-${i}`,
@@ -142,6 +144,11 @@ export class Files {
     this.#chosen = name;
     this.notifications.toast(`${file} is ${name} now`);
     await this.list();
+  }
+
+  // Takes back the last new name or pin, whichever recording it was of.
+  undo() {
+    return this.connection.request({ type: "undo_file" }).then(this.notifications.toast.bind(this.notifications), this.notifications.showError).then(() => this.list());
   }
 
   #delete() {

@@ -20,7 +20,7 @@ const WORDS = [
   ["arrows, Shift+arrows", "with the move tool: nudge the selected object by 1 cm or 10 cm"],
   ["W A S D", "drive while held, if enabled; arrows on the driving pad"],
   ["K", "pause or resume the emulator"],
-  ["Ctrl+Z", "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; in Tune, the last parameter"],
+  ["Ctrl+Z", "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; in Tune, the last parameter; in Files, the last name or pin"],
   ["Escape", "cancel; clear the selection"],
   ["?", "this list"],
 ];

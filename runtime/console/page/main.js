@@ -240,11 +240,11 @@ connection.on("evidence", (message) => objects.showEvidence(message));
 connection.on("parameters", (message) => parameters.show(message.parameters));
 connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
-byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings segments and objects back, walls are recognised anew, and vacant areas stay."), [
+byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings segments, objects and walls back, and vacant areas stay."), [
   ["Keep it", null],
   ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tools.current.id === "places" ? places_tool : tabs.shown === "tune" ? parameters : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
+watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tools.current.id === "places" ? places_tool : tabs.shown === "tune" ? parameters : tabs.shown === "files" ? files : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 tabs.restore(preferred("tab", ""));
 new Beside({ tabs, shown: panelShown });

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
-from perception.bayes.tracks.kept_tracks import kept_track, restore_track
+from perception.bayes.tracks.kept_tracks import kept_track, kept_walls, restore_track, restore_walls
 from perception.edits import ObjectRow
 from perception.snapshot import bounds_of
 
@@ -61,3 +61,31 @@ def test_a_number_that_was_never_given_is_refused(memory: Memory) -> None:
     assert "cannot be put back" in str(restore_track(memory, row(kept, 4), bounds_of(Owner(memory))))
     memory.state["objects_numbered"] = 2
     assert "cannot be put back" in str(restore_track(memory, row(kept), bounds_of(Owner(memory))))
+
+
+def with_wall(memory: Memory) -> Memory:
+    wall = memory.state["room"]["walls"][0, 3]
+    wall["weight"], wall["normal_x"], wall["spans"][0]["number"] = 12.5, 1.0, 4
+    memory.state["room"]["remembered"]["x"][0, :50] = 2.0
+    return memory
+
+
+def test_walls_come_back_whole(memory: Memory) -> None:
+    assert kept_walls(memory) == "", "there are none"
+    room = with_wall(memory).state["room"].copy()
+    kept = kept_walls(memory)
+    memory.clear()
+    assert restore_walls(memory, kept, bounds_of(Owner(memory))) is None
+    assert (memory.state["room"] == room).all()
+
+
+@pytest.mark.parametrize(("field", "value"), [("weight", np.nan), ("span_count", 99), ("number", 6)])
+def test_walls_with_a_number_out_of_its_bound_are_refused(memory: Memory, field: str, value: float) -> None:
+    room = with_wall(memory).state["room"][0].copy()
+    wall = room["walls"][3]
+    (wall["spans"][1] if field == "number" else wall)[field] = value
+    before = memory.state.copy()
+    text = base64.b64encode(zlib.compress(room.tobytes())).decode()
+    for bad in (text, text[:40], "!"):
+        assert "cannot be put back" in str(restore_walls(memory, bad, bounds_of(Owner(memory))))
+    assert memory.state.tobytes() == before.tobytes()

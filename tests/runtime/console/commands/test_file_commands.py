@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,42 @@ async def test_a_recording_is_named_kept_and_deleted(folder: Path) -> None:
         assert (await page.ask(type="pin_recording", file="dock.mcap", pinned=False))["ok"]
         assert (await page.ask(type="delete_recording", file="dock.mcap"))["ok"]
         assert list(folder.glob("*.mcap*")) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+async def test_each_undo_leaves_names_and_pins_as_they_were(folder: Path, seed: int) -> None:
+    """Over random new names and pins, some of which change nothing or are refused."""
+    rng, done, changes = random.Random(seed), list[list[str]](), 0
+
+    def held() -> list[str]:
+        return sorted(path.name for path in folder.iterdir())
+
+    async with with_files(folder) as case:
+        page = await case.page()
+        (folder / "other.mcap").write_bytes(b"x")
+        begin = held()
+
+        async def take_back() -> None:
+            assert (await page.ask(type="undo_file"))["data"].endswith(" again")
+            assert held() == done.pop()
+
+        for _ in range(40):
+            before, file = held(), rng.choice(["run", "other", "dock", "gone"]) + ".mcap"
+            if done and rng.random() < 0.3:
+                await take_back()
+                continue
+            if rng.random() < 0.5:
+                await page.ask(type="rename_recording", file=file, to=rng.choice(["dock", "run", "../x"]))
+            else:
+                await page.ask(type="pin_recording", file=file, pinned=rng.random() < 0.6)
+            if held() != before:
+                changes += 1
+                done.append(before)
+        while done:
+            await take_back()
+        assert held() == begin
+        assert changes >= 3
+        assert "no new name or pin" in (await page.ask(type="undo_file"))["error"]
 
 
 async def test_what_a_job_made_is_announced_and_can_be_had(folder: Path) -> None:
