@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
 
+from config.settings import Settings
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
@@ -152,6 +153,9 @@ class SettingsFileControl(Protocol):
 
     async def save(self, number: int, text: str, digest: str, /) -> Mapping[str, Any]:
         """Write a text in place of a file, if that still has the digest; return it as `read` would."""
+
+    async def keep_places(self, settings: Settings) -> None:
+        """Write the places of a run into the map file that it was started with, if it was."""
 
     async def restart(self) -> None:
         """End the run and start it again with the same command."""

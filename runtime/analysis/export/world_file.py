@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+import tomllib
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -19,6 +21,8 @@ from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from drivers.messages import Floats
 from perception.detected_object import DetectedObject
 
+HEADER: Final = re.compile(r"""\s*\[\[?\s*["']?(?P<name>[A-Za-z_][\w-]*)["']?\s*[\].]""")
+"""The first line of a table; a line of coordinates within a list has no letter."""
 DIGITS: Final = 4
 """Decimals of a length, m."""
 
@@ -68,6 +72,44 @@ def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[
 def with_places(world: WorldConfig, places: PlacesConfig) -> WorldConfig:
     """Return a world with what an operator has marked on its map."""
     return world.model_copy(update={key: getattr(places, key) for key in PLACE_KEYS})
+
+
+def text_with_places(text: str, places: PlacesConfig) -> str:
+    """Return the text of a world file with other places; the rest of it stays as it is, comments included.
+
+    Parameters
+    ----------
+    text : str
+        Of a valid world file.
+    places : PlacesConfig
+        In place of those that it has.
+    """
+    rows = places.model_dump(mode="json", exclude_defaults=True)
+    lines, kept, left_out = text.splitlines(keepends=True), list[str](), list[str]()
+    for line in lines:
+        header = HEADER.match(line)
+        if header is not None:
+            kept += _after_last_key(left_out)
+            left_out = [line] if header["name"] in PLACE_KEYS else []
+        elif left_out:
+            left_out.append(line)
+        if not left_out:
+            kept.append(line)
+    kept += _after_last_key(left_out)
+    tables = "".join(f"\n[[{key}]]\n{tomli_w.dumps(row)}" for key, listed in rows.items() for row in listed)
+    whole = "".join(kept).rstrip() + "\n" + tables
+    table = {key: value for key, value in tomllib.loads(text).items() if key not in PLACE_KEYS} | rows
+    try:
+        is_right = tomllib.loads(whole) == table
+    except tomllib.TOMLDecodeError:  # the places stood in another form, as in a list in one line
+        is_right = False
+    return whole if is_right else tomli_w.dumps(table)
+
+
+def _after_last_key(lines: Sequence[str]) -> list[str]:
+    """Return the empty lines and comments at the end of a table: they belong to what follows."""
+    at = next((k for k in range(len(lines), 0, -1) if lines[k - 1].strip()[:1] not in {"", "#"}), 0)
+    return list(lines[at:])
 
 
 def round_names(objects: Sequence[DetectedObject], models: Sequence[ModelConfig]) -> list[str]:

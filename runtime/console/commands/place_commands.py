@@ -52,14 +52,15 @@ class SaveMap:
     format: Annotated[Literal["toml", "geojson"], Field()]
 
 
-def set_places(call: Call, given: SetPlaces) -> None:
-    """Put other places in force from the next cycle on."""
+async def set_places(call: Call, given: SetPlaces) -> None:
+    """Put other places in force from the next cycle on, and into the map file of the run."""
     before = call.context.tuning.current.places
     if call.context.tuning.set_places(given.places):
         call.context.places_before.append(before)
+        await _keep(call)
 
 
-def undo_places(call: Call, _: NoArguments) -> None:
+async def undo_places(call: Call, _: NoArguments) -> None:
     """Put the places in force that the last change replaced.
 
     Raises
@@ -70,6 +71,12 @@ def undo_places(call: Call, _: NoArguments) -> None:
     if not call.context.places_before:
         raise CommandError(NO_UNDO)
     call.context.tuning.set_places(call.context.places_before.pop())
+    await _keep(call)
+
+
+async def _keep(call: Call) -> None:
+    if call.context.settings_files is not None:
+        await call.context.settings_files.keep_places(call.context.tuning.current)
 
 
 def go_to_place(call: Call, to: GoToPlace) -> None:

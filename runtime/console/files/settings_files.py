@@ -13,8 +13,12 @@ from typing import Final, TypedDict
 
 from config.errors import UserError
 from config.files import ConfigError, DocumentRead, in_place_of, read_file
+from config.load import parse_text
+from config.places import PlacesConfig
 from config.settings import Settings
 from config.toml_lines import located
+from config.world import WorldConfig
+from runtime.analysis.export.world_file import text_with_places, with_places
 from runtime.console.commands.command_error import CommandError
 from runtime.support.config_lint import lint_settings
 from runtime.support.whole_file import whole_file
@@ -23,6 +27,7 @@ KINDS: Final = MappingProxyType(
     {"runs": "run", "robots": "robot", "worlds": "world", "models": "model", "missions": "mission"}
 )
 """Kinds of files as the page names them."""
+NO_PLACES: Final = PlacesConfig()
 
 
 class SettingsRow(TypedDict):
@@ -78,6 +83,7 @@ class SettingsFiles:
         self._documents = [one for one in documents if one.kind in KINDS]
         self._reload = reload
         self._restart = restart
+        self._keeping = asyncio.Lock()
 
     def listed(self) -> list[SettingsRow]:
         """Return the files, in the order in which they were read."""
@@ -107,6 +113,17 @@ class SettingsFiles:
         """
         return await asyncio.to_thread(self._save, self._document(number), text, digest)
 
+    async def keep_places(self, settings: Settings) -> None:
+        """Write the places of a run into the map file that it was started with, if it was.
+
+        Raises
+        ------
+        CommandError
+            The file cannot be read or written.
+        """
+        async with self._keeping:
+            await asyncio.to_thread(self._keep_places, settings)
+
     async def restart(self) -> None:
         """End the run and start it again with the same command.
 
@@ -121,6 +138,21 @@ class SettingsFiles:
             raise CommandError(f"the settings are wrong, and the run goes on: {error}") from None
         if (why := self._restart()) is not None:
             raise CommandError(why)
+
+    def _keep_places(self, settings: Settings) -> None:
+        room = settings.perception.localization.known_room
+        for document in reversed(self._documents):  # the map is read after the emulator's world
+            if room is None or document.kind != "worlds" or document.path is None:
+                continue
+            text = self._read(document)["text"]
+            try:
+                world = parse_text(WorldConfig, text, document.name)
+            except ConfigError as error:
+                raise CommandError(f"the places are in force, but not kept in {document.name}: {error}") from None
+            if with_places(world, NO_PLACES) == with_places(room, NO_PLACES):
+                if world.places() != settings.places:
+                    self._put(document, document.path, text_with_places(text, settings.places))
+                return
 
     def _document(self, number: int) -> DocumentRead:
         if number >= len(self._documents):
@@ -164,11 +196,14 @@ class SettingsFiles:
             raise CommandError(f"{document.name} is not saved: {problems[0]['text']}")
         if "\r\n" in before["text"]:  # a page has plain line ends
             text = "\r\n".join(text.splitlines()) + "\r\n"
+        self._put(document, document.path, text)
+        return self._read(document)
+
+    def _put(self, document: DocumentRead, path: Path, text: str) -> None:
         try:
-            _write(document.path.resolve(), text)
+            _write(path.resolve(), text)
         except OSError as error:
             raise CommandError(f"{document.name}: cannot be written: {error.strerror or error}") from None
-        return self._read(document)
 
 
 def _write(path: Path, text: str) -> None:

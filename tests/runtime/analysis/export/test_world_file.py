@@ -8,11 +8,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from config.load import load_model
+from config.load import load_model, parse_text
 from config.model import ModelConfig
+from config.places import NoGoAreaConfig, PlaceConfig, PlacesConfig
 from config.world import WorldConfig
 from perception.detected_object import DetectedObject
-from runtime.analysis.export.world_file import placed, world_of, world_text
+from runtime.analysis.export.world_file import placed, text_with_places, with_places, world_of, world_text
 
 BOX = ModelConfig(name="box", closed=True, vertices_m=((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)))
 CORNER = ModelConfig(name="corner", closed=False, vertices_m=((1.0, 0.0), (0.0, 0.0), (0.0, 1.0)))
@@ -51,3 +52,55 @@ def test_a_model_is_turned_about_its_origin() -> None:
     assert placed(CORNER, seen("corner", 1.0, 1.0, math.pi)) == pytest.approx(
         np.array([(0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]), abs=1e-12
     )
+
+
+MAP = """# My room, measured by hand.
+[[wall]]  # north
+x1_m = 0.0
+y1_m = 3.0
+x2_m = 4.0
+y2_m = 3.0
+
+[[place]]
+name = "old"
+x_m = 1.0
+y_m = 1.0
+
+[[no_go_area]]
+vertices_m = [
+  [1.0, 1.0],
+  [2, 1],
+  [2.0, 2.0],
+]
+
+# where it starts
+[start]
+x_m = 0.5
+y_m = 0.5
+heading_deg = 0.0
+"""
+RUG = NoGoAreaConfig(name="rug", vertices_m=((5.0, 5.0), (6.0, 5.0), (6.0, 6.0)))
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        PlacesConfig(),
+        PlacesConfig(place=(PlaceConfig(name="lift", x_m=1.0, y_m=-2.0, heading_deg=90.0),), no_go_area=(RUG,)),
+    ],
+)
+def test_a_map_gets_other_places_and_keeps_its_other_lines(places: PlacesConfig) -> None:
+    text = text_with_places(MAP, places)
+    before, after = (parse_text(WorldConfig, one, "map") for one in (MAP, text))
+    assert after == with_places(before, places)
+    head, _, tail = MAP.partition("[[place]]")
+    rest = (head + tail[tail.index("# where") :]).splitlines()
+    assert [line for line in text.partition("\n[[place]]")[0].splitlines() if line] == [line for line in rest if line]
+    assert "old" not in text
+    assert text_with_places(text, places) == text
+
+
+def test_places_in_a_form_that_is_not_found_in_lines_are_replaced_all_the_same() -> None:
+    text = "place = [{ name = 'old', x_m = 1.0, y_m = 1.0 }]\n" + MAP.partition("[[place]]")[0]
+    world = parse_text(WorldConfig, text_with_places(text, PlacesConfig(no_go_area=(RUG,))), "map")
+    assert (len(world.wall), world.places()) == (1, PlacesConfig(no_go_area=(RUG,)))

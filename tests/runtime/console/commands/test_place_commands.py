@@ -12,6 +12,7 @@ import pytest
 
 from behaviors.move_to_goal import Goal
 from config.load import parse_text
+from config.settings import Settings
 from config.world import WorldConfig
 from tests.runtime.console.console_case import ConsoleCase, Page, open_console
 
@@ -97,3 +98,18 @@ def test_what_is_no_map_is_refused(text: str) -> None:
         assert refused["field"] == "text"
 
     over_a_socket(body)
+
+
+async def test_each_change_of_the_places_is_kept() -> None:
+    kept: list[list[str]] = []
+
+    class Files:
+        async def keep_places(self, settings: Settings) -> None:
+            kept.append([place.name for place in settings.places.place])
+
+    async with open_console(settings_files=Files()) as case:  # type: ignore[arg-type]
+        page = await case.page()
+        await ask(page, type="set_places", places={"place": [CHARGER]})
+        await ask(page, type="set_places", places={"place": [CHARGER]})
+        await ask(page, type="undo_places")
+    assert kept == [["charger"], []]

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from config.files import documents_read, noting_files_read
-from config.load import load_settings
+from config.load import load_settings, load_world, with_known_room, with_room
+from config.places import PlaceConfig, PlacesConfig
 from config.settings import Settings
 from runtime.console.commands.command_error import CommandError
 from runtime.console.files.settings_files import SettingsFiles
@@ -109,3 +110,26 @@ async def test_a_run_is_started_again_only_with_settings_that_are_right(run: Run
     with pytest.raises(CommandError, match="the run goes on"):
         await run.files.restart()
     assert run.restarts == 1
+
+
+async def test_changed_places_are_kept_in_the_map_that_the_run_was_started_with(tmp_path: Path) -> None:
+    path, other = tmp_path / "map.toml", tmp_path / "other.toml"
+    text = "# by hand\n[[wall]]\nx1_m = 0.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n"
+    for file in (path, other):
+        file.write_text(text)
+    with noting_files_read():
+        settings = with_known_room(load_settings("hallway", world=str(other)), str(path))
+        files = SettingsFiles(documents_read(), lambda: settings, lambda: None)
+    charger = PlacesConfig(place=(PlaceConfig(name="charger", x_m=1.0, y_m=2.0),))
+    marked = settings.model_copy(update={"places": charger})
+    await files.keep_places(marked)
+    assert path.read_text().startswith(text)
+    assert with_known_room(settings, str(path)).places == charger
+    assert other.read_text() == text, "the emulator's world is no map"
+    await files.keep_places(settings)
+    assert path.read_text() == text
+    await files.keep_places(with_room(marked, load_world("room"), "map"))
+    assert path.read_text() == text, "of another map that was loaded since"
+    path.write_text("[[wall]")
+    with pytest.raises(CommandError, match="not kept in"):
+        await files.keep_places(marked)
