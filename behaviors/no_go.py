@@ -61,14 +61,12 @@ class Zone:
 
     def distances_m(self, points: Floats) -> Floats:
         """Return the distance of points (shape (…, 2), m) to it, shape (…): negative inside an area."""
+        distances: Floats = side_distances_m(self.ends, points).min(axis=-1)
+        if not self.is_area:
+            return distances
         x, y = points[..., 0, None], points[..., 1, None]
         x1, y1, x2, y2 = self.ends.T
         dx, dy = x2 - x1, y2 - y1
-        length = np.maximum(dx * dx + dy * dy, 1e-18)
-        share = np.clip(((x - x1) * dx + (y - y1) * dy) / length, 0.0, 1.0)
-        distances: Floats = np.hypot(x - x1 - share * dx, y - y1 - share * dy).min(axis=-1)
-        if not self.is_area:
-            return distances
         crosses = (y1 > y) != (y2 > y)
         at = x1 + (y - y1) * dx / np.where(dy == 0.0, 1.0, dy)
         inside = (crosses & (x < at)).sum(axis=-1) % 2 == 1
@@ -78,6 +76,17 @@ class Zone:
         """Return whether its box is within a distance of a place."""
         left, right, low, high = self.box
         return left - reach_m <= x <= right + reach_m and low - reach_m <= y <= high + reach_m
+
+
+def side_distances_m(ends: Floats, points: Floats) -> Floats:
+    """Return the distance of points (shape (…, 2), m) to each of n sides (shape (n, 4), m), shape (…, n)."""
+    x, y = points[..., 0, None], points[..., 1, None]
+    x1, y1, x2, y2 = ends.T
+    dx, dy = x2 - x1, y2 - y1
+    length = np.maximum(dx * dx + dy * dy, 1e-18)
+    share = np.clip(((x - x1) * dx + (y - y1) * dy) / length, 0.0, 1.0)
+    distances: Floats = np.hypot(x - x1 - share * dx, y - y1 - share * dy)
+    return distances
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,10 +149,10 @@ def limited(
     fastest = max(abs(asked.v), abs(last.v), abs(moving.v))
     room_m = body.radius_m + MARGIN_M
     reach_m = room_m + fastest * delay_s + 0.5 * fastest * fastest / body.acceleration_max_m_s2
-    near = [zone for zone in zones.no_go if zone.is_near(pose.x, pose.y, reach_m)]
-    if not near or fastest == 0.0:
-        return asked, None
     here = np.array((pose.x, pose.y))
+    near = [] if fastest == 0.0 else _within(zones.no_go, here, reach_m)
+    if not near:
+        return asked, None
     least_m = [min(0.0, float(zone.distances_m(here)) - room_m) - EQUAL_M for zone in near]
 
     def spare_m(speed_m_s: float, turns: Floats) -> list[float]:
@@ -171,6 +180,20 @@ def limited(
         if room >= 0.0:
             break
     return Twist(0.0, best), tight[0]
+
+
+def _within(zones: tuple[Zone, ...], here: Floats, reach_m: float) -> list[Zone]:
+    """Return the zones within a distance of a place, without the sides of lines that are farther away."""
+    x, y = here.tolist()
+    near = []
+    for zone in zones:
+        if zone.is_near(x, y, reach_m):
+            is_near = side_distances_m(zone.ends, here) < reach_m
+            if zone.is_area and (is_near.any() or float(zone.distances_m(here)) < 0.0):
+                near.append(zone)
+            elif is_near.any():
+                near.append(replace(zone, ends=zone.ends[is_near]))
+    return near
 
 
 def _turns(w: float, last_rad_s: float, moving_rad_s: float, body: BodyConfig, delay_s: float) -> Floats:

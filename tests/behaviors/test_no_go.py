@@ -1,14 +1,16 @@
 """No robot enters a no-go area or crosses a line, whatever is asked of it; one inside comes out."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from behaviors.no_go import MARGIN_M, Zones, limited, no_go_at, with_no_go, zones_of
+from behaviors import no_go
+from behaviors.no_go import MARGIN_M, Zones, limited, no_go_at, side_distances_m, with_no_go, zones_of
 from config.places import NoGoAreaConfig, NoGoLineConfig, PlacesConfig, SpeedAreaConfig
 from config.robot import BodyConfig
-from perception.percept import OccupancyWindow, Percept, Pose, Twist
+from perception.percept import Floats, OccupancyWindow, Percept, Pose, Twist
 from tests.behaviors.views import EVERYWHERE
 
 STEP_S = 0.01
@@ -112,6 +114,44 @@ def worst_gap_m(seed: int, cycles: int = 400) -> float:
 @pytest.mark.parametrize("seed", range(12))
 def test_no_velocity_leads_into_a_zone(seed: int) -> None:
     assert worst_gap_m(seed) > 0.0
+
+
+EVALUATIONS_MAX = 8
+"""Ways of braking that are looked at in a cycle: as asked, standing, and then six turns or four speeds."""
+PLACES_MAX = 2 * 3 * 20
+"""On each of them: places from two speeds, by three turns."""
+
+
+def test_the_work_of_a_cycle_is_bounded_by_the_sides_that_are_near(
+    monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]
+) -> None:
+    """Beside twenty lines of a hundred corners each, of which the robot can reach some corners."""
+    points = [(0.25 * k, 0.5 + 0.3 * math.sin(k)) for k in range(100)]
+    lines = [NoGoLineConfig(points_m=tuple((x, y + 2.0 * i) for x, y in points)) for i in range(20)]
+    body = BodyConfig(radius_m=0.25, speed_max_m_s=1.0, turn_max_rad_s=1.5, acceleration_max_m_s2=0.5)
+    zones, pairs = zones_of(PlacesConfig(no_go_line=tuple(lines))), list[int]()
+
+    def counted(ends: Floats, points: Floats) -> Floats:
+        pairs[-1] += len(ends) * (points.size // 2)
+        return side_distances_m(ends, points)
+
+    monkeypatch.setattr(no_go, "side_distances_m", counted)
+    sides, near_max, rng = sum(len(zone.ends) for zone in zones.no_go), 0, np.random.default_rng(0)
+    for _ in range(200):
+        pose = Pose(*rng.uniform((0.0, -1.0), (24.0, 1.0)).tolist(), rng.uniform(-3.0, 3.0))
+        asked, last, moving = (Twist(*rng.uniform(-1.0, 1.0, 2).tolist()) for _ in range(3))
+        pairs.append(0)
+        limited(asked, last, moving, pose, zones, body, 0.15)
+        fastest = max(abs(twist.v) for twist in (asked, last, moving))
+        reach_m = body.radius_m + MARGIN_M + 0.15 * fastest + 0.5 * fastest**2 / body.acceleration_max_m_s2
+        ends = np.concatenate([zone.ends for zone in zones.no_go])
+        near = int((side_distances_m(ends, np.array((pose.x, pose.y))) < reach_m).sum())
+        near_max = max(near_max, near)
+        assert pairs[-1] <= EVALUATIONS_MAX * PLACES_MAX * near + sides + near
+    assert near_max > 3
+    measured(
+        f"{len(lines)} lines of {sides} sides: at most {max(pairs):,} distances in a cycle, {near_max} sides near"
+    )
 
 
 @pytest.mark.soak

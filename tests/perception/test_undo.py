@@ -62,20 +62,20 @@ def any_edit(rng: random.Random, seen: Perception) -> Edit:
     one = rng.choice([*(number_of(one) for one in seen.known_objects() if one.number), GONE])
     x, y = rng.uniform(-1.0, 3.0), rng.uniform(-1.5, 1.5)
     areas = [area.number for area in seen.vacant_areas()]
-    return rng.choice(
-        (
-            DeleteSegments(some),
-            PinSegments(some, pinned=rng.random() < 0.6),
-            PlaceModel(rng.choice(["drum", "box", "no model"]), x, y, rng.uniform(-4.0, 4.0)),
-            MoveObject(one, x, y, 0.3),
-            ConfirmObject(one),
-            RejectObject(one),
-            MarkVacant(x, y, rng.uniform(0.1, 1.5)),
-            LiftArea(rng.choice([*areas, GONE])),
-            # The paper's method forgets a candidate that a placed model hides once the map is cleared.
-            *([ClearMap()] if is_bayes(seen) and rng.random() < 0.3 else []),
-        )
-    )
+    edits: list[Edit] = [
+        DeleteSegments(some),
+        PinSegments(some, pinned=rng.random() < 0.6),
+        PlaceModel(rng.choice(["drum", "box", "no model"]), x, y, rng.uniform(-4.0, 4.0)),
+        MoveObject(one, x, y, 0.3),
+        ConfirmObject(one),
+        RejectObject(one),
+        MarkVacant(x, y, rng.uniform(0.1, 1.5)),
+        LiftArea(rng.choice([*areas, GONE])),
+    ]
+    # The paper's method forgets a candidate that a placed model hides once the map is cleared.
+    if is_bayes(seen) and rng.random() < 0.3:
+        edits.append(ClearMap())
+    return rng.choice(edits)
 
 
 @pytest.mark.promise("P31")
