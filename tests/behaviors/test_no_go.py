@@ -138,7 +138,8 @@ def test_the_work_of_a_cycle_is_bounded_by_the_sides_that_are_near(
     monkeypatch.setattr(no_go, "side_distances_m", counted)
     sides, near_max, rng = sum(len(zone.ends) for zone in zones.no_go), 0, np.random.default_rng(0)
     for _ in range(200):
-        pose = Pose(*rng.uniform((0.0, -1.0), (24.0, 1.0)).tolist(), rng.uniform(-3.0, 3.0))
+        x, y, theta = rng.uniform((0.0, -1.0, -3.0), (24.0, 1.0, 3.0)).tolist()
+        pose = Pose(x, y, theta)
         asked, last, moving = (Twist(*rng.uniform(-1.0, 1.0, 2).tolist()) for _ in range(3))
         pairs.append(0)
         limited(asked, last, moving, pose, zones, body, 0.15)

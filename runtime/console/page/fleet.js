@@ -5,6 +5,7 @@ import { takeToken } from "./token.js";
 
 const EVERY_MS = 200;
 const LOST_MS = 1000;
+const UNSENT_MS = 700; // with EVERY_MS less than a second
 const HALT_WORDS = {
   none: "", sent: "HALT is sent", confirmed: "HALT confirmed", unconfirmed: "HALT not confirmed: use the robot's own stop",
 };
@@ -68,7 +69,7 @@ function show() {
   byId("fleet-none").hidden = rows.length > 0;
   const silent = performance.now() - heard_ms > LOST_MS ? "nothing comes from `echolocate fleet`: what is shown is old" : "";
   const open = rows.filter(({ halt }) => halt === "unconfirmed").map(({ name, address }) => name ? `${name} (${address})` : address);
-  const unsent = silent && performance.now() - halt_ms > LOST_MS && halt_ms > heard_ms ? "HALT not confirmed: use the robots' own stops" : "";
+  const unsent = performance.now() - halt_ms > UNSENT_MS && halt_ms > heard_ms ? "HALT not confirmed: use the robots' own stops" : "";
   const alarm = [open.length > 0 ? `HALT not confirmed: use the own stop of ${open.join(", ")}` : "", unsent, silent || problem].filter(Boolean).join(". ");
   setText(byId("fleet-alarm"), alarm);
   byId("fleet-alarm").hidden = alarm === "";

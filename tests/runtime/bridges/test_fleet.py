@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Awaitable, Callable
+from importlib import resources
 
-from runtime.bridges.fleet import CONFIRM_MAX_S, SILENT_S, Fleet
+from runtime.bridges.fleet import CONFIRM_MAX_S, SILENT_S, Fleet, FleetRun
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
 from tests.runtime.console.console_case import ConsoleCase, open_console
@@ -52,6 +54,20 @@ def test_a_halt_is_confirmed_by_the_answer_and_a_state_after_it() -> None:
         await shows(case, fleet, "halt", "confirmed")
 
     with_fleet(body)
+
+
+async def test_a_halt_that_is_not_confirmed_is_shown_within_a_second() -> None:
+    """A run that hangs at any moment: the fleet's clock and the times of its page are added up."""
+    now_s, script = [50.0], (resources.files("runtime") / "console" / "page" / "fleet.js").read_text("utf-8")
+    found = [re.findall(rf"const {name}_MS = (\d+)", script) for name in ("EVERY", "UNSENT")]
+    every_s, unsent_s = (int(numbers[0]) / 1000.0 for numbers in found)
+    fleet = Fleet(lambda: now_s[0], list)
+    fleet.runs.append(FleetRun(NOWHERE, is_local=False))
+    fleet.halt(None)
+    now_s[0] += 0.95 - every_s
+    assert fleet.rows()[0]["halt"] == "unconfirmed"
+    assert unsent_s + every_s <= 0.95
+    await fleet.close()
 
 
 def test_control_of_the_run_is_left_to_its_page() -> None:
