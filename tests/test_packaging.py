@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -60,3 +61,20 @@ def test_wheel_and_source_distribution_work_outside_the_clone(tmp_path: Path) ->
     env["XDG_CACHE_HOME"], env["XDG_STATE_HOME"] = str(tmp_path / "cache"), str(tmp_path / "state")
     run(installed / "echolocate", "experiment", "hallway", "--json", "table.json")
     assert (tmp_path / "table.json").stat().st_size > 100
+
+
+@pytest.mark.parametrize(
+    ("there", "taken"),
+    [(("python3.12", "python3.13"), "python3.12"), (("python3.13",), "python3.13"), ((), "python3.11")],
+)
+def test_make_takes_the_first_python_that_is_there(tmp_path: Path, there: tuple[str, ...], taken: str) -> None:
+    make = shutil.which("make")
+    assert make is not None
+    for name in there:
+        (tmp_path / name).write_text("#!/bin/sh\n")
+        (tmp_path / name).chmod(0o755)
+    said = subprocess.run(
+        [make, "--eval", "which: ; $(info taken $(PYTHON))", "which"], cwd=ROOT, capture_output=True, text=True,
+        env={"PATH": str(tmp_path)}, check=False,
+    )  # fmt: skip
+    assert f"taken {taken}\n" in said.stdout, said.stderr

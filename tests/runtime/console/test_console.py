@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,16 @@ async def test_hints_name_the_start_url_and_the_tunnel() -> None:
         assert first == f"console: {case.console.url}"
         assert second.startswith("from another machine: ssh -L ")
         assert not [line for line in case.log if line["level"] == "warning"]
+
+
+async def test_a_port_that_another_program_has_is_replaced_with_a_word() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        busy = other.getsockname()[1]
+        async with open_console(f"console.port={busy}") as case:
+            assert case.url.port != busy
+            assert f"console.port {busy} is in use by another program" in case.console.hints()
+            (warning,) = [line for line in case.log if line["level"] == "warning"]
+            assert warning["event"] == f"console.port {busy} is in use, so the console has port {case.url.port}"
 
 
 async def test_a_console_open_to_other_machines_warns() -> None:

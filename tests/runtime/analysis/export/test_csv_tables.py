@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 
+from perception.detected_object import DetectedObject
 from runtime.analysis.export.csv_tables import tables, write_csv, write_parquet
 from tests.runtime.analysis.synthetic_timeline import START_NS, synthetic_timeline, with_cross_paths
 
@@ -75,3 +77,12 @@ def test_an_echo_is_placed_along_its_bearing() -> None:
         assert (x is None) == (y is None) == (reach is None)
         if reach is not None:
             assert y == pytest.approx(sensor_y + reach), "sensor 6 looks along y"
+
+
+def test_objects_include_corners_and_edges_of_walls() -> None:
+    run = synthetic_timeline()
+    corner = DetectedObject("inside corner", 3.0, 1.0, 0.0, 0.02, 9, 0.99)
+    run.snapshots[-1] = replace(run.snapshots[-1], corners=(corner,))
+    found = tables(run)["objects"]
+    assert (found["model"][-1], found["x_m"][-1], found["t_s"][-1]) == ("inside corner", 3.0, run.snapshots[-1].t_s)
+    assert len(found["model"]) == len(tables(synthetic_timeline())["objects"]["model"]) + 1

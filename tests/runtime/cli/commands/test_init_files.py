@@ -11,6 +11,7 @@ import pytest
 from config.errors import DONE, WRONG_CALL
 from config.load import load_settings
 from runtime.cli.app import run_command
+from runtime.cli.commands.init_files import models_for
 from runtime.cycle.modes import Mode
 from tests.runtime.emulated_run import Run
 
@@ -75,6 +76,7 @@ def test_a_robot_that_is_described_with_the_defaults_can_be_driven(driver: str) 
         (("robot", "--sensors", "1"), "--sensors 1: expected a whole number from 2 to 24"),
         (("robot", "--driver", "arcos", "--sensors", "12"), "has arrays of 8"),
         (("robot", "--range-max", "0.2"), "--range-max 0.2: expected a number from 0.25"),
+        (("robot", "--sensors", "many"), "--sensors"),
         (("robot", "--sensors", "5"), "the pattern does not look ahead"),
         (("run", "--robot", "absent.toml"), "absent.toml"),
         (("model", "--name", "a b"), "nothing was written"),
@@ -90,13 +92,27 @@ def test_a_wrong_option_writes_nothing(words: tuple[str, ...], said: str, capsys
 def test_what_no_option_gives_is_asked_for_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("sys.stdin", Person("box\n9999\n1.5\n\n"))
+    monkeypatch.setattr("sys.stdin", Person("box\n9999\nlong\n1.5\n\n"))
     assert run_command(["init", "model", "table.toml", "--name", "table"]) == DONE
     asked = capsys.readouterr().err
     assert "Its shape (round, box) [round]: " in asked
-    assert "expected a number from 0.02 to 20" in asked, "it asks again"
+    assert asked.count("expected a number from 0.02 to 20") == 2, "it asks again"
+    assert "could not convert" not in asked
     written = tomllib.loads(Path("table.toml").read_text())
     assert (written["name"], written["vertices_m"][0]) == ("table", [0.75, -0.2])
     monkeypatch.setattr("sys.stdin", Person(""))
     assert run_command(["init", "model", "other.toml"]) == WRONG_CALL
     assert not Path("other.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "model", "note"),
+    [(None, "drum", "has no drums"), (0.15, "drum", "have the radius 0.15 m"), (0.3048, "semicircle", "")],
+)
+def test_the_default_model_of_a_run_is_what_its_world_has(radius_m: float | None, model: str, note: str) -> None:
+    drum = "" if radius_m is None else f"[[drum]]\nx_m = 1.0\ny_m = 0.0\nradius_m = {radius_m}\n"
+    Path("world.toml").write_text(f"[[wall]]\nx1_m = 0.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n{drum}")
+    found, said = models_for("world.toml")
+    assert found == model
+    assert note in said
+    assert (said == "") == (note == "")
