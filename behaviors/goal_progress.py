@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
+from behaviors.way_progress import NEARER_M
 from config.behaviors import MoveToGoalConfig
 from perception.percept import Pose
 
 Fault: TypeAlias = Literal["stuck", "unreachable"]
-NEARER_M: Final = 0.1
-"""Least gain on the smallest distance so far that counts as progress, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +29,8 @@ class Progress:
     nearest_m: float
     nearer_run_s: float
     """The smallest distance to the goal so far, and when it was reached, m and s."""
+    excused_run_s: float | None = None
+    """Until when a detour led away from the goal, s; such a robot comes no nearer, and is not given up for it."""
     given_up: str | None = None
     """Why the drive has ended short of the goal; None while it goes on."""
     fault: Fault | None = None
@@ -73,7 +74,7 @@ def observe_progress(
         after = replace(after, x=pose.x, y=pose.y, moved_run_s=run_s)
     if distance_m <= before.nearest_m - NEARER_M:
         after = replace(after, nearest_m=distance_m, nearer_run_s=run_s)
-    stood_s, stayed_s = run_s - after.moved_run_s, run_s - after.nearer_run_s
+    stood_s, stayed_s = run_s - after.moved_run_s, run_s - max(after.nearer_run_s, after.excused_run_s or 0.0)
     fault: Fault = "unreachable"
     if stood_s >= config.stuck_after_s and not is_occupied:
         if is_blocked:

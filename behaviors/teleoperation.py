@@ -83,7 +83,7 @@ def blocked_by(percept: Percept, v: float, body_radius_m: float) -> str | None:
         ahead, left = c * dx + s * dy, c * dy - s * dx
         if sign * ahead > 0.0:
             distance_m = math.hypot(dx, dy)
-            # What lies aside pushes less against the way.
+            # What lies to the side pushes less against the way.
             found = (distance_m * distance_m / abs(ahead), distance_m, math.degrees(math.atan2(left, ahead)), number)
             nearest = found if nearest is None else min(nearest, found)
     if nearest is None:

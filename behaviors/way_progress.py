@@ -1,16 +1,14 @@
 """Whether a drive makes progress towards what its request wants; a robot without any for `STALLED_S` says why.
 
 Progress is coming nearer to where the request leads, or new ground where it leads nowhere in particular. A robot that
-drives to and fro before a wall moves all the time and makes none.
+drives to and fro before a wall moves all the time and makes none. A goal and a mission keep their own progress
+(`behaviors.goal_progress`, `behaviors.missions.mission`), by the same distances; legs keep the one here.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
-
-from perception.percept import Pose
 
 STALLED_S: Final = 20.0
 """After so long without progress the operator reads why, s."""
@@ -24,41 +22,32 @@ GROUND_M: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class WayProgress:
-    """The newest progress of a drive; times by the run's clock."""
+    """The newest progress along legs; times by the run's clock."""
 
-    part: int = 0
-    """Which part of the request that was: a leg's direction or a mission's step."""
+    outbound: bool = True
+    """In which direction that was."""
     best_m: float | None = None
-    """Least distance left so far, m; None where the request leads nowhere in particular."""
-    x: float = 0.0
-    y: float = 0.0
-    """Where the robot was, m in odometry's frame."""
-    run_s: float | None = None
-    """When it was; None before the first cycle."""
+    """Least distance left so far, m from any origin; None before the first cycle."""
+    run_s: float = 0.0
+    """When it was."""
 
-    def observe(
-        self, pose: Pose, remaining_m: float | None, part: int, requested_run_s: float, run_s: float
-    ) -> WayProgress:
+    def observe(self, remaining_m: float, requested_run_s: float, run_s: float, *, outbound: bool) -> WayProgress:
         """Return the progress after a cycle.
 
         Parameters
         ----------
-        pose
-            The robot's, in odometry's frame.
         remaining_m
-            Distance left to where the request leads, m, from any origin; None if it leads nowhere in particular.
-        part
-            Which part of the request is driven; another one starts anew.
+            Distance left in the direction of the leg, m, from any origin.
         requested_run_s, run_s
-            When the request was made, and now, by the run's clock, s.
+            When the legs were requested, and now, by the run's clock, s.
+        outbound
+            Whether the leg leads outbound; the other direction starts anew.
         """
-        is_new = self.run_s is None or part != self.part or requested_run_s > self.run_s
-        if not is_new and remaining_m is not None and self.best_m is not None:
-            is_new = remaining_m <= self.best_m - NEARER_M
-        elif not is_new:
-            is_new = remaining_m != self.best_m or math.hypot(pose.x - self.x, pose.y - self.y) >= GROUND_M
-        return WayProgress(part, remaining_m, pose.x, pose.y, run_s) if is_new else self
+        goes_on = self.best_m is not None and outbound is self.outbound and requested_run_s <= self.run_s
+        if goes_on and self.best_m is not None and remaining_m > self.best_m - NEARER_M:
+            return self
+        return WayProgress(outbound, remaining_m, run_s)
 
     def stalled_s(self, run_s: float) -> float:
         """Return for how long there was no progress, s."""
-        return 0.0 if self.run_s is None else run_s - self.run_s
+        return 0.0 if self.best_m is None else run_s - self.run_s

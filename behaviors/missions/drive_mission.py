@@ -21,12 +21,12 @@ from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene, Visited
 from behaviors.schema_registry import SCHEMAS
-from behaviors.way_progress import GROUND_M
+from behaviors.way_progress import GROUND_M, NEARER_M
 from config.mission_step import HELPERS, Condition, SchemaUse, SeenCondition, UnseenCondition
 from perception.percept import Pose
 
-PROGRESS_M: Final = 0.1
-"""Coming nearer by less than this is no progress, and neither is staying this near to a place, m."""
+TURNED_RAD: Final = 0.1
+"""Turning by less than this is no progress of a turn, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +172,11 @@ def _watched(mission: Mission, scene: Scene, answers: tuple[Answer, ...]) -> Mis
         has_moved = True
     elif remaining_m is None or remaining_m == 0.0:  # nowhere in particular, or only a turn is left
         turned = abs(math.remainder(pose.theta - anchor.theta, math.tau))
-        ground_m = GROUND_M if remaining_m is None else PROGRESS_M
+        ground_m = GROUND_M if remaining_m is None else NEARER_M
         has_moved = math.hypot(pose.x - anchor.x, pose.y - anchor.y) >= ground_m
-        has_moved |= remaining_m == 0.0 and turned >= PROGRESS_M
+        has_moved |= remaining_m == 0.0 and turned >= TURNED_RAD
     else:
-        has_moved = progress.best_m is None or remaining_m <= progress.best_m - PROGRESS_M
+        has_moved = progress.best_m is None or remaining_m <= progress.best_m - NEARER_M
     if not has_moved:
         return mission if progress.anchor is not None else _with_anchor(mission, progress, scene)
     progress = replace(progress, best_m=remaining_m, best_s=progress.step_s)

@@ -17,7 +17,7 @@ from behaviors.leave_canyon import SCHEMA as CANYON
 from behaviors.missions.drive_mission import drive_mission, given_up
 from behaviors.missions.mission import Mission
 from behaviors.move_ahead import SCHEMA as AHEAD
-from behaviors.move_ahead import Leg, along_m, move_ahead
+from behaviors.move_ahead import Leg, move_ahead
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response, summed
@@ -93,8 +93,6 @@ class DriveResult:
     """Of the mission's step, for the next cycle."""
     memory: DriveMemory = NO_MEMORY
     """For the next cycle."""
-    remaining_m: float | None = None
-    """How far it still is, m, from any origin; None if the request leads nowhere in particular."""
 
 
 def drive(
@@ -153,7 +151,7 @@ def drive(
         isinstance(result.decision, Drive) and result.decision.twist == STANDSTILL and result.hold_reason is not None
     )
     progress, leg, stalled = observe_way(
-        result.drive_request, result.leg, None if stands else memory.progress, percept.pose, result.remaining_m,
+        result.drive_request, result.leg, None if stands else memory.progress, result.goal_drive, percept.pose,
         requested_run_s, run_s, settings.behaviors.move_ahead,
     )  # fmt: skip
     hold_reason, memory = result.hold_reason or stalled, DriveMemory(memory.commitment, progress)
@@ -238,8 +236,7 @@ def _to_goal(
                 f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) was reached, but the robot is "
                 f"{away_m:.1f} m from it now: it was moved, or its place was wrong; set the goal again"
             )
-    vectors, left_m = with_sum(responses, decision), math.hypot(there.x - percept.pose.x, there.y - percept.pose.y)
-    return DriveResult(decision, vectors, drive_request, leg, hold_reason, goal_drive, trail, remaining_m=left_m)
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive, trail)
 
 
 def _at_goal(
@@ -290,9 +287,7 @@ def _along_legs(
     if leg.gave_up and isinstance(decision, Drive):
         return DriveResult(Drive(STANDSTILL), (), drive_request, leg, LEG_GIVEN_UP, trail=trail)
     hold_reason = LEG_DONE if leg.done else None
-    remaining_m = -along_m(percept.pose, leg, settings.behaviors.move_ahead)
-    vectors = with_sum(responses, decision)
-    return DriveResult(decision, vectors, drive_request, leg, hold_reason, trail=trail, remaining_m=remaining_m)
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, trail=trail)
 
 
 def _on_mission(
@@ -353,12 +348,7 @@ def _on_mission(
     if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:
         hold_reason = NO_WAY.format(step.name)
     vectors = with_sum(responses, decision)
-    left_m = asked.remaining_m
-    if asked.goal is not None:
-        left_m = math.hypot(asked.goal.x - percept.pose.x, asked.goal.y - percept.pose.y)
-    return DriveResult(
-        decision, vectors, mission, leg, hold_reason, goal_drive, step_settings=step_settings, remaining_m=left_m
-    )
+    return DriveResult(decision, vectors, mission, leg, hold_reason, goal_drive, step_settings=step_settings)
 
 
 def of_step(step: StepConfig, settings: Settings, before: StepSettings | None) -> StepSettings:

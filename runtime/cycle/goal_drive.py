@@ -104,7 +104,7 @@ def drive_to_goal(
         response = Response(around.schema, length * math.cos(driven_rad), length * math.sin(driven_rad))
         room_m = behaviors.leave_canyon.room_m
         if now.detour.rounds < ROUNDS_MAX:
-            now = replace(now, progress=replace(now.progress, nearer_run_s=run_s))
+            now = replace(now, progress=replace(now.progress, excused_run_s=run_s))
     elif behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
         now = _with_search(now, goal, percept, run_s, settings)
         response, valley = follow_valley(

@@ -218,10 +218,8 @@ def _memory(what: str, memory: DriveMemory) -> None:
     _bounded(f"{what}.commitment.requested", commitment.requested, 1.0)
     _bounded(f"{what}.commitment.side", commitment.side, 1.0)
     _bounded(f"{what}.commitment.turn_rad_s", commitment.turn_rad_s, SPEED_MAX)
-    _count(f"{what}.progress.part", progress.part)
     _time(f"{what}.progress.run_s", progress.run_s)
-    for value in (progress.x, progress.y, progress.best_m or 0.0):
-        _bounded(f"{what}.progress", value, PLACE_MAX_M)
+    _bounded(f"{what}.progress.best_m", progress.best_m or 0.0, PLACE_MAX_M)
 
 
 def _clock(what: str, monitor: ClockMonitor) -> None:
@@ -241,6 +239,7 @@ def _goal_drive(what: str, drive: GoalDrive) -> None:
     progress, valley, search = drive.progress, drive.valley, drive.search
     for name, time_s in (
         ("progress.moved_run_s", progress.moved_run_s), ("progress.nearer_run_s", progress.nearer_run_s),
+        ("progress.excused_run_s", progress.excused_run_s),
         ("searched_run_s", drive.searched_run_s),
     ):  # fmt: skip
         _time(f"{what}.{name}", time_s)

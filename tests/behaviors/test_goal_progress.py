@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from behaviors.goal_progress import Progress, observe_progress
 from config.behaviors import MoveToGoalConfig
 from perception.percept import Pose
@@ -52,3 +54,11 @@ def test_a_goal_on_which_something_stands_is_given_up_soon() -> None:
 
 def test_what_is_given_up_stays_so() -> None:
     assert driven([(0.0, 0.0)] * 11 + [(0.1 * k, 0.0) for k in range(50)]) is not None
+
+
+def test_a_detour_is_no_fault_while_it_lasts() -> None:
+    begin, far = Progress.starting_at(Pose(0.0, 0.0, 0.0), 10.0, 0.0), Pose(5.0, 0.0, 0.0)
+    after = observe_progress(replace(begin, excused_run_s=59.0), far, 12.0, 100.0, None, CONFIG)
+    assert after.given_up is None
+    assert after.nearer_run_s == 0.0, "it made no progress all the same"
+    assert observe_progress(after, Pose(8.0, 0.0, 0.0), 12.0, 119.0, None, CONFIG).given_up is not None
