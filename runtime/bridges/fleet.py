@@ -208,4 +208,4 @@ def _place(state: Message, session: Message) -> str:
             return f"at {near[0][1]}"
     if localized is not None and not in_map:
         return "place in the map not known"
-    return f"{x:.1f}, {y:.1f} m{' in the map' if in_map else ' from its start'}"
+    return f"{x:z.1f}, {y:z.1f} m{' in the map' if in_map else ' from its start'}"

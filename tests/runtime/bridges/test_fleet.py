@@ -134,3 +134,11 @@ def test_runs_of_this_machine_come_and_go() -> None:
         await fleet.close()
 
     asyncio.run(body())
+
+
+async def test_a_place_has_no_minus_before_zero() -> None:
+    fleet = Fleet(lambda: 50.0, list)
+    fleet.runs.append(
+        FleetRun(NOWHERE, is_local=False, state={"mode": "READY", "flags": [], "pose": [-0.04, 1.0, 0.0]})
+    )
+    assert fleet.rows()[0]["place"] == "0.0, 1.0 m from its start"
