@@ -18,8 +18,9 @@ from config.study import StudyConfig
 from drivers.messages import Pose
 from runtime.analysis.export.world_file import world_text
 from runtime.batch.runs import expand
+from runtime.batch.tuning_study import SENSORS, THRESHOLDS
 from runtime.batch.worker import run_one
-from runtime.cli.commands.tune import CHANGES, SENSORS, THRESHOLDS, run_tune
+from runtime.cli.commands.tune import CHANGES, tune
 from runtime.recording.ring_log import write_ring_log
 from runtime.simulation.scenes import halls, readings
 
@@ -72,7 +73,7 @@ def measure(folder: Path, seeds: Iterable[int], *, trials: int, workers: int, bl
         study["truth"] = "truth"
     path = folder / "study.toml"
     path.write_text(tomli_w.dumps(study), encoding="utf-8")
-    run_tune(str(path), out=str(folder / "out"), trials=trials, scheduler=None, workers=workers, retries=1)
+    tune(str(path), out=str(folder / "out"), trials=trials, scheduler=None, workers=workers, retries=1)
     changes = folder / "out" / CHANGES
     found = tomllib.loads(changes.read_text(encoding="utf-8")) if changes.exists() else {}
     tuned = (*wrong, *(f"{name}={json.dumps(value)}" for name, value in flat(found)))

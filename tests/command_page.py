@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from runtime.cli.app import app
+from runtime.cli.app import app, show_whole_help
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
 HEADER: Final = """# Commands
@@ -22,6 +22,8 @@ file that exists only with `--force`. Exit codes: 0 done, 1 the work failed, 2 t
 
 def page() -> str:
     """Return the page, in Markdown."""
+    for name in app:
+        show_whole_help(name)
     text = app.generate_docs(output_format="markdown", recursive=True)
     # It takes `python -m` for a part of the name.
     text = re.sub(r"^(echolocate .*?)-m \S+ ", r"\1", text, flags=re.MULTILINE)

@@ -16,6 +16,7 @@ from typing import Final
 import pytest
 
 from drivers.registry import SHIPPED
+from runtime.cli.app import COMMANDS, place_of
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 PACKAGES: Final = ("config", "drivers", "perception", "behaviors", "runtime")
@@ -83,7 +84,7 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "drivers/firmware/board/robot_config_esp32.py",
             "drivers/firmware/board/robot_config_pico.py",
         ),
-        "tests/runtime/cli/commands/test_init_files.py calls its commands": ("runtime/cli/init_commands.py",),
+        "tests/runtime/cli/commands/test_init_files.py calls its commands": ("runtime/cli/commands/init.py",),
         "`make ros2` runs it beside real nodes, see test_real_nodes.py": (
             "drivers/ros2/gateway.py",
             "runtime/bridges/ros2/bridge.py",
@@ -215,6 +216,7 @@ def test_every_module_is_reached_from_an_entry_point() -> None:
     library = (ROOT / "echolocate.py").read_text("utf-8")
     left = [*named_modules("echolocate.py", library), "runtime.cli.__main__", "runtime.cli.terminal.__main__"]
     left += [family.module for family in SHIPPED.values()]
+    left += [place_of(name).partition(":")[0] for commands in COMMANDS.values() for name in commands]
     reached: set[str] = set()
     while left:
         name = left.pop()

@@ -27,6 +27,10 @@ Several = Parameter(negative="", consume_multiple=True)
 """Allows `--option a b c` besides repeating the option."""
 ConfigFile = Annotated[str | None, Parameter(help="Run file, or the name of a shipped one.")]
 RobotFile = Annotated[str | None, Parameter(help="Robot file, or the name of a shipped one.")]
+Connect = Annotated[
+    str | None,
+    Parameter(help="URL of the run, on another machine with its token; by default the newest run here."),
+]
 WorldFile = Annotated[str | None, Parameter(help="World file, or the name of a shipped one.")]
 ModelFiles = Annotated[
     tuple[str, ...],

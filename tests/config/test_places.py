@@ -8,8 +8,8 @@ from config.errors import UserError
 from config.load import ConfigError, load_settings, load_world, parse_text, with_known_room, with_mission
 from config.mission import MissionConfig
 from config.places import PlacesConfig
-from runtime.cli.commands.check import check_config
-from runtime.cli.commands.run_settings import settings_of_files
+from runtime.cli.commands.check import check
+from runtime.cli.commands.run_settings import SettingsFiles
 
 MAP = """
 [[wall]]
@@ -78,7 +78,7 @@ def test_a_run_drives_to_a_place_by_its_name(tmp_path: Path) -> None:
 
     def goal(text: str) -> object:
         map_file = str(tmp_path / "map.toml")
-        return settings_of_files("room", [], None, None, map_file, None, goal=text, no_console=True).goal
+        return SettingsFiles("room", map_file=map_file, goal=text).read().goal
 
     found = goal("charger")
     assert found is not None
@@ -91,9 +91,9 @@ def test_check_names_an_unknown_place(tmp_path: Path) -> None:
     steps = '[[step]]\nname = "go"\nschemas = [{ name = "move_to_goal", place = "charger" }]\n'
     (tmp_path / "errand.toml").write_text(f'name = "errand"\n{steps}', encoding="utf-8")
     (tmp_path / "run.toml").write_text('robot = "denning"\nmission = "./errand.toml"\n', encoding="utf-8")
-    assert check_config(str(tmp_path / "errand.toml"), []) == 0, "its map is not known yet"
+    assert check(str(tmp_path / "errand.toml")) == 0, "its map is not known yet"
     with pytest.raises(ConfigError, match="mission errand: no place is named charger"):
-        check_config(str(tmp_path / "run.toml"), [])
+        check(str(tmp_path / "run.toml"))
 
 
 @pytest.mark.parametrize(

@@ -15,33 +15,19 @@ from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
-    from runtime.support.length_format import Units
+    from runtime.cli.commands.experiment import Experiment
     from runtime.timing.refinement_budget import RefinementBudget
 
 
-def run_budgets(
-    sets: Sequence[str],
-    *,
-    budgets_ms: Sequence[float],
-    quanta: Sequence[float],
-    models: Sequence[str],
-    seeds: int,
-    json_file: str | None,
-    force: bool,
-    units: Units,
-) -> int:
+def run_budgets(common: Experiment, budgets_ms: Sequence[float], quanta: Sequence[float]) -> int:
     """Drive through the hall under each budget, print a table and return the exit code.
-
-    Parameters
-    ----------
-    sets, budgets_ms, quanta, models, seeds, json_file, force, units
-        As of `runtime.cli.experiment_commands.experiment`.
 
     Raises
     ------
     UserError
         A budget is not a number ≥ 0.
     """
+    sets, models, seeds, json_file, force, units = common
     if not all(0.0 <= budget < math.inf for budget in (*budgets_ms, *quanta)):
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
     settings = load_settings("irregular", sets, models=models)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
+from cyclopts import Parameter
 from rich.table import Table
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import utf8
-from config.load import load_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.cli.options import Force, RobotFile
+from runtime.cli.source_options import File, LogOptions
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 
 if TYPE_CHECKING:
@@ -25,25 +27,47 @@ FIRINGS_MIN: Final = 100
 """Fewest firings of a drive."""
 
 
-def calibrate_robot(
-    file: str, out: str, *, way_m: float | None, radii_m: Sequence[float], robot: str | None, force: bool,
-    options: RingLogOptions = AUTO,
-) -> int:  # fmt: skip
-    """Calibrate a robot from a drive, print what was found and return the exit code.
+def calibrate(
+    file: File,
+    /,
+    *,
+    out: str,
+    way: float | None = None,
+    drum: Annotated[tuple[float, ...], Parameter(negative="", show_default=False)] = (),
+    force: Force = False,
+    robot: RobotFile = None,
+    options: LogOptions = AUTO,
+) -> int:
+    """Find a robot's mounts, beams and scales from a drive by a wall and a drum, and write them as a robot file.
+
+    The drive: stand a metre from a bare wall, turn slowly twice on the spot; drive some metres, away from the wall
+    and past something round; turn slowly twice again. Measure the way between both stands, and what is round.
 
     Parameters
     ----------
-    file, out, way_m, radii_m, robot, force, options
-        As of `runtime.cli.recording_commands.calibrate`.
+    out
+        Robot file to write (TOML).
+    way
+        Measured distance between both stands, m; without it, a round object's radius alone shows lengths.
+    drum
+        Measured radius of a round object beside the way, m; may be repeated.
+    force
+        Overwrite files that exist already.
+    file
+        Recording or ring log of the drive.
+    robot
+        Ring logs: the nominal robot, file or name of a shipped one; None for the default.
+    options
+        The conventions of a ring log.
 
     Raises
     ------
     UserError
         The file cannot be read or written, or the drive does not show what is needed.
     """
-    from perception.calibration.calibrate import calibrate
+    from perception.calibration.calibrate import calibrate as find_calibration
 
-    for option, value in (*(("--drum", radius) for radius in radii_m), ("--way", way_m)):
+    for option, value in (*(("--drum", radius) for radius in drum), ("--way", way)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise UserError(f"{option} {value}: must be a length above 0, in metres", WRONG_CALL)
     settings, firings = read_firings(
@@ -54,7 +78,7 @@ def calibrate_robot(
     if settings.ring.turning:
         which = f"{robot or file}: only some of its sensors turn with the wheels"
         raise UserError(f"{which}; calibrate each of its rings by a robot file of its own", WRONG_CALL)
-    found = calibrate(firings, settings.ring, radii_m, way_m, synchro=settings.body.synchro)
+    found = find_calibration(firings, settings.ring, drum, way, synchro=settings.body.synchro)
     if found is None:
         raise UserError(
             f"{file}: no surface was heard often enough from enough places, so nothing was written; drive nearer to "
@@ -78,7 +102,7 @@ def calibrate_robot(
         if nominal:
             which = "all sensors" if len(nominal) == len(sigmas) else f"sensors {', '.join(nominal)}"
             output.print(f"the {what} of {which} are not shown by this drive and stay as they were")
-    if way_m is None:
+    if way is None:
         output.print("without a measured way, lengths are known less well: measure it and give --way")
     output.print(f"{out}: robot file written; use it with: echolocate run --robot {out} --port DEVICE")
     return DONE
@@ -216,6 +240,7 @@ def read_firings(
     UserError
         The file cannot be read.
     """
+    from config.load import load_settings
     from runtime.analysis.export.ring_log_export import recorded_firings
     from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.reader import is_recording, open_recording

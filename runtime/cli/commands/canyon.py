@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from rich.box import SIMPLE
 from rich.table import Table
@@ -15,6 +15,9 @@ from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
+
+if TYPE_CHECKING:
+    from runtime.cli.commands.experiment import Experiment
 
 REFLECTIONS: Final[tuple[Literal["specular", "cone"], ...]] = ("specular", "cone")
 _REACTIVE: Final = ("behaviors.follow_valley.follow_valley_gain=0", "behaviors.leave_canyon.leave_canyon_gain=0")
@@ -29,16 +32,9 @@ SCHEMAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({
 """The sets of schemas, each beside avoid-static-obstacle, and the settings that make them."""
 
 
-def run_canyons(
-    sets: Sequence[str], *, models: Sequence[str], seeds: int, json_file: str | None, force: bool
-) -> int:  # fmt: skip
-    """Drive in so many worlds with each set of schemas, print a table and return the exit code.
-
-    Parameters
-    ----------
-    sets, models, seeds, json_file, force
-        As of `runtime.cli.experiment_commands.experiment`.
-    """
+def run_canyons(common: Experiment) -> int:
+    """Drive in so many worlds with each set of schemas, print a table and return the exit code."""
+    sets, models, seeds, json_file, force, _ = common
     chosen = {name: load_settings("hallway", (*own, *sets), models=models) for name, own in SCHEMAS.items()}
     console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file}, force=force)

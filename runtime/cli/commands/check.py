@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 
 from config.errors import DONE
-from config.load import load_any
-from config.places import check_places
-from config.settings import Settings
-from runtime.support.config_lint import lint_settings
-from runtime.support.pattern_check import refuse_undrivable
+from runtime.cli.options import Sets
 
 
-def check_config(config: str, sets: Sequence[str]) -> int:
-    """Print whether a configuration is good, with warnings, and return the exit code.
+def check(config: str, /, *, sets: Sets = ()) -> int:
+    """Check a configuration file; report each error with its place and the likely fix.
+
+    Parameters
+    ----------
+    config
+        Run, robot, world, model or mission file, or the name of a shipped run.
 
     Raises
     ------
@@ -23,6 +23,12 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     FiringError
         Each value is valid, but the ring cannot carry out its firing pattern, or would not see where it drives.
     """
+    from config.load import load_any
+    from config.places import check_places
+    from config.settings import Settings
+    from runtime.support.config_lint import lint_settings
+    from runtime.support.pattern_check import refuse_undrivable
+
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
         refuse_undrivable(settings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from config.errors import DONE
@@ -14,19 +13,12 @@ from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
-    from runtime.support.length_format import Units
+    from runtime.cli.commands.experiment import Experiment
 
 
-def run_drift(
-    sets: Sequence[str], *, models: Sequence[str], seeds: int, json_file: str | None, force: bool, units: Units
-) -> int:  # fmt: skip
-    """Drive the rounds at each level of errors, print a table and return the exit code.
-
-    Parameters
-    ----------
-    sets, models, seeds, json_file, force, units
-        As of `runtime.cli.experiment_commands.experiment`.
-    """
+def run_drift(common: Experiment) -> int:
+    """Drive the rounds at each level of errors, print a table and return the exit code."""
+    sets, models, seeds, json_file, force, units = common
     settings = load_settings("hallway", sets, models=models)
     console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file}, force=force)

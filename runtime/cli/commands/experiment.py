@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.load import load_settings
-from config.settings import Settings
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, make_output_folder
-from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
+from runtime.cli.options import Count, Force, JsonFile, ModelFiles, Sets, Several, UnitsOption, WorldFile
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.length_format import Units
-from runtime.support.pattern_check import refuse_undrivable
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
+    from config.settings import Settings
     from runtime.simulation.evaluation import SeedOutcome
 
 QUEUE_MAX: Final = 1_000_000
@@ -32,32 +29,120 @@ ROWS_SHOWN: Final = 24
 """Longer tables are not printed."""
 
 
-def run_experiment(
-    name: str,
-    sets: Sequence[str],
+class Experiment(NamedTuple):
+    """What all experiments have in common."""
+
+    sets: tuple[str, ...]
+    models: tuple[str, ...]
+    seeds: int
+    json_file: str | None
+    force: bool
+    units: Units
+
+
+def experiment(
+    name: Literal["hallway", "irregular", "budget", "drift", "canyon"],
+    /,
     *,
-    world: str | None,
-    models: Sequence[str] = (),
-    seeds: int,
+    method: Literal["paper", "bayes"] = "bayes",
+    scene: SceneName | None = None,
+    world: WorldFile = None,
+    model: ModelFiles = (),
+    budget_ms: Annotated[tuple[float, ...], Several] = (0.2, 0.5, 1.0, 2.0, 5.0),
+    quanta: Annotated[tuple[float, ...], Several] = (),
+    seeds: Count = 1,
     out: str | None = None,
-    json_file: str | None,
-    force: bool,
-    units: Units,
+    json: JsonFile = None,
+    force: Force = False,
+    units: UnitsOption = "ft",
+    sets: Sets = (),
 ) -> int:
-    """Drive through the experiment's hall once per seed, print the outcome and return the exit code.
+    """Repeat an experiment of the paper in virtual time, and print its Table 2.
 
     Parameters
     ----------
-    name, sets, world, models, seeds, out, json_file, force, units
-        As of `runtime.cli.experiment_commands.experiment`.
+    name
+        The simulated hallway, the irregular hallway of the real run, the effect of smaller time budgets for
+        perception in a hall of 40 drums, rounds among drums with drifting odometry, or drives to a goal behind a box
+        canyon by several sets of schemas.
+    method
+        How objects are recognised.
+    scene
+        Instead of driving, give perception the readings of this scene at exact poses.
+    budget_ms
+        For `budget`: processor time of perception per cycle, ms.
+    quanta
+        For `budget`: refinement quanta per cycle instead of a time, which makes the table repeatable; 0.1 is one in
+        ten cycles.
+    seeds
+        Repeat with this many seeds, starting at 0.
+    out
+        Folder for recording, figures and report of the run with seed 0.
+    world
+        World file to drive in instead of the experiment's own hall.
+    model
+        Object models to recognise; empty for those of the experiment.
+    json
+        File for a summary (JSON); None for no file.
+    force
+        Overwrite files that exist already.
+    units
+        Units of the printed tables.
+    sets
+        Single settings, each `path=value`, that override the experiment's.
+
+    Raises
+    ------
+    UserError
+        The options exclude one another, or there are no seeds.
+    """
+    common = Experiment((*sets, f"perception.method={method}"), model, seeds, json, force, units)
+    if seeds < 1:
+        raise UserError(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
+    if scene is not None and out is not None:
+        raise UserError("--scene gives perception readings without a run: there is nothing to record in --out",
+                        WRONG_CALL)  # fmt: skip
+    if name == "budget":
+        from runtime.cli.commands.budget import run_budgets
+
+        if scene is not None or world is not None:
+            raise UserError("experiment budget has a hall of its own: leave out --scene and --world", WRONG_CALL)
+        return run_budgets(common, budget_ms, quanta)
+    if name == "drift":
+        from runtime.cli.commands.drift import run_drift
+
+        if scene is not None or world is not None or out is not None:
+            raise UserError("experiment drift has a hall of its own and records nothing: leave out --scene, --world "
+                            "and --out", WRONG_CALL)  # fmt: skip
+        return run_drift(common)
+    if name == "canyon":
+        from runtime.cli.commands.canyon import run_canyons
+
+        if scene is not None or world is not None or out is not None:
+            raise UserError("experiment canyon has worlds of its own and records nothing: leave out --scene, --world "
+                            "and --out", WRONG_CALL)  # fmt: skip
+        return run_canyons(common)
+    if scene is not None:
+        if name != "hallway" or world is not None:
+            raise UserError("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
+        return run_scenes(common, scene)
+    return run_experiment(common, name, world, out)
+
+
+def run_experiment(common: Experiment, name: str, world: str | None, out: str | None) -> int:
+    """Drive through the experiment's hall once per seed, print the outcome and return the exit code.
 
     Raises
     ------
     UserError
         The settings do not describe an experiment, or a file cannot be written.
     """
+    from config.load import load_settings
+    from runtime.cli.tables import outcome_line, spread_line, table_2
     from runtime.simulation.evaluation import run_seed, stop_at_leg_end, summarise
+    from runtime.support.pattern_check import refuse_undrivable
 
+    sets, models, seeds, json_file, force, units = common
     settings = stop_at_leg_end(load_settings(name, sets, world=world, models=models))
     if settings.world is None or not settings.world.drum:
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
@@ -165,23 +250,12 @@ def draw_recorded_run(folder: Path, name: str, console: Console, units: Units) -
     return [timeline.path, page, *draw_all(timeline, folder, console, moving=True, units=units)]
 
 
-def run_scenes(
-    scene: SceneName,
-    sets: Sequence[str],
-    *,
-    models: Sequence[str],
-    seeds: int,
-    json_file: str | None,
-    force: bool,
-    units: Units,
-) -> int:
-    """Give perception the readings of a scene once per seed, print the outcome and return the exit code.
+def run_scenes(common: Experiment, scene: SceneName) -> int:
+    """Give perception the readings of a scene once per seed, print the outcome and return the exit code."""
+    from config.load import load_settings
+    from runtime.cli.tables import boxes_table, scene_line, table_2
 
-    Parameters
-    ----------
-    scene, sets, models, seeds, json_file, force, units
-        As of `runtime.cli.experiment_commands.experiment`.
-    """
+    sets, models, seeds, json_file, force, units = common
     settings = load_settings("hallway", sets, models=models)
     console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file}, force=force)

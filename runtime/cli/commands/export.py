@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.cli.commands.offline_io import plain_console, read_timeline, require_package
 from runtime.cli.commands.output_files import check_outputs, make_output_folder, writing
+from runtime.cli.options import Force, Sets
+from runtime.cli.source_options import NO_OPTIONS, File, SourceOptions
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
@@ -25,13 +27,33 @@ OPTIONAL_PACKAGES: Final = MappingProxyType(
 EXTRA: Final = "export"
 
 
-def export_run(source: TimelineSource, to: ExportFormat, out: str, *, force: bool) -> int:
-    """Export a run and return the exit code.
+def export(
+    file: File,
+    /,
+    *,
+    to: ExportFormat,
+    out: str,
+    force: Force = False,
+    options: SourceOptions = NO_OPTIONS,
+    sets: Sets = (),
+) -> int:
+    """Convert a run to the format of another program; some formats need `pip install 'echolocate[export]'`.
 
     Parameters
     ----------
-    source, to, out, force
-        As of `runtime.cli.recording_commands.export`.
+    to
+        Tables (csv, or parquet*), an MCAP for Foxglove (foxglove*), a ROS 2 bag (rosbag2*), or the firings of a
+        recording as a ring log (ringlog). Formats with * need the extra `export`.
+    out
+        Folder for tables, new folder for a bag, otherwise the file to write.
+    force
+        Overwrite files that exist already; a bag always needs a new folder.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    sets
+        Single settings, each `path=value`, that override the others.
 
     Raises
     ------
@@ -40,7 +62,7 @@ def export_run(source: TimelineSource, to: ExportFormat, out: str, *, force: boo
     """
     if to in OPTIONAL_PACKAGES:
         require_package(*OPTIONAL_PACKAGES[to], EXTRA)
-    target = Path(out)
+    source, target = options.timeline_source(file, sets), Path(out)
     console, output = plain_console(stderr=True), plain_console()
     if to == "ringlog":
         check_outputs({"--out": target}, source.inputs, force=force)

@@ -4,40 +4,61 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from rich.console import Console
 
 from config.errors import DONE
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, make_output_folder, writing
+from runtime.cli.options import Flag, Force, Sets, UnitsOption
+from runtime.cli.source_options import NO_OPTIONS, File, SourceOptions
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
-    from runtime.analysis.timeline_sources import TimelineSource
 
 ANIMATION: Final = "overview"
 """Name of the animation without its suffix."""
 
 
-def draw_figures(source: TimelineSource, out: str, *, moving: bool, force: bool, units: Units) -> int:
-    """Draw all figures of a run and return the exit code.
+def figures(
+    file: File,
+    /,
+    *,
+    out: str,
+    still: Annotated[bool, Flag] = False,
+    force: Force = False,
+    options: SourceOptions = NO_OPTIONS,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Draw a run as the paper does: raw data, segments, clusters, matched models, and an animation of it all.
 
     Parameters
     ----------
-    source, out, force, units
-        As of `runtime.cli.recording_commands.figures`.
-    moving : bool
-        Whether the animation is drawn.
+    out
+        Folder for the figures: SVG, PDF and PNG; the animation as GIF, and as MP4 if ffmpeg is installed.
+    still
+        Leave out the animation.
+    force
+        Overwrite files that exist already.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    units
+        Units of the axes.
+    sets
+        Single settings, each `path=value`, that override the others.
     """
-    console, output = plain_console(stderr=True), plain_console()
+    console, output, source = plain_console(stderr=True), plain_console(), options.timeline_source(file, sets)
     folder = make_output_folder(out)
-    files = figure_files(folder, moving=moving)
+    files = figure_files(folder, moving=not still)
     check = partial(check_outputs, {"--out": files}, source.inputs, force=force)
     timeline = read_timeline(source, console, check)
-    for path in draw_all(timeline, folder, console, moving=moving, units=units):
+    for path in draw_all(timeline, folder, console, moving=not still, units=units):
         output.print(str(path))
     for note in timeline.notes:
         console.print(note)

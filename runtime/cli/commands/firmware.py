@@ -4,32 +4,36 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import one_line
-from drivers.firmware.bundle import CONFIG_NAME, Board, board_files, check_pins, read_config, robot_file
+from runtime.cli.options import Force
 
 ROBOT_NAME: Final = "robot.toml"
 
 
-def write_firmware(board: Board, out: str, *, force: bool) -> int:
-    """Write the files, say what to do next, and return the exit code.
+def firmware(*, board: Literal["pico", "esp32"], out: str, force: Force = False) -> int:
+    """Write the firmware of a ring and base that anybody can build, and the robot file that matches it.
+
+    Pins and geometry are in robot_config.py. One that is in the folder already is kept: edit it and call this again.
 
     Parameters
     ----------
     board
-        The board.
+        Raspberry Pi Pico (RP2040), or ESP32; both with MicroPython.
     out
-        The folder; a robot_config.py in it is kept.
+        Folder for the files.
     force
-        Whether other files that differ may be overwritten.
+        Overwrite files that were changed there, robot_config.py excepted.
 
     Raises
     ------
     UserError
         A file differs, or cannot be written; or robot_config.py is wrong.
     """
+    from drivers.firmware.bundle import CONFIG_NAME, board_files, check_pins, read_config, robot_file
+
     folder = Path(out)
     files = board_files(board)
     try:
@@ -71,6 +75,8 @@ def _refuse_changed(folder: Path, files: dict[str, str], *, force: bool) -> None
 
 
 def _say_what_next(folder: Path, *, is_kept: bool) -> None:
+    from drivers.firmware.bundle import CONFIG_NAME
+
     shown = one_line(str(folder))
     kept = "kept" if is_kept else "edit it to your pins and geometry, then run this command again"
     sys.stdout.write(

@@ -2,36 +2,47 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 import time
-from collections.abc import Sequence
 
 from config.errors import DONE
 from runtime.cli.commands.ros2 import until_interrupted
+from runtime.cli.options import Count
 from runtime.support.console_address import find_consoles
 from runtime.support.user_folders import state_folder
 
 
-def serve_fleet_page(urls: Sequence[str], host: str, port: int) -> int:
-    """Serve the fleet page until interrupted, and return the exit code.
+def fleet(
+    *urls: str,
+    host: str = "127.0.0.1",
+    port: Count = 8764,
+) -> int:
+    """Serve one page for several runs: mode, battery and place of each, HALT for one and for all.
+
+    Runs of this machine appear by themselves.
 
     Parameters
     ----------
-    urls, host, port
-        As of `runtime.bridges.fleet_server.serve_fleet`.
+    urls
+        Start URLs of runs on other machines, with their tokens.
+    host
+        Address to listen on; the page has a token of its own.
+    port
+        TCP port; 0 takes any that is free.
 
     Raises
     ------
     UserError
         A URL is wrong, or the port is in use.
     """
+    import asyncio
+
     from runtime.bridges.fleet import Fleet
     from runtime.bridges.fleet_server import serve_fleet
 
     async def serve() -> None:
-        fleet = Fleet(time.monotonic, lambda: find_consoles(state_folder()))
-        await serve_fleet(fleet, host, port, urls, _tell)
+        runs = Fleet(time.monotonic, lambda: find_consoles(state_folder()))
+        await serve_fleet(runs, host, port, urls, _tell)
 
     asyncio.run(until_interrupted(serve()))
     return DONE

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import os
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING, Final
-
-import orjson
+from typing import TYPE_CHECKING, Annotated, Final
 
 from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.commands.offline_io import require_package
 from runtime.cli.commands.ros2 import console_finder, until_interrupted
+from runtime.cli.options import Connect, Count, Flag
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 
 if TYPE_CHECKING:
@@ -25,21 +23,41 @@ CONSOLE: Final = "ECHOLOCATE_CONSOLE"
 PACKAGE: Final = ("foxglove", "foxglove-sdk", "export")
 
 
-def serve_live(connect: str | None, host: str, port: int, *, allow_set: bool) -> int:
-    """Serve a live run to Foxglove until interrupted, and return the exit code.
+def foxglove(
+    *,
+    connect: Connect = None,
+    host: str = "127.0.0.1",
+    port: Count = 8766,
+    allow_set: Annotated[bool, Flag] = False,
+    print_layout: Annotated[bool, Flag] = False,
+) -> int:
+    """Serve a live run to Foxglove, with the topics of `export --to foxglove`.
 
     Parameters
     ----------
-    connect : str, optional
-        Start URL of the run; None for the run of this user on this machine.
-    host, port, allow_set
-        As of `runtime.bridges.foxglove_live.serve_foxglove`.
+    host
+        Address to listen on. Foxglove's protocol has no token: any program that reaches this port sees the run.
+    port
+        TCP port.
+    allow_set
+        Let Foxglove change settings of the run.
+    print_layout
+        Print a layout to import into Foxglove instead.
 
     Raises
     ------
     UserError
         The package is missing, or the port is in use.
     """
+    if print_layout:
+        import orjson
+
+        from runtime.bridges.foxglove_layout import layout
+
+        sys.stdout.write(orjson.dumps(layout(), option=orjson.OPT_INDENT_2).decode() + "\n")
+        return DONE
+    import asyncio
+
     require_package(*PACKAGE)
     from runtime.bridges.foxglove_live import serve_foxglove
 
@@ -61,14 +79,6 @@ def check_foxglove(*, no_console: bool) -> None:
     require_package(*PACKAGE)
 
 
-def write_layout() -> int:
-    """Print the layout and return the exit code."""
-    from runtime.bridges.foxglove_layout import layout
-
-    sys.stdout.write(orjson.dumps(layout(), option=orjson.OPT_INDENT_2).decode() + "\n")
-    return DONE
-
-
 @asynccontextmanager
 async def foxglove_beside(url: str, log: FilteringBoundLogger) -> AsyncIterator[None]:
     """Serve the run of this process to Foxglove while the context lasts, in a process of low priority.
@@ -80,6 +90,8 @@ async def foxglove_beside(url: str, log: FilteringBoundLogger) -> AsyncIterator[
     log : structlog logger
         Gets what the process reports; if it ends, the run goes on.
     """
+    import asyncio
+
     process = await start_child(ECHOLOCATE, ["foxglove"], pipes=False, low_priority=True, environment={CONSOLE: url})
 
     async def pass_on() -> None:

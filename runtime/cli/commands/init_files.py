@@ -116,7 +116,7 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
     Parameters
     ----------
     file, given, yes, force
-        As of `runtime.cli.init_commands.robot`.
+        As of `runtime.cli.commands.init.robot`.
     """
     ask = _questions(file, given, yes=yes, force=force)
     driver = ask.choice("driver", "The robot's protocol", DRIVERS)
@@ -151,7 +151,7 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
 
 
 def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:
-    """Write a world file and return the exit code; parameters as of `runtime.cli.init_commands.world`."""
+    """Write a world file and return the exit code; parameters as of `runtime.cli.commands.init.world`."""
     ask = _questions(file, given, yes=yes, force=force)
     width = ask.number("width", "Size of the room along x, m", 8.0, 1.0, 1000.0)
     depth = ask.number("depth", "Size of the room along y, m", 6.0, 1.0, 1000.0)
@@ -185,7 +185,7 @@ noise_m = 0.005
 
 
 def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
-    """Write a model file and return the exit code; parameters as of `runtime.cli.init_commands.model`."""
+    """Write a model file and return the exit code; parameters as of `runtime.cli.commands.init.model`."""
     ask = _questions(file, given, yes=yes, force=force)
     name = ask.text("name", "What such an object is called", Path(file).stem)
     if ask.choice("shape", "Its shape", ("round", "box")) == "round":
@@ -208,7 +208,7 @@ closed = true
 
 
 def write_run(file: str, given: Given, *, yes: bool, force: bool) -> int:
-    """Write a run file and return the exit code; parameters as of `runtime.cli.init_commands.run_file`."""
+    """Write a run file and return the exit code; parameters as of `runtime.cli.commands.init.run_file`."""
     ask = _questions(file, given, yes=yes, force=force)
     robot = ask.text("robot", "Robot file, or the name of a shipped one", "denning")
     world = ask.text("world", "World file for the emulator, or the name of a shipped one", "hallway")

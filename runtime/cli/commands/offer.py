@@ -46,7 +46,7 @@ def ask_for_robot(ports: list[str], chosen: RobotConfig | None, console: Console
     answers
         Where the answer is read.
     """
-    from runtime.cli.commands.probe import probe_port, run_it
+    from runtime.cli.commands.port_probe import probe_port, run_it
 
     own = "this run's robot"
     robots = {own: chosen} if chosen is not None else {name: load_robot(name) for name in list_shipped("robots")}

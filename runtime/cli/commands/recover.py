@@ -7,34 +7,39 @@ from typing import Final
 
 from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.cli.options import Force
 from runtime.cli.terminal.escaping_console import EscapingConsole
 
 SHOWN_MAX: Final = 10
 """Damaged places that are listed."""
 
 
-def recover_recording(source: str, out: str | None, *, force: bool) -> int:
-    """Write what can be read of a recording into a new one and return the exit code.
+def recover(recording: str, /, *, out: str | None = None, force: Force = False) -> int:
+    """Restore what can be read of a damaged or incomplete recording.
 
     Parameters
     ----------
-    source, out, force
-        As of `runtime.cli.recording_commands.recover`.
+    recording
+        Damaged file; it is not changed.
+    out
+        File to write; by default NAME-recovered.mcap in the same folder.
+    force
+        Overwrite it if it exists already.
 
     Raises
     ------
     UserError
         The input is not a recording, or the output cannot be written.
     """
-    from runtime.recording.recovery import recover
+    from runtime.recording.recovery import recover as restore
 
-    path = Path(source)
+    path = Path(recording)
     target = path.with_name(f"{path.stem}-recovered.mcap") if out is None else Path(out)
     if target.exists() and not target.is_file():
         raise UserError(f"--out {target}: is not a file; choose another name", WRONG_CALL)
-    check_outputs({"--out": target}, (source,), force=force)
+    check_outputs({"--out": target}, (recording,), force=force)
     with writing("--out", target):
-        recovered = recover(path, target)
+        recovered = restore(path, target)
     console = EscapingConsole(soft_wrap=True, highlight=False)
     for region in recovered.corrupt_regions[:SHOWN_MAX]:
         console.print(str(region))

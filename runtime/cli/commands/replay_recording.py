@@ -78,7 +78,7 @@ def replay_recording(
     Parameters
     ----------
     log, sets, verify, other, robot, models, json_file, force, units
-        As of `runtime.cli.recording_commands.replay`.
+        As of `runtime.cli.commands.replay.replay`.
     span : Span
         The part to replay.
 
@@ -119,7 +119,7 @@ def other_settings(
     recording : Recording
         The recording.
     other, sets, robot, models
-        As of `runtime.cli.recording_commands.replay`.
+        As of `runtime.cli.commands.replay.replay`.
     """
     if other is not None or models or robot is not None:
         return load_settings(other, sets, robot=robot, models=models)

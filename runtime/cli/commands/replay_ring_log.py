@@ -44,7 +44,7 @@ def replay_log(
     Parameters
     ----------
     log, sets, robot, models, json_file, force, units, localize, trajectory, map_file, options
-        As of `runtime.cli.recording_commands.replay`.
+        As of `runtime.cli.commands.replay.replay`.
     """
     settings = load_settings(None, sets, robot=robot, models=models)
     if map_file is not None:

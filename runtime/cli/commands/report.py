@@ -11,23 +11,43 @@ from rich.console import Console
 from config.errors import DONE
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.cli.options import Force, Sets, UnitsOption
+from runtime.cli.source_options import NO_OPTIONS, File, SourceOptions
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
-    from runtime.analysis.timeline_sources import TimelineSource
 
 
-def write_report(source: TimelineSource, out: str | None, *, force: bool, units: Units) -> int:
-    """Write the page of a run and return the exit code.
+def report(
+    file: File,
+    /,
+    *,
+    out: str | None = None,
+    force: Force = False,
+    options: SourceOptions = NO_OPTIONS,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Write one HTML page about a run: Table 2 with errors, figures, timing, link, stop reasons, settings.
 
     Parameters
     ----------
-    source, out, force, units
-        As of `runtime.cli.recording_commands.report`.
+    out
+        Page to write; by default NAME.html in the folder of FILE.
+    force
+        Overwrite it if it exists already.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    units
+        Units of lengths on the page.
+    sets
+        Single settings, each `path=value`, that override the others.
     """
-    console = plain_console(stderr=True)
+    console, source = plain_console(stderr=True), options.timeline_source(file, sets)
     target = Path(source.file).with_suffix(".html") if out is None else Path(out)
     check = partial(check_outputs, {"--out": target}, source.inputs, force=force)
     timeline = read_timeline(source, console, check, skim=True)

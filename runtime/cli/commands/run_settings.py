@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from config.errors import WRONG_CALL, UserError
 from config.files import is_utf8, one_line, utf8
@@ -13,82 +14,68 @@ from config.settings import GoalConfig, Settings
 from runtime.support.pattern_check import refuse_undrivable
 
 
-def settings_of_files(
-    config: str | None,
-    sets: Sequence[str],
-    world: str | None,
-    robot: str | None,
-    map_file: str | None,
-    mission: str | None,
-    *,
-    goal: str | None = None,
-    no_console: bool,
-) -> Settings:
-    """Return the settings as the files are now, on the port that they name.
+@dataclass(frozen=True, slots=True)
+class SettingsFiles:
+    """What the command line says of a run's settings, as of `runtime.cli.commands.run.run`."""
 
-    Without a run file and a mission, a shipped world is driven as the shipped run of its name says: with its goal.
+    config: str | None = None
+    sets: Sequence[str] = ()
+    robot: str | None = None
+    world: str | None = None
+    map_file: str | None = None
+    mission: str | None = None
+    goal: str | None = None
+    no_console: bool = False
 
-    Parameters
-    ----------
-    config, sets, world, robot, map_file, mission, goal, no_console
-        As of `runtime.cli.robot_commands.run`.
+    def read(self) -> Settings:
+        """Return the settings as the files are now, on the port that they name.
 
-    Raises
-    ------
-    ConfigError
-        The settings are wrong.
-    UserError
-        No robot can carry them out.
-    """
-    if config is None and mission is None and world in list_shipped("runs"):
-        config = world
-    settings = load_settings(config, sets, robot=robot, world=world, mission=mission)
-    if map_file is not None:
-        settings = with_known_room(settings, map_file)
-    if goal is not None:
-        if mission is not None:
-            raise UserError("--goal and --mission exclude each other: leave one of them out", WRONG_CALL)
-        settings = with_goal(settings, parse_goal(goal, "odom" if map_file is None else "map", settings))
-    check_places(settings.mission, settings.places)
-    refuse_undrivable(settings)
-    return without_console(settings) if no_console else settings
+        Without a run file and a mission, a shipped world is driven as the shipped run of its name: with its goal.
 
+        Raises
+        ------
+        ConfigError
+            The settings are wrong.
+        UserError
+            No robot can carry them out.
+        """
+        is_shipped = self.config is None and self.mission is None and self.world in list_shipped("runs")
+        config = self.world if is_shipped else self.config
+        settings = load_settings(config, self.sets, robot=self.robot, world=self.world, mission=self.mission)
+        if self.map_file is not None:
+            settings = with_known_room(settings, self.map_file)
+        if self.goal is not None:
+            if self.mission is not None:
+                raise UserError("--goal and --mission exclude each other: leave one of them out", WRONG_CALL)
+            frame: Frame = "odom" if self.map_file is None else "map"
+            settings = with_goal(settings, parse_goal(self.goal, frame, settings))
+        check_places(settings.mission, settings.places)
+        refuse_undrivable(settings)
+        return without_console(settings) if self.no_console else settings
 
-def reload_settings(
-    config: str | None,
-    sets: Sequence[str],
-    world: str | None,
-    port: str | None,
-    emulator_port: str | None,
-    *,
-    robot: str | None = None,
-    map_file: str | None = None,
-    mission: str | None = None,
-    goal: str | None = None,
-    no_console: bool = False,
-) -> Settings:
-    """Return the settings as the files are now, for a run on the same port as before.
+    def read_again(self, port: str | None, emulator_port: str | None) -> Settings:
+        """Return the settings as the files are now, for a run on the same port as before.
 
-    Parameters
-    ----------
-    config, sets, world, port, robot, map_file, mission, goal, no_console
-        As of `runtime.cli.robot_commands.run`.
-    emulator_port : str, optional
-        Port of the emulator, which is used if the settings name none.
+        Parameters
+        ----------
+        port : str, optional
+            The port that the command line names.
+        emulator_port : str, optional
+            Port of the emulator, which is used if the settings name none.
 
-    Raises
-    ------
-    ConfigError
-        The settings are wrong, or no robot can carry them out.
-    """
-    try:
-        settings = settings_of_files(config, sets, world, robot, map_file, mission, goal=goal, no_console=no_console)
-    except ConfigError:
-        raise
-    except UserError as error:
-        raise ConfigError(str(error)) from error
-    port = port or settings.link.port or emulator_port
-    return settings if port is None else with_port(settings, port)
+        Raises
+        ------
+        ConfigError
+            The settings are wrong, or no robot can carry them out.
+        """
+        try:
+            settings = self.read()
+        except ConfigError:
+            raise
+        except UserError as error:
+            raise ConfigError(str(error)) from error
+        port = port or settings.link.port or emulator_port
+        return settings if port is None else with_port(settings, port)
 
 
 def parse_goal(text: str, frame: Frame, settings: Settings) -> GoalConfig:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 from config.errors import DONE, WRONG_CALL, UserError
-from config.load import load_settings
+from runtime.cli.options import ConfigFile, Flag, Sets
 
 UNIT: Final = """\
 # The main process of a robot. After a boot or a failure it waits in READY until it is armed:
@@ -58,23 +58,38 @@ SYSTEM_ONLY: Final = (
 """Lines that the manager of a user cannot carry out: the user's own folders, groups and limits hold."""
 
 
-def print_service(
-    config: str | None, sets: Sequence[str], *, port: str | None, user: str | None, own: bool = False
-) -> int:  # fmt: skip
-    """Print the unit and return the exit code.
+def service(
+    config: ConfigFile = None,
+    /,
+    *,
+    port: str | None = None,
+    user: str | None = None,
+    own: Annotated[bool, Flag] = False,
+    sets: Sets = (),
+) -> int:
+    """Print a systemd unit that runs the robot's main process from boot on; it never arms the robot.
 
     Parameters
     ----------
-    config, sets, port, user, own
-        As of `runtime.cli.robot_commands.service`.
+    port
+        Serial port of the robot, unless the run file names one.
+    user
+        User that runs it; by default one that systemd creates.
+    own
+        Print a unit for your own manager (systemctl --user), which needs no rights of an administrator.
+    config
+        Run file, or the name of a shipped one; None for the default settings.
+    sets
+        Single settings, each `path=value`, that the service passes to `run`.
 
     Raises
     ------
     UserError
         No port is given, or a name contains characters that a unit file cannot hold.
     """
-    settings = load_settings(config, sets)
-    port = port or settings.link.port
+    from config.load import load_settings
+
+    port = port or load_settings(config, sets).link.port
     if port is None:
         raise UserError("a service needs the robot's serial port: set --port or link.port", WRONG_CALL)
     if any(not text.isprintable() for text in (port, user or "", *sets)):

@@ -8,28 +8,30 @@ from rich.padding import Padding
 from rich.text import Text
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.reference import FILES, markdown, settings_of
 from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.options import Force
 from runtime.cli.terminal.escaping_console import EscapingConsole
 
 
-def run_settings(text: str, out: str | None, *, force: bool) -> int:
-    """Print the keys whose name or description contains a text, or write the page of all of them.
+def settings(text: str = "", /, *, out: str | None = None, force: Force = False) -> int:
+    """List the keys of all files with values, defaults and meaning.
 
     Parameters
     ----------
     text
-        What to look for; all keys if empty.
+        List only keys whose name or meaning contains this.
     out
-        Markdown file to write instead.
+        Write the whole list into this file, as Markdown.
     force
-        Overwrite that file.
+        Overwrite an existing file.
 
     Raises
     ------
     UserError
         No key contains the text, or the file cannot be written.
     """
+    from config.reference import FILES, markdown, settings_of
+
     if out is not None:
         check_outputs({"--out": out}, (), force=force)
         try:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from cyclopts import Parameter
 from rich.table import Table
 
 from config.errors import DONE, FAILED, UserError
 from runtime.cli.commands.calibrate import read_firings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
-from runtime.cycle.summary import write_json
+from runtime.cli.options import Force, JsonFile, RobotFile, UnitsOption
+from runtime.cli.source_options import File, LogOptions
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.support.length_format import Units, format_length, format_point
 
@@ -23,47 +25,82 @@ if TYPE_CHECKING:
     from perception.stand import StandSurface
 
 
-def show_stand(
-    file: str, at_s: float | None, *, robot: str | None, json_file: str | None, force: bool, units: Units,
-    options: RingLogOptions = AUTO,
-) -> int:  # fmt: skip
-    """Print the surfaces around a robot that stood, and return the exit code.
+def stand(
+    file: File,
+    /,
+    *,
+    at: float | None = None,
+    map_file: Annotated[str | None, Parameter(name="--map")] = None,
+    robot: RobotFile = None,
+    json: JsonFile = None,
+    force: Force = False,
+    units: UnitsOption = "m",
+    options: LogOptions = AUTO,
+) -> int:
+    """List what a robot heard where it stood, surface by surface, or with --map where in a known room it stood.
+
+    To name kinds takes sensors that listen while others fire (robot file `ears`) and fine ranges. What the readings
+    leave open is unknown, or convex if it may be an edge or a cylinder.
+
+    With --map each pose that the readings of one round fit is given, the most probable first: a symmetric room gives
+    several. This is Drumheller's method (1987); a drive says more: see `replay --localize --map`.
 
     Parameters
     ----------
-    file, at_s, robot, json_file, force, units, options
-        As of `runtime.cli.recording_commands.stand`.
+    file
+        Recording or ring log.
+    at
+        A moment of the stand by the robot's clock, s; by default the end.
+    map_file
+        The known room: a world file, or the name of a shipped one; its acoustics say how surfaces reflect.
+    robot
+        Ring logs: robot file, or the name of a shipped one; None for the default.
+    json
+        File for the surfaces or the poses (JSON).
+    force
+        Overwrite it if it exists already.
+    units
+        Units of the table.
+    options
+        The conventions of a ring log.
 
     Raises
     ------
     UserError
         The file cannot be read or written, or no surface was heard often enough.
     """
+    if map_file is not None:
+        from runtime.cli.commands.stand_in_room import locate_stand
+
+        return locate_stand(
+            file, map_file, at, robot=robot, json_file=json, force=force, units=units, options=options
+        )
     from drivers.messages import Pose
     from perception.stand import surfaces_of_stand
+    from runtime.cycle.summary import write_json
 
-    settings, stand = read_stand(file, at_s, robot, json_file, force=force, options=options)
-    surfaces = surfaces_of_stand(settings.ring, stand)
-    last = stand[-1]
+    settings, heard = read_stand(file, at, robot, json, force=force, options=options)
+    surfaces = surfaces_of_stand(settings.ring, heard)
+    last = heard[-1]
     ring = Pose(last.pose.x, last.pose.y, last.ring_yaw)
-    if json_file is not None:
-        write_json(json_file, {"firings": len(stand), "surfaces": [surface_row(one, ring) for one in surfaces]})
+    if json is not None:
+        write_json(json, {"firings": len(heard), "surfaces": [surface_row(one, ring) for one in surfaces]})
     if not surfaces:
         raise UserError(
-            f"{file}: no surface was heard over three different paths in the {len(stand)} firings of this stand; let "
+            f"{file}: no surface was heard over three different paths in the {len(heard)} firings of this stand; let "
             "the robot stand for a round of its firing pattern, or name another moment with --at",
             FAILED,
         )
     output = plain_console()
     output.print(stand_table(surfaces, ring, last.pose, units))
-    output.print(f"{len(stand)} firings from {stand[0].robot_s:.2f} to {last.robot_s:.2f} s by the robot's clock")
+    output.print(f"{len(heard)} firings from {heard[0].robot_s:.2f} to {last.robot_s:.2f} s by the robot's clock")
     return DONE
 
 
 def read_stand(
     file: str, at_s: float | None, robot: str | None, json_file: str | None, *, force: bool, options: RingLogOptions
 ) -> tuple[Settings, Sequence[Firing]]:
-    """Return the settings, and the firings at the place where the robot was; arguments and errors of `show_stand`."""
+    """Return the settings, and the firings at the place where the robot was; arguments and errors of `stand`."""
     from perception.stand import stand_of
 
     settings, firings = read_firings(

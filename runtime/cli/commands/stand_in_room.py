@@ -31,7 +31,7 @@ def locate_stand(
     Parameters
     ----------
     file, map_file, at_s, robot, json_file, force, units, options
-        As of `runtime.cli.recording_commands.stand`.
+        As of `runtime.cli.commands.stand.stand`.
 
     Raises
     ------

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
+from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.load import load_study
-from config.settings import Settings
 from runtime.cli.commands.offline_io import plain_console, require_package
 from runtime.cli.commands.output_files import make_output_folder, writing
+from runtime.cli.options import Count
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import needed_parts
@@ -42,35 +43,55 @@ SHOWN: Final = 5
 """Combinations that are printed; the page has more."""
 
 
-def run_sweep(name: str, *, out: str | None, scheduler: str | None, workers: int, retries: int) -> int:
-    """Make the runs of a study that are not finished yet, write table and page, and return the exit code.
+def sweep(
+    study: str,
+    /,
+    *,
+    out: str | None = None,
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
+    workers: Count | None = None,
+    retries: Count = 3,
+) -> int:
+    """Make the runs of a study on many processes or machines, and compare their settings; needs the extra `sweep`.
+
+    A sweep that was stopped, in whatever way, goes on when it is called again.
 
     Parameters
     ----------
-    name, out, scheduler, workers, retries
-        As of `runtime.cli.experiment_commands.sweep`.
+    study
+        Study file, or the name of a shipped one: scenes, worlds or recordings, seeds, and settings to vary.
+    out
+        Folder for the results: runs.parquet, report.html and a file for each run; by default NAME-sweep.
+    scheduler
+        Address of a Dask scheduler, as in tcp://host:8786; by default, processes of this machine do the work.
+    workers
+        Processes on this machine; by default one for each processor.
+    retries
+        How often a run that ended without a result is tried again.
 
     Raises
     ------
     UserError
-        The study is invalid, a package is missing, the folder is not a sweep's, or a run was given up.
+        There are no workers, or the options exclude one another.
     """
+    from config.load import load_study
     from runtime.batch.runs import expand
 
-    study = load_study(name)
-    if (one := next((one for one in study.vary if one.range), None)) is not None:
-        raise UserError(f"{name}: {one.setting} has a range, in which `echolocate tune` searches: give values for a "
+    processes = worker_processes(workers, scheduler)
+    chosen = load_study(study)
+    if (one := next((one for one in chosen.vary if one.range), None)) is not None:
+        raise UserError(f"{study}: {one.setting} has a range, in which `echolocate tune` searches: give values for a "
                         "sweep", WRONG_CALL)  # fmt: skip
-    runs = expand(study, Path(name).parent)
+    runs = expand(chosen, Path(study).parent)
     for module, package in PACKAGES:
         require_package(module, package, EXTRA)
-    folder = sweep_folder(f"{Path(name).stem}-sweep" if out is None else out)
+    folder = sweep_folder(f"{Path(study).stem}-sweep" if out is None else out)
     console = EscapingConsole(stderr=True)
     with file_lock(folder / LOCK, f"--out {folder}"):
-        unfinished = make_runs(runs, folder, console, scheduler=scheduler, workers=workers, retries=retries)
-        combinations = write_results(Path(name).stem, study, runs, folder, unfinished)
+        unfinished = make_runs(runs, folder, console, scheduler=scheduler, workers=processes, retries=retries)
+        combinations = write_results(Path(study).stem, chosen, runs, folder, unfinished)
     output = plain_console()
-    output.print(best_table(study, combinations))
+    output.print(best_table(chosen, combinations))
     for file in (folder / "runs.parquet", folder / PAGE):
         output.print(str(file))
     if unfinished:
@@ -78,6 +99,21 @@ def run_sweep(name: str, *, out: str | None, scheduler: str | None, workers: int
                         f"{unfinished[0].reason}; {folder / PAGE} lists them; the same call tries them again",
                         FAILED)  # fmt: skip
     return DONE
+
+
+def worker_processes(workers: int | None, scheduler: str | None) -> int:
+    """Return how many processes of this machine work.
+
+    Raises
+    ------
+    UserError
+        There are none, or a scheduler has its own.
+    """
+    if workers == 0:
+        raise UserError("--workers 0: must be at least 1", WRONG_CALL)
+    if workers is not None and scheduler is not None:
+        raise UserError("--scheduler has workers of its own: leave out --workers", WRONG_CALL)
+    return workers or os.cpu_count() or 1
 
 
 def sweep_folder(path: str) -> Path:
@@ -172,6 +208,8 @@ def compile_kernels(runs: Sequence[Run], console: Console, prepared: set[str] | 
     prepared : set of str, optional
         The parts that are compiled already; more are added.
     """
+    from config.settings import Settings
+
     prepared = set() if prepared is None else prepared
     for text in {run.settings: None for run in runs}:
         settings = Settings.model_validate_json(text)

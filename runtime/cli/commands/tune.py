@@ -6,14 +6,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
+from cyclopts import Parameter
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.load import load_study, override_settings
-from config.settings import Settings
-from config.study import StudyConfig, Value, VaryConfig
 from runtime.cli.commands.offline_io import plain_console, require_package
 from runtime.cli.commands.output_files import writing
 from runtime.cli.commands.sweep import (
@@ -24,12 +22,15 @@ from runtime.cli.commands.sweep import (
     compile_kernels,
     keeping_what_is_done,
     sweep_folder,
+    worker_processes,
 )  # fmt: skip
+from runtime.cli.options import Count
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.file_lock import file_lock
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
+    from config.study import StudyConfig, Value
     from runtime.batch.dispatch import Unfinished
     from runtime.batch.runs import Run
     from runtime.batch.tuning import Make, Tuned
@@ -41,116 +42,77 @@ SEED: Final = 1
 """Of the search."""
 CHANGES: Final = "tuned.toml"
 TRIALS: Final = "trials.csv"
-THRESHOLDS: Final = tuple(
-    VaryConfig(setting=f"perception.bayes.{name}", values=(0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999))
-    for name in ("report_probability", "report_probability_near")
-)
-"""Searched where the truth is known and a study names no settings. Without a truth no threshold can be found: what a
-false object costs is for the user to say."""
-SENSORS: Final = (
-    VaryConfig(setting="ring.beam_half_angle_deg", range=(4.0, 40.0), log=True),
-    VaryConfig(setting="ring.resolution_m", range=(0.001, 0.3), log=True),
-)
-"""What recordings show of the sensors, searched where a study names no settings."""
 
 
-def run_tune(
-    name: str, *, out: str | None, trials: int, scheduler: str | None, workers: int, retries: int, seed: int = SEED
+def tune(
+    study: str,
+    /,
+    *,
+    out: str | None = None,
+    trials: Count = 60,
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
+    workers: Count | None = None,
+    retries: Count = 3,
 ) -> int:
-    """Search among the settings of a study, write what is better, and return the exit code.
+    """Find better settings for your recordings or scenes, and write the changes as TOML; needs the extra `tune`.
+
+    What is gained is measured on recordings or seeds that the search has not used. A search that was stopped, in
+    whatever way, goes on when it is called again.
 
     Parameters
     ----------
-    name, out, trials, scheduler, workers, retries
-        As of `runtime.cli.experiment_commands.tune`.
-    seed : int
-        Of the search.
+    study
+        Study file, or a folder of recordings.
+    out
+        Folder for the results: tuned.toml, report.html, trials.csv and a file for each run; by default NAME-tune.
+    trials
+        Combinations of settings to try.
+    scheduler
+        Address of a Dask scheduler, as in tcp://host:8786; by default, processes of this machine do the work.
+    workers
+        Processes on this machine; by default one for each processor.
+    retries
+        How often a run that ended without a result is tried again.
 
     Raises
     ------
     UserError
-        The study is invalid, a package is missing, the folder is not a search's, or a run was given up.
+        There are no workers or trials, or the options exclude one another.
     """
-    study, base = tuned_study(name)
-    for module, package in PACKAGES:
-        require_package(module, package, EXTRA)
     from runtime.batch.search import OptunaSearch
     from runtime.batch.tuning import Tuner, trial_runs
+    from runtime.batch.tuning_study import present_values, tuned_study
 
-    present = present_values(study, base)
-    folder = sweep_folder(f"{Path(name).stem}-tune" if out is None else out)
+    if trials == 0:
+        raise UserError("--trials 0: must be at least 1", WRONG_CALL)
+    processes = worker_processes(workers, scheduler)
+    chosen, base = tuned_study(study)
+    for module, package in PACKAGES:
+        require_package(module, package, EXTRA)
+    present = present_values(chosen, base)
+    name = Path(study).stem
+    folder = sweep_folder(f"{name}-tune" if out is None else out)
     console = EscapingConsole(stderr=True)
     unfinished: list[Unfinished] = []
 
-    searched = trial_runs(study, base, [{}], held_out=False)
-    held_out = trial_runs(study, base, [{}], held_out=True)
-    total = len(searched) * (1 + trials + len(study.vary)) + 2 * len(held_out)
+    searched = trial_runs(chosen, base, [{}], held_out=False)
+    held_out = trial_runs(chosen, base, [{}], held_out=True)
+    total = len(searched) * (1 + trials + len(chosen.vary)) + 2 * len(held_out)
     if scheduler is None:
         compile_kernels(searched, console)
     with (
         file_lock(folder / LOCK, f"--out {folder}"),
-        run_maker(folder, console, total, unfinished, scheduler=scheduler, workers=workers, retries=retries) as make,
+        run_maker(
+            folder, console, total, unfinished, scheduler=scheduler, workers=processes, retries=retries
+        ) as make,
     ):
-        tuned = Tuner(study, base, make).search(OptunaSearch(study.vary, present, seed), trials)
-        write_results(Path(name).stem, study, present, tuned, folder, unfinished)
+        tuned = Tuner(chosen, base, make).search(OptunaSearch(chosen.vary, present, SEED), trials)
+        write_results(name, chosen, present, tuned, folder, unfinished)
     say_results(tuned, present, folder)
     if unfinished:
         raise UserError(f"{len(unfinished)} runs ended without a result, the first: {unfinished[0].reason}; the same "
                         "call tries them again", FAILED)  # fmt: skip
     return DONE
-
-
-def tuned_study(name: str) -> tuple[StudyConfig, Path]:
-    """Return the study of a name, a file, or a folder of recordings, and the folder that its paths refer to.
-
-    Settings to search among and objectives that the study leaves out are added.
-
-    Raises
-    ------
-    UserError
-        It is invalid, or cannot be tuned.
-    """
-    if Path(name).is_dir():
-        study, base = StudyConfig(recordings="."), Path(name)
-    else:
-        study, base = load_study(name), Path(name).parent
-    of_recordings = study.recordings is not None
-    is_true = not of_recordings or study.truth is not None
-    if "objectives" not in study.model_fields_set:
-        study = study.model_copy(update={"objectives": ("f1", "mean_error_m") if is_true else ("predicted_nat",)})
-    if not study.vary:
-        judged = "predicted_nat" not in study.objectives
-        vary = (*(SENSORS if of_recordings else ()), *(THRESHOLDS if judged else ()))
-        study = study.model_copy(update={"vary": vary})
-    for one in study.vary:
-        if not of_recordings and one.setting.split(".")[0] in ("ring", "body", "robot", "world"):
-            raise UserError(f"{name}: {one.setting}: scenes and worlds would be sensed by another robot then, not "
-                            "better by this one: tune it with recordings, or compare robots with a sweep",
-                            WRONG_CALL)  # fmt: skip
-        if any(part.isdigit() for part in one.setting.split(".")):
-            raise UserError(f"{name}: {one.setting}: a part of a list cannot be tuned: compare values with a sweep",
-                            WRONG_CALL)  # fmt: skip
-    return study, base
-
-
-def present_values(study: StudyConfig, base: Path) -> dict[str, Value]:
-    """Return the present value of each varied setting, where it has one; of the first recording if there are any."""
-    from runtime.batch.runs import expand
-    from runtime.recording.reader import is_recording, open_recording
-
-    first = expand(study, base, [{}])[0]
-    settings, path = Settings.model_validate_json(first.settings), Path(first.subject)
-    if first.kind == "recording" and is_recording(path):
-        with open_recording(path) as recording:
-            settings = override_settings(recording.settings, str(path), study.sets)
-    table, found = settings.model_dump(mode="json"), dict[str, Value]()
-    for one in study.vary:
-        value: object = table
-        for part in one.setting.split("."):
-            value = value.get(part) if isinstance(value, dict) else None
-        if isinstance(value, bool | int | float | str):
-            found[one.setting] = value
-    return found
 
 
 @contextmanager

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 from typing import Literal
 
 import pytest
 
 from config.errors import DONE, WRONG_CALL
-from runtime.cli.app import app, main, print_error, run_command
+from runtime.cli.app import COMMANDS, app, main, print_error, run_command
 from runtime.support.build import describe_build
 from tests.runtime.cli.user_errors import error_lines
 
@@ -73,6 +75,18 @@ def test_the_completion_of_a_shell_has_every_command(shell: Literal["bash", "zsh
     assert all(name in script for name in app if not name.startswith("-"))
 
 
+def test_the_line_of_a_command_in_the_list_is_the_first_of_its_docstring() -> None:
+    for name, line in {name: line for group in COMMANDS.values() for name, line in group.items()}.items():
+        command = app[name].default_command
+        assert name == "init" if command is None else (command.__doc__ or "").splitlines()[0] == line
+
+
+def test_a_list_of_commands_imports_none() -> None:
+    listed = "import sys, runtime.cli.app as a; a.run_command(['--help'])"
+    code = f"{listed}; assert not [m for m in sys.modules if m.startswith('runtime.cli.commands.')], sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
 def test_main_exits_with_the_code(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["frobnicate"])
@@ -86,7 +100,7 @@ def test_an_interrupt_has_its_exit_code_and_no_traceback(
     def interrupt(*_arguments: object, **_options: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("runtime.cli.commands.check.check_config", interrupt)
+    monkeypatch.setattr("config.load.load_any", interrupt)
     with pytest.raises(SystemExit) as caught:
         main(["check", "hallway"])
     assert caught.value.code == 128 + signal.SIGINT

@@ -13,9 +13,9 @@ from serial.tools.list_ports_common import ListPortInfo
 from config.load import load_settings
 from config.robot import RobotConfig
 from runtime.cli.app import run_command
-from runtime.cli.commands import offer, probe, run
+from runtime.cli.commands import offer, port_probe
 from runtime.cli.commands.offer import Offered, ask_for_robot, plugged_in
-from runtime.cli.commands.probe import Finding
+from runtime.cli.commands.port_probe import Finding
 from runtime.cli.terminal.escaping_console import EscapingConsole
 
 FOUND = {
@@ -35,7 +35,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
         name = FOUND[port].robot
         return FOUND[port] if name is None or name in robots else Finding(next(iter(robots)), FOUND[port].said)
 
-    monkeypatch.setattr(probe, "probe_port", probe_port)
+    monkeypatch.setattr(port_probe, "probe_port", probe_port)
     return names
 
 
@@ -109,8 +109,8 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     monkeypatch.setattr(EscapingConsole, "is_dumb_terminal", property(lambda _: False))
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr(run, "plugged_in", lambda: ["/dev/ttyUSB0"])
-    monkeypatch.setattr(run, "begin_preparation", begins)
+    monkeypatch.setattr(offer, "plugged_in", lambda: ["/dev/ttyUSB0"])
+    monkeypatch.setattr("runtime.support.kernel_loader.begin_preparation", begins)
     return monkeypatch
 
 
@@ -119,8 +119,8 @@ def test_a_robot_that_was_offered_is_not_armed_whatever_the_command_line_says(te
     async def begins(settings: RobotConfig, *_: object, arm: bool, **__: object) -> None:
         raise RunStartedError(settings.link.port, arm)
 
-    terminal.setattr(run, "begin_preparation", lambda _: None)
-    terminal.setattr(run, "run_process", begins)
+    terminal.setattr("runtime.support.kernel_loader.begin_preparation", lambda _: None)
+    terminal.setattr("runtime.cli.commands.run_process.run_process", begins)
     with pytest.raises(RunStartedError) as error:
         run_command(["run", "--arm", "--no-record", "--no-console"])
     assert error.value.args == ("/dev/ttyUSB0", False)

@@ -12,12 +12,10 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from config.errors import DONE, FAILED
-from config.load import load_robot
-from config.robot import RobotConfig
 from runtime.bridges import local_network
 from runtime.bridges.local_network import Announced
 from runtime.cli.app import run_command
-from runtime.cli.commands import probe
+from runtime.cli.commands import port_probe
 from tests.hil.running import emulated
 from tests.hil.truth import Truth
 
@@ -35,7 +33,7 @@ def test_runs_on_the_local_network_are_listed(
     async def none(_seconds: float) -> list[Announced]:
         raise OSError("Network is unreachable")
 
-    monkeypatch.setattr(probe, "comports", list)
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
     monkeypatch.setattr(local_network, "find_robots", two)
     assert run_command(["probe"]) == DONE
     assert capsys.readouterr().out.splitlines()[:2] == [
@@ -64,42 +62,12 @@ def test_a_robot_is_named_and_does_not_move(
     assert all(row.still for row in Truth(found.trace).read())
 
 
-@pytest.mark.parametrize(
-    ("fired", "chosen"),
-    [
-        ({"atrvjr": 16, "b21r": 24, "b21r-both": 24, "magellan": 8}, "b21r"),
-        ({"atrvjr": 13, "b21r": 8, "magellan": 16}, "magellan"),
-        ({"atrvjr": 5, "b21r": 20}, "b21r"),
-        ({"atrvjr": 3}, "atrvjr"),
-    ],
-)
-async def test_of_robots_that_do_not_name_themselves_the_one_of_which_all_or_most_sensors_fire_is_chosen(
-    fired: dict[str, int], chosen: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robots = {name: load_robot(name) for name in ("atrvjr", "b21r", "b21r-both", "denning", "magellan")}
-
-    async def answer(_port: str, config: RobotConfig) -> probe._Answer:
-        (name,) = (name for name, known in robots.items() if known is config)
-        if config.robot.driver != "rflex":
-            return probe._Answer(has_answered=False)
-        count = fired.get(name, 0)
-        return probe._Answer(has_answered=True, text=name, fired=count, is_whole=count == len(config.ring.mounts))
-
-    monkeypatch.setattr(probe, "_try", answer)
-    assert await probe.probe_port("/dev/ttyUSB0", robots) == probe.Finding(chosen, (chosen,))
-
-
-def test_a_battery_that_is_low_is_named_with_and_without_its_voltage() -> None:
-    assert probe._battery(10.94, is_low=True) == "battery 10.9 V, low"
-    assert probe._battery(None, is_low=True) == "battery low"
-
-
 def test_a_port_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(probe, "ANSWER_MAX_S", 0.05)
+    monkeypatch.setattr(port_probe, "ANSWER_MAX_S", 0.05)
     monkeypatch.setattr(local_network, "find_robots", no_robots)
     robot, line = os.openpty()
     tty.setraw(line)
-    monkeypatch.setattr(probe, "comports", lambda: [ListPortInfo(os.ttyname(line))])
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [ListPortInfo(os.ttyname(line))])
     assert run_command(["probe"]) == FAILED
     os.close(robot)
     os.close(line)
@@ -109,7 +77,7 @@ def test_a_port_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatc
 def test_no_port_and_one_that_cannot_be_opened(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(probe, "comports", list)
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
     monkeypatch.setattr(local_network, "find_robots", no_robots)
     assert run_command(["probe"]) == FAILED
     assert "this computer has no serial port: plug the robot in" in capsys.readouterr().err
@@ -158,7 +126,7 @@ def test_a_device_that_is_no_robot_is_named_and_a_socket_has_no_speeds(
     peer: type[Peer], robot: str | None, said: str,
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(probe, "ANSWER_MAX_S", 0.5)
+    monkeypatch.setattr(port_probe, "ANSWER_MAX_S", 0.5)
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), peer) as server:
         threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
         named = () if robot is None else ("--robot", robot)

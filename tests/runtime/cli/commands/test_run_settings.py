@@ -9,7 +9,7 @@ import pytest
 from config.errors import UserError
 from config.load import ConfigError, load_settings
 from config.settings import GoalConfig
-from runtime.cli.commands.run_settings import reload_settings, settings_of_files, with_port
+from runtime.cli.commands.run_settings import SettingsFiles, with_port
 
 BACKWARDS = "ring.firing={sets=[[10, 12, 14]]}"
 
@@ -17,20 +17,18 @@ BACKWARDS = "ring.firing={sets=[[10, 12, 14]]}"
 @pytest.mark.promise("P24")
 def test_a_pattern_with_which_it_could_not_drive_is_refused_in_a_reload_too() -> None:
     with pytest.raises(UserError, match="the pattern does not look ahead"):
-        settings_of_files(None, [BACKWARDS], None, None, None, None, no_console=False)
+        SettingsFiles(sets=[BACKWARDS]).read()
     with pytest.raises(ConfigError, match="the pattern does not look ahead"):
-        reload_settings(None, [BACKWARDS], None, None, None)
+        SettingsFiles(sets=[BACKWARDS]).read_again(None, None)
     with pytest.raises(ConfigError, match="p3xd"):
-        reload_settings(None, [], None, None, None, robot="p3xd")
+        SettingsFiles(robot="p3xd").read_again(None, None)
 
 
 def test_a_reload_keeps_robot_room_and_port_of_the_command_line() -> None:
-    settings = reload_settings(None, [], None, "socket://localhost:8101", None, robot="p3dx")
+    settings = SettingsFiles(robot="p3dx").read_again("socket://localhost:8101", None)
     assert (settings.robot.driver, settings.link.port) == ("arcos", "socket://localhost:8101")
-    assert settings == settings_of_files(
-        None, ["link.port=socket://localhost:8101"], None, "p3dx", None, None, no_console=False
-    )
-    emulated = reload_settings(None, [], None, None, "/dev/pts/7", map_file="hallway", no_console=True)
+    assert settings == SettingsFiles(sets=["link.port=socket://localhost:8101"], robot="p3dx").read()
+    emulated = SettingsFiles(map_file="hallway", no_console=True).read_again(None, "/dev/pts/7")
     assert emulated.link.port == "/dev/pts/7"
     assert emulated.perception.localization.known_room
     assert not emulated.console.enabled
@@ -43,7 +41,7 @@ def test_a_port_that_no_settings_can_hold_is_refused() -> None:
 
 def test_a_goal_of_the_command_line_takes_the_place_of_the_files_goal_or_mission() -> None:
     def goal_of(text: str, run: str | None = None, map_file: str | None = None) -> GoalConfig | None:
-        settings = settings_of_files(run, [], None, None, map_file, None, goal=text, no_console=False)
+        settings = SettingsFiles(run, map_file=map_file, goal=text).read()
         assert settings.mission is None
         return settings.goal
 
@@ -53,12 +51,12 @@ def test_a_goal_of_the_command_line_takes_the_place_of_the_files_goal_or_mission
         with pytest.raises(UserError, match="expected X,Y in metres"):
             goal_of(wrong)
     with pytest.raises(UserError, match="exclude each other"):
-        settings_of_files(None, [], None, None, None, "patrol", goal="1,2", no_console=False)
-    assert reload_settings(None, [], None, None, None, goal="1,2").goal == GoalConfig(x_m=1.0, y_m=2.0)
+        SettingsFiles(mission="patrol", goal="1,2").read()
+    assert SettingsFiles(goal="1,2").read_again(None, None).goal == GoalConfig(x_m=1.0, y_m=2.0)
 
 
 def test_a_shipped_world_is_driven_as_the_run_of_its_name_says_unless_a_run_is_named() -> None:
-    office = settings_of_files(None, [], "office", None, None, None, no_console=True)
+    office = SettingsFiles(world="office").read()
     assert office.goal is not None
     assert office.perception.grid.method == "directed"
-    assert settings_of_files("hallway", [], "office", None, None, None, no_console=True).goal is None
+    assert SettingsFiles("hallway", world="office").read().goal is None

@@ -1,4 +1,4 @@
-"""Tests of the commands on finished runs: what a user can get wrong."""
+"""`echolocate replay`: what a user can get wrong before anything is replayed."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 
 from config.errors import FAILED, WRONG_CALL
-from runtime.analysis.timeline_sources import TimelineSource
-from runtime.cli.recording_commands import SourceOptions
 from tests.runtime.cli.user_errors import Calls, assert_refused, call_name
 
 pytestmark = pytest.mark.usefixtures("bad_files")
@@ -26,8 +24,6 @@ WRONG: Calls = [
     (["replay", "good.csv", "--robot", "dening"], "dening"),
     (["replay", "good.csv", "--verify"], "apply to recordings (MCAP) only"),
     (["replay", "good.csv", "--from", "1"], "--from"),
-    (["figures", "good.csv"], "--out"),
-    (["export", "good.csv", "--out", "x", "--to", "xml"], "xml"),
 ]
 
 
@@ -45,9 +41,3 @@ FAILING: Calls = [
 def test_work_that_failed(arguments: list[str], cause: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert_refused(arguments, cause, FAILED, capfd)
     assert Path("regular").read_bytes() == b""
-
-
-def test_the_options_of_a_source_go_to_the_analysis() -> None:
-    options = SourceOptions(world="hallway", robot="denning", models=("drum",))
-    source = options.timeline_source("log.csv", ("cycle.rate_hz=10",))
-    assert source == TimelineSource("log.csv", ("cycle.rate_hz=10",), "denning", ("drum",), "hallway")

@@ -10,13 +10,10 @@ from runtime.cli.options import Flag, Force
 
 Yes = Annotated[bool, Parameter(negative="", show_default=False, help="Ask nothing; take the defaults.")]
 
-init_app = App(
-    name="init",
-    help="Write a first file of your own, with comments. What no option gives is asked for on a terminal.",
-)
+app = App(name="init")
 
 
-@init_app.command
+@app.command
 def robot(
     file: str,
     /,
@@ -79,7 +76,7 @@ def robot(
     return write_robot(file, given, yes=yes, force=force)
 
 
-@init_app.command
+@app.command
 def world(
     file: str,
     /,
@@ -115,7 +112,7 @@ def world(
     return write_world(file, given, yes=yes, force=force)
 
 
-@init_app.command
+@app.command
 def model(
     file: str,
     /,
@@ -151,7 +148,7 @@ def model(
     return write_model(file, given, yes=yes, force=force)
 
 
-@init_app.command(name="run")
+@app.command(name="run")
 def run_file(
     file: str,
     /,

@@ -1,4 +1,4 @@
-"""Tests of the commands `run`, `emulate`, `check` and `service`: what a user can get wrong."""
+"""What a user can get wrong in a call of each command."""
 
 from __future__ import annotations
 
@@ -65,6 +65,30 @@ WRONG: Calls = [
     (["check", "broken.toml"], "broken.toml: line 3"),
     (["check", "nowhere.toml"], "nowhere.toml"),
     (["check", "drum.toml"], "y_m"),
+    (["figures", "good.csv"], "--out"),
+    (["export", "good.csv", "--out", "x", "--to", "xml"], "xml"),
+    (["experiment", "hallway", "--seeds", "1.5"], "1.5"),
+    (["experiment"], "NAME"),
+    (["experiment", "corridor"], "corridor"),
+    (["experiment", "hallway", "--method", "psychic"], "psychic"),
+    (["experiment", "hallway", "--seeds", "0"], "--seeds 0"),
+    (["experiment", "hallway", "--seeds", "many"], "many"),
+    (["experiment", "hallway", "--world", "empty.toml"], "drum"),
+    (["experiment", "hallway", "--json"], "--json"),
+    (["experiment", "irregular", "--scene", "clean"], "--scene"),
+    (["experiment", "hallway", "--scene", "clean", "--world", "hallway"], "--scene"),
+    (["experiment", "hallway", "--scene", "clean", "--out", "x"], "nothing to record"),
+    (["experiment", "budget", "--scene", "clean"], "a hall of its own"),
+    (["experiment", "budget", "--world", "hallway"], "a hall of its own"),
+    (["experiment", "budget", "--seeds", "0"], "--seeds 0"),
+    (["ros2", "--connect"], "--connect"),
+    (["ros2-robot", "--out", "x.toml"], "--radius"),
+    (["foxglove", "--port", "many"], "many"),
+    (["ros2-robot", "--radius", "0.3"], "--out"),
+    (["ros2-robot", "--radius", "0", "--out", "x.toml"], "--radius"),
+    (["firmware"], "--board"),
+    (["firmware", "--board", "uno", "--out", "x"], "uno"),
+    (["firmware", "--board", "pico"], "--out"),
 ]
 
 
@@ -80,6 +104,8 @@ FAILING: Calls = [
     (["emulate", "--link", "regular"], "regular"),
     (["emulate", "--link", "nowhere/robot"], "nowhere/robot"),
     (["emulate", "--trace", "nowhere/x.csv"], "nowhere/x.csv"),
+    (["experiment", "hallway", "--method", "paper", "--json", "nowhere/x.json"], "nowhere/x.json"),
+    (["firmware", "--board", "pico", "--out", "regular"], "regular"),
 ]
 
 

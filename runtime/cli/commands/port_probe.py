@@ -1,0 +1,188 @@
+"""What answers on a port: the drivers of known robots are tried, without moving anything."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import math
+import shlex
+import time
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from config.robot import RobotConfig
+from drivers.driver import LineState
+from drivers.heard_bytes import HeardBytes
+from drivers.link import Link, LinkError
+from drivers.messages import Flags, Identity
+from drivers.registry import make_driver
+from runtime.cycle.connection import POLL_S, Connection
+
+ANSWER_MAX_S: Final = 3.0
+"""Longest wait for a robot's first frame, s: as long as it takes to call a Pioneer at every speed of its line."""
+READY_MAX_S: Final = 6.0
+"""Longest wait from the first frame until the robot is ready, s."""
+LOOK_S: Final = 1.0
+"""How long a robot that is ready is listened to, for its sensors and its state, s."""
+NOTHING: Final = "nothing answers: is the robot on, and is this its cable?"
+NO_FRAME: Final = (
+    "no robot answers, and what is received is no frame of a known robot; another device is on this port, or one of "
+    "another speed: name its file with --robot"
+)
+WARNINGS: Final = (
+    (Flags.MOTOR_FAULT, "a motor reports a fault"),
+    (Flags.BUMPER, "a bumper is pressed"),
+)
+
+
+class Finding(NamedTuple):
+    """What was found on a port."""
+
+    robot: str | None
+    """The name by which the robot is run; None if there is none."""
+    said: tuple[str, ...]
+    """The robot in words, or why there is none."""
+
+
+class _Answer(NamedTuple):
+    """What the driver of one robot found out."""
+
+    has_answered: bool
+    """Whether any of its frames arrived."""
+    text: str | None = None
+    """The robot in words; None if it is none of this kind."""
+    problem: str | None = None
+    """Why it is not, or why the port cannot be opened."""
+    stranger: str | None = None
+    """Who sent the bytes that were no frame, None if none came."""
+    fired: int = 0
+    """How many of its sensors have fired."""
+    is_whole: bool = False
+    """Whether all have."""
+
+
+async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
+    """Return what answers on a port.
+
+    Robots of one driver and one speed are tried one after the other as long as something answers them. One of which
+    all sensors fire is the robot; some controllers do not name theirs, and the one of which most fire is chosen.
+
+    Parameters
+    ----------
+    port
+        The port.
+    robots
+        Robots by the names by which they are run.
+    """
+    said, best = list[str](), (0, Finding(None, ()))
+    strangers = list[str]()
+    for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
+        for name, config in family:
+            answer = await _try(port, config)
+            if answer.text is not None:
+                if best[1].robot is None or answer.fired > best[0]:
+                    best = (answer.fired, Finding(name, (answer.text,)))
+                if answer.is_whole:
+                    return best[1]
+            if answer.stranger is not None:
+                strangers.append(answer.stranger)
+            if answer.problem is not None:
+                said.append(f"as {name}: {answer.problem}" if answer.has_answered else answer.problem)
+            if not answer.has_answered:
+                break
+        if best[1].robot is not None:
+            return best[1]
+        if said and not answer.has_answered and answer.problem is not None:
+            break  # the port cannot be opened
+    known = [stranger for stranger in strangers if stranger != NO_FRAME]
+    return Finding(None, tuple(said or (known or strangers or [NOTHING])[:1]))
+
+
+def run_it(port: str, robot: str) -> str:
+    """Return the command that runs a robot on a port."""
+    return shlex.join(("echolocate", "run", "--robot", robot, "--port", port))
+
+
+def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
+    return item[1].robot.driver, item[1].link.baud
+
+
+async def _try(port: str, config: RobotConfig) -> _Answer:
+    """Return what the driver of one robot finds out; it is never released, so nothing moves."""
+    config = config.model_copy(update={"link": config.link.model_copy(update={"port": port})})
+    driver, clock, heard = make_driver(config), time.monotonic, HeardBytes()
+
+    def send() -> None:
+        link.set_baud(driver.line_baud)
+        if link.is_open and (data := driver.outgoing(writable=link.writable)):
+            heard.sent(data)
+            link.send(data)
+
+    def opened() -> None:
+        driver.line_opened(clock())
+        send()
+
+    def received(data: bytes) -> None:
+        heard.received(data)
+        driver.receive(data, clock())
+
+    link = Link(config.link, opened, received, lambda _reason: driver.line_closed())
+    try:
+        await link.open_once()
+    except LinkError as error:
+        return _Answer(has_answered=False, problem=str(error))
+    connection, begin_s = Connection(link, driver, send, clock), clock()
+    try:
+        while driver.state is not LineState.READY and link.is_open:
+            driver.tick(clock())
+            send()
+            has_answered = driver.counts.frames > 0
+            if driver.state is LineState.DOWN and has_answered:
+                return _Answer(has_answered=True, problem=driver.problem)
+            if clock() - begin_s > (READY_MAX_S if has_answered else ANSWER_MAX_S):
+                stranger = heard.stranger or NO_FRAME if heard.total and not has_answered else None
+                return _Answer(has_answered, stranger=stranger)
+            await asyncio.sleep(POLL_S)
+        if not link.is_open:
+            return _Answer(has_answered=False, problem=link.last_error)
+        return await _look(connection)
+    finally:
+        if driver.state is LineState.READY:
+            await connection.shut_down()
+        await link.stop()
+
+
+async def _look(connection: Connection) -> _Answer:
+    """Return what a robot that is ready says, after listening to it for a while."""
+    driver, clock = connection.driver, connection.clock
+    flags, fired, heard = Flags.NONE, set[int](), set[int]()
+    end_s = clock() + LOOK_S
+    while clock() < end_s and connection.link.is_open:
+        driver.tick(clock())
+        connection.send()
+        received = driver.take_received()
+        flags |= received.flags
+        for firing in received.firings:
+            fired |= set(np.flatnonzero(~np.isnan(firing.ranges_m)).tolist())
+            heard |= set(np.flatnonzero(np.isfinite(firing.ranges_m)).tolist())
+        await asyncio.sleep(POLL_S)
+    identity = driver.identity
+    robot = "a robot" if identity is None else f"{_name(identity)}, {identity.sensors} sensors"
+    within = f"within {LOOK_S:g} s {len(fired)} have fired and {len(heard)} have heard something"
+    battery = _battery(driver.battery_v, is_low=Flags.BATTERY_LOW in flags)
+    text = "; ".join([robot, battery, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+    count = math.inf if identity is None else identity.sensors
+    return _Answer(has_answered=True, text=text, fired=len(fired), is_whole=len(fired) >= count)
+
+
+def _battery(volts: float | None, *, is_low: bool) -> str:
+    """Return the battery's state as a phrase."""
+    if volts is None:
+        return "battery low" if is_low else "battery not reported"
+    return f"battery {volts:.1f} V, low" if is_low else f"battery {volts:.1f} V"
+
+
+def _name(identity: Identity) -> str:
+    """Return how a robot names itself, as a phrase."""
+    return f"robot '{identity.name}'" if identity.name else "a robot without a name"
