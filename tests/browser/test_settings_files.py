@@ -6,7 +6,7 @@ import pytest
 from playwright.async_api import expect
 
 from tests.browser.fake_server import FakeServer
-from tests.browser.open_page import Opener
+from tests.browser.open_page import PHONE, Opener
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -76,3 +76,27 @@ async def test_a_change_is_not_lost_and_a_restart_waits_for_a_robot_that_stands(
     await page.click("#settings-restart")
     await page.get_by_role("button", name="Start it again").click()
     await server.wait("restart_run")
+
+
+async def test_title_and_buttons_stay_in_view_on_a_phone(server: FakeServer, opener: Opener) -> None:
+    server.data |= {
+        "list_settings": [{"kind": "robot", "name": "my.toml", "shipped": False}],
+        "read_settings": {"text": TEXT + 60 * "# a line\n", "digest": "a" * 64},
+        "check_settings": {"problems": [{"line": 2, "text": 30 * "long "}], "warnings": [30 * "word "],
+                           "difference": 30 * "+x\n"},
+    }  # fmt: skip
+    opened = await opener.open(server.url, PHONE)
+    page = opened.page
+    await page.click("#tab-tune")
+    await page.click("#settings-open")
+    await expect(page.locator("#settings-text")).not_to_have_value("")
+    await page.locator("#settings-text").fill("[ring]\ncount = 1\n")
+    await opened.run_for(500)
+    await expect(page.locator("#settings-problems li").first).to_contain_text("long")
+    bar = await page.locator(".bar").bounding_box()
+    for name in ("close", "copy", "restart", "save"):
+        box = await page.locator(f"#settings-{name}").bounding_box()
+        assert box is not None
+        assert bar is not None
+        assert bar["y"] + bar["height"] <= box["y"], name
+        assert box["y"] + box["height"] <= PHONE[1], name
