@@ -26,6 +26,7 @@ from bench.map_commands import (
     free_cells,
     grid,
     map_size,
+    standing,
     walls,
 )
 from bench.measure import Plan, measure
@@ -271,6 +272,7 @@ for command in (
     false_walls,
     false_canyons,
     free_cells,
+    standing,
     grid,
 ):
     app.command(command)

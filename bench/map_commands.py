@@ -74,6 +74,31 @@ def free_cells(*, json: str = "free-cells.json", rooms: int = 20, seed: int = 0)
     return report(json, rows, rows_table("cells called free", rows))
 
 
+def standing(*, json: str = "standing.json", rooms: int = 100, minutes: float = 10.0, first: int = 0) -> int:
+    """Count what was sure after a minute's drive and is lost, moved or false after standing; and sensors named.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        How many random rooms, each by both models of reflection.
+    minutes
+        How long the robot stands, min of virtual time.
+    first
+        Seed of the first room.
+    """
+    use_kernel_cache()
+    from bench.standing import measure
+
+    seeds = range(first, first + max(1, rooms))
+    return try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, minutes, tell),
+        lambda rows: rows_table(f"what is sure at a stop, and after {minutes:g} min, in {len(seeds)} rooms", rows),
+        json, BY_BAYES,
+    )  # fmt: skip
+
+
 def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
     """Measure what a firing costs in halls of more and more drums, driven through once and back.
 

@@ -206,7 +206,8 @@ def place_readings(
 ) -> list[tuple[float, ...]]:  # fmt: skip
     """Return the new readings of this firing in the odometry's frame: x, y, axis, range, sensor.
 
-    Of those from one place the first, second, fourth and so on are new; three in turn that differ begin a new series.
+    Of those from one place the first, second, fourth and eighth are new. Three in turn that differ from the first one
+    begin a new series, and one more for each doubling of those before.
     """
     turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
     new = []
@@ -223,14 +224,16 @@ def place_readings(
         if old is not None and moved < 0.005:
             var = sigma[0] ** 2 + (sigma[1] * min(q[4], old[4])) ** 2 + half_box**2 / 3 + 1e-6 * FT**2
             differ = differ + 1 if abs(q[4] - old[4]) > 2 * half_box + 3 * math.sqrt(2 * var) else 0
-            stands[i] = (1, 0) if differ == 3 else (looks + 1, differ)
-            if math.log2(stands[i][0]) % 1 != 0:
+            is_changed = differ >= 3 + math.log2(max(1, looks + 1 - differ))
+            stands[i] = (1, 0) if is_changed else (looks + 1, differ)
+            if stands[i][0] not in (1, 2, 4, 8):
                 continue
         elif old is not None and moved < 0.05 * FT and abs(q[4] - old[4]) <= half_box:
             continue
         else:
             stands[i] = (1, 0)
-        last[i] = q
+        if stands[i][0] == 1:
+            last[i] = q
         new.append((*q, float(i)))
     return new
 

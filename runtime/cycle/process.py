@@ -32,6 +32,7 @@ from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.mode_log import ModeLog
 from runtime.cycle.modes import Mode, ModeState
+from runtime.cycle.object_log import ObjectLog
 from runtime.cycle.preparation import Preparation, RunningPreparation, fresh_state
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary
@@ -133,6 +134,7 @@ class RobotProcess:
         self._connection = Connection(self._link, self._driver, self._send, self._clock, line_messages)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
         self._mode_log = ModeLog(log, self._notifier)
+        self._object_log = ObjectLog(log)
         self._line_log = LineLog(log, line_messages)
         self._alerts = Alerts()
         self._request: Request | None = None
@@ -308,6 +310,7 @@ class RobotProcess:
         received, on_firing = record.inputs.received, self._observers.on_firing
         self._mode_log.observe(self._state, before, record.inputs.run_s)
         self._line_log.observe(record, self._driver, self._budget.flood(record.inputs.run_s))
+        self._object_log.observe(self._state.perception, record.inputs.run_s, is_edited=bool(record.inputs.edits))
         for line in self._alerts.update(received, self._state, record.inputs.run_s):
             self._log.warning(line)
         if on_firing is not None:

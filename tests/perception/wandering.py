@@ -62,6 +62,8 @@ class Wandering:
         How long the robot drives, and stands after that.
     deaf
         A sensor that hears nothing.
+    acoustics
+        Of the room, instead.
     """
 
     ring: RingConfig
@@ -69,11 +71,12 @@ class Wandering:
     drive_s: float
     stand_s: float = 0.0
     deaf: int | None = None
+    acoustics: AcousticsConfig | None = None
 
     def firings(self) -> Iterator[Firing]:
         """Yield the firings."""
         rng, room, ring = np.random.default_rng([self.seed, 77]), furnished_room(self.seed), self.ring
-        acoustics = (*ACOUSTICS, room.world.acoustics)[self.seed % (len(ACOUSTICS) + 1)]
+        acoustics = self.acoustics or (*ACOUSTICS, room.world.acoustics)[self.seed % (len(ACOUSTICS) + 1)]
         scene, pattern = compile_scene(room.world), firing_pattern(ring)
         sonar = Sonar(ring, scene, acoustics, np.random.default_rng([self.seed, 3]))
         least_m, period_s = max(math.hypot(x, y) for x, y, _ in ring.mounts) + 0.15, pattern.step_period_s

@@ -19,8 +19,10 @@ COORDINATE_MAX_M: Final = 0.5 * FAR
 STANDING_M: Final = 0.005
 """A sensor that moved less is where it was; odometry trembles by less than this."""
 CHANGED_MIN: Final = 3
-"""So many readings in turn that differ from the last one say that the surroundings have changed: of drop-outs of 10 %
-one in a thousand series is so long."""
+"""So many readings in turn that differ from the first one say that the surroundings have changed: of drop-outs of
+10 % one in a thousand series is so long. Each doubling of the looks before them asks for one more."""
+LOOKS_MAX: Final = 8
+"""Readings from one place that can be evidence."""
 
 
 @kernel
@@ -28,10 +30,11 @@ def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
     """Return whether a reading from the place of the sensor's last one is evidence; count it.
 
     The errors of readings from one place are not independent: what their mean is off by stays, however many they are.
-    So the first, second, fourth, eighth and so on count, whatever they read. If those that repeat the last range were
-    left out instead, ranges that vary by a count would outnumber silences, and after minutes the surroundings would
-    seem to answer at any angle. When several in turn are different, the surroundings have changed, and counting
-    begins anew.
+    So the first, second, fourth and eighth count, whatever they read, and no later one: after minutes they would
+    outweigh all that was heard on the way. If those that repeat the last range were left out instead, ranges that
+    vary by a count would outnumber silences, and the surroundings would seem to answer at any angle. When several in
+    turn are different, the surroundings have changed, and counting begins anew. Where two surfaces answer in turn,
+    long series come by chance; so the longer the first range was heard, the longer the series must be.
 
     Parameters
     ----------
@@ -44,10 +47,10 @@ def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
     """
     sensor.looks += 1
     sensor.changed = sensor.changed + 1 if abs(range_m - sensor.last.range_m) > tolerance else 0
-    if sensor.changed >= CHANGED_MIN:
+    if sensor.changed >= CHANGED_MIN + math.log2(max(1, sensor.looks - sensor.changed)):
         sensor.looks = 1
         sensor.changed = 0
-    return bool(sensor.looks & (sensor.looks - 1) == 0)
+    return bool(sensor.looks <= LOOKS_MAX and sensor.looks & (sensor.looks - 1) == 0)
 
 
 @kernel
@@ -94,12 +97,15 @@ def place_readings(
         else:
             sensor.looks = 1
             sensor.changed = 0
-        last.x = x
-        last.y = y
-        last.axis_x = ux
-        last.axis_y = uy
-        last.range_m = r
-        copy_reading(last, scratch.fired[m])
+        q = scratch.fired[m]
+        q.x = x
+        q.y = y
+        q.axis_x = ux
+        q.axis_y = uy
+        q.range_m = r
+        q.listener_x = q.listener_y = 0.0
+        if sensor.looks == 1:  # Later ones from there may be strays.
+            copy_reading(q, last)
         scratch.fired_sensors[m] = i
         scratch.explained_by[m] = UNEXPLAINED
         m += 1

@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 
 from perception.bayes.memory.elements import REJECTIONS_MAX
-from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, CircleTrack, StateRecord
+from perception.bayes.memory.parameters import APART_RADII, CENTRE_VARIANCE_MAX_M2
+from perception.bayes.memory.settings_record import SettingsRecord
+from perception.bayes.memory.state import FREE, TENTATIVE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -88,6 +90,47 @@ def outlives(track: AnyTrack, other: AnyTrack, has_more: bool) -> bool:
         else:
             other.number = older
     return has_more
+
+
+@kernel
+def hold(track: CircleTrack, x: float, y: float) -> None:
+    """Leave a track that a user marked in its place, as uncertain as a user's: its readings do not support it.
+
+    A track moves with each refinement, and without support it would follow the echoes of other bodies anywhere.
+    """
+    track.x = x
+    track.y = y
+    track.covariance_xx = CENTRE_VARIANCE_MAX_M2
+    track.covariance_xy = 0.0
+    track.covariance_yy = CENTRE_VARIANCE_MAX_M2
+
+
+@kernel
+def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
+    """Merge a track with others in the same place: keep the one with more evidence, or the one that a user marked.
+
+    A model that was reported, or confirmed, keeps its number, whichever of the two is older.
+
+    Parameters
+    ----------
+    tracks, p, t
+        Circles (updated), settings, and index of the track.
+    """
+    track = tracks[t]
+    for k in range(len(tracks)):
+        other = tracks[k]
+        if k != t and other.status != FREE:
+            apart = max(p[0].merge_m, APART_RADII * max(track.radius, other.radius))
+            if math.hypot(other.x - track.x, other.y - track.y) < apart:
+                lead = track.is_named + track.is_confirmed - other.is_named - other.is_confirmed
+                named = track.number if lead > 0 else other.number
+                is_one_named = lead != 0 and track.marks == 0 and other.marks == 0
+                if outlives(other, track, other.log_likelihood_ratio > track.log_likelihood_ratio):
+                    other.number = named if is_one_named else other.number
+                    track.status = FREE
+                    return
+                track.number = named if is_one_named else track.number
+                other.status = FREE
 
 
 @kernel

@@ -74,7 +74,7 @@ class Sensor(Record):
     kept: Count
     """Readings ever put there."""
     last: Annotated[Reading, UNHEARD]
-    """The last reading that was not redundant."""
+    """The first reading from the place where it was last."""
     looks: Count
     """Readings from its place; see `placement.says_new`."""
     changed: Count

@@ -238,13 +238,14 @@ def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None
     model : int
         Which polygon.
     t : int
-        Its track, near the best pose; where its covariance is zero, the first lattice uses default deviations.
+        Its track, near the job's best pose, the first middle; where its covariance is zero, the first lattice uses
+        default deviations.
     """
     job = s[0].job
     track = s[0].polygons[t]
-    job.middle.x = track.x
-    job.middle.y = track.y
-    job.middle.heading = track.heading
+    job.middle.x = job.best.x
+    job.middle.y = job.best.y
+    job.middle.heading = job.best.heading
     copy_triangle(track.covariance, job.covariance)
     if track.covariance.xx <= 0.0:
         job.covariance.xx = FIRST_SIGMA_M**2

@@ -105,7 +105,8 @@ def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probabili
     covariance = polygon_covariance(track)
     xx, xy, yy = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
     period = 2.0 * math.pi / int(p[0].polygons[track.model].symmetry)
-    is_located = xx > 0.0  # else only a user's placement gives its position so far
+    # Else only a user's placement gives its position so far.
+    is_located = xx > 0.0 and not int(track.marks) & PLACED
     return DetectedObject(
         label, float(track.x), float(track.y), (heading + 0.5 * period) % period - 0.5 * period,
         worst_sigma(xx, xy, yy) if is_located else PLACED_SIGMA_M, int(track.hits), probability, probability,

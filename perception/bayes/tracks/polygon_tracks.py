@@ -22,6 +22,7 @@ from perception.bayes.memory.job_records import (
     SEARCH_NEAR,
     SEARCH_WIDE,
 )
+from perception.bayes.memory.parameters import PLACED_STRAY_MAX_M
 from perception.bayes.memory.polygon_parameters import (
     FITTING_SHARE,
     LATTICE_ATTEMPTS,
@@ -170,6 +171,12 @@ def begin_refinement(s: StateRecord, p: SettingsRecord, threshold: float) -> boo
 
 
 @kernel
+def is_sure(track: PolygonTrack, p: SettingsRecord) -> bool:
+    """Return whether a polygon's readings make it sure enough to be reported."""
+    return is_sure_polygon(track, min(p[0].report_probability, POLYGON_PROBABILITY))
+
+
+@kernel
 def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
     """Update a track's pose, evidence and status from the pose search.
 
@@ -184,6 +191,7 @@ def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> No
     found = s[0].job.best
     track.log_likelihood_ratio = score_pose(s, p, track.model, found.x, found.y, found.heading)
     score = s[0].scratch.score
+    x, y, heading = track.x, track.y, track.heading
     track.x = found.x
     track.y = found.y
     track.heading = found.heading
@@ -194,8 +202,14 @@ def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> No
         return
     compare_circles(s, tracks, p, track)
     update_status(s, p, track)
-    if track.marks > CONFIRMED and is_sure_polygon(track, min(p[0].report_probability, POLYGON_PROBABILITY)):
-        track.marks &= CONFIRMED
+    if track.marks != 0:
+        is_near = math.hypot(found.x - x, found.y - y) < PLACED_STRAY_MAX_M
+        if is_sure(track, p) and (is_near or track.marks == CONFIRMED):
+            track.marks &= CONFIRMED
+        else:  # It would follow the echoes of other bodies anywhere.
+            track.x = x
+            track.y = y
+            track.heading = heading
     if track.status != FREE:
         merge_polygons(s, p, t)
 
@@ -250,11 +264,12 @@ def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
         return cost((1 + p[0].circle_count) * job.reading_count, 1, p[0].polygons[model].side_count)
     spent = advance_lattice(s, p, model, left)
     if job.lattices == LATTICE_ATTEMPTS:
-        track.x = job.middle.x
-        track.y = job.middle.y
-        track.heading = job.middle.heading
         copy_triangle(job.covariance, track.covariance)
         track.status = ESTABLISHED
+        if track.marks == 0 or (track.marks == CONFIRMED and is_sure(track, p)):
+            track.x = job.middle.x
+            track.y = job.middle.y
+            track.heading = job.middle.heading
         end_job(s)
     return spent
 

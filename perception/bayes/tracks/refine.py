@@ -21,10 +21,9 @@ from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.range_fit import fit_circle, score_circle
 from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
-from perception.bayes.inference.track_labels import drop_track, may_become, outlives
+from perception.bayes.inference.track_labels import drop_track, hold, may_become, merge_duplicates
 from perception.bayes.memory.parameters import (
     ALTERNATIVE_STEPS,
-    APART_RADII,
     CENTRE_VARIANCE_MAX_M2,
     CERTAIN_PROBABILITY,
     CORNER_MISS_SHARE,
@@ -42,6 +41,7 @@ from perception.bayes.memory.parameters import (
     LINE_PRIOR_NAT,
     LOST_NAT,
     MODEL_CHECK_EVERY,
+    PLACED_STRAY_MAX_M,
     REPLACING_LINE_HITS_MIN,
     ROOT_CORRELATION_MAX,
     ROOT_VARIANCE_MIN_M2,
@@ -58,7 +58,7 @@ from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import (
     CONFIRMED,
     ESTABLISHED,
-    FREE,
+    PLACED,
     TENTATIVE,
     CircleTrack,
     CircleTracks,
@@ -317,7 +317,11 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     if n < TRACK_READINGS_MIN:
         drop_track(track)
         return
+    x, y = track.x, track.y
     locate(s, p, track, n)
+    if track.marks & PLACED and math.hypot(track.x - x, track.y - y) > PLACED_STRAY_MAX_M:
+        track.x = x  # Another body's echoes lead there.
+        track.y = y
     prior = update_score(s, p, track, n)
     if not compare_alternatives(s, p, track, n, prior) and drop_track(track):
         return
@@ -340,35 +344,9 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     withdraw_overlapping(tracks, t)
     if track.is_named == 1:
         track.marks &= CONFIRMED
+    elif track.marks != 0:
+        hold(track, x, y)
     merge_duplicates(tracks, p, t)
-
-
-@kernel
-def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
-    """Merge a track with others in the same place: keep the one with more evidence, or the one that a user marked.
-
-    A model that was reported, or confirmed, keeps its number, whichever of the two is older.
-
-    Parameters
-    ----------
-    tracks, p, t
-        Circles (updated), settings, and index of the track.
-    """
-    track = tracks[t]
-    for k in range(len(tracks)):
-        other = tracks[k]
-        if k != t and other.status != FREE:
-            apart = max(p[0].merge_m, APART_RADII * max(track.radius, other.radius))
-            if math.hypot(other.x - track.x, other.y - track.y) < apart:
-                lead = track.is_named + track.is_confirmed - other.is_named - other.is_confirmed
-                named = track.number if lead > 0 else other.number
-                is_one_named = lead != 0 and track.marks == 0 and other.marks == 0
-                if outlives(other, track, other.log_likelihood_ratio > track.log_likelihood_ratio):
-                    other.number = named if is_one_named else other.number
-                    track.status = FREE
-                    return
-                track.number = named if is_one_named else track.number
-                other.status = FREE
 
 
 @kernel

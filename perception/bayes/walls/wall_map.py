@@ -28,23 +28,27 @@ from perception.bayes.memory.wall_records import (
     MAX_WALLS,
     RECENT_MAX,
     WALL_BINS,
+    RoomCorner,
     WallMap,
 )
 from perception.bayes.walls.bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
+    EDGE_REACH_M,
     EXPLAINED_SIGMAS,
     FOOT,
     NOWHERE,
     ONLY_NAMED,
     contact,
     distance_and_foot,
+    edges_answer,
     explaining_wall,
     is_from_circle,
     is_from_end,
     is_hidden,
     is_on_span,
     is_on_straight_span,
+    range_sigma,
     tolerance,
     wall_point,
 )
@@ -53,7 +57,7 @@ from perception.bayes.walls.fit import fit_walls
 from perception.bayes.walls.initiation import try_wall
 from perception.bayes.walls.merging import drop_explained, merge_walls
 from perception.bayes.walls.noise import add_residual, estimate_noise
-from perception.bayes.walls.points import find_heard_points
+from perception.bayes.walls.points import LONGER_SIGMAS, find_heard_points
 from perception.bayes.walls.review import remember, review
 from perception.kernel import kernel
 
@@ -128,6 +132,19 @@ def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: Setting
 
 
 @kernel
+def may_be_of_wall(room: WallMap, edge: RoomCorner, q: Reading) -> bool:
+    """Return whether the wall that ends at an edge may answer an echo from afar itself, where it goes on.
+
+    Between mirrors an end with many such echoes would seem to be an inside corner, in the middle of a plain wall.
+    """
+    d = math.hypot(edge.x - q.x, edge.y - q.y)
+    if d <= EDGE_REACH_M or edges_answer(room):
+        return False
+    distance, _ = distance_and_foot(room.walls[edge.first], q.x, q.y)
+    return d - abs(distance) <= LONGER_SIGMAS * range_sigma(room, d)
+
+
+@kernel
 def enter_point(room: WallMap, q: Reading, p: SettingsRecord, less_than: float) -> float:
     """Enter an echo that a corner or an edge explains with less error than this; return its error, else 1."""
     corner, error = point_of(room, room.corners, CORNERS_MAX, q, p)
@@ -136,7 +153,7 @@ def enter_point(room: WallMap, q: Reading, p: SettingsRecord, less_than: float) 
         return 1.0
     if error <= error_of_edge:
         enter_echo(room, room.corners[corner], q)
-    else:
+    elif not may_be_of_wall(room, room.edges[edge], q):
         enter_echo(room, room.edges[edge], q)
     return min(error, error_of_edge)
 

@@ -7,9 +7,20 @@ import pytest
 
 from perception.bayes.inference import track_labels
 from perception.bayes.memory.elements import REJECTIONS_MAX
+from perception.bayes.memory.parameters import CENTRE_VARIANCE_MAX_M2
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.bayes.tracks import refine
-from tests.perception.bayes.random_tracks import TRACKS, P, around, examples, keep, new_memory, place_of, random_track
+from tests.perception.bayes.random_tracks import (
+    RADII,
+    TRACKS,
+    P,
+    around,
+    examples,
+    keep,
+    new_memory,
+    place_of,
+    random_track,
+)
 
 
 @examples(200, 1000)
@@ -110,3 +121,24 @@ def test_no_reading_ends_a_circle_that_a_user_marked_nor_makes_it_something_else
         assert track.marks & CONFIRMED == mark & CONFIRMED
         tentative += track.status == TENTATIVE
     assert tentative > 2
+
+
+@pytest.mark.parametrize("marks", [0, PLACED])
+def test_a_track_that_a_user_placed_stays_where_it_is_until_its_readings_support_it(marks: int) -> None:
+    """The echoes of another body, from one side, lead a track to it, and a placed one nowhere."""
+    memory = new_memory()
+    track = memory.tracks[0]
+    track.kind, track.radius, track.number, track.marks = 0, RADII[0], 1, marks
+    track.x, track.y, track.status, track.root_xx, track.root_yy = 1.0, 0.0, TENTATIVE, 0.1, 0.1
+    sensors, body = np.column_stack([np.full(12, -0.5), np.linspace(-0.3, 0.3, 12)]), np.array([1.2, 0.0])
+    off = body - sensors
+    away = np.hypot(*off.T)
+    keep(memory, 0, np.column_stack([sensors, off / away[:, None], away - RADII[0]]))
+    for _ in range(10):
+        refine.refine(memory.s, memory.tracks, P, 0)
+    assert track.is_named == 0
+    if marks == PLACED:
+        assert (track.x, track.y, track.marks) == (1.0, 0.0, PLACED)
+        assert track.covariance_xx == CENTRE_VARIANCE_MAX_M2
+    else:
+        assert track.x > 1.1 or track.status == FREE

@@ -89,7 +89,7 @@ def spread_of(memory: Memory, w: Floats, pose: Floats, left: int, noise: int = L
     enter_job(memory, w, noise)
     memory.polygons.view(np.uint8)[...] = 0
     track, job = memory.s[0].polygons[0], memory.s[0].job
-    track.x, track.y, track.heading = pose.tolist()
+    job.best.x, job.best.y, job.best.heading = pose.tolist()
     begin_lattice(memory.s, P, 0, 0)
     while job.lattices < LATTICE_ATTEMPTS:
         advance_lattice(memory.s, P, 0, left)

@@ -12,7 +12,7 @@ from perception.bayes.inference import lines as walls
 from perception.bayes.inference.kernel_settings import make_settings
 from perception.bayes.memory.parameters import PLACED_SIGMA_M, UNKNOWN_HITS_MIN
 from perception.bayes.memory.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
-from perception.bayes.memory.state import ESTABLISHED, FREE, PLACED, TENTATIVE
+from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.bayes.reports import object_report
 from tests import naive_walls
 from tests.naive_tracks import FT, Line
@@ -126,6 +126,10 @@ def test_a_polygon_is_reported_with_its_least_heading_and_an_uncertain_one_with_
     expected = POLYGON_INFLATION * np.array([[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, 1e-5], [2e-5, 1e-5, 1e-4]])
     expected[2, 2] += POLYGON_TURN_SIGMA_RAD**2
     assert full == pytest.approx(expected, rel=1e-12)
+    assert object_report.polygon_object(track, box_settings, "box", 0.4).covariance is None, (
+        "still where it was placed"
+    )
+    track.marks = CONFIRMED
     located = object_report.polygon_object(track, box_settings, "box", 0.4)
     assert located.covariance == (full[0, 0], full[0, 1], full[1, 1])
     assert located.sigma == pytest.approx(math.sqrt(np.linalg.eigvalsh(full[:2, :2])[1]))

@@ -89,14 +89,16 @@ def test_a_polygon_is_established_doubted_and_ended_by_its_evidence(
     assert (track.status, job.stage) == (after, stage)
 
 
-def test_a_refinement_finds_a_box_from_beside_it_and_establishes_it() -> None:
+@pytest.mark.parametrize("marks", [0, PLACED])
+def test_a_refinement_finds_a_box_from_beside_it_and_a_placed_one_stays_until_it_is_sure(marks: int) -> None:
     rng, memory = np.random.default_rng(2), Memory(SENSORS, TRACKS)
     s, truth = memory.s, np.array([0.3, -0.2, 0.4])
     s[0].noise_level = LEVEL
     track = s[0].polygons[3]
     keep_polygon_readings(memory, 3, heard(rng, truth, 24, 0.0, 1))
-    track.status, track.unseen, track.number, track.marks = TENTATIVE, 24, 1, PLACED
-    track.x, track.y, track.heading = (truth + np.array([0.04, -0.03, 0.05])).tolist()
+    track.status, track.unseen, track.number, track.marks = TENTATIVE, 24, 1, marks
+    beside = (truth + np.array([0.04, -0.03, 0.05])).tolist()
+    track.x, track.y, track.heading = beside
     assert polygon_tracks.begin_refinement(s, P, THRESHOLD)
     job = s[0].job
     assert (job.kind, job.stage, job.track, job.reading_count) == (REFINEMENT, ASSIGN, 3, 24)
@@ -106,9 +108,12 @@ def test_a_refinement_finds_a_box_from_beside_it_and_establishes_it() -> None:
     assert track.status == ESTABLISHED
     assert track.reservoir == 24
     assert track.probability > 0.9
+    assert 0.0 < track.covariance.xx < 0.01
+    if marks == PLACED:
+        assert [track.x, track.y, track.heading] == beside
+        return
     assert math.dist((track.x, track.y), truth[:2]) < 0.02
     assert abs((track.heading - truth[2] + 0.25 * math.pi) % (0.5 * math.pi) - 0.25 * math.pi) < 0.05
-    assert 0.0 < track.covariance.xx < 0.01
     assert not polygon_tracks.polygon_quantum(s, memory.tracks, P, THRESHOLD), "nothing is left to do"
 
 

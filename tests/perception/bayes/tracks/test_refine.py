@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference import lines as walls
-from perception.bayes.inference import reservoir
+from perception.bayes.inference import reservoir, track_labels
 from perception.bayes.memory.parameters import SWITCH_LEAD_NAT, SWITCH_UNSEEN
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.bayes.tracks import refine
@@ -45,7 +45,7 @@ def test_of_two_tracks_in_one_place_the_marked_one_stays_else_the_one_with_more_
             t, live, places(memory), circles["radius"], circles["log_likelihood_ratio"], S.merge_m, circles["marks"],
             circles["number"],
         )  # fmt: skip
-        refine.merge_duplicates(memory.tracks, P, t)
+        track_labels.merge_duplicates(memory.tracks, P, t)
         assert ((circles["status"] != FREE) == want).all()
         assert (circles["number"][want] == older[want]).all()
         merged += int((live != want).sum())

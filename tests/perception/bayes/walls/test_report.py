@@ -11,7 +11,7 @@ from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import WallMap
 from perception.bayes.reports.object_report import corner_object, wall_object
 from perception.bayes.walls.bins import bin_of, enter_pass, free
-from perception.bayes.walls.corners import find_corners
+from perception.bayes.walls.corners import add_information, find_corners
 from perception.bayes.walls.report import room_report, wall_ends, wall_segments
 from tests.perception.bayes.rooms import fill, new_room, place_wall
 
@@ -257,3 +257,23 @@ def test_between_mirrors_a_corner_or_an_edge_that_is_heard_often_is_reported_wha
     assert [corner_object(point.item()).model for point in room_report(memory)[1]] == ["edge"]
     edge.far_echoes = 5.0
     assert len(room_report(memory)[1]) == 0, "from afar it is not heard"
+
+
+def test_an_edge_that_was_heard_from_one_direction_is_not_sure() -> None:
+    """Echoes of a wall that goes on come from there, too."""
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.0)
+    find_corners(memory.s)
+    (edge,) = (it for it in room.edges if it.is_used == 1 and it.second == 1)
+    edge.echoes = 30.0
+    edge.covariance_xx = edge.covariance_yy = 1e-5
+    for bearings, is_sure in (((0.0, 0.01), False), ((-0.4, 0.4), True)):
+        edge.heard.xx = edge.heard.xy = edge.heard.yy = 0.0
+        for bearing in 15 * bearings:
+            add_information(edge.heard, math.cos(bearing), math.sin(bearing), 0.0, 1.0 / 0.02**2)
+        (point,) = room_report(memory)[1]
+        probability = corner_object(point.item()).probability
+        assert probability is not None
+        assert probability > 0.5
+        assert (probability > 0.99) == is_sure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -14,11 +15,13 @@ from drivers.messages import Pose
 from perception.bayes.inference.placement import place_readings
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.tracks.observe import associate_circles
+from perception.bayes.walls.corners import find_corners
 from perception.bayes.walls.report import wall_ends
-from perception.bayes.walls.wall_map import update_walls
+from perception.bayes.walls.wall_map import may_be_of_wall, update_walls
 from perception.kernel import Floats
 from perception.localization.room.expected_ranges import Reflection
 from tests.perception.bayes.random_tracks import MOUNTS, NOISES, SENSORS, SETTINGS, P, new_memory
+from tests.perception.bayes.rooms import fill, new_room, place_wall, reading
 
 ROOM = (
     (-2.0, -1.5, 2.0, -1.5),
@@ -79,3 +82,21 @@ def test_slanting_walls_are_taken_to_answer_where_fewer_beams_are_silent_than_be
     memory.s[0].heard, memory.s[0].silent = heard, silent
     update_walls(memory, P, 0)
     assert memory.state["room"]["is_loud"][0] == is_loud
+
+
+def test_an_echo_from_afar_that_its_wall_may_answer_is_none_of_its_end() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 0.0)
+    find_corners(memory.s)
+    edge = next(it for it in room.edges if it.is_used == 1 and it.second == 1)
+
+    def is_walls(x: float, y: float) -> bool:
+        off = edge.x - x, edge.y - y
+        return may_be_of_wall(room, edge, reading(x, y, math.atan2(off[1], off[0]), math.hypot(*off)))
+
+    assert is_walls(0.5, 0.1), "the wall would answer in the same range"
+    assert not is_walls(0.5, 1.0), "from the side an end is farther than its wall"
+    assert not is_walls(1.2, 0.1), "from near ends between mirrors answer"
+    room.edge_echoes = 100.0
+    assert not is_walls(0.5, 0.1), "where all answers, ends are heard from afar"
