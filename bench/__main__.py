@@ -46,6 +46,7 @@ from bench.place_commands import (
 )  # fmt: skip
 from bench.recording import measure_recording
 from bench.runners import Method, candidates
+from bench.sensitivity import app as sensitivity
 from bench.table import report, results_table, wide
 from bench.timing import Timing, TimingPlan, measure_timing
 from bench.timing_table import figures_table, quantiles_table, read_earlier
@@ -277,6 +278,7 @@ for command in (
 ):
     app.command(command)
 app.command(map_size, name="map")
+app.command(sensitivity, name="sensitivity")
 app.command(cross_paths)
 app.command(tune)
 app.command(ear_halls)
