@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 from bench.lies import (
-    KINDS, ROBOTS, ROOMS, Plan, TrialResult, honest, lies_table, make_lie, measure, run_trial, trials,
+    KINDS,
+    ROBOTS,
+    ROOMS,
+    Plan,
+    TrialResult,
+    honest,
+    lies_table,
+    make_lie,
+    measure,
+    run_trial,
+    trials,
 )  # fmt: skip
 from config.load import load_robot, load_settings
 from perception.ring_faults.monitor import REASONS as RING_REASONS
