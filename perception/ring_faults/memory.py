@@ -39,6 +39,12 @@ class EchoTrace(Record):
     """Whether it has made a reading."""
     last_m: Annotated[float, PLACE]
     """The last reading, m; `SILENCE_M` without an echo."""
+    latest: SensorPlace
+    """Where the ring, not the sensor, was at that reading …"""
+    before: SensorPlace
+    """… and the one before …"""
+    is_compared: Flag
+    """… if there is one."""
     standstill: Count
     """The standstill of the ring's readings to which `repeated` belongs."""
     repeated: SensorPlace

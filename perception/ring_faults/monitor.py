@@ -9,9 +9,12 @@ can only be compared with how it moves. An honest ring among objects that stand 
 - *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
   ranges are. How often an honest ring misses a known echo is learned on the way.
 - *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°.
+- *Changed.* All readings change at once from one round of the firing pattern to the next, by a change that the
+  sensors have in common (`perception.ring_faults.changes`).
 
-Each is a sequential test with one threshold, `perception.ring_faults.motion_tests.EVIDENCE_NAT`. A lie that agrees
-with the motion, as ranges that are all too long by the same amount do, cannot be found in this way.
+The first three are sequential tests, with one threshold for all, `perception.ring_faults.motion_tests.EVIDENCE_NAT`.
+A lie that agrees with the motion, as ranges that are all too long by the same amount do, can be found only as it
+begins.
 """
 
 from __future__ import annotations
@@ -26,14 +29,27 @@ from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.bounds import CONSTANT, bounds, index_of
 from perception.records import records, zeros
-from perception.ring_faults.memory import QUARTERS, EchoTrace, RingTrace
-from perception.ring_faults.motion_tests import NOTHING, REPEATED, SCATTERED, TURNED, VANISHED, check_motion
+from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
+from perception.ring_faults.memory import EchoTrace, RingTrace
+from perception.ring_faults.motion_tests import (
+    CHANGED,
+    NOTHING,
+    REPEATED,
+    SCATTERED,
+    TURNED,
+    VANISHED,
+    check_motion,
+)
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
 from perception.sensor_mounts import mounts_array, turn_mounts
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
     "its cables and the order of its sensors, then re-arm"
+)
+_CHANGED: Final = (
+    "the readings of the whole ring changed at once, as no motion changes them: {}; check the ring's power, cables "
+    "and controller, and the odometry for a jump, then re-arm"
 )
 REASONS: Final = MappingProxyType({
     REPEATED: "the ring repeats old readings although the odometry moves on: it is frozen, or the wheels turn and "
@@ -45,6 +61,8 @@ REASONS: Final = MappingProxyType({
     TURNED: _TURNED.format("90°, counter-clockwise,"),
     TURNED + 1: _TURNED.format("180°"),
     TURNED + 2: _TURNED.format("90°, clockwise,"),
+    CHANGED + LENGTHENED: _CHANGED.format("all ranges are longer or shorter by the same length"),
+    CHANGED + EXCHANGED: _CHANGED.format("each sensor hears what another one heard, as if the ring had been turned"),
 })  # fmt: skip
 """What happened, the likely cause, the next action."""
 
@@ -58,11 +76,11 @@ class RingMonitor:
         The sensors.
     """
 
-    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned")
+    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned", "_expected")
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT, _turning=CONSTANT, _turns=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
-        _reach_m=CONSTANT, _echoes=EchoTrace.BOUNDS, _ring=RingTrace.BOUNDS, _found=index_of(TURNED + QUARTERS),
+        _reach_m=CONSTANT, _echoes=EchoTrace.BOUNDS, _ring=RingTrace.BOUNDS, _found=index_of(CHANGED + EXCHANGED + 1),
     )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
@@ -77,6 +95,7 @@ class RingMonitor:
         self._echo_records = records(EchoTrace, self._echoes)
         self._ring = zeros(RingTrace, 1)
         self._ring_records = records(RingTrace, self._ring)
+        self._expected = records(Expected, zeros(Expected, len(ring.mounts)))
         self._found = NOTHING
 
     def observe(self, firing: Firing) -> None:
@@ -87,7 +106,7 @@ class RingMonitor:
             turn_mounts(self._mounts, self._turning, float(pose.theta - firing.ring_yaw), mounts)
         found = check_motion(
             firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), mounts, self._half_angle,
-            self._tolerance, self._reach_m, self._echo_records, self._ring_records,
+            self._tolerance, self._reach_m, self._echo_records, self._ring_records, self._expected,
         )  # fmt: skip
         if found != NOTHING:
             self._found = int(found)

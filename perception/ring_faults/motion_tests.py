@@ -13,6 +13,7 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
+from perception.ring_faults.changes import NO_CHANGE, Expected, weigh_changes
 from perception.ring_faults.memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
 from perception.ring_faults.repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat
 from perception.sensor_faults.wall import NOISE_SHARE
@@ -20,6 +21,8 @@ from perception.sensor_faults.wall import NOISE_SHARE
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
 """A sum of evidence that convicts the ring, nat: a day has some 10⁷ readings, and at most two days in a
 thousand are to have a false alarm. In 40 hours of simulated honest drives the greatest sum was 19.5."""
+CHANGE_NAT: Final = math.log(3e5 / 0.002)
+"""The same for changes from one round of the firing pattern to the next, of which a day has some 3·10⁵, nat."""
 LEAP_M: Final = 0.25
 """The memory starts again where the ring has moved farther than this between two firings, m."""
 AHEAD_COS: Final = math.cos(math.radians(100.0))
@@ -59,7 +62,16 @@ LEAN_RAD: Final = 0.15
 
 NOTHING, REPEATED, VANISHED, SCATTERED, TURNED = range(5)
 """What `check_motion` returns: nothing is wrong; the ring repeats old readings; most known echoes have gone
-silent, or are elsewhere; `TURNED` plus 0 to 2: it is turned by a quarter, two or three."""
+silent, or are elsewhere; `TURNED` plus 0 to 2: it is turned by a quarter, two or three, …"""
+CHANGED: Final = TURNED + QUARTERS - 1
+"""… and this plus one of the changes of `perception.ring_faults.changes`."""
+
+
+@kernel
+def honest_share(all_of: RingTrace, kind: int) -> float:
+    """Return the share of an honest ring's looks of a kind that miss a known echo, as learned so far."""
+    share = (all_of.misses[kind] + PRIOR_MISSES[kind]) / (all_of.looks[kind] + PRIOR_LOOKS)
+    return min(max(share, MISS_MIN), MISS_MAX)
 
 
 @kernel
@@ -97,10 +109,9 @@ def weigh_look(
         kind = DOUBTED
         if is_known:
             kind = AGAIN if c.silences > 0 else TURNING if turned > TURNING_SHARE * half_angle else STEADY
-        honest = (all_of.misses[kind] + PRIOR_MISSES[kind]) / (all_of.looks[kind] + PRIOR_LOOKS)
+        honest = honest_share(all_of, kind)
         if kind == TURNING:
-            honest = max(honest, 0.25 * turned / half_angle)
-        honest = min(max(honest, MISS_MIN), MISS_MAX)
+            honest = min(max(honest, 0.25 * turned / half_angle), MISS_MAX)
         evidence = math.log((1.0 - MISSED) / (1.0 - honest)) if agrees else math.log(MISSED / honest)
         for part in range(HALVES):
             if part == 0 or is_ahead:
@@ -206,7 +217,7 @@ def begin_evidence(all_of: RingTrace) -> None:
 @kernel
 def check_motion(
     ranges: Floats, x: float, y: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float, reach: float,
-    echoes: Records[EchoTrace], ring: Records[RingTrace],
+    echoes: Records[EchoTrace], ring: Records[RingTrace], expected: Records[Expected],
 ) -> int:  # fmt: skip
     """Test the readings of a firing; return what is wrong, `NOTHING` where nothing is.
 
@@ -228,6 +239,8 @@ def check_motion(
         What is remembered of each sensor. Updated.
     ring : (1,) record
         What is remembered of the ring. Updated. After a finding the evidence is dropped.
+    expected : (n,) records
+        Overwritten.
     """
     if not math.isfinite(x + y + yaw):
         return NOTHING
@@ -237,7 +250,7 @@ def check_motion(
         all_of.is_started = 1
         begin_evidence(all_of)
         for i in range(len(echoes)):
-            echoes[i].is_known = echoes[i].is_anchored = echoes[i].agreed = 0
+            echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
             echoes[i].heard.range_m = echoes[i].agreed_m = SILENCE_M
     elif moved > 0.0:
         all_of.travel_rad = math.atan2(y - all_of.y, x - all_of.x)
@@ -252,11 +265,22 @@ def check_motion(
         own_y = y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
         is_ahead = math.cos(axis - all_of.travel_rad) > AHEAD_COS
+        then = echoes[i].latest
+        echoes[i].is_compared = echoes[i].is_known
+        mark(echoes[i].before, then.range_m, then.x, then.y, then.axis, then.path_m)
+        mark(then, r, x, y, axis, all_of.path_m)
         weigh_repeat(i, r, own_x, own_y, axis, yaw, is_ahead, mounts, half_angle, tolerance, reach, echoes, ring)
         weigh_look(echoes[i], r, own_x, own_y, axis, is_ahead, half_angle, tolerance, reach, all_of)
         if r >= 0.0:
             weigh_change(i, r, own_x, own_y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of)
     found = conclusion(all_of)
+    if found == NOTHING:
+        missed = honest_share(all_of, STEADY)
+        change, nats = weigh_changes(mounts, half_angle, tolerance, reach, missed, echoes, expected)
+        if change != NO_CHANGE and nats >= CHANGE_NAT:
+            found = CHANGED + change
     if found != NOTHING:
         begin_evidence(all_of)
+        for i in range(len(echoes)):
+            echoes[i].is_compared = 0
     return found

@@ -1,0 +1,258 @@
+"""The test of whether the readings of a whole ring have changed at once, as no motion changes them.
+
+The newest reading of each sensor is compared with the one before it, a round of the firing pattern earlier. An honest
+ring hears what stood there then, moved as the odometry says. Two other explanations shift what is expected by one
+change that all sensors have in common:
+
+- all ranges have become longer or shorter by the same length;
+- each sensor hears what another one heard, as if the ring had been turned.
+
+All use the density of an honest reading around what is expected, so what no change explains better counts for none. A
+change that agrees with the motion from then on can be found only in this one round.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+from perception.angles import wrapped
+from perception.bounds import FINITE, Bound, Flag, Place
+from perception.kernel import Floats, kernel
+from perception.records import Record, Records
+from perception.ring_faults.memory import EchoTrace
+from perception.sensor_faults.wall import NOISE_SHARE
+
+NO_CHANGE, LENGTHENED, EXCHANGED = range(3)
+"""The changes; see the module."""
+NOISE_M: Final = 0.02
+"""Noise of a range that is no share of it, m; as `motion_tests.NOISE_M`."""
+ROUND_M: Final = 0.5
+"""A sensor that moved farther since its reading before is not compared, m."""
+SAME_M: Final = 1e-3
+"""A window of ranges is at least as wide, m."""
+SAME_RAD: Final = 1e-6
+"""Directions that differ by less are the same, rad."""
+TURNS: Final = 8
+"""Turns by a part of the circle that are tried; one by half as much looks as if the robot had turned."""
+
+
+class Expected(Record):
+    """What is expected of one sensor's newest reading."""
+
+    source: Annotated[int, Bound(-1.0, 255.0)]
+    """The sensor that looked there before; −1 for none, which says nothing."""
+    is_off: Flag
+    """Whether it hears an echo elsewhere than where one is expected."""
+    low: Place
+    """Between what ranges an echo is expected, m; below zero where silence is, …"""
+    high: Place
+    honest_nat: Annotated[float, FINITE]
+    """… and the logarithm of the density of what it reads."""
+
+
+@kernel
+def density(r: float, low: float, high: float, reach: float, missed: float) -> float:
+    """Return the density of a reading where an echo is expected, 1/m; of a silence the probability.
+
+    Parameters
+    ----------
+    r : float
+        The reading, m; below zero without an echo.
+    low, high : float
+        Where it is expected, m; `high` is below zero where silence is.
+    reach : float
+        Range up to which the ring listens, m.
+    missed : float
+        Share of readings that are not as expected: half of them are silent.
+    """
+    if high < 0.0 or low > reach:
+        return 1.0 - missed if r < 0.0 else missed / reach
+    if r < 0.0:
+        return 0.5 * missed
+    return 0.5 * missed / reach + ((1.0 - missed) / (high - low) if low <= r <= high else 0.0)
+
+
+@kernel
+def source(i: int, turn: float, half_angle: float, echoes: Records[EchoTrace]) -> int:
+    """Return the sensor that looked before where sensor `i` looks now, or at an angle `turn` from it; −1 for none.
+
+    Of those that looked there the sensor itself comes first.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    turn : float
+        The angle, rad.
+    half_angle, echoes
+        As for `weigh_changes`.
+    """
+    axis = echoes[i].latest.axis + turn
+    found, off = -1, half_angle
+    for step in range(len(echoes)):
+        k = (i + step) % len(echoes)
+        if echoes[k].is_compared:
+            away = abs(wrapped(echoes[k].before.axis - axis))
+            if away < off:
+                found, off = k, away - SAME_RAD
+    return found
+
+
+@kernel
+def expect(
+    k: int, i: int, turn: float, half_angle: float, tolerance: float, mounts: Floats,
+    echoes: Records[EchoTrace],
+) -> tuple[float, float]:  # fmt: skip
+    """Return between what ranges sensor `i` should hear what `k` heard before, m; (−1, −1) for a silence.
+
+    A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
+    the beam; a rough one along the path comes no nearer. `k` may be −1, which heard nothing.
+
+    Parameters
+    ----------
+    k, i : int
+        The sensors.
+    turn : float
+        Angle by which sensor `i` looks elsewhere than the robot file says, rad.
+    half_angle, tolerance, mounts, echoes
+        As for `weigh_changes`.
+    """
+    if k < 0 or echoes[k].before.range_m < 0.0:
+        return -1.0, -1.0
+    then, now = echoes[k].before, echoes[i].latest
+    axis = now.axis + turn
+    error = tolerance + NOISE_M + (NOISE_SHARE + abs(wrapped(axis - then.axis))) * then.range_m
+    r = then.range_m
+    r += mounts[k, 0] * math.cos(mounts[k, 2]) + mounts[k, 1] * math.sin(mounts[k, 2])
+    r -= mounts[i, 0] * math.cos(mounts[i, 2]) + mounts[i, 1] * math.sin(mounts[i, 2])
+    dx, dy = now.x - then.x, now.y - then.y
+    moved = math.hypot(dx, dy)
+    if moved > 0.0:
+        angle = abs(wrapped(axis - math.atan2(dy, dx)))
+        most = max(0.0, moved * math.cos(max(0.0, angle - half_angle)))
+        least = min(0.0, moved * math.cos(min(math.pi, angle + half_angle)))
+        return max(0.0, r - most - error), max(0.0, r - least) + error
+    return max(0.0, r - error), max(0.0, r) + error
+
+
+@kernel
+def compare(
+    half_angle: float, tolerance: float, reach: float, missed: float, mounts: Floats,
+    echoes: Records[EchoTrace], expected: Records[Expected],
+) -> bool:  # fmt: skip
+    """Compare the newest readings with what an honest ring is expected to hear; return whether most echoes differ.
+
+    A change explains the echoes that differ, and misses the others: otherwise little speaks for one.
+
+    Parameters
+    ----------
+    half_angle, tolerance, reach, missed, mounts, echoes, expected
+        As for `weigh_changes`.
+    """
+    misses, known = 0, 0
+    for i in range(len(echoes)):
+        one = expected[i]
+        one.source = source(i, 0.0, half_angle, echoes) if echoes[i].is_compared else -1
+        if one.source < 0:
+            continue
+        r, then = echoes[i].latest.range_m, echoes[one.source].before
+        if math.hypot(echoes[i].latest.x - then.x, echoes[i].latest.y - then.y) > ROUND_M:
+            one.source = -1
+            continue
+        one.low, one.high = expect(one.source, i, 0.0, half_angle, tolerance, mounts, echoes)
+        one.honest_nat = math.log(density(r, one.low, one.high, reach, missed))
+        is_known = one.high >= 0.0 and one.low <= reach
+        one.is_off = 1 if is_known and r >= 0.0 and not one.low <= r <= one.high else 0
+        misses += one.is_off or (is_known and r < 0.0)
+        known += is_known
+    return 2 * misses > known
+
+
+@kernel
+def weigh_exchange(
+    turn: float, half_angle: float, tolerance: float, reach: float, missed: float, mounts: Floats,
+    echoes: Records[EchoTrace], expected: Records[Expected],
+) -> float:  # fmt: skip
+    """Return the evidence that each sensor hears what was at an angle `turn` from it before, nat.
+
+    Parameters
+    ----------
+    turn : float
+        The angle, rad.
+    half_angle, tolerance, reach, missed, mounts, echoes, expected
+        As for `weigh_changes`.
+    """
+    evidence = 0.0
+    for i in range(len(echoes)):
+        if expected[i].source < 0:
+            continue
+        other = source(i, turn, half_angle, echoes)
+        if other >= 0:
+            low, high = expect(other, i, turn, half_angle, tolerance, mounts, echoes)
+            likely = density(echoes[i].latest.range_m, low, high, reach, missed)
+            evidence += math.log(likely) - expected[i].honest_nat
+    return evidence
+
+
+@kernel
+def weigh_length(
+    k: int, reach: float, missed: float, echoes: Records[EchoTrace], expected: Records[Expected]
+) -> float:
+    """Return the evidence that all ranges are longer or shorter by as much as that of sensor `k`, nat.
+
+    Parameters
+    ----------
+    k : int
+        The sensor, of which an echo was expected elsewhere.
+    reach, missed, echoes, expected
+        As for `weigh_changes`.
+    """
+    longer = echoes[k].latest.range_m - 0.5 * (expected[k].low + expected[k].high)
+    evidence = math.log((1.0 - missed) / (2.0 * reach)) - expected[k].honest_nat  # any length is as likely
+    for i in range(len(echoes)):
+        one = expected[i]
+        if i != k and one.source >= 0 and one.high >= 0.0:
+            low, high = max(0.0, one.low + longer), max(0.0, one.high + longer) + SAME_M
+            evidence += math.log(density(echoes[i].latest.range_m, low, high, reach, missed)) - one.honest_nat
+    return evidence
+
+
+@kernel
+def weigh_changes(
+    mounts: Floats, half_angle: float, tolerance: float, reach: float, missed: float,
+    echoes: Records[EchoTrace], expected: Records[Expected],
+) -> tuple[int, float]:  # fmt: skip
+    """Return the common change that explains the newest readings best, and the evidence for it, nat.
+
+    Parameters
+    ----------
+    mounts, half_angle, tolerance, reach
+        As for `motion_tests.check_motion`.
+    missed : float
+        Share of an honest ring's readings that are not as expected.
+    echoes : (n,) records
+        What is remembered of each sensor.
+    expected : (n,) records
+        Overwritten.
+
+    Returns
+    -------
+    (int, float)
+        One of the changes, and the logarithm of its likelihood over that of an honest ring. Sensors whose beams
+        overlap hear the same surface, and together count as one.
+    """
+    found, most = NO_CHANGE, 0.0
+    if not compare(half_angle, tolerance, reach, missed, mounts, echoes, expected):
+        return found, most
+    for k in range(len(echoes)):
+        if expected[k].source >= 0 and expected[k].is_off:
+            nats = weigh_length(k, reach, missed, echoes, expected)
+            if nats > most:
+                found, most = LENGTHENED, nats
+    for part in range(1, TURNS):
+        turn = math.tau * part / TURNS
+        nats = weigh_exchange(turn, half_angle, tolerance, reach, missed, mounts, echoes, expected)
+        if nats > most:
+            found, most = EXCHANGED, nats
+    return found, most / max(1.0, len(echoes) * half_angle / math.pi)
