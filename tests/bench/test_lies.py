@@ -8,19 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from bench.lies import (
-    KINDS,
-    ROBOTS,
-    ROOMS,
-    Plan,
-    TrialResult,
-    honest,
-    lies_table,
-    make_lie,
-    measure,
-    run_trial,
-    trials,
-)  # fmt: skip
+from bench.lies import KINDS, ROBOTS, Plan, TrialResult, honest, lies_table, make_lie, measure, run_trial, trials
 from config.load import load_robot, load_settings
 from perception.ring_faults.monitor import REASONS as RING_REASONS
 from runtime.cycle.modes import CLOCK_REASONS
@@ -45,9 +33,9 @@ def assert_found(results: Iterable[TrialResult]) -> None:
     assert [one for one in results if one.named_s is None and one.is_driving] == []
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_an_honest_robot_drives_in_every_room(room: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Goals and missions do not wait for the recognition that a trial leaves out."""
+@pytest.mark.parametrize("room", ["room", "furnished", "corridor"])
+def test_an_honest_robot_drives_without_recognition(room: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A robot that stands would show nothing about lies."""
     monkeypatch.setattr("bench.lies.HONEST_S", 8.0)
     result = run_trial("p3dx", room, None, 1, 0)
     assert result.way_m > 0.2

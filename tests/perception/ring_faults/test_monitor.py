@@ -16,8 +16,9 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose
+from perception.ring_faults.changes import EXCHANGED, LENGTHENED
 from perception.ring_faults.monitor import REASONS, RingMonitor
-from perception.ring_faults.motion_tests import REPEATED, SCATTERED, TURNED, VANISHED
+from perception.ring_faults.motion_tests import CHANGED, REPEATED, SCATTERED, TURNED, VANISHED
 from runtime.simulation.random_halls import random_hall
 
 pytestmark = [pytest.mark.compiled]
@@ -29,7 +30,7 @@ MIRRORS = ROUGH.model_copy(update={"model": "specular"})
 CLEAN = AcousticsConfig(model="cone")
 SPEED_M = 0.015
 """Way from one firing to the next, m: .3 m/s at 50 ms."""
-TOO_FEW_ECHOES = {("silent", "amigo"), ("at its maximum", "amigo"), ("half turned", "amigo")}
+TOO_FEW_ECHOES = {("silent", "amigo"), ("at its maximum", "amigo"), ("half turned", "amigo"), ("longer", "amigo")}
 """Eight sensors hear so few echoes at once that their silence may be the end of a room."""
 SLOW = "half turned"
 """Is found after metres, which not every room has: walls that a beam grazes deceive a ring that is mounted well."""
@@ -76,10 +77,17 @@ def half_turned(ranges: Floats, context: LieContext) -> Floats:
     return np.where(np.isnan(ranges), ranges, context.last[context.behind])
 
 
+def longer(ranges: Floats, context: LieContext) -> Floats:
+    """Return ranges that are too long by 1.5 ft: within the window."""
+    far = ranges + 0.4572
+    return np.where(far > context.ring.window_m, math.inf, far)
+
+
 LIES: dict[str, tuple[Lie, set[int]]] = {
     "frozen": (frozen, {REPEATED}), "silent": (silent, {VANISHED}), "at its maximum": (at_maximum, {VANISHED}),
     "all at 3 ft": (at_three_feet, {REPEATED, SCATTERED, VANISHED}), "random": (at_random, {SCATTERED}),
-    "half turned": (half_turned, {TURNED, TURNED + 1, TURNED + 2, SCATTERED, VANISHED}),
+    "longer": (longer, {CHANGED + LENGTHENED, SCATTERED}),
+    "half turned": (half_turned, {CHANGED + EXCHANGED, TURNED, TURNED + 1, TURNED + 2, SCATTERED, VANISHED}),
 }  # fmt: skip
 
 

@@ -9,8 +9,10 @@ import pytest
 
 from perception.kernel import Floats
 from perception.records import records, zeros
+from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
 from perception.ring_faults.memory import EchoTrace, RingTrace
 from perception.ring_faults.motion_tests import (
+    CHANGED,
     EVIDENCE_NAT,
     NOTHING,
     REPEATED,
@@ -31,12 +33,13 @@ class Ring:
 
     def __init__(self) -> None:
         self.echoes, self.memory = zeros(EchoTrace, COUNT), zeros(RingTrace, 1)
+        self.expected = zeros(Expected, COUNT)
         self.x = 0.0
 
     def fire(self, ranges: Floats) -> int:
         found = check_motion(
             ranges, self.x, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, REACH, records(EchoTrace, self.echoes),
-            records(RingTrace, self.memory),
+            records(RingTrace, self.memory), records(Expected, self.expected),
         )  # fmt: skip
         self.x += STEP_M
         return int(found)
@@ -81,6 +84,24 @@ def test_silence_and_the_maximum_are_the_same_and_randomness_is_something_else()
         (rng.uniform(0.2, 1.5, COUNT), SCATTERED),
     ):
         assert after(0.5).fire(ranges) == reason
+
+
+def test_a_length_that_comes_to_all_ranges_is_named_in_that_round() -> None:
+    for length in (0.4572, -0.4572, 1.2192):
+        ring = after(0.5)
+        ring.memory["misses"], ring.memory["looks"] = 250.0, 500.0
+        assert ring.fire(honest(ring.x) + length) == CHANGED + LENGTHENED
+        assert ring.fire(honest(ring.x) + length) == NOTHING, "from then on they agree with the motion"
+
+
+def test_a_ring_that_is_turned_on_the_way_is_named_in_that_round() -> None:
+    for part in (3, 6, 12, 18):
+        ring = after(0.5)
+        ring.memory["misses"], ring.memory["looks"] = 250.0, 500.0
+        ranges = 1.0 + 0.2 * np.random.default_rng(3).permutation(COUNT)
+        assert ring.fire(ranges) != CHANGED + EXCHANGED
+        assert ring.fire(ranges) == NOTHING
+        assert ring.fire(np.roll(ranges, -part)) == CHANGED + EXCHANGED
 
 
 def test_a_few_misses_are_honest_and_a_finding_begins_anew() -> None:
