@@ -36,13 +36,16 @@ class Promise(NamedTuple):
 LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
     "most such silences are named at once, and some are not before a contact.",
-    "Ranges that are all too long, or too short, by the same length: they change as the robot's motion says. A "
-    "map of the room contradicts them; without one, only a bumper stops the robot.",
+    "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
+    "become so where the ring hears four echoes or fewer: from then on they change as the robot's motion says. A map "
+    "of the room contradicts them; without one, only a bumper stops the robot.",
     "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "
     "which the robot drives goes on, and one that turns into it has never heard that part.",
-    "Echoes of an earlier drive that fit the present one, as replays in a corridor along its walls do.",
+    "Echoes of an earlier drive that fit the present one: replays in a corridor along its walls, or of a drive like "
+    "this one. They change as the motion says, and what returns to an earlier place are a few sensors ahead and "
+    "behind.",
     "A ring that is mounted turned by a small angle, or two sensors exchanged, until the objects that result are "
-    "seen to be wrong: measure it with `echolocate calibrate`.",
+    "seen to be wrong: measure it with `echolocate calibrate`. So is one of eight sensors or fewer that is turned.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
     "then, and nothing is touched. Where nothing echoes, silence is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
