@@ -70,7 +70,7 @@ CHANGED: Final = TURNED + QUARTERS - 1
 @kernel
 def honest_share(all_of: RingTrace, kind: int) -> float:
     """Return the share of an honest ring's looks of a kind that miss a known echo, as learned so far."""
-    share = (all_of.misses[kind] + PRIOR_MISSES[kind]) / (all_of.looks[kind] + PRIOR_LOOKS)
+    share: float = (all_of.misses[kind] + PRIOR_MISSES[kind]) / (all_of.looks[kind] + PRIOR_LOOKS)
     return min(max(share, MISS_MIN), MISS_MAX)
 
 

@@ -27,7 +27,7 @@ COUNT = 16
 AXES = np.arange(COUNT) * math.tau / COUNT
 MOUNTS = np.stack([0.2 * np.cos(AXES), 0.2 * np.sin(AXES), AXES], axis=1)
 HALF, TOLERANCE, REACH, MISSED = math.radians(12.0), 0.005, 5.0, 0.1
-ROOM = 1.0 + 0.2 * np.random.default_rng(3).permutation(COUNT)
+ROOM: Floats = np.random.default_rng(3).permutation(np.linspace(1.0, 4.0, COUNT))
 """Ranges that no two sensors share, m."""
 ENOUGH_NAT = 18.0
 

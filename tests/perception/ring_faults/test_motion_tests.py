@@ -98,7 +98,7 @@ def test_a_ring_that_is_turned_on_the_way_is_named_in_that_round() -> None:
     for part in (3, 6, 12, 18):
         ring = after(0.5)
         ring.memory["misses"], ring.memory["looks"] = 250.0, 500.0
-        ranges = 1.0 + 0.2 * np.random.default_rng(3).permutation(COUNT)
+        ranges: Floats = np.random.default_rng(3).permutation(np.linspace(1.0, 5.6, COUNT))
         assert ring.fire(ranges) != CHANGED + EXCHANGED
         assert ring.fire(ranges) == NOTHING
         assert ring.fire(np.roll(ranges, -part)) == CHANGED + EXCHANGED
