@@ -12,6 +12,7 @@ COMMA  := ,
 PYTEST := $(BIN)/python -m pytest -q
 PROCESSORS = $(shell nproc)
 LINES  := $(VENV)/lines
+BIOME  := $(VENV)/npm/node_modules/.bin/biome
 KERNELS = tests/perception tests/behaviors/valley tests/drivers/emulator
 BOUNDSCHECKED = $(KERNELS) tests/runtime/recording
 
@@ -35,12 +36,14 @@ test: $(VENV)/test.stamp
 check: lint
 	$(BIN)/python -m tests.changed
 
-lint: $(VENV)/test.stamp
+lint: $(VENV)/test.stamp $(VENV)/npm.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell
+	@if [ -x $(BIOME) ]; then $(BIOME) ci --colors=off --config-path=.ci/page runtime/console/page; \
+		else echo "without npm's packages the console's page is not checked"; fi
 
 kernels: $(VENV)/test.stamp
 	$(BIN)/python -m tests.compile_kernels
@@ -49,7 +52,7 @@ tests: compiled interpreted
 	@$(MAKE) --no-print-directory coverage
 
 # All tests but those that `boundscheck` runs. Many wait for the clock, so there are twice as many at a time as processors.
-compiled: $(VENV)/test.stamp
+compiled: $(VENV)/test.stamp $(VENV)/browser.stamp
 	@rm -f $(LINES)/compiled-*
 	LINE_COVERAGE=$(LINES) $(PYTEST) --forks $$((2 * $(PROCESSORS))) -m "not soak and not boundscheck"
 
@@ -68,12 +71,12 @@ boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
 
 # Measures every promise and writes docs/promises.md. (The option needs its "=": pytest would take the page for a test.)
-promises: $(VENV)/test.stamp
+promises: $(VENV)/test.stamp $(VENV)/browser.stamp
 	$(BIN)/python -m pytest -q -m "promise and not soak" --promises=docs/promises.md
 
 # Long forms of tests, fuzzers, new random examples (`make tests` repeats the same ones), and 1.5 h of driving in virtual
 # time that checks memory growth, late compilation and full garbage collections.
-soak: $(VENV)/soak.stamp ros2
+soak: $(VENV)/soak.stamp $(VENV)/browser.stamp ros2
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and soak"
 	$(BIN)/python -m pytest -m "soak and not ros2" --promises=docs/promises-soak.md
@@ -96,7 +99,7 @@ mutants: $(VENV)/test.stamp
 # Compares our methods with libraries, then measures timing; at last pytest checks what depends on the wall clock.
 # BENCH=--quick shortens the comparison, TIMING="--against earlier.json" adds the figures of an earlier run. What the
 # result files hold enters docs/figures.md.
-bench: $(VENV)/bench.stamp
+bench: $(VENV)/bench.stamp $(VENV)/browser.stamp
 	@$(BIN)/python -m bench $(BENCH)
 	@$(BIN)/python -m bench timing $(TIMING)
 	@$(BIN)/python -m bench waking
@@ -150,13 +153,14 @@ $(VENV)/browser.stamp: | $(VENV)/bin/python
 			{ apt-get -qq install -y chromium-headless-shell || apt-get -qq install -y chromium; }"; }
 	@touch $@
 
-# Recordings are tested with the reader that Foxglove and Lichtblick use; without npm that test is skipped.
-$(VENV)/npm.stamp: | $(VENV)/bin/python
-	@{ command -v npm >/dev/null && npm install --silent --no-audit --no-fund --prefix $(VENV)/npm @mcap/core@2.2.2 fzstd@0.1.1; } \
-		|| echo "npm is not installed, or reaches no registry: the test with npm's @mcap/core is skipped"
+# What checks the page, and the reader of recordings that Foxglove and Lichtblick use, at the locked versions.
+$(VENV)/npm.stamp: .ci/page/package-lock.json | $(VENV)/bin/python
+	@mkdir -p $(VENV)/npm && cp .ci/page/package.json .ci/page/package-lock.json $(VENV)/npm
+	@{ command -v npm >/dev/null && npm ci --silent --no-audit --no-fund --prefix $(VENV)/npm; } \
+		|| echo "npm is not installed, or reaches no registry: what needs its packages is skipped"
 	@touch $@
 
-$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/browser.stamp $(VENV)/npm.stamp
+$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/npm.stamp
 	$(call install,.[dev])
 
 $(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python

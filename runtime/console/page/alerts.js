@@ -1,4 +1,5 @@
-// Warnings that should reach a person who looks elsewhere: counted on the Log tab and in the window's title until the log
+// Warnings that should reach a person who looks elsewhere: counted on the Log tab and in the window's title until the
+// log
 // is looked at, and heard if one wants.
 
 import { byId, setAttribute, setText } from "./dom.js";
@@ -28,7 +29,8 @@ export class Alerts extends Emitter {
       this.#play("warning"); // so one knows what to listen for
     });
     // After a reload a browser plays nothing before the page was touched.
-    for (const touch of ["pointerdown", "keydown"]) addEventListener(touch, () => this.#audio?.resume?.(), { capture: true });
+    for (const touch of ["pointerdown", "keydown"])
+      addEventListener(touch, () => this.#audio?.resume?.(), { capture: true });
     run.on("log", ({ level }) => (level === "warning" || level === "error") && this.#take(level));
     run.on("mode", ({ mode }) => {
       if (this.#mode !== null && mode !== this.#mode && STOPS.has(mode)) this.#play("error");
@@ -53,7 +55,8 @@ export class Alerts extends Emitter {
   }
 
   #show() {
-    const badge = byId("log-badge"), words = `${this.unseen} new warning${this.unseen === 1 ? "" : "s"}`;
+    const badge = byId("log-badge"),
+      words = `${this.unseen} new warning${this.unseen === 1 ? "" : "s"}`;
     badge.hidden = this.unseen === 0;
     setText(badge, this.unseen > 99 ? "99+" : String(this.unseen));
     if (this.unseen > 0) setAttribute(byId("tab-log"), "title", words);
@@ -69,7 +72,8 @@ export class Alerts extends Emitter {
     this.#audio.resume?.();
     TONES_HZ[kind].forEach((hz, i) => {
       const from = this.#audio.currentTime + 1.3 * TONE_S * i;
-      const tone = this.#audio.createOscillator(), loud = this.#audio.createGain();
+      const tone = this.#audio.createOscillator(),
+        loud = this.#audio.createGain();
       tone.frequency.value = hz;
       loud.gain.setValueAtTime(0.2, from);
       loud.gain.exponentialRampToValueAtTime(0.001, from + TONE_S);

@@ -15,7 +15,9 @@ export class Beside {
   constructor({ tabs, shown }) {
     Object.assign(this, { tabs, shown });
     const chooser = byId("beside-panel");
-    chooser.append(...tabs.names.filter((name) => !ALONE.has(name)).map((name) => el("option", { value: name }, tabs.label(name))));
+    chooser.append(
+      ...tabs.names.filter((name) => !ALONE.has(name)).map((name) => el("option", { value: name }, tabs.label(name))),
+    );
     chooser.addEventListener("change", () => this.set(chooser.value));
     byId("beside-close").addEventListener("click", () => this.set(""));
     tabs.taken = () => this.set(""); // the panel beside is shown as the first one
@@ -30,7 +32,9 @@ export class Beside {
   }
 
   #place() {
-    const { tabs } = this, before = tabs.beside, name = this.#wide.matches && tabs.names.includes(this.#wanted) ? this.#wanted : "";
+    const { tabs } = this,
+      before = tabs.beside,
+      name = this.#wide.matches && tabs.names.includes(this.#wanted) ? this.#wanted : "";
     byId("beside-panel").value = name;
     if (name === before) return;
     if (before !== "") byId(`panel-${before}`).classList.remove("is-beside");

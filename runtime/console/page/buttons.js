@@ -1,4 +1,5 @@
-// Buttons of one's own over the map: missions, places and whatever else offers actions, each with a key if one wants. They
+// Buttons of one's own over the map: missions, places and whatever else offers actions, each with a key if one wants.
+// They
 // are kept in this browser.
 
 import { byId, el, setText, writesText } from "./dom.js";
@@ -28,30 +29,61 @@ export class Buttons {
   }
 
   get #actions() {
-    return [...this.#offers].flatMap(([kind, list]) => list().map((one) => ({ ...one, kind, key: `${kind}:${one.id}` })));
+    return [...this.#offers].flatMap(([kind, list]) =>
+      list().map((one) => ({ ...one, kind, key: `${kind}:${one.id}` })),
+    );
   }
 
   refresh() {
-    const actions = this.#actions, kept = this.#kept;
+    const actions = this.#actions,
+      kept = this.#kept;
     const enabled = this.run.state.controller && !this.run.watchesRecording;
     const shown = JSON.stringify([kept, enabled, actions.map(({ key, name }) => [key, name])]);
     if (shown === this.#shown) return;
     this.#shown = shown;
-    const bar = byId("own-buttons"), chooser = byId("button-action"), chosen = chooser.value;
+    const bar = byId("own-buttons"),
+      chooser = byId("button-action"),
+      chosen = chooser.value;
     bar.hidden = kept.length === 0;
-    bar.replaceChildren(...kept.map(({ action, key }) => {
-      const found = actions.find((one) => one.key === action);
-      const name = found?.name ?? action.slice(action.indexOf(":") + 1);
-      const button = el("button", { type: "button", "data-action": action, title: found ? `${found.kind} ${name}` : "not there now", onclick: () => this.#act(action) }, el("span", {}, name));
-      if (key) button.append(el("kbd", {}, key.toUpperCase()));
-      button.disabled = !enabled || found === undefined;
-      return button;
-    }));
+    bar.replaceChildren(
+      ...kept.map(({ action, key }) => {
+        const found = actions.find((one) => one.key === action);
+        const name = found?.name ?? action.slice(action.indexOf(":") + 1);
+        const button = el(
+          "button",
+          {
+            type: "button",
+            "data-action": action,
+            title: found ? `${found.kind} ${name}` : "not there now",
+            onclick: () => this.#act(action),
+          },
+          el("span", {}, name),
+        );
+        if (key) button.append(el("kbd", {}, key.toUpperCase()));
+        button.disabled = !enabled || found === undefined;
+        return button;
+      }),
+    );
     chooser.replaceChildren(...actions.map(({ key, kind, name }) => el("option", { value: key }, `${kind} ${name}`)));
     if (actions.some(({ key }) => key === chosen)) chooser.value = chosen;
-    byId("button-list").replaceChildren(...kept.map(({ action, key }) => el("li", { class: "line" },
-      el("span", {}, `${action.replace(":", " ")}${key ? `, key ${key.toUpperCase()}` : ""}`),
-      el("button", { type: "button", "aria-label": `Remove the button ${action.replace(":", " ")}`, onclick: () => this.#keep(this.#kept.filter((one) => one.action !== action)) }, "Remove"))));
+    byId("button-list").replaceChildren(
+      ...kept.map(({ action, key }) =>
+        el(
+          "li",
+          { class: "line" },
+          el("span", {}, `${action.replace(":", " ")}${key ? `, key ${key.toUpperCase()}` : ""}`),
+          el(
+            "button",
+            {
+              type: "button",
+              "aria-label": `Remove the button ${action.replace(":", " ")}`,
+              onclick: () => this.#keep(this.#kept.filter((one) => one.action !== action)),
+            },
+            "Remove",
+          ),
+        ),
+      ),
+    );
   }
 
   #keep(buttons) {
@@ -62,10 +94,20 @@ export class Buttons {
 
   #add(event) {
     event.preventDefault();
-    const action = byId("button-action").value, key = byId("button-key").value.trim().toLowerCase();
+    const action = byId("button-action").value,
+      key = byId("button-key").value.trim().toLowerCase();
     const others = this.#kept.filter((one) => one.action !== action);
-    const taken = TAKEN.has(key) ? "the page itself" : others.find((one) => one.key === key && key !== "")?.action.replace(":", " ");
-    setText(byId("button-error"), action === "" ? "there is nothing to make a button of" : taken === undefined ? "" : `the key ${key.toUpperCase()} belongs to ${taken}: choose another`);
+    const taken = TAKEN.has(key)
+      ? "the page itself"
+      : others.find((one) => one.key === key && key !== "")?.action.replace(":", " ");
+    setText(
+      byId("button-error"),
+      action === ""
+        ? "there is nothing to make a button of"
+        : taken === undefined
+          ? ""
+          : `the key ${key.toUpperCase()} belongs to ${taken}: choose another`,
+    );
     if (action === "" || taken !== undefined) return;
     byId("button-key").value = "";
     this.#keep([...others, { action, key }]);
@@ -83,7 +125,17 @@ export class Buttons {
   }
 
   #key(event) {
-    if (event.defaultPrevented || event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || writesText(event.target) || event.target instanceof HTMLSelectElement) return;
+    if (
+      event.defaultPrevented ||
+      event.repeat ||
+      event.ctrlKey ||
+      event.metaKey ||
+      event.altKey ||
+      event.shiftKey ||
+      writesText(event.target) ||
+      event.target instanceof HTMLSelectElement
+    )
+      return;
     const found = this.#kept.find(({ key }) => key !== "" && key === event.key.toLowerCase());
     if (found === undefined || TAKEN.has(found.key)) return;
     event.preventDefault();

@@ -8,7 +8,12 @@ const COLUMN_PX = 3;
 const LEFT = 34;
 const TOP = 14;
 const BOTTOM = 4;
-const ENDS = { budget: "no time left", quota: "quota used", converged: "nothing left to improve", nothing: "nothing to refine" };
+const ENDS = {
+  budget: "no time left",
+  quota: "quota used",
+  converged: "nothing left to improve",
+  nothing: "nothing to refine",
+};
 const TOPS_MS = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 
 class Strip {
@@ -49,7 +54,8 @@ class Strip {
 
   line(ms, text, dash) {
     if (!(ms > 0) || ms > this.top_ms) return;
-    const { ctx } = this, y = this.y(ms);
+    const { ctx } = this,
+      y = this.y(ms);
     ctx.strokeStyle = this.theme.ink;
     ctx.setLineDash(dash);
     ctx.lineWidth = 1.4;
@@ -70,7 +76,8 @@ class Strip {
 
   // Crosses where a cycle was missed, triangles where one was late.
   marks(shown) {
-    const crosses = new Path2D(), triangles = new Path2D();
+    const crosses = new Path2D(),
+      triangles = new Path2D();
     shown.forEach(({ missed, late }, i) => {
       const x = this.x(i, shown.length) + COLUMN_PX / 2;
       if (missed > 0) {
@@ -119,7 +126,8 @@ export class Charts {
   #drawPhases(chart) {
     const strip = this.#phases;
     const names = Object.keys(this.#run.state.phases);
-    const budget = 1000 * (this.#run.session?.budget_s ?? 0), period = 1000 * (this.#run.session?.period_s ?? 0);
+    const budget = 1000 * (this.#run.session?.budget_s ?? 0),
+      period = 1000 * (this.#run.session?.period_s ?? 0);
     const shownMax = Math.floor((strip.canvas.clientWidth - LEFT - 6) / COLUMN_PX);
     const shown = chart.slice(-Math.max(1, shownMax));
     const sums = shown.map(({ phases }) => names.reduce((sum, name) => sum + (phases[name] ?? 0) / 1000, 0));
@@ -129,7 +137,8 @@ export class Charts {
       const path = new Path2D();
       shown.forEach(({ phases }, i) => {
         const ms = (phases[name] ?? 0) / 1000;
-        const from = strip.y(base[i]), to = strip.y(base[i] + ms);
+        const from = strip.y(base[i]),
+          to = strip.y(base[i] + ms);
         base[i] += ms;
         if (from - to > 0.2) path.rect(strip.x(i, shown.length), to, COLUMN_PX - 0.5, from - to);
       });
@@ -146,11 +155,14 @@ export class Charts {
     if (names.join() !== this.#names?.join()) {
       this.#names = names;
       this.#values = names.map(() => el("b"));
-      this.#legend.replaceChildren(...names.map((name, k) => {
-        const swatch = el("i");
-        swatch.style.background = `var(--phase-${k % 6})`;
-        return el("span", {}, swatch, `${name} `, this.#values[k]);
-      }), el("span", {}, names.length > 0 ? "✕ missed  ▼ late" : "not recorded"));
+      this.#legend.replaceChildren(
+        ...names.map((name, k) => {
+          const swatch = el("i");
+          swatch.style.background = `var(--phase-${k % 6})`;
+          return el("span", {}, swatch, `${name} `, this.#values[k]);
+        }),
+        el("span", {}, names.length > 0 ? "✕ missed  ▼ late" : "not recorded"),
+      );
     }
     names.forEach((name, k) => setText(this.#values[k], ((phases[name] ?? 0) / 1000).toFixed(2)));
   }
@@ -172,7 +184,11 @@ export class Charts {
     setText(this.#lateLegend, `${counts}; ${quanta} steps of refinement, then ${ENDS[refinement] ?? "–"}`);
     const last = shown.at(-1);
     if (last && shown.length % 20 === 0) {
-      setAttribute(strip.canvas, "aria-label", `Lateness of the last ${shown.length} cycles, the last one ${last.late_ms.toFixed(2)} ms`);
+      setAttribute(
+        strip.canvas,
+        "aria-label",
+        `Lateness of the last ${shown.length} cycles, the last one ${last.late_ms.toFixed(2)} ms`,
+      );
     }
   }
 }

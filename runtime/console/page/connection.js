@@ -13,12 +13,40 @@ const HALT_ANSWER_MS = 3000;
 const MESSAGE_MAX = 65_536;
 // Refused while a recording is shown: its object numbers and poses are not those of the live run.
 const LIVE_ONLY = new Set([
-  "arm", "legs", "goal", "teleoperate", "start_mission", "run_mission", "set_route", "resume_mission", "skip_step", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
-  "confirm_object", "lift_area", "undo_edit", "clear_map", "evidence", "place_robot", "load_map",
+  "arm",
+  "legs",
+  "goal",
+  "teleoperate",
+  "start_mission",
+  "run_mission",
+  "set_route",
+  "resume_mission",
+  "skip_step",
+  "delete_segments",
+  "pin_segments",
+  "place_model",
+  "move_object",
+  "reject_object",
+  "confirm_object",
+  "lift_area",
+  "undo_edit",
+  "clear_map",
+  "evidence",
+  "place_robot",
+  "load_map",
 ]);
 // Carried out by a cycle, so that in a paused run they wait for the next one, however long that takes.
 const EDITS = new Set([
-  "delete_segments", "pin_segments", "place_model", "move_object", "confirm_object", "reject_object", "lift_area", "undo_edit", "clear_map", "place_robot",
+  "delete_segments",
+  "pin_segments",
+  "place_model",
+  "move_object",
+  "confirm_object",
+  "reject_object",
+  "lift_area",
+  "undo_edit",
+  "clear_map",
+  "place_robot",
 ]);
 // With more than this unsent the network is stalled: a command sent now would move the robot too late.
 const CONGESTED_BYTES = 4096;
@@ -99,10 +127,12 @@ export class Connection extends Emitter {
       const id = this.#transmit(message, refuse);
       if (id === null) return;
       const waits = EDITS.has(message.type) && this.isPaused();
-      const timer = waits ? undefined : setTimeout(() => {
-        this.#pending.delete(id);
-        refuse(new RequestError(`no answer to "${message.type}" in ${timeout_ms / 1000} s`, { answered: false }));
-      }, timeout_ms);
+      const timer = waits
+        ? undefined
+        : setTimeout(() => {
+            this.#pending.delete(id);
+            refuse(new RequestError(`no answer to "${message.type}" in ${timeout_ms / 1000} s`, { answered: false }));
+          }, timeout_ms);
       this.#pending.set(id, { resolve, refuse, timer, waits });
       if (waits) this.#countWaiting();
     });
@@ -117,11 +147,13 @@ export class Connection extends Emitter {
     return this.#transmit(message, () => {}) !== null;
   }
 
-  // A HALT is sent until it is answered: again as the first message of the next connection, and over a new one where this
+  // A HALT is sent until it is answered: again as the first message of the next connection, and over a new one where
+  // this
   // one hangs. "halt" is emitted with false when it is not confirmed in time, with true when it is.
   async halt() {
     const socket = this.open ? this.#socket : null;
-    if (!this.#halting) this.#unconfirmed = setTimeout(() => this.emit("halt", false), socket === null ? 0 : HALT_CONFIRM_MS);
+    if (!this.#halting)
+      this.#unconfirmed = setTimeout(() => this.emit("halt", false), socket === null ? 0 : HALT_CONFIRM_MS);
     this.#halting = true;
     try {
       await this.request({ type: "halt" }, HALT_ANSWER_MS);
@@ -200,16 +232,19 @@ export class Connection extends Emitter {
     else pending.refuse(new RequestError(error ?? "refused", { field }));
   }
 
-  // After a laptop's sleep a socket can look open and be dead. Silence alone proves nothing, because playback may be paused:
+  // After a laptop's sleep a socket can look open and be dead. Silence alone proves nothing, because playback may be
+  // paused:
   // so send a harmless request, and close the socket if that is not answered either.
   #checkSilence() {
     if (!this.open || performance.now() - this.#received_ms < SILENCE_MAX_MS || this.#probing) return;
     this.#probing = true;
     const socket = this.#socket;
-    this.request({ type: "save_toml" }).catch((error) => {
-      if (!error.answered) this.#lose(socket);
-    }).finally(() => {
-      this.#probing = false;
-    });
+    this.request({ type: "save_toml" })
+      .catch((error) => {
+        if (!error.answered) this.#lose(socket);
+      })
+      .finally(() => {
+        this.#probing = false;
+      });
   }
 }

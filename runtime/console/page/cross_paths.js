@@ -12,16 +12,19 @@ const wrap = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
 // the sensors are apart. Where the beams do not meet on it, the part within the transmitter's beam and beside the
 // listener's; `listener.angle` null: only the transmitter's beam counts.
 export function ellipseArc({ transmitter: t, listener: l, half }, beam) {
-  const apart = Math.hypot(l.x - t.x, l.y - t.y), focus = apart / 2;
+  const apart = Math.hypot(l.x - t.x, l.y - t.y),
+    focus = apart / 2;
   if (half <= focus) return null;
   const across = Math.atan2(l.y - t.y, l.x - t.x);
   const side = Math.sqrt(half ** 2 - focus ** 2);
   // From a focus the ellipse is this far in a direction; `other` is the direction of the other focus.
   const reach = (direction, other) => side ** 2 / (half - focus * Math.cos(direction - other));
-  let low = -beam, high = beam; // off the transmitter's axis
+  let low = -beam,
+    high = beam; // off the transmitter's axis
   for (const width of l.angle === null ? [] : [beam, SOUND_REACH * beam]) {
     const [from, to] = [-width, width].map((off) => {
-      const direction = l.angle + off, far = reach(direction, across + Math.PI);
+      const direction = l.angle + off,
+        far = reach(direction, across + Math.PI);
       return wrap(Math.atan2(l.y + far * Math.sin(direction) - t.y, l.x + far * Math.cos(direction) - t.x) - t.angle);
     });
     if (Math.max(from, -beam) < Math.min(to, beam)) {
@@ -30,7 +33,8 @@ export function ellipseArc({ transmitter: t, listener: l, half }, beam) {
     }
   }
   const [start, end] = [low, high].map((off) => {
-    const direction = t.angle + off - across, far = reach(direction, 0);
+    const direction = t.angle + off - across,
+      far = reach(direction, 0);
     return Math.atan2((far * Math.sin(direction)) / side, (far * Math.cos(direction) - focus) / half);
   });
   return [(t.x + l.x) / 2, (t.y + l.y) / 2, half, side, across, start, end < start ? end + 2 * Math.PI : end];
@@ -38,18 +42,21 @@ export function ellipseArc({ transmitter: t, listener: l, half }, beam) {
 
 export function addArc(path, arc) {
   const [x, y, a, b, turn, from] = arc;
-  const along = a * Math.cos(from), up = b * Math.sin(from);
+  const along = a * Math.cos(from),
+    up = b * Math.sin(from);
   path.moveTo(x + along * Math.cos(turn) - up * Math.sin(turn), y + along * Math.sin(turn) + up * Math.cos(turn));
   path.ellipse(...arc);
 }
 
-// The object that explains a cross path best: { object, kind, x, y } with the point that reflected it, null if none does.
+// The object that explains a cross path best: { object, kind, x, y } with the point that reflected it, null if none
+// does.
 export function reflectorOf(path, run) {
   const { transmitter: t, listener: l, half } = path;
   const beam = run.session.ring.half_angle;
   const sees = (sensor, point, width) =>
     Math.abs(wrap(Math.atan2(point.y - sensor.y, point.x - sensor.x) - sensor.angle)) <= width + BEAM_SLACK;
-  let best = null, least = GATE_M;
+  let best = null,
+    least = GATE_M;
   for (const object of run.state.objects) {
     if (object.hidden_by !== null) continue;
     for (const [kind, found] of waysOver(object, run, path)) {
@@ -68,7 +75,8 @@ function waysOver(object, run, { transmitter: t, listener: l, half }) {
   if (object.model === "inside corner") return [["corner", overCorner(t, l, object)]];
   const model = run.model(object.model);
   if (model && !(model.arc_radius_m && (model.closed || object.covariance))) {
-    const c = Math.cos(object.theta), s = Math.sin(object.theta);
+    const c = Math.cos(object.theta),
+      s = Math.sin(object.theta);
     const at = model.vertices.map(([x, y]) => [object.x + c * x - s * y, object.y + s * x + c * y]);
     const sides = at.map((one, i) => [...one, ...at[(i + 1) % at.length]]).slice(0, model.closed ? at.length : -1);
     const ways = sides.flatMap((side) => overSide(t, l, side, 0)).sort((a, b) => a.half - b.half);
@@ -94,8 +102,12 @@ export function overCorner(t, l, { x, y }) {
 export function overSide(t, l, [x1, y1, x2, y2], beyond) {
   const length = Math.hypot(x2 - x1, y2 - y1);
   if (length === 0) return [];
-  const ux = (x2 - x1) / length, uy = (y2 - y1) / length;
-  const [from, to] = [t, l].map(({ x, y }) => ({ along: (x - x1) * ux + (y - y1) * uy, away: (y - y1) * ux - (x - x1) * uy }));
+  const ux = (x2 - x1) / length,
+    uy = (y2 - y1) / length;
+  const [from, to] = [t, l].map(({ x, y }) => ({
+    along: (x - x1) * ux + (y - y1) * uy,
+    away: (y - y1) * ux - (x - x1) * uy,
+  }));
   if (from.away * to.away <= 0) return [];
   const at = (from.along * to.away + to.along * from.away) / (from.away + to.away);
   const along = Math.max(-beyond, Math.min(length + beyond, at));
@@ -108,13 +120,17 @@ export function overCircle(t, l, { x, y }, radius) {
   const away = [t, l].map((sensor) => Math.max(Math.hypot(sensor.x - x, sensor.y - y), radius));
   const weights = [(away[1] - radius) / away[0], (away[0] - radius) / away[1]];
   let turn = Math.atan2(
-    weights[0] * (t.y - y) + weights[1] * (l.y - y), weights[0] * (t.x - x) + weights[1] * (l.x - x),
+    weights[0] * (t.y - y) + weights[1] * (l.y - y),
+    weights[0] * (t.x - x) + weights[1] * (l.x - x),
   );
   for (let step = 0; step < 4; step++) {
-    const wx = Math.cos(turn), wy = Math.sin(turn);
-    let slope = 0, bend = 0;
+    const wx = Math.cos(turn),
+      wy = Math.sin(turn);
+    let slope = 0,
+      bend = 0;
     for (const sensor of [t, l]) {
-      const dx = sensor.x - x, dy = sensor.y - y;
+      const dx = sensor.x - x,
+        dy = sensor.y - y;
       const far = Math.max(Math.hypot(dx - radius * wx, dy - radius * wy), 1e-6);
       const across = (radius * (dx * wy - dy * wx)) / far;
       slope += across;

@@ -1,4 +1,5 @@
-// Helpers that build elements. Text is always inserted as text, so that no string from a robot or a recording becomes markup.
+// Helpers that build elements. Text is always inserted as text, so that no string from a robot or a recording becomes
+// markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -55,5 +56,7 @@ export function download(name, blob) {
 export function writesText(element) {
   if (!(element instanceof HTMLElement)) return false;
   if (element instanceof HTMLTextAreaElement || element.isContentEditable) return true;
-  return element instanceof HTMLInputElement && !["checkbox", "range", "file", "button", "radio"].includes(element.type);
+  return (
+    element instanceof HTMLInputElement && !["checkbox", "range", "file", "button", "radio"].includes(element.type)
+  );
 }

@@ -12,7 +12,8 @@ export function drawCanyons(f) {
 
 function drawCanyon(f, { mouth: [x1, y1, x2, y2], axis, depth, probability }) {
   const { ctx, px, theme } = f;
-  const dx = Math.cos(axis), dy = Math.sin(axis);
+  const dx = Math.cos(axis),
+    dy = Math.sin(axis);
   f.inWorld();
   ctx.strokeStyle = theme.stop;
   ctx.lineWidth = 1.2 * px;
@@ -29,8 +30,12 @@ function drawCanyon(f, { mouth: [x1, y1, x2, y2], axis, depth, probability }) {
   ctx.moveTo(x1, y1);
   ctx.lineTo(x2, y2);
   ctx.stroke();
-  const x = 0.5 * (x1 + x2), y = 0.5 * (y1 + y2), length = Math.min(0.6 * depth, AXIS_MAX_PX * px), head = Math.min(8 * px, 0.3 * length);
-  const tipX = x + length * dx, tipY = y + length * dy;
+  const x = 0.5 * (x1 + x2),
+    y = 0.5 * (y1 + y2),
+    length = Math.min(0.6 * depth, AXIS_MAX_PX * px),
+    head = Math.min(8 * px, 0.3 * length);
+  const tipX = x + length * dx,
+    tipY = y + length * dy;
   ctx.setLineDash([]);
   ctx.lineWidth = 2 * px;
   ctx.beginPath();
@@ -45,7 +50,8 @@ function drawCanyon(f, { mouth: [x1, y1, x2, y2], axis, depth, probability }) {
   ctx.font = theme.font(11, 600);
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
-  const text = `dead end, ${f.units.length(depth, 1)} deep, ${percent(probability)}`, half = 0.5 * ctx.measureText(text).width;
+  const text = `dead end, ${f.units.length(depth, 1)} deep, ${percent(probability)}`,
+    half = 0.5 * ctx.measureText(text).width;
   f.labels.push([at[0] - half, at[1] - 7, at[0] + half, at[1] + 7]);
   textWithHalo(f, text, at[0], at[1], theme.stop);
 }

@@ -2,23 +2,47 @@
 
 import { addArc, ellipseArc, reflectorOf } from "./cross_paths.js";
 
-const AGES = [[0.15, 0.8, 1.6], [0.5, 0.4, 1.2], [Infinity, 0.22, 1]]; // up to s, opacity, px
+const AGES = [
+  [0.15, 0.8, 1.6],
+  [0.5, 0.4, 1.2],
+  [Infinity, 0.22, 1],
+]; // up to s, opacity, px
 const UNEXPLAINED = 0.4; // of that opacity, where no object explains the path
 const MARK_PX = 4.5;
 const MARK_EVERY_PX = 12; // one mark for all that lie as near together
 
 // Each mark in a frame of its own: x towards the sensors, in units of MARK_PX.
 const MARKS = {
-  wall: [[0, -1.6], [0, 1.6]],
-  corner: [[1, -1], [0, 0], [1, 1]],
-  edge: [[1, 0], [-1, 1], [-1, -1], [1, 0]],
-  outline: [[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]],
+  wall: [
+    [0, -1.6],
+    [0, 1.6],
+  ],
+  corner: [
+    [1, -1],
+    [0, 0],
+    [1, 1],
+  ],
+  edge: [
+    [1, 0],
+    [-1, 1],
+    [-1, -1],
+    [1, 0],
+  ],
+  outline: [
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+    [-1, -1],
+  ],
 };
 
 export function drawCrossPaths(f) {
   const { ctx, run, px, theme } = f;
-  const explained = AGES.map(() => new Path2D()), others = AGES.map(() => new Path2D());
-  const marks = new Path2D(), marked = new Set();
+  const explained = AGES.map(() => new Path2D()),
+    others = AGES.map(() => new Path2D());
+  const marks = new Path2D(),
+    marked = new Set();
   for (const path of run.crossPaths) {
     path.arc ??= ellipseArc(path, run.session.ring.half_angle) ?? [];
     if (path.arc.length === 0) continue;
@@ -58,7 +82,8 @@ function addMark(marks, { transmitter: t, listener: l, reflector: { kind, x, y }
     return;
   }
   const angle = Math.atan2((t.y + l.y) / 2 - y, (t.x + l.x) / 2 - x);
-  const c = size * Math.cos(angle), s = size * Math.sin(angle);
+  const c = size * Math.cos(angle),
+    s = size * Math.sin(angle);
   MARKS[kind].forEach(([forward, left], i) => {
     const at = [x + c * forward - s * left, y + s * forward + c * left];
     if (i === 0) marks.moveTo(...at);

@@ -2,7 +2,11 @@
 
 import { textWithHalo } from "./scene.js";
 
-const AGES = [[0.3, 0.9, 1.8], [1.5, 0.45, 1.2], [Infinity, 0.2, 1]]; // up to s, opacity, px
+const AGES = [
+  [0.3, 0.9, 1.8],
+  [1.5, 0.45, 1.2],
+  [Infinity, 0.2, 1],
+]; // up to s, opacity, px
 
 export function drawArcs(f) {
   const { ctx, run, px } = f;
@@ -28,7 +32,8 @@ export function drawBeams(f) {
   const { ctx, run, px, theme } = f;
   const ring = run.session?.ring;
   if (!ring) return;
-  const heard = new Path2D(), unheard = new Path2D();
+  const heard = new Path2D(),
+    unheard = new Path2D();
   const places = [];
   for (const index of run.state.firing) {
     const at = run.sensor(index);

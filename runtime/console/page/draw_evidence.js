@@ -20,7 +20,7 @@ function paint(grid, theme) {
   [picture.width, picture.height] = [grid.columns, grid.rows];
   const ctx = picture.getContext("2d");
   cells.forEach((byte, i) => {
-    const percent = byte << 24 >> 24;
+    const percent = (byte << 24) >> 24;
     if (percent === UNKNOWN) return;
     ctx.fillStyle = percent >= 50 ? theme.occupied : theme.free;
     ctx.globalAlpha = Math.abs(percent - 50) / 50;
@@ -32,13 +32,16 @@ function paint(grid, theme) {
 
 // Asks for the grid while its layer is on; the answer comes as a message of its own.
 export function watchGrid({ layer, run, connection, notifications, changed }) {
-  let waiting = false, warned = false, refused = false;
+  let waiting = false,
+    warned = false,
+    refused = false;
   connection.on("open", () => {
     refused = false;
   });
   connection.on("grid", (message) => {
     run.grid = message;
-    if (layer.on && !message.on && !warned) notifications.toast("This run keeps no evidence grid: set perception.grid.method to directed.");
+    if (layer.on && !message.on && !warned)
+      notifications.toast("This run keeps no evidence grid: set perception.grid.method to directed.");
     warned = !message.on;
     changed();
   });

@@ -19,7 +19,8 @@ export function drawGrid(f) {
   f.onScreen();
   ctx.font = theme.font(11);
   const lines = (from, to, path) => {
-    const plain = new Path2D(), axis = new Path2D();
+    const plain = new Path2D(),
+      axis = new Path2D();
     for (let n = Math.ceil(from / step); n * step <= to; n++) path(n * step, n === 0 ? axis : plain);
     ctx.lineWidth = 1;
     ctx.strokeStyle = theme.grid;
@@ -40,7 +41,8 @@ export function drawGrid(f) {
     const sy = Math.round(view.toScreen(0, y)[1]) + 0.5;
     path.moveTo(0, sy);
     path.lineTo(view.width, sy);
-    if (sy > 16 && sy < view.height - 24) labels.push([f.units.number(y, digits), f.view.insets.left > 50 ? f.view.insets.left - 8 : 5, sy + 4, "left"]);
+    if (sy > 16 && sy < view.height - 24)
+      labels.push([f.units.number(y, digits), f.view.insets.left > 50 ? f.view.insets.left - 8 : 5, sy + 4, "left"]);
   });
   for (const [text, x, y, align] of labels) {
     ctx.textAlign = align;
@@ -52,7 +54,8 @@ export function drawScale(f) {
   const { ctx, view, theme } = f;
   const step = stepOf(f, Math.min(SCALE_PX, view.width / 7));
   const width = step * view.scale;
-  const x = view.width - width - 16.5, y = view.height - 21.5;
+  const x = view.width - width - 16.5,
+    y = view.height - 21.5;
   f.onScreen();
   ctx.lineWidth = 2;
   ctx.strokeStyle = theme.ink;
@@ -73,7 +76,8 @@ export function drawTruth(f) {
   const truth = f.run.session?.truth;
   if (!truth) return;
   f.inWorld();
-  const closed = new Path2D(), lines = new Path2D();
+  const closed = new Path2D(),
+    lines = new Path2D();
   for (const [x, y, r] of truth.drums ?? []) {
     closed.moveTo(x + r, y);
     closed.arc(x, y, r, 0, 2 * Math.PI);

@@ -10,10 +10,14 @@ export function drawMission(f) {
   const { ctx, run, theme, view } = f;
   const mission = run.state.drive_request;
   if (mission?.kind !== "mission") return;
-  const places = mission.steps.flatMap(({ places, frame }, step) => places.map(([x, y, degrees]) => {
-    const at = inPlane(run.state.localized, frame, x, y, degrees === null ? null : (degrees * Math.PI) / 180);
-    return at && { at: view.toScreen(at[0], at[1]), heading: at[2], step, isPath: places.length > 1 };
-  })).filter(Boolean);
+  const places = mission.steps
+    .flatMap(({ places, frame }, step) =>
+      places.map(([x, y, degrees]) => {
+        const at = inPlane(run.state.localized, frame, x, y, degrees === null ? null : (degrees * Math.PI) / 180);
+        return at && { at: view.toScreen(at[0], at[1]), heading: at[2], step, isPath: places.length > 1 };
+      }),
+    )
+    .filter(Boolean);
   if (places.length === 0) return;
   f.onScreen();
   ctx.strokeStyle = theme.drive;
@@ -27,8 +31,14 @@ export function drawMission(f) {
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
   const hasEnded = mission.status === "done";
-  for (const { at: [x, y], heading, step, isPath } of places) {
-    const isPast = hasEnded || step < mission.step, isCurrent = !hasEnded && step === mission.step;
+  for (const {
+    at: [x, y],
+    heading,
+    step,
+    isPath,
+  } of places) {
+    const isPast = hasEnded || step < mission.step,
+      isCurrent = !hasEnded && step === mission.step;
     ctx.globalAlpha = isPast ? 0.45 : 1;
     ctx.strokeStyle = theme.drive;
     ctx.textAlign = "center"; // the name of the step under way is written with other settings

@@ -7,7 +7,12 @@ import { magnitude } from "./units.js";
 const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
 const LENGTH_MAX = 2; // in units
 const AXIS_PX = 40;
-const DASHES = [[7, 4], [2, 3], [10, 3, 2, 3], [4, 6]];
+const DASHES = [
+  [7, 4],
+  [2, 3],
+  [10, 3, 2, 3],
+  [4, 6],
+];
 
 export function trailDrawer() {
   let version = -1;
@@ -62,13 +67,16 @@ export function drawRobot(f) {
 
 // The surfaces of the known room, where the robot's place has them; dashed while it does not track.
 function drawKnownRoom({ ctx, run, px, theme }, { drums, walls, polygons }) {
-  const [x, y, turn] = run.state.localized.frame, lines = new Path2D();
+  const [x, y, turn] = run.state.localized.frame,
+    lines = new Path2D();
   for (const [x1, y1, x2, y2] of walls) {
     lines.moveTo(x1, y1);
     lines.lineTo(x2, y2);
   }
   for (const polygon of polygons) {
-    polygon.forEach(([cornerX, cornerY], i) => (i === 0 ? lines.moveTo(cornerX, cornerY) : lines.lineTo(cornerX, cornerY)));
+    polygon.forEach(([cornerX, cornerY], i) =>
+      i === 0 ? lines.moveTo(cornerX, cornerY) : lines.lineTo(cornerX, cornerY),
+    );
     lines.closePath();
   }
   for (const [cx, cy, r] of drums) {
@@ -85,11 +93,15 @@ function drawKnownRoom({ ctx, run, px, theme }, { drums, walls, polygons }) {
   ctx.restore();
 }
 
-// The axes of the map frame, which lies askew in odometry's where odometry has drifted, and the ellipse of the robot's place.
+// The axes of the map frame, which lies askew in odometry's where odometry has drifted, and the ellipse of the robot's
+// place.
 export function drawMapFrame(f) {
   const { ctx, run, px, theme } = f;
   if (!run.fresh || run.state.localized === null) return;
-  const { frame: [x, y, turn], covariance } = run.state.localized;
+  const {
+    frame: [x, y, turn],
+    covariance,
+  } = run.state.localized;
   const length = AXIS_PX * px;
   f.inWorld();
   if (run.session?.known_room) drawKnownRoom(f, run.session.known_room);
@@ -101,7 +113,8 @@ export function drawMapFrame(f) {
   ctx.lineTo(x - length * Math.sin(turn), y + length * Math.cos(turn));
   ctx.stroke();
   if (covariance !== null) {
-    const { major, minor, angle } = ellipseOf(covariance), times = f.options.ellipseScale;
+    const { major, minor, angle } = ellipseOf(covariance),
+      times = f.options.ellipseScale;
     ctx.beginPath();
     ctx.ellipse(run.state.pose[0], run.state.pose[1], times * major, times * minor, angle + turn, 0, 2 * Math.PI);
     ctx.stroke();
@@ -114,7 +127,9 @@ export function drawMapFrame(f) {
 }
 
 function arrow(ctx, x, y, dx, dy, head) {
-  const length = Math.hypot(dx, dy), ux = dx / length, uy = dy / length;
+  const length = Math.hypot(dx, dy),
+    ux = dx / length,
+    uy = dy / length;
   ctx.beginPath();
   ctx.moveTo(x, y);
   ctx.lineTo(x + dx - ux * head, y + dy - uy * head);
@@ -140,7 +155,8 @@ export function drawVectors(f) {
     const size = Math.hypot(vx, vy);
     if (!(size > 0.01)) return;
     const length = Math.min(size, LENGTH_MAX) * unit;
-    const dx = (vx / size) * length, dy = (-vy / size) * length;
+    const dx = (vx / size) * length,
+      dy = (-vy / size) * length;
     const sum = name === "sum";
     ctx.strokeStyle = ctx.fillStyle = sum ? theme.ink : theme.vector;
     ctx.lineWidth = sum ? 3.5 : 2;
@@ -161,9 +177,11 @@ export function drawVectors(f) {
 
 // The way that the look-ahead has found, and on a ring round the robot the directions in which something stands.
 export function drawValley(f) {
-  const { ctx, run, px, theme } = f, valley = run.state.valley;
+  const { ctx, run, px, theme } = f,
+    valley = run.state.valley;
   if (!run.fresh || !valley) return;
-  const [x, y] = run.state.pose, r = 1.35 * (run.session?.body?.radius ?? 0.2);
+  const [x, y] = run.state.pose,
+    r = 1.35 * (run.session?.body?.radius ?? 0.2);
   const sector = (2 * Math.PI) / valley.blocked.length;
   f.inWorld();
   ctx.strokeStyle = theme.stop;
@@ -217,7 +235,7 @@ export function drawGoal(f) {
   ctx.arc(x, y, 4, 0, 2 * Math.PI);
   ctx.fill();
   if (drive_request.heading !== null && drive_request.heading !== undefined) {
-    const heading = drive_request.heading + (drive_request.frame === "map" ? run.state.localized?.frame[2] ?? 0 : 0);
+    const heading = drive_request.heading + (drive_request.frame === "map" ? (run.state.localized?.frame[2] ?? 0) : 0);
     ctx.lineWidth = 3;
     ctx.beginPath();
     ctx.moveTo(x, y);

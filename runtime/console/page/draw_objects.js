@@ -14,8 +14,12 @@ export function drawClusters(f) {
   const { ctx, px, theme } = f;
   const path = new Path2D();
   for (const [x, y, length, width, angle, , cx = x, cy = y] of f.run.state.clusters) {
-    const c = Math.cos(angle), s = Math.sin(angle);
-    const corner = (a, b) => [x + (a * c * length) / 2 - (b * s * width) / 2, y + (a * s * length) / 2 + (b * c * width) / 2];
+    const c = Math.cos(angle),
+      s = Math.sin(angle);
+    const corner = (a, b) => [
+      x + (a * c * length) / 2 - (b * s * width) / 2,
+      y + (a * s * length) / 2 + (b * c * width) / 2,
+    ];
     const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
     corners.forEach(([px_, py], i) => (i === 0 ? path.moveTo(px_, py) : path.lineTo(px_, py)));
     path.closePath();
@@ -46,14 +50,17 @@ export function outlinePath(path, model, { x, y, theta, covariance = null }, px)
     path.closePath();
     return;
   }
-  if (model.arc_radius_m && (model.closed || covariance !== null)) { // the Bayesian method locates circles, the paper's chords
+  if (model.arc_radius_m && (model.closed || covariance !== null)) {
+    // the Bayesian method locates circles, the paper's chords
     path.moveTo(x + model.arc_radius_m, y);
     path.arc(x, y, model.arc_radius_m, 0, 2 * Math.PI);
     return;
   }
-  const c = Math.cos(theta), s = Math.sin(theta);
+  const c = Math.cos(theta),
+    s = Math.sin(theta);
   model.vertices.forEach(([vx, vy], i) => {
-    const wx = x + c * vx - s * vy, wy = y + s * vx + c * vy;
+    const wx = x + c * vx - s * vy,
+      wy = y + s * vx + c * vy;
     if (i === 0) path.moveTo(wx, wy);
     else path.lineTo(wx, wy);
   });
@@ -62,7 +69,8 @@ export function outlinePath(path, model, { x, y, theta, covariance = null }, px)
 
 export function ellipseOf(covariance) {
   const [xx, xy, yy] = covariance;
-  const mean = (xx + yy) / 2, off = Math.hypot((xx - yy) / 2, xy);
+  const mean = (xx + yy) / 2,
+    off = Math.hypot((xx - yy) / 2, xy);
   return {
     major: Math.sqrt(CHI2_95 * Math.max(mean + off, 0)),
     minor: Math.sqrt(CHI2_95 * Math.max(mean - off, 0)),
@@ -94,8 +102,11 @@ export function drawAreas(f) {
 
 export function drawModels(f) {
   const { ctx, run, theme, px, selection } = f;
-  const sure = new Path2D(), unsure = new Path2D(), picked = new Path2D();
-  const walls = new Path2D(), unsureWalls = new Path2D();
+  const sure = new Path2D(),
+    unsure = new Path2D(),
+    picked = new Path2D();
+  const walls = new Path2D(),
+    unsureWalls = new Path2D();
   for (const object of run.state.objects) {
     const isSure = (object.probability ?? object.score) >= SURE && object.hidden_by === null;
     const isPicked = object.number !== null && object.number === selection.object;
@@ -136,7 +147,9 @@ export function drawModels(f) {
 export function drawEllipses(f) {
   const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;
-  const path = new Path2D(), magnified = new Path2D(), centres = new Path2D();
+  const path = new Path2D(),
+    magnified = new Path2D(),
+    centres = new Path2D();
   for (const object of run.state.objects) {
     if (isWall(object)) continue; // the covariance of a wall's place is its length
     const { x, y, covariance } = object;
@@ -168,17 +181,21 @@ export function drawLabels(f) {
   const { ctx, run, theme, view } = f;
   f.onScreen();
   ctx.textBaseline = "middle";
-  const spots = run.state.objects.map((object) => {
-    const [x, y] = view.toScreen(object.x, object.y);
-    return { object, x, y, r: Math.max(6, (run.model(object.model)?.arc_radius_m ?? 0.1) * view.scale) };
-  }).filter(({ x, y }) => x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50);
+  const spots = run.state.objects
+    .map((object) => {
+      const [x, y] = view.toScreen(object.x, object.y);
+      return { object, x, y, r: Math.max(6, (run.model(object.model)?.arc_radius_m ?? 0.1) * view.scale) };
+    })
+    .filter(({ x, y }) => x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50);
   const taken = f.labels;
   const [rx, ry] = view.toScreen(run.state.pose[0], run.state.pose[1]);
   const robot = { x: rx, y: ry, r: (run.session?.body?.radius ?? 0.2) * view.scale };
   const misses = ({ x, y, r }, [left, top, right, bottom]) =>
     Math.hypot(x - Math.max(left, Math.min(x, right)), y - Math.max(top, Math.min(y, bottom))) > r;
-  const free = (box, own) => taken.every((one) => !overlap(one, box))
-    && misses(robot, box) && spots.every((spot) => spot === own || misses(spot, box));
+  const free = (box, own) =>
+    taken.every((one) => !overlap(one, box)) &&
+    misses(robot, box) &&
+    spots.every((spot) => spot === own || misses(spot, box));
   for (const spot of spots) {
     const { object, x, y, r } = spot;
     const numbered = object.number !== null && object.number !== undefined;
@@ -213,7 +230,10 @@ export function drawEvidence(f) {
   const evidence = run.evidence;
   if (!evidence || evidence.object !== selection.object) return;
   const half = run.session?.ring?.half_angle ?? 0;
-  const speaks = new Path2D(), against = new Path2D(), crosses = new Path2D(), rays = new Path2D();
+  const speaks = new Path2D(),
+    against = new Path2D(),
+    crosses = new Path2D(),
+    rays = new Path2D();
   const reachMax = run.session?.ring?.range_max ?? 0;
   for (const { x1, y1, x2, y2, supports } of evidence.lines) {
     const path = supports ? speaks : against;
@@ -221,11 +241,21 @@ export function drawEvidence(f) {
     path.lineTo(x2, y2);
     if (!supports) cross(crosses, (x1 + x2) / 2, (y1 + y2) / 2, 4 * px);
   }
-  for (const { x, y, range: heard, angle, nats, listener: [lx, ly] } of evidence.readings) {
+  for (const {
+    x,
+    y,
+    range: heard,
+    angle,
+    nats,
+    listener: [lx, ly],
+  } of evidence.readings) {
     const range = heard ?? reachMax; // without an echo: anything up to this range would have been heard
     const path = nats < 0 ? against : speaks;
     if (lx !== undefined) {
-      const arc = ellipseArc({ transmitter: { x, y, angle }, listener: { x: lx, y: ly, angle: null }, half: range }, half);
+      const arc = ellipseArc(
+        { transmitter: { x, y, angle }, listener: { x: lx, y: ly, angle: null }, half: range },
+        half,
+      );
       if (arc !== null) addArc(path, arc);
       continue;
     }

@@ -9,8 +9,11 @@ export const PIN_PX = 8;
 export function drawPlaces(f) {
   const { ctx, run, theme, view, units } = f;
   const { places } = run;
-  if (!places || !places.frameIsKnown && !run.state.localized) return;
-  const onScreen = (kind, row) => cornersOf(kind, row).map((corner) => places.inPlane(corner)).map(([x, y]) => view.toScreen(x, y));
+  if (!places || (!places.frameIsKnown && !run.state.localized)) return;
+  const onScreen = (kind, row) =>
+    cornersOf(kind, row)
+      .map((corner) => places.inPlane(corner))
+      .map(([x, y]) => view.toScreen(x, y));
   const isSelected = (kind, i) => places.selected?.[0] === kind && places.selected[1] === i;
   f.onScreen();
   ctx.globalAlpha = places.frameIsKnown ? 1 : 0.45;
@@ -22,7 +25,12 @@ export function drawPlaces(f) {
     ctx.setLineDash([6, 4]);
     stroke(ctx, isSelected("speed_area", i) ? 3 : 1.5);
     ctx.setLineDash([]);
-    label(f, points, `${row.name ? `${row.name} ` : ""}≤ ${units.speed ? units.speed(row.speed_max_m_s) : `${row.speed_max_m_s} m/s`}`, theme.warning);
+    label(
+      f,
+      points,
+      `${row.name ? `${row.name} ` : ""}≤ ${units.speed ? units.speed(row.speed_max_m_s) : `${row.speed_max_m_s} m/s`}`,
+      theme.warning,
+    );
   }
   for (const [i, row] of places.all.no_go_area.entries()) {
     const points = onScreen("no_go_area", row);
@@ -47,7 +55,10 @@ export function drawPlaces(f) {
 
 function drawPlace(f, row, isSelected) {
   const { ctx, run, theme, view } = f;
-  const [x, y, heading] = run.places.inPlane([row.x_m, row.y_m], row.heading_deg === null ? null : (row.heading_deg * Math.PI) / 180);
+  const [x, y, heading] = run.places.inPlane(
+    [row.x_m, row.y_m],
+    row.heading_deg === null ? null : (row.heading_deg * Math.PI) / 180,
+  );
   const [sx, sy] = view.toScreen(x, y);
   ctx.strokeStyle = theme.drive;
   if (heading !== null) {
@@ -87,9 +98,12 @@ function fillFaintly(ctx, alpha) {
 
 // Diagonal lines inside the outline that is the context's path.
 function hatch(ctx, points) {
-  const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
-  const left = Math.max(0, Math.min(...xs)), right = Math.min(4000, Math.max(...xs));
-  const top = Math.max(0, Math.min(...ys)), bottom = Math.min(4000, Math.max(...ys));
+  const xs = points.map(([x]) => x),
+    ys = points.map(([, y]) => y);
+  const left = Math.max(0, Math.min(...xs)),
+    right = Math.min(4000, Math.max(...xs));
+  const top = Math.max(0, Math.min(...ys)),
+    bottom = Math.min(4000, Math.max(...ys));
   if (right <= left || bottom <= top) return;
   ctx.save();
   ctx.clip("evenodd");

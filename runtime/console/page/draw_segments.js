@@ -1,6 +1,12 @@
 // Outline segments, the newer the bolder; pinned ones have square ends, selected ones a band behind them.
 
-const AGES = [[2, 1, 2.8], [10, 0.85, 2.2], [30, 0.65, 1.8], [60, 0.5, 1.4], [Infinity, 0.36, 1.1]]; // s, opacity, px
+const AGES = [
+  [2, 1, 2.8],
+  [10, 0.85, 2.2],
+  [30, 0.65, 1.8],
+  [60, 0.5, 1.4],
+  [Infinity, 0.36, 1.1],
+]; // s, opacity, px
 
 export const AGE_LEGEND = "bold: new, thin: old";
 
@@ -67,9 +73,11 @@ export function segmentsDrawer() {
 
 // The segment nearest to a point of the plane, within reach (m).
 export function nearestSegment(run, x, y, reach) {
-  let best = null, nearest = reach;
+  let best = null,
+    nearest = reach;
   for (const s of run.segments.values()) {
-    const dx = s.x2 - s.x1, dy = s.y2 - s.y1;
+    const dx = s.x2 - s.x1,
+      dy = s.y2 - s.y1;
     const square = dx * dx + dy * dy;
     const along = square > 0 ? Math.max(0, Math.min(1, ((x - s.x1) * dx + (y - s.y1) * dy) / square)) : 0;
     const away = Math.hypot(x - s.x1 - along * dx, y - s.y1 - along * dy);

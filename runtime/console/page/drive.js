@@ -8,15 +8,25 @@ export class Drive {
   constructor({ run, units, connection, notifications, teleoperation, tools, askForToken }) {
     Object.assign(this, { run, units, connection, notifications, teleoperation, tools, askForToken });
     const asks = {
-      arm: () => this.arm(), disarm: { type: "disarm" }, "take-control": { type: "take_control" },
-      "give-control": { type: "release_control" }, "drive-request-legs": { type: "legs" },
+      arm: () => this.arm(),
+      disarm: { type: "disarm" },
+      "take-control": { type: "take_control" },
+      "give-control": { type: "release_control" },
+      "drive-request-legs": { type: "legs" },
     };
     for (const [id, message] of Object.entries(asks)) {
       byId(id).addEventListener("click", typeof message === "function" ? message : () => this.#ask(message));
     }
     byId("halt").addEventListener("click", () => this.halt());
-    connection.on("halt", (confirmed) => notifications.banner("halt", confirmed ? null
-      : "HALT not confirmed: use the robot's own stop. It is sent again until the robot's process answers.", { bad: true }));
+    connection.on("halt", (confirmed) =>
+      notifications.banner(
+        "halt",
+        confirmed
+          ? null
+          : "HALT not confirmed: use the robot's own stop. It is sent again until the robot's process answers.",
+        { bad: true },
+      ),
+    );
     byId("drive-request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
     run.on("session", () => {
@@ -44,7 +54,8 @@ export class Drive {
 
   // Drives to a place of the plane; the final heading in radians, null for any.
   goal(x, y, heading = null) {
-    const { localized } = this.run.state, there = inMap(localized, x, y);
+    const { localized } = this.run.state,
+      there = inMap(localized, x, y);
     const turn = there.frame === "map" ? localized.frame[2] : 0;
     return this.connection.request({ type: "goal", ...there, heading: heading === null ? null : heading - turn });
   }
@@ -53,12 +64,16 @@ export class Drive {
     event.preventDefault();
     const error = byId("goal-error");
     const [x, y] = [byId("goal-x"), byId("goal-y")].map((input) => this.units.parse(input.value));
-    const given = byId("goal-heading").value.trim(), degrees = given === "" ? null : Number(given.replace("−", "-"));
+    const given = byId("goal-heading").value.trim(),
+      degrees = given === "" ? null : Number(given.replace("−", "-"));
     if (x === null || y === null || Number.isNaN(degrees)) {
       setText(error, "two numbers are wanted, and a heading in degrees or none");
       return;
     }
-    this.goal(x, y, degrees === null ? null : (degrees * Math.PI) / 180).then(() => setText(error, ""), (refusal) => setText(error, refusal.message));
+    this.goal(x, y, degrees === null ? null : (degrees * Math.PI) / 180).then(
+      () => setText(error, ""),
+      (refusal) => setText(error, refusal.message),
+    );
   }
 
   // A stop of the robot is shown also beside a recording; arming requires the live run on the screen.
@@ -68,7 +83,11 @@ export class Drive {
     if (mode === "SAFE_STOP" || mode === "FAULT") {
       const buttons = mode === "SAFE_STOP" && this.enabled ? [["Re-arm", () => this.arm()]] : [];
       const what = mode === "FAULT" ? "Fault" : "Stopped";
-      this.notifications.banner("stopped", `${this.run.watchesRecording ? `The robot itself: ${what.toLowerCase()}` : what}: ${reason ?? "no reason given"}`, { bad: true, buttons });
+      this.notifications.banner(
+        "stopped",
+        `${this.run.watchesRecording ? `The robot itself: ${what.toLowerCase()}` : what}: ${reason ?? "no reason given"}`,
+        { bad: true, buttons },
+      );
     } else this.notifications.banner("stopped", null);
   }
 
@@ -85,9 +104,24 @@ export class Drive {
     if (this.controller !== controller) {
       this.controller = controller;
       if (!controller) this.teleoperation.stop("another client controls");
-      const mayAct = this.run.session?.has_token ?? true, justWatch = ["Just watch", () => this.notifications.banner("watching", null)];
-      this.notifications.banner("watching", controller ? null : mayAct ? "You are watching." : "This page has no token, so it only watches; HALT does nothing here.",
-        { buttons: [mayAct ? ["Ask for control", () => this.#ask({ type: "take_control" })] : ["Enter the token", this.askForToken], justWatch] });
+      const mayAct = this.run.session?.has_token ?? true,
+        justWatch = ["Just watch", () => this.notifications.banner("watching", null)];
+      this.notifications.banner(
+        "watching",
+        controller
+          ? null
+          : mayAct
+            ? "You are watching."
+            : "This page has no token, so it only watches; HALT does nothing here.",
+        {
+          buttons: [
+            mayAct
+              ? ["Ask for control", () => this.#ask({ type: "take_control" })]
+              : ["Enter the token", this.askForToken],
+            justWatch,
+          ],
+        },
+      );
       if (controller) this.notifications.banner("asked", null);
     }
     byId("arm").disabled = !enabled || mode === "DRIVE" || mode === "FAULT";
@@ -97,7 +131,10 @@ export class Drive {
     byId("give-control").disabled = !controller || !live;
     setAttribute(byId("pad"), "aria-disabled", this.teleoperation.refusalReason() !== null);
     const others = clients - 1;
-    setText(byId("role-text"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "no other client is connected."}`);
+    setText(
+      byId("role-text"),
+      `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "no other client is connected."}`,
+    );
     setText(byId("drive-request-text"), driveRequestText(drive_request, this.units, this.run.state.localized));
     setAttribute(byId("drive-request-legs"), "aria-pressed", drive_request?.kind === "legs");
     setAttribute(byId("drive-request-goal"), "aria-pressed", drive_request?.kind === "goal");
@@ -108,20 +145,30 @@ export class Drive {
       this.notifications.banner("asked", null);
       return;
     }
-    this.notifications.banner("asked", `${typeof name === "number" ? `Client ${name}` : name} asks for control.`, { buttons: [
-      ["Hand over", () => {
-        this.notifications.banner("asked", null);
-        this.#ask({ type: "grant_control", client: client ?? name });
-      }],
-      ["Keep it", () => this.notifications.banner("asked", null)],
-    ] });
+    this.notifications.banner("asked", `${typeof name === "number" ? `Client ${name}` : name} asks for control.`, {
+      buttons: [
+        [
+          "Hand over",
+          () => {
+            this.notifications.banner("asked", null);
+            this.#ask({ type: "grant_control", client: client ?? name });
+          },
+        ],
+        ["Keep it", () => this.notifications.banner("asked", null)],
+      ],
+    });
   }
 
   #watchTeleoperation() {
     const { teleoperation } = this;
-    const keys = byId("teleop-keys"), limit = byId("teleop-limit");
+    const keys = byId("teleop-keys"),
+      limit = byId("teleop-limit");
     watchPad(teleoperation);
-    watchKeys(teleoperation, () => keys.checked, () => writesText(document.activeElement));
+    watchKeys(
+      teleoperation,
+      () => keys.checked,
+      () => writesText(document.activeElement),
+    );
     watchGamepad(teleoperation, (text) => setText(byId("teleop-gamepad"), text));
     const setLimit = () => {
       teleoperation.limit = Number(limit.value) / 100;

@@ -8,7 +8,8 @@ const SHOULDERS = [4, 5];
 const DEAD_ZONE = 0.12;
 
 export function watchPad(drive) {
-  const pad = byId("pad"), knob = byId("knob");
+  const pad = byId("pad"),
+    knob = byId("knob");
   let pointer = null;
 
   const put = (dx, dy) => {
@@ -17,7 +18,8 @@ export function watchPad(drive) {
   const pull = (event) => {
     const box = pad.getBoundingClientRect();
     const reach = box.width / 2 - 22;
-    let dx = event.clientX - box.left - box.width / 2, dy = event.clientY - box.top - box.height / 2;
+    let dx = event.clientX - box.left - box.width / 2,
+      dy = event.clientY - box.top - box.height / 2;
     const far = Math.hypot(dx, dy);
     if (far > reach) [dx, dy] = [(dx / far) * reach, (dy / far) * reach];
     if (!drive.hold("pad", -dy / reach, -dx / reach)) return false;
@@ -47,7 +49,12 @@ export function watchPad(drive) {
 
 export function watchKeys(drive, enabled, elsewhere) {
   // With Shift the letters keep their other meanings: Shift+A arms.
-  holdKeys(drive, window, (event) => (enabled() && !event.shiftKey && !elsewhere() ? KEYS[event.code] : undefined), "key");
+  holdKeys(
+    drive,
+    window,
+    (event) => (enabled() && !event.shiftKey && !elsewhere() ? KEYS[event.code] : undefined),
+    "key",
+  );
 }
 
 // A key counts as held from keydown to keyup; auto-repeat changes nothing.
@@ -60,7 +67,8 @@ function holdKeys(drive, target, directionOf, name) {
     if (!event.repeat) drive.hold(`${name} ${event.code}`, by[0], by[1]);
   });
   window.addEventListener("keyup", (event) => drive.release(`${name} ${event.code}`));
-  if (target !== window) target.addEventListener("blur", () => Object.keys(PAD_KEYS).forEach((code) => drive.release(`${name} ${code}`)));
+  if (target !== window)
+    target.addEventListener("blur", () => Object.keys(PAD_KEYS).forEach((code) => drive.release(`${name} ${code}`)));
 }
 
 // Gamepads send no events for their sticks: poll once per animation frame while one is connected.

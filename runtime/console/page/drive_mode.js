@@ -1,4 +1,5 @@
-// Drive mode, for a phone in one's hands: the map, and below it the pad beside HALT under the thumbs. The same pad and the
+// Drive mode, for a phone in one's hands: the map, and below it the pad beside HALT under the thumbs. The same pad and
+// the
 // same HALT as ever, moved; without drive mode they return to where they were.
 
 import { byId } from "./dom.js";
@@ -23,8 +24,14 @@ export class DriveMode {
     if (on === this.on) return;
     this.teleoperation.stop("the layout changes"); // what is moved loses the pointer that held it
     if (on) {
-      for (const [id, place] of [["pad", "dock-pad"], ["teleop-facts", "dock-facts"], ["arm-row", "dock-facts"], ["halt", "dock-halt"]]) {
-        const element = byId(id), mark = document.createComment(id);
+      for (const [id, place] of [
+        ["pad", "dock-pad"],
+        ["teleop-facts", "dock-facts"],
+        ["arm-row", "dock-facts"],
+        ["halt", "dock-halt"],
+      ]) {
+        const element = byId(id),
+          mark = document.createComment(id);
         element.replaceWith(mark);
         byId(place).append(element);
         this.#moved.push({ element, mark });

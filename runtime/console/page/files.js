@@ -5,19 +5,27 @@ import { byId, el, setText } from "./dom.js";
 
 const LONG = { report: "Report", map: "Map" };
 
-export const base = (file) => String(file ?? "").split("/").at(-1);
+export const base = (file) =>
+  String(file ?? "")
+    .split("/")
+    .at(-1);
 
 // 3725 s as "1 h 02 min", 65 s as "1 min 05 s".
 export function duration(s) {
   if (s === null || s === undefined) return "length unknown";
   if (s < 60) return `${s.toFixed(1)} s`;
   const two = (n) => String(Math.floor(n)).padStart(2, "0");
-  return s < 3600 ? `${Math.floor(s / 60)} min ${two(s % 60)} s` : `${Math.floor(s / 3600)} h ${two((s % 3600) / 60)} min`;
+  return s < 3600
+    ? `${Math.floor(s / 60)} min ${two(s % 60)} s`
+    : `${Math.floor(s / 3600)} h ${two((s % 3600) / 60)} min`;
 }
 
-const size = (bytes) => (bytes === null ? "size unknown" : bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
-const when = (unix_s) => (unix_s === null ? "" : new Date(1000 * unix_s).toLocaleString([], { dateStyle: "medium", timeStyle: "short" }));
-const state = ({ live, state: of }) => (live ? "this run, up to now" : of === "live" ? "being written" : of === "incomplete" ? "cut off" : "complete");
+const size = (bytes) =>
+  bytes === null ? "size unknown" : bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+const when = (unix_s) =>
+  unix_s === null ? "" : new Date(1000 * unix_s).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+const state = ({ live, state: of }) =>
+  live ? "this run, up to now" : of === "live" ? "being written" : of === "incomplete" ? "cut off" : "complete";
 
 export class Files {
   #rows = [];
@@ -48,9 +56,12 @@ export class Files {
   // Request the lists when the panel is shown.
   shown() {
     this.list();
-    this.connection.request({ type: "list_jobs" }).then((jobs) => {
-      for (const job of [...(jobs ?? [])].reverse()) this.#follow(job, { quiet: true });
-    }, () => {});
+    this.connection.request({ type: "list_jobs" }).then(
+      (jobs) => {
+        for (const job of [...(jobs ?? [])].reverse()) this.#follow(job, { quiet: true });
+      },
+      () => {},
+    );
   }
 
   async list(refused = () => {}) {
@@ -69,7 +80,8 @@ export class Files {
   }
 
   #refresh() {
-    const { controller } = this.run.state, recording = this.run.robot?.recording?.file ?? null;
+    const { controller } = this.run.state,
+      recording = this.run.robot?.recording?.file ?? null;
     if (recording !== this.#recording && this.#recording !== undefined && !byId("panel-files").hidden) this.list();
     this.#recording = recording;
     const shown = JSON.stringify([this.#rows, this.#chosen, controller, this.run.watchesRecording]);
@@ -79,23 +91,63 @@ export class Files {
     byId("files-undo").disabled = !controller;
     setText(byId("files-count"), String(this.#rows.length));
     byId("files-empty").hidden = this.#rows.length > 0;
-    byId("files").replaceChildren(...this.#rows.map((row, i) => el("li", {}, el("button", { type: "button", class: "file", id: `file-row-${i}`,
-      "aria-pressed": String(row.file === this.#chosen), onclick: () => this.#choose(row.file) },
-      el("strong", {}, base(row.file)), el("span", {}, [row.live ? null : duration(row.duration_s), row.live ? null : size(row.bytes), state(row), row.pinned ? "pinned" : null].filter(Boolean).join(", "))))));
+    byId("files").replaceChildren(
+      ...this.#rows.map((row, i) =>
+        el(
+          "li",
+          {},
+          el(
+            "button",
+            {
+              type: "button",
+              class: "file",
+              id: `file-row-${i}`,
+              "aria-pressed": String(row.file === this.#chosen),
+              onclick: () => this.#choose(row.file),
+            },
+            el("strong", {}, base(row.file)),
+            el(
+              "span",
+              {},
+              [
+                row.live ? null : duration(row.duration_s),
+                row.live ? null : size(row.bytes),
+                state(row),
+                row.pinned ? "pinned" : null,
+              ]
+                .filter(Boolean)
+                .join(", "),
+            ),
+          ),
+        ),
+      ),
+    );
     const row = this.#row;
     byId("file").hidden = row === null;
     if (focused?.startsWith("file-row-")) byId(focused)?.focus();
     if (row === null) return;
-    const isLive = row.live || row.state === "live", inFolder = !row.file.includes("/");
+    const isLive = row.live || row.state === "live",
+      inFolder = !row.file.includes("/");
     setText(byId("file-name"), base(row.file));
-    const facts = [["recorded", when(row.modified_s)], ["length", duration(row.duration_s)], ["size", size(row.bytes)], ["state", state(row)], ["when the folder is full", row.pinned ? "stays: it is pinned" : "may go, the oldest first"]];
-    byId("file-facts").replaceChildren(...facts.filter(([, value]) => value !== "").flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
+    const facts = [
+      ["recorded", when(row.modified_s)],
+      ["length", duration(row.duration_s)],
+      ["size", size(row.bytes)],
+      ["state", state(row)],
+      ["when the folder is full", row.pinned ? "stays: it is pinned" : "may go, the oldest first"],
+    ];
+    byId("file-facts").replaceChildren(
+      ...facts
+        .filter(([, value]) => value !== "")
+        .flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]),
+    );
     byId("file-download").href = this.address("/recording", { file: row.file });
     byId("file-new-name").value = base(row.file).replace(/\.mcap$/, "");
     setText(byId("file-error"), "");
     setText(byId("file-pin"), row.pinned ? "Unpin" : "Pin");
     byId("file-pin").disabled = !controller || !inFolder;
-    for (const id of ["file-new-name", "file-rename-do", "file-delete"]) byId(id).disabled = !controller || isLive || !inFolder;
+    for (const id of ["file-new-name", "file-rename-do", "file-delete"])
+      byId(id).disabled = !controller || isLive || !inFolder;
   }
 
   #choose(file) {
@@ -136,7 +188,11 @@ export class Files {
     const file = this.#chosen;
     let name;
     try {
-      name = await this.connection.request({ type: "rename_recording", file, to: byId("file-new-name").value.trim() || "?" });
+      name = await this.connection.request({
+        type: "rename_recording",
+        file,
+        to: byId("file-new-name").value.trim() || "?",
+      });
     } catch (error) {
       setText(byId("file-error"), error.message);
       return;
@@ -148,15 +204,32 @@ export class Files {
 
   // Takes back the last new name or pin, whichever recording it was of.
   undo() {
-    return this.connection.request({ type: "undo_file" }).then(this.notifications.toast.bind(this.notifications), this.notifications.showError).then(() => this.list());
+    return this.connection
+      .request({ type: "undo_file" })
+      .then(this.notifications.toast.bind(this.notifications), this.notifications.showError)
+      .then(() => this.list());
   }
 
   #delete() {
     const row = this.#row;
-    this.notifications.confirm(`Delete ${row.file}?`, el("p", {}, `${duration(row.duration_s)}, ${size(row.bytes)}. It is deleted for good; download it first if it may be of use.`), [
-      ["Keep it", null],
-      ["Delete it", () => void this.#change({ type: "delete_recording", file: row.file }).then((done) => done && this.notifications.toast(`${row.file} is deleted`))],
-    ]);
+    this.notifications.confirm(
+      `Delete ${row.file}?`,
+      el(
+        "p",
+        {},
+        `${duration(row.duration_s)}, ${size(row.bytes)}. It is deleted for good; download it first if it may be of use.`,
+      ),
+      [
+        ["Keep it", null],
+        [
+          "Delete it",
+          () =>
+            void this.#change({ type: "delete_recording", file: row.file }).then(
+              (done) => done && this.notifications.toast(`${row.file} is deleted`),
+            ),
+        ],
+      ],
+    );
   }
 
   // Begins to make a report or a map; what becomes of it comes as messages.
@@ -184,19 +257,25 @@ export class Files {
     byId("job").hidden = running === undefined;
     if (running === undefined) return;
     this.#showJob({
-      text: `${LONG[running.kind]} of ${base(running.file)}: ${running.what}${running.share > 0 ? `, ${Math.round(100 * running.share)} %` : ""}`, share: running.share,
-      cancel: () => this.connection.request({ type: "cancel_job", job: running.job }).catch(this.notifications.showError),
+      text: `${LONG[running.kind]} of ${base(running.file)}: ${running.what}${running.share > 0 ? `, ${Math.round(100 * running.share)} %` : ""}`,
+      share: running.share,
+      cancel: () =>
+        this.connection.request({ type: "cancel_job", job: running.job }).catch(this.notifications.showError),
     });
   }
 
   // Returns whether there is a recording of this run.
   async #makeOfRun(kind) {
-    if (![...this.#jobs.values()].some(({ over }) => !over)) this.#showJob({ text: `${LONG[kind]} of this run: looking for its recording` });
+    if (![...this.#jobs.values()].some(({ over }) => !over))
+      this.#showJob({ text: `${LONG[kind]} of this run: looking for its recording` });
     await this.list(this.notifications.showError);
     const live = this.#rows.find((row) => row.live);
     if (!live) this.#showRunning();
     if (live) await this.make(kind, live.file);
-    else this.notifications.toast(`This run is not being recorded, and its ${kind} is made from the recording: press Record in the tab Time`);
+    else
+      this.notifications.toast(
+        `This run is not being recorded, and its ${kind} is made from the recording: press Record in the tab Time`,
+      );
     return live !== undefined;
   }
 
@@ -205,17 +284,39 @@ export class Files {
     this.#jobs.set(job.job, job);
     this.#showRunning();
     if (!job.over || was?.over) return;
-    byId("made").replaceChildren(...[...this.#jobs.values()].filter(({ made }) => made.length > 0).reverse().map((done) => this.#made(done)));
+    byId("made").replaceChildren(
+      ...[...this.#jobs.values()]
+        .filter(({ made }) => made.length > 0)
+        .reverse()
+        .map((done) => this.#made(done)),
+    );
     byId("made-part").hidden = byId("made").children.length === 0;
     if (quiet) return;
-    this.notifications.toast(job.error === null ? `${LONG[job.kind]} of ${base(job.file)}: ready in the tab Files` : `${LONG[job.kind]} of ${base(job.file)}: ${job.error}`);
+    this.notifications.toast(
+      job.error === null
+        ? `${LONG[job.kind]} of ${base(job.file)}: ready in the tab Files`
+        : `${LONG[job.kind]} of ${base(job.file)}: ${job.error}`,
+    );
   }
 
   #made({ job, kind, file, made }) {
-    return el("li", {}, el("span", {}, `${LONG[kind]} of ${base(file)}`), ...made.map((name) => {
-      const isPage = name.endsWith(".html");
-      return el("a", { class: "button small", href: this.address("/made", { job, file: name }), ...(isPage ? { target: "_blank", rel: "noopener" } : { download: name }),
-        "aria-label": `${isPage ? "Open" : "Download"} ${name}` }, isPage ? "Open" : name.split(".").at(-1).toUpperCase());
-    }));
+    return el(
+      "li",
+      {},
+      el("span", {}, `${LONG[kind]} of ${base(file)}`),
+      ...made.map((name) => {
+        const isPage = name.endsWith(".html");
+        return el(
+          "a",
+          {
+            class: "button small",
+            href: this.address("/made", { job, file: name }),
+            ...(isPage ? { target: "_blank", rel: "noopener" } : { download: name }),
+            "aria-label": `${isPage ? "Open" : "Download"} ${name}`,
+          },
+          isPage ? "Open" : name.split(".").at(-1).toUpperCase(),
+        );
+      }),
+    );
   }
 }

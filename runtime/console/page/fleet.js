@@ -1,4 +1,5 @@
-// The fleet page: a card for each run, HALT for one and for all. The server of `echolocate fleet` holds the connections.
+// The fleet page: a card for each run, HALT for one and for all. The server of `echolocate fleet` holds the
+// connections.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
 import { takeToken } from "./token.js";
@@ -7,16 +8,26 @@ const EVERY_MS = 200;
 const LOST_MS = 1000;
 const UNSENT_MS = 700; // with EVERY_MS less than a second
 const HALT_WORDS = {
-  none: "", sent: "HALT is sent", confirmed: "HALT confirmed", unconfirmed: "HALT not confirmed: use the robot's own stop",
+  none: "",
+  sent: "HALT is sent",
+  confirmed: "HALT confirmed",
+  unconfirmed: "HALT not confirmed: use the robot's own stop",
 };
 
 const token = takeToken("fleet token");
 const cards = new Map();
-let rows = [], heard_ms = performance.now(), halt_ms = -Infinity, problem = "connecting";
+let rows = [],
+  heard_ms = performance.now(),
+  halt_ms = -Infinity,
+  problem = "connecting";
 
 async function ask(path, body = undefined) {
   const how = body === undefined ? {} : { method: "POST", body: JSON.stringify(body) };
-  const answer = await fetch(path, { ...how, headers: { "X-Echolocate-Token": token }, signal: AbortSignal.timeout(5000) });
+  const answer = await fetch(path, {
+    ...how,
+    headers: { "X-Echolocate-Token": token },
+    signal: AbortSignal.timeout(5000),
+  });
   if (!answer.ok) throw new Error(await answer.text());
   return answer.json();
 }
@@ -32,13 +43,47 @@ function halt(address) {
 function card(address) {
   const part = (name, properties = {}) => el(name, properties);
   const parts = {
-    name: part("h2"), mode: part("dd", { class: "mode-word" }), reason: part("dd"), battery: part("dd"), place: part("dd"), address: part("dd"), problem: part("p", { class: "error" }),
-    halt: part("p", { class: "halt-state", role: "status" }), page: el("a", { target: "_blank", rel: "noopener" }, "its page"),
+    name: part("h2"),
+    mode: part("dd", { class: "mode-word" }),
+    reason: part("dd"),
+    battery: part("dd"),
+    place: part("dd"),
+    address: part("dd"),
+    problem: part("p", { class: "error" }),
+    halt: part("p", { class: "halt-state", role: "status" }),
+    page: el("a", { target: "_blank", rel: "noopener" }, "its page"),
   };
-  const facts = [["mode", "mode"], ["reason", "reason"], ["battery", "battery"], ["place", "place"], ["address", "address"]];
-  parts.remove = el("button", { type: "button", class: "small", onclick: () => ask("/remove", { address }).then(refresh, () => {}) }, "Remove");
-  parts.root = el("li", {}, parts.name, el("dl", {}, ...facts.flatMap(([name, key]) => [el("dt", {}, name), parts[key]])), parts.problem,
-    el("div", { class: "row" }, el("button", { type: "button", class: "halt", "aria-label": `HALT ${address}`, onclick: () => halt(address) }, "HALT"), parts.page, parts.remove), parts.halt);
+  const facts = [
+    ["mode", "mode"],
+    ["reason", "reason"],
+    ["battery", "battery"],
+    ["place", "place"],
+    ["address", "address"],
+  ];
+  parts.remove = el(
+    "button",
+    { type: "button", class: "small", onclick: () => ask("/remove", { address }).then(refresh, () => {}) },
+    "Remove",
+  );
+  parts.root = el(
+    "li",
+    {},
+    parts.name,
+    el("dl", {}, ...facts.flatMap(([name, key]) => [el("dt", {}, name), parts[key]])),
+    parts.problem,
+    el(
+      "div",
+      { class: "row" },
+      el(
+        "button",
+        { type: "button", class: "halt", "aria-label": `HALT ${address}`, onclick: () => halt(address) },
+        "HALT",
+      ),
+      parts.page,
+      parts.remove,
+    ),
+    parts.halt,
+  );
   return parts;
 }
 
@@ -67,14 +112,29 @@ function show() {
     parts.remove.hidden = row.is_local;
   }
   byId("fleet-none").hidden = rows.length > 0;
-  const silent = performance.now() - heard_ms > LOST_MS ? "nothing comes from `echolocate fleet`: what is shown is old" : "";
-  const open = rows.filter(({ halt }) => halt === "unconfirmed").map(({ name, address }) => name ? `${name} (${address})` : address);
-  const unsent = performance.now() - halt_ms > UNSENT_MS && halt_ms > heard_ms ? "HALT not confirmed: use the robots' own stops" : "";
-  const alarm = [open.length > 0 ? `HALT not confirmed: use the own stop of ${open.join(", ")}` : "", unsent, silent || problem].filter(Boolean).join(". ");
+  const silent =
+    performance.now() - heard_ms > LOST_MS ? "nothing comes from `echolocate fleet`: what is shown is old" : "";
+  const open = rows
+    .filter(({ halt }) => halt === "unconfirmed")
+    .map(({ name, address }) => (name ? `${name} (${address})` : address));
+  const unsent =
+    performance.now() - halt_ms > UNSENT_MS && halt_ms > heard_ms
+      ? "HALT not confirmed: use the robots' own stops"
+      : "";
+  const alarm = [
+    open.length > 0 ? `HALT not confirmed: use the own stop of ${open.join(", ")}` : "",
+    unsent,
+    silent || problem,
+  ]
+    .filter(Boolean)
+    .join(". ");
   setText(byId("fleet-alarm"), alarm);
   byId("fleet-alarm").hidden = alarm === "";
   const driving = rows.filter(({ mode, problem: lost }) => mode === "DRIVE" && !lost).length;
-  setText(byId("fleet-summary"), `${rows.length} run${rows.length === 1 ? "" : "s"}, ${driving} driving${rows.some((row) => row.problem) ? `, ${rows.filter((row) => row.problem).length} not reached` : ""}`);
+  setText(
+    byId("fleet-summary"),
+    `${rows.length} run${rows.length === 1 ? "" : "s"}, ${driving} driving${rows.some((row) => row.problem) ? `, ${rows.filter((row) => row.problem).length} not reached` : ""}`,
+  );
 }
 
 async function refresh() {
@@ -99,14 +159,23 @@ byId("fleet-add").addEventListener("submit", async (event) => {
     setText(byId("fleet-error"), error.message);
   }
 });
-addEventListener("keydown", (event) => {
-  if (event.key !== " " || event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey || event.altKey) return;
-  event.preventDefault();
-  if (!event.repeat) halt(null);
-}, { capture: true });
-addEventListener("keyup", (event) => {
-  if (event.key === " " && !(event.target instanceof HTMLInputElement)) event.preventDefault();
-}, { capture: true });
+addEventListener(
+  "keydown",
+  (event) => {
+    if (event.key !== " " || event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey || event.altKey)
+      return;
+    event.preventDefault();
+    if (!event.repeat) halt(null);
+  },
+  { capture: true },
+);
+addEventListener(
+  "keyup",
+  (event) => {
+    if (event.key === " " && !(event.target instanceof HTMLInputElement)) event.preventDefault();
+  },
+  { capture: true },
+);
 setInterval(show, EVERY_MS);
 (async function follow() {
   for (;;) {

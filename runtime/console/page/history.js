@@ -1,4 +1,5 @@
-// The numbers of past frames by time, for the plots: each frame of the last minute, one a second of half an hour before.
+// The numbers of past frames by time, for the plots: each frame of the last minute, one a second of half an hour
+// before.
 
 const NEAR_S = 60;
 const FAR_S = 1800;
@@ -6,9 +7,27 @@ const COARSE_S = 1;
 const SLACK = 200; // old frames are thinned out once in so many
 
 // What the places of a short list hold.
-const PLACES = { pose: ["x", "y", "heading"], frame: ["x", "y", "heading"], twist: ["v", "w"], covariance: ["xx", "xy", "yy", "heading"] };
+const PLACES = {
+  pose: ["x", "y", "heading"],
+  frame: ["x", "y", "heading"],
+  twist: ["v", "w"],
+  covariance: ["xx", "xy", "yy", "heading"],
+};
 // Positions in a list say nothing from one frame to the next; these are drawn on the map.
-const LEFT_OUT = new Set(["firing", "clusters", "areas", "sensors", "segments", "archived", "steps", "way", "number", "hidden_by", "robot_s", "host_s"]);
+const LEFT_OUT = new Set([
+  "firing",
+  "clusters",
+  "areas",
+  "sensors",
+  "segments",
+  "archived",
+  "steps",
+  "way",
+  "number",
+  "hidden_by",
+  "robot_s",
+  "host_s",
+]);
 
 // Yields the parts of a field by name: objects by their number, vectors by their schema, numbers by what they hold.
 function* parts(value, name) {
@@ -35,7 +54,8 @@ export function* numericFields(value, path = "", name = "") {
 
 // The number at such a path; null where the frame has none.
 export function valueAt(frame, path) {
-  let value = frame, name = "";
+  let value = frame,
+    name = "";
   for (const key of path.split(".")) {
     if (typeof value !== "object" || value === null) return null;
     const found = [...parts(value, name)].find(([one]) => one === key);

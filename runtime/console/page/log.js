@@ -7,16 +7,31 @@ const SHOWN_MAX = 300;
 const MARKS = { debug: "·", info: "○", warning: "▲", error: "■" };
 
 const DETAILS_MAX = 600;
-const UNITS = [["us", "µs"], ["ms", "ms"], ["s", "s"], ["m", "m"], ["rad", "rad"], ["bytes", "bytes"], ["hz", "Hz"]];
+const UNITS = [
+  ["us", "µs"],
+  ["ms", "ms"],
+  ["s", "s"],
+  ["m", "m"],
+  ["rad", "rad"],
+  ["bytes", "bytes"],
+  ["hz", "Hz"],
+];
 
 // A line of the log as a sentence: what happened, why, and in brackets what else is known of it.
 export function sentence(event, fields) {
-  const known = Object.fromEntries(Object.entries(fields ?? {}).filter(([, value]) => !["", "None", "null"].includes(String(value))));
+  const known = Object.fromEntries(
+    Object.entries(fields ?? {}).filter(([, value]) => !["", "None", "null"].includes(String(value))),
+  );
   const { reason, [event]: what, ...others } = known; // an event named as a field, as "mode", is described by that field
   const head = what === undefined ? event : `${event} ${what}`;
   const text = `${head.charAt(0).toUpperCase()}${head.slice(1)}${reason === undefined ? "" : `: ${reason}`}`;
-  const details = Object.entries(others).map(([key, value]) => detail(key, value)).join(", ");
-  return [/[.!?]$/.test(text) || details !== "" ? text : `${text}.`, details === "" ? "" : `(${details.slice(0, DETAILS_MAX)})`];
+  const details = Object.entries(others)
+    .map(([key, value]) => detail(key, value))
+    .join(", ");
+  return [
+    /[.!?]$/.test(text) || details !== "" ? text : `${text}.`,
+    details === "" ? "" : `(${details.slice(0, DETAILS_MAX)})`,
+  ];
 }
 
 // "took_s", 1.5 as "took 1.5 s"; a flag is named alone.
@@ -53,9 +68,12 @@ export class Log {
   }
 
   #matches({ level, event, fields }) {
-    const found = LEVELS.indexOf(level), least = LEVELS.indexOf(this.#level.value);
+    const found = LEVELS.indexOf(level),
+      least = LEVELS.indexOf(this.#level.value);
     const text = this.#filter.value.trim().toLowerCase();
-    return (found < 0 || found >= least) && (text === "" || sentence(event, fields).join(" ").toLowerCase().includes(text));
+    return (
+      (found < 0 || found >= least) && (text === "" || sentence(event, fields).join(" ").toLowerCase().includes(text))
+    );
   }
 
   #add(entry) {
@@ -65,15 +83,21 @@ export class Log {
   }
 
   #rebuild() {
-    const lines = this.#run.log.filter((entry) => this.#matches(entry)).slice(-SHOWN_MAX).reverse();
+    const lines = this.#run.log
+      .filter((entry) => this.#matches(entry))
+      .slice(-SHOWN_MAX)
+      .reverse();
     this.#list.replaceChildren(...lines.map((entry) => this.#line(entry)));
   }
 
   #line({ timestamp, level, event, fields }) {
     const [text, details] = sentence(event, fields);
-    return el("li", { "data-level": level },
+    return el(
+      "li",
+      { "data-level": level },
       el("span", {}, when(timestamp)),
       el("span", { class: "level" }, `${MARKS[level] ?? "○"} ${level}`),
-      el("span", {}, `${text} `, el("span", { class: "more" }, details)));
+      el("span", {}, `${text} `, el("span", { class: "more" }, details)),
+    );
   }
 }

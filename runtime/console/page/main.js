@@ -56,7 +56,10 @@ const ROOM_M = 0.6;
 const token = takeToken();
 const query = token === "" ? "" : `?token=${encodeURIComponent(token)}`;
 const connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${query}`);
-const run = new RunState(), view = new View(), units = new Units(), notifications = new Notifications();
+const run = new RunState(),
+  view = new View(),
+  units = new Units(),
+  notifications = new Notifications();
 connection.showsRecording = () => run.watchesRecording;
 connection.isPaused = () => run.robot.paused;
 const selection = new Selection(run);
@@ -64,7 +67,8 @@ const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
 const layers = makeLayers();
 
-let scene = null, tabs = null;
+let scene = null,
+  tabs = null;
 const redraw = () => scene?.invalidate("front");
 const redrawAll = () => scene?.invalidate("back", "front");
 const theme = new Theme(() => {
@@ -79,41 +83,91 @@ const places_tool = placesTool({ places, view, redraw });
 const drive = {}; // filled in below: the goal tool and the drive panel need each other
 const announce = (text) => setText(byId("announce"), text);
 const tools = new Toolbox({
-  box: byId("tools"), canvas: front, view, redraw,
+  box: byId("tools"),
+  canvas: front,
+  view,
+  redraw,
   tools: [
     panTool(view),
     selectTool({ run, view, selection, redraw }),
     moveTool({ run, view, selection, mapEdits, redraw }),
     placeTool({ run, view, connection, notifications, redraw }),
-    goalTool({ sendGoal: (x, y, heading) => drive.panel.goal(x, y, heading).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan"), redraw }),
+    goalTool({
+      sendGoal: (x, y, heading) =>
+        drive.panel
+          .goal(x, y, heading)
+          .then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError),
+      after: () => tools.choose("pan"),
+      redraw,
+    }),
     tapeTool({ units, announce, redraw }),
     hereTool({ run, connection, notifications, redraw, choose: (id) => tools.choose(id) }),
     routeTool({ route, view, redraw }),
     places_tool,
   ],
 });
-scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), run, view, theme, units, selection, options });
+scene = new Scene({
+  back: byId("map-back"),
+  front,
+  layers,
+  overlay: (f) => tools.draw(f),
+  run,
+  view,
+  theme,
+  units,
+  selection,
+  options,
+});
 watchPointers(front, view, () => tools.current);
 
 const teleoperation = new Teleoperation({ connection, run });
-drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools, askForToken: () => askForToken(notifications) });
+drive.panel = new Drive({
+  run,
+  units,
+  connection,
+  notifications,
+  teleoperation,
+  tools,
+  askForToken: () => askForToken(notifications),
+});
 new MissionPanel({ run, units, connection, notifications });
 new RoutePanel({ route, run, units, connection, notifications, tools });
 route.on("changed", redraw);
 new PlacesPanel({ places, tool: places_tool, run, units, connection, notifications, tools });
 places.on("changed", redraw);
 const alerts = new Alerts({ run, connection, seen: () => byId("log").offsetParent !== null });
-const status = new Status({ run, units, connection, notifications, alerts, askForToken: () => askForToken(notifications) });
+const status = new Status({
+  run,
+  units,
+  connection,
+  notifications,
+  alerts,
+  askForToken: () => askForToken(notifications),
+});
 const objects = new Objects({ run, units, selection, connection, notifications, tools });
 const parameters = new Parameters({ run, connection, notifications });
 const log = new Log(run);
 const time = new Time({ run, connection, notifications, shoot: () => screenshot({ scene, view, run, theme, units }) });
 const ring = new Ring({ canvas: byId("ring"), text: byId("ring-text"), run, theme, units });
-const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), run, theme });
+const charts = new Charts({
+  phases: byId("phases"),
+  late: byId("late"),
+  legend: byId("phases-legend"),
+  lateLegend: byId("late-legend"),
+  run,
+  theme,
+});
 const plots = new Plots({ run, units, theme, shown: () => tabs?.shows("plot") ?? false });
 const chosen = selectionBar({ run, selection, connection, notifications });
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
-const files = new Files({ run, connection, notifications, address, play: (file) => time.openFile(file).then((isOpen) => isOpen && tabs.show("time")), showFiles: () => tabs.show("files") });
+const files = new Files({
+  run,
+  connection,
+  notifications,
+  address,
+  play: (file) => time.openFile(file).then((isOpen) => isOpen && tabs.show("time")),
+  showFiles: () => tabs.show("files"),
+});
 new SettingsFiles({ run, connection, notifications });
 new RobotForm({ run, connection, notifications });
 new Robots({ run, connection });
@@ -129,8 +183,20 @@ tabs = new Tabs((name) => {
   panelShown(name);
 });
 const buttons = new Buttons({ run, notifications });
-buttons.offer("mission", () => (run.session?.missions ?? []).map(({ name }) => ({ id: name, name, act: () => connection.request({ type: "start_mission", name }) })));
-buttons.offer("place", () => places.all.place.map(({ name }) => ({ id: name, name, act: () => connection.request({ type: "go_to_place", name }) })));
+buttons.offer("mission", () =>
+  (run.session?.missions ?? []).map(({ name }) => ({
+    id: name,
+    name,
+    act: () => connection.request({ type: "start_mission", name }),
+  })),
+);
+buttons.offer("place", () =>
+  places.all.place.map(({ name }) => ({
+    id: name,
+    name,
+    act: () => connection.request({ type: "go_to_place", name }),
+  })),
+);
 
 let instrumentsAsked = false;
 function drawInstruments() {
@@ -147,7 +213,6 @@ const instrumentsResized = new ResizeObserver(() => drawInstruments());
 for (const id of ["panel-cycle", "plot-lanes"]) instrumentsResized.observe(byId(id));
 watchSplitters(document.querySelector("main"));
 
-
 // Measure what covers the map, so that fitting keeps clear of it: a row takes height, a column width.
 function measureInsets() {
   const map = byId("map").getBoundingClientRect();
@@ -156,7 +221,8 @@ function measureInsets() {
     if (box.width > box.height) {
       if (box.top - map.top < map.bottom - box.bottom) insets.top = Math.max(insets.top, box.bottom - map.top + 10);
       else insets.bottom = Math.max(insets.bottom, map.bottom - box.top + 10);
-    } else if (box.left - map.left < map.right - box.right) insets.left = Math.max(insets.left, box.right - map.left + 16);
+    } else if (box.left - map.left < map.right - box.right)
+      insets.left = Math.max(insets.left, box.right - map.left + 16);
     else insets.right = Math.max(insets.right, map.right - box.left + 16);
   }
   view.insets = insets;
@@ -169,15 +235,19 @@ new ResizeObserver(() => {
 // The view.
 const fit = () => view.fit(extent(run));
 for (const [id, act] of Object.entries({
-  "zoom-in": () => view.zoom(1.25), "zoom-out": () => view.zoom(0.8), fit, follow: () => view.setFollow(!view.follow),
+  "zoom-in": () => view.zoom(1.25),
+  "zoom-out": () => view.zoom(0.8),
+  fit,
+  follow: () => view.setFollow(!view.follow),
   units: () => units.choose(units.name === "m" ? "ft" : "m"),
-})) byId(id).addEventListener("click", act);
+}))
+  byId(id).addEventListener("click", act);
 view.on("changed", redrawAll);
 view.on("follow", (on) => {
   setAttribute(byId("follow"), "aria-pressed", on);
   if (on) view.followTo(run.state.pose[0], run.state.pose[1]);
 });
-let unitsGiven = preferred("units", "");
+const unitsGiven = preferred("units", "");
 units.on("changed", () => {
   setText(byId("units"), units.name);
   setAttribute(byId("units"), "aria-label", `Units: ${units.word}`);
@@ -202,7 +272,9 @@ run.on("session", (session) => {
   redrawAll();
 });
 let fitted = false;
-let drawnVersion = -1, drawnSecond = -1, described_ms = -Infinity;
+let drawnVersion = -1,
+  drawnSecond = -1,
+  described_ms = -Infinity;
 run.on("state", (state) => {
   const now = performance.now();
   if (!view.touched && !(fitted && view.shows(extent(run)))) fitUntouched(fitted ? ROOM_M : 0);
@@ -227,7 +299,13 @@ function fitUntouched(room = 0) {
   fitted = true;
 }
 
-watchGrid({ layer: layers.find(({ id }) => id === "evidence_grid"), run, connection, notifications, changed: () => scene.invalidate("back") });
+watchGrid({
+  layer: layers.find(({ id }) => id === "evidence_grid"),
+  run,
+  connection,
+  notifications,
+  changed: () => scene.invalidate("back"),
+});
 connection.on("session", ({ history: past = null, ...session }) => {
   run.beginSession(session);
   if (past !== null) run.takeHistory(past);
@@ -240,11 +318,41 @@ connection.on("evidence", (message) => objects.showEvidence(message));
 connection.on("parameters", (message) => parameters.show(message.parameters));
 connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
-byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again. Undo brings segments, objects and walls back, and vacant areas stay."), [
-  ["Keep it", null],
-  ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
-]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, chosen, time, undo: () => (tools.current.id === "route" ? route : tools.current.id === "places" ? places_tool : tabs.shown === "tune" ? parameters : tabs.shown === "files" ? files : mapEdits).undo(), notifications, drivingByKeys: () => byId("teleop-keys").checked });
+byId("clear-map").addEventListener("click", () =>
+  notifications.confirm(
+    "Clear the map?",
+    el(
+      "p",
+      {},
+      "All segments, clusters and objects are deleted; recognition starts again. Undo brings segments, objects and walls back, and vacant areas stay.",
+    ),
+    [
+      ["Keep it", null],
+      ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
+    ],
+  ),
+);
+watchKeyboard({
+  drive: drive.panel,
+  tools,
+  view,
+  fit,
+  chosen,
+  time,
+  undo: () =>
+    (tools.current.id === "route"
+      ? route
+      : tools.current.id === "places"
+        ? places_tool
+        : tabs.shown === "tune"
+          ? parameters
+          : tabs.shown === "files"
+            ? files
+            : mapEdits
+    ).undo(),
+  notifications,
+  drivingByKeys: () => byId("teleop-keys").checked,
+});
 connection.connect();
 tabs.restore(preferred("tab", ""));
 new Beside({ tabs, shown: panelShown });

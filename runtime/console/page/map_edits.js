@@ -3,9 +3,14 @@
 import { byId, el, setText } from "./dom.js";
 
 const DONE = {
-  delete_segments: "The deleted segments are back", pin_segments: "The pins are as before", place_model: "The placed object is gone",
-  move_object: "The object is back where it was", confirm_object: "The object is not confirmed any more", reject_object: "The object is reported again",
-  lift_area: "The area is vacant again", clear_map: "Segments and objects are back; walls are recognised anew",
+  delete_segments: "The deleted segments are back",
+  pin_segments: "The pins are as before",
+  place_model: "The placed object is gone",
+  move_object: "The object is back where it was",
+  confirm_object: "The object is not confirmed any more",
+  reject_object: "The object is reported again",
+  lift_area: "The area is vacant again",
+  clear_map: "Segments and objects are back; walls are recognised anew",
 };
 const SETTLED_MS = 1500; // by then the readings have moved an object that was placed badly
 const STRAYED_M = 0.03;
@@ -17,8 +22,20 @@ export class MapEdits {
   constructor({ run, units, connection, notifications }) {
     Object.assign(this, { run, units, connection, notifications });
     byId("undo-edit").addEventListener("click", () => this.undo());
-    connection.on("waiting", (count) => notifications.banner("waiting", count === 0 ? null : `Paused: ${count} edit${count === 1 ? " of the map waits" : "s of the map wait"} for the next cycle.`,
-      { buttons: [["One cycle", () => this.#ask("single_step")], ["Resume", () => this.#ask("resume")]] }));
+    connection.on("waiting", (count) =>
+      notifications.banner(
+        "waiting",
+        count === 0
+          ? null
+          : `Paused: ${count} edit${count === 1 ? " of the map waits" : "s of the map wait"} for the next cycle.`,
+        {
+          buttons: [
+            ["One cycle", () => this.#ask("single_step")],
+            ["Resume", () => this.#ask("resume")],
+          ],
+        },
+      ),
+    );
     run.on("state", () => this.#refresh());
     units.on("changed", () => this.#refresh());
   }
@@ -28,7 +45,9 @@ export class MapEdits {
   }
 
   undo() {
-    return this.connection.request({ type: "undo_edit" }).then((kind) => this.notifications.toast(DONE[kind] ?? "The last edit is undone"), this.notifications.showError);
+    return this.connection
+      .request({ type: "undo_edit" })
+      .then((kind) => this.notifications.toast(DONE[kind] ?? "The last edit is undone"), this.notifications.showError);
   }
 
   // Moves an object, and says so if the readings have moved it away again.
@@ -43,7 +62,8 @@ export class MapEdits {
     this.timer = setTimeout(() => {
       const object = this.run.object(number);
       const off = object === null ? 0 : Math.hypot(object.x - x, object.y - y);
-      if (off > STRAYED_M) this.notifications.toast(`The readings put object ${number} ${this.units.length(off)} from where you moved it`);
+      if (off > STRAYED_M)
+        this.notifications.toast(`The readings put object ${number} ${this.units.length(off)} from where you moved it`);
     }, SETTLED_MS);
   }
 
@@ -55,11 +75,27 @@ export class MapEdits {
     this.#shown = shown;
     byId("areas-part").hidden = areas.length === 0;
     setText(byId("areas-count"), `${areas.length}`);
-    this.#list.replaceChildren(...areas.map(([number, x, y, radius]) => {
-      const lift = el("button", { type: "button", class: "control", "aria-label": `Lift area ${number}`,
-        onclick: () => this.connection.request({ type: "lift_area", area: number }).catch(this.notifications.showError) }, "Lift");
-      lift.disabled = !enabled;
-      return el("li", { class: "line" }, el("span", {}, `${number}  ${this.units.place(x, y)}, radius ${this.units.length(radius)}`), lift);
-    }));
+    this.#list.replaceChildren(
+      ...areas.map(([number, x, y, radius]) => {
+        const lift = el(
+          "button",
+          {
+            type: "button",
+            class: "control",
+            "aria-label": `Lift area ${number}`,
+            onclick: () =>
+              this.connection.request({ type: "lift_area", area: number }).catch(this.notifications.showError),
+          },
+          "Lift",
+        );
+        lift.disabled = !enabled;
+        return el(
+          "li",
+          { class: "line" },
+          el("span", {}, `${number}  ${this.units.place(x, y)}, radius ${this.units.length(radius)}`),
+          lift,
+        );
+      }),
+    );
   }
 }

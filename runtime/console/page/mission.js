@@ -9,12 +9,20 @@ export class MissionPanel {
 
   constructor({ run, units, connection, notifications }) {
     Object.assign(this, { run, units, connection, notifications });
-    byId("mission-start").addEventListener("click", () => this.#ask({ type: "start_mission", name: byId("mission-name").value }));
-    for (const [id, type] of [["mission-hold", "hold_mission"], ["mission-resume", "resume_mission"], ["mission-skip", "skip_step"]]) {
+    byId("mission-start").addEventListener("click", () =>
+      this.#ask({ type: "start_mission", name: byId("mission-name").value }),
+    );
+    for (const [id, type] of [
+      ["mission-hold", "hold_mission"],
+      ["mission-resume", "resume_mission"],
+      ["mission-skip", "skip_step"],
+    ]) {
       byId(id).addEventListener("click", () => this.#ask({ type }));
     }
     run.on("session", ({ missions = [] }) => {
-      byId("mission-name").replaceChildren(...missions.map(({ name, about }) => el("option", { value: name, title: about }, name)));
+      byId("mission-name").replaceChildren(
+        ...missions.map(({ name, about }) => el("option", { value: name, title: about }, name)),
+      );
     });
     run.on("state", () => this.#refresh());
   }
@@ -34,7 +42,12 @@ export class MissionPanel {
     const { name, status, steps } = mission;
     setText(byId("mission-title"), `${name}: ${status}`);
     setText(byId("mission-about"), mission.about);
-    setText(byId("mission-reason"), mission.reason ?? reason ?? `${mission.step_s.toFixed(0)} s and ${this.units.number(mission.way_m)} ${this.units.name} in this step`);
+    setText(
+      byId("mission-reason"),
+      mission.reason ??
+        reason ??
+        `${mission.step_s.toFixed(0)} s and ${this.units.number(mission.way_m)} ${this.units.name} in this step`,
+    );
     setAttribute(byId("mission-reason"), "data-status", status);
     const text = JSON.stringify(steps);
     if (text !== this.#shown) {
@@ -56,6 +69,11 @@ export class MissionPanel {
 
 function stepRow({ name, schemas, until }) {
   const lead = (go) => (go === "next" ? "next step" : go);
-  return el("li", {}, el("strong", {}, name), ` ${schemas.join(" + ").replaceAll("_", "-") || "stand"}`,
-    el("ul", {}, ...until.map(([when, go]) => el("li", {}, `${when} → ${lead(go)}`))));
+  return el(
+    "li",
+    {},
+    el("strong", {}, name),
+    ` ${schemas.join(" + ").replaceAll("_", "-") || "stand"}`,
+    el("ul", {}, ...until.map(([when, go]) => el("li", {}, `${when} → ${lead(go)}`))),
+  );
 }

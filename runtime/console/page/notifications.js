@@ -27,8 +27,12 @@ export class Notifications {
       return;
     }
     if (shown?.key === key) return;
-    const element = el("div", { class: bad ? "banner bad" : "banner", id: `banner-${name}`, role: "group", "aria-label": name },
-      el("span", {}, text), ...buttons.map(([label, act]) => el("button", { type: "button", onclick: act }, label)));
+    const element = el(
+      "div",
+      { class: bad ? "banner bad" : "banner", id: `banner-${name}`, role: "group", "aria-label": name },
+      el("span", {}, text),
+      ...buttons.map(([label, act]) => el("button", { type: "button", onclick: act }, label)),
+    );
     if (shown) shown.element.replaceWith(element);
     else this.#banners.append(element);
     this.#shown.set(name, { key, element });
@@ -54,9 +58,20 @@ export class Notifications {
     this.#before ??= document.activeElement;
     setText(byId("dialog-title"), title);
     byId("dialog-body").replaceChildren(body);
-    byId("dialog-buttons").replaceChildren(...buttons.map(([label, act]) => el("button", { type: "button", onclick: () => {
-      if (act?.() !== false) this.close();
-    } }, label)));
+    byId("dialog-buttons").replaceChildren(
+      ...buttons.map(([label, act]) =>
+        el(
+          "button",
+          {
+            type: "button",
+            onclick: () => {
+              if (act?.() !== false) this.close();
+            },
+          },
+          label,
+        ),
+      ),
+    );
     if (!this.#dialog.open) this.#dialog.show();
     byId("dialog-buttons").lastChild?.focus();
   }

@@ -23,4 +23,5 @@ export class Pace {
   }
 }
 
-export const paceText = (speed, reached) => `× ${speed}${reached === null ? "" : ` (this machine reaches × ${reached.toFixed(1)})`}`;
+export const paceText = (speed, reached) =>
+  `× ${speed}${reached === null ? "" : ` (this machine reaches × ${reached.toFixed(1)})`}`;

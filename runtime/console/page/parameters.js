@@ -1,4 +1,5 @@
-// The live settings: each is validated by the robot's process, and its error is shown beside its field. The schemas' gains
+// The live settings: each is validated by the robot's process, and its error is shown beside its field. The schemas'
+// gains
 // appear in the drive panel as well; both places show the same value.
 
 import { byId, download, el, setAttribute, setText } from "./dom.js";
@@ -20,9 +21,13 @@ export class Parameters {
   }
 
   #list(parameters) {
-    const typing = document.activeElement?.closest?.(".field") !== null && parameters.length > 0
-      && parameters.every(({ path }) => this.#fields.has(path)) && parameters.length === this.#fields.size;
-    if (typing) { // the same parameters again: another client may have changed a value, but text being typed is kept
+    const typing =
+      document.activeElement?.closest?.(".field") !== null &&
+      parameters.length > 0 &&
+      parameters.every(({ path }) => this.#fields.has(path)) &&
+      parameters.length === this.#fields.size;
+    if (typing) {
+      // the same parameters again: another client may have changed a value, but text being typed is kept
       this.show(parameters);
       return;
     }
@@ -30,12 +35,18 @@ export class Parameters {
     const sections = new Map();
     for (const parameter of parameters) {
       const section = parameter.path.split(".").slice(0, -1).join(".");
-      if (!sections.has(section)) sections.set(section, el("fieldset", {}, el("legend", {}, section.replaceAll("_", " ").replaceAll(".", " › "))));
+      if (!sections.has(section))
+        sections.set(
+          section,
+          el("fieldset", {}, el("legend", {}, section.replaceAll("_", " ").replaceAll(".", " › "))),
+        );
       sections.get(section).append(this.#field(parameter, "tune"));
     }
     byId("tune-fields").replaceChildren(...sections.values());
     const gains = parameters.filter(({ path }) => GAIN.test(path)).map((parameter) => this.#field(parameter, "gain"));
-    byId("drive-gains").replaceChildren(...(gains.length > 0 ? gains : [el("p", { class: "hint" }, "no gains to set")]));
+    byId("drive-gains").replaceChildren(
+      ...(gains.length > 0 ? gains : [el("p", { class: "hint" }, "no gains to set")]),
+    );
     this.#filter();
   }
 
@@ -43,16 +54,36 @@ export class Parameters {
     const { path, label, kind, choices, low, high, help } = parameter;
     const id = `${place}-${path.replaceAll(".", "-")}`;
     let input;
-    if (kind === "choice" || choices) input = el("select", { id }, ...(parameter.optional ? ["", ...choices] : choices).map((choice) => el("option", { value: String(choice) }, String(choice))));
+    if (kind === "choice" || choices)
+      input = el(
+        "select",
+        { id },
+        ...(parameter.optional ? ["", ...choices] : choices).map((choice) =>
+          el("option", { value: String(choice) }, String(choice)),
+        ),
+      );
     else if (kind === "bool") input = el("input", { id, type: "checkbox" });
-    else input = el("input", { id, type: "text", inputmode: kind === "float" ? "decimal" : kind === "int" ? "numeric" : null, autocomplete: "off", spellcheck: "false" });
+    else
+      input = el("input", {
+        id,
+        type: "text",
+        inputmode: kind === "float" ? "decimal" : kind === "int" ? "numeric" : null,
+        autocomplete: "off",
+        spellcheck: "false",
+      });
     input.className = "control";
     const error = el("output", { class: "error", id: `${id}-error`, for: id });
     const range = describeRange(low, high);
     const text = [help, range, parameter.optional ? "Empty: none." : ""].filter(Boolean).join(" ");
     setAttribute(input, "aria-describedby", `${id}-help ${id}-error`);
-    const element = el("div", { class: "field", "data-path": path }, el("label", { for: id }, label || path.split(".").at(-1).replaceAll("_", " ")),
-      input, error, el("span", { class: "help", id: `${id}-help` }, text));
+    const element = el(
+      "div",
+      { class: "field", "data-path": path },
+      el("label", { for: id }, label || path.split(".").at(-1).replaceAll("_", " ")),
+      input,
+      error,
+      el("span", { class: "help", id: `${id}-help` }, text),
+    );
     const field = { parameter, element, input, error };
     input.addEventListener("change", () => this.#set(field));
     input.addEventListener("keydown", (event) => {
@@ -84,7 +115,10 @@ export class Parameters {
   }
 
   async #set(field) {
-    const { parameter: { path, kind, optional = false }, input } = field;
+    const {
+      parameter: { path, kind, optional = false },
+      input,
+    } = field;
     const value = read(kind, input, optional);
     if (value === undefined) {
       this.#refuse(field, kind === "int" ? "a whole number is wanted" : "a number is wanted");
@@ -138,7 +172,7 @@ export class Parameters {
     let text;
     try {
       const data = await this.connection.request({ type: "save_toml" });
-      text = typeof data === "string" ? data : data?.toml ?? "";
+      text = typeof data === "string" ? data : (data?.toml ?? "");
     } catch (error) {
       this.notifications.showError(error);
       return;
@@ -152,7 +186,8 @@ export class Parameters {
   }
 
   async #loadModel() {
-    const input = byId("model-file"), error = byId("model-error");
+    const input = byId("model-file"),
+      error = byId("model-error");
     const [file] = input.files;
     if (!file) return;
     setText(error, "");

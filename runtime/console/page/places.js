@@ -11,8 +11,12 @@ const NONE = { frame: "odom", place: [], no_go_line: [], no_go_area: [], speed_a
 const degrees = (rad) => Math.round((rad * 180) / Math.PI) % 360;
 const millimetres = (value) => Math.round(value * 1000) / 1000;
 
-export const cornersOf = (kind, row) => (kind === "place" ? [[row.x_m, row.y_m]] : kind === "no_go_line" ? row.points_m : row.vertices_m);
-const withCorners = (kind, row, corners) => (kind === "place" ? { ...row, x_m: corners[0][0], y_m: corners[0][1] } : { ...row, [kind === "no_go_line" ? "points_m" : "vertices_m"]: corners });
+export const cornersOf = (kind, row) =>
+  kind === "place" ? [[row.x_m, row.y_m]] : kind === "no_go_line" ? row.points_m : row.vertices_m;
+const withCorners = (kind, row, corners) =>
+  kind === "place"
+    ? { ...row, x_m: corners[0][0], y_m: corners[0][1] }
+    : { ...row, [kind === "no_go_line" ? "points_m" : "vertices_m"]: corners };
 
 export class Places extends Emitter {
   all = NONE;
@@ -40,17 +44,26 @@ export class Places extends Emitter {
     const { localized } = this.run.state;
     if (this.all.frame === "odom") return [millimetres(x), millimetres(y), heading];
     if (localized?.status !== "tracking") {
-      this.notifications.toast("The robot does not know its place in the map, in which places lie: say where it is, or drive on");
+      this.notifications.toast(
+        "The robot does not know its place in the map, in which places lie: say where it is, or drive on",
+      );
       return null;
     }
-    const [x0, y0, turn] = localized.frame, c = Math.cos(turn), s = Math.sin(turn);
-    return [millimetres(c * (x - x0) + s * (y - y0)), millimetres(c * (y - y0) - s * (x - x0)), heading === null ? null : heading - turn];
+    const [x0, y0, turn] = localized.frame,
+      c = Math.cos(turn),
+      s = Math.sin(turn);
+    return [
+      millimetres(c * (x - x0) + s * (y - y0)),
+      millimetres(c * (y - y0) - s * (x - x0)),
+      heading === null ? null : heading - turn,
+    ];
   }
 
   // Adds what was drawn: corners in the frame of the places; a heading in radians for a place.
   add(kind, corners, heading = null) {
     const row = withCorners(kind, {}, corners);
-    if (kind === "place") Object.assign(row, { name: this.#freeName(), heading_deg: heading === null ? null : degrees(heading) });
+    if (kind === "place")
+      Object.assign(row, { name: this.#freeName(), heading_deg: heading === null ? null : degrees(heading) });
     else row.name = "";
     if (kind === "speed_area") row.speed_max_m_s = SPEED_M_S;
     return this.#change(kind, [...this.all[kind], row], this.all[kind].length);
@@ -62,11 +75,19 @@ export class Places extends Emitter {
   }
 
   set(kind, i, row) {
-    return this.#change(kind, this.all[kind].map((one, k) => (k === i ? row : one)), i);
+    return this.#change(
+      kind,
+      this.all[kind].map((one, k) => (k === i ? row : one)),
+      i,
+    );
   }
 
   remove(kind, i) {
-    return this.#change(kind, this.all[kind].filter((_, k) => k !== i), null);
+    return this.#change(
+      kind,
+      this.all[kind].filter((_, k) => k !== i),
+      null,
+    );
   }
 
   select(selected) {

@@ -45,7 +45,8 @@ export function linePath(points, x, y, isAngle) {
   const path = new Path2D();
   let before = null;
   for (const [t, value] of points) {
-    const broken = before === null || value === null || t - before[0] > GAP_S || (isAngle && Math.abs(value - before[1]) > 180);
+    const broken =
+      before === null || value === null || t - before[0] > GAP_S || (isAngle && Math.abs(value - before[1]) > 180);
     if (value !== null && broken) path.moveTo(x(t), y(value));
     else if (value !== null) path.lineTo(x(t), y(value));
     before = value === null ? null : [t, value];
@@ -55,13 +56,21 @@ export function linePath(points, x, y, isAngle) {
 
 // A little more than the values take; a constant has room around it.
 export function bounds(values) {
-  const low = Math.min(...values), high = Math.max(...values);
+  const low = Math.min(...values),
+    high = Math.max(...values);
   if (values.length === 0) return [0, 1];
   return high > low ? [low - 0.04 * (high - low), high + 0.04 * (high - low)] : [low - 0.5, high + 0.5];
 }
 
 export function digits(value) {
   const size = Math.abs(value);
-  const text = size >= 1000 ? value.toFixed(0) : size >= 100 ? value.toFixed(1) : size >= 1 || size === 0 ? value.toFixed(2) : value.toPrecision(2);
+  const text =
+    size >= 1000
+      ? value.toFixed(0)
+      : size >= 100
+        ? value.toFixed(1)
+        : size >= 1 || size === 0
+          ? value.toFixed(2)
+          : value.toPrecision(2);
   return (Number(text) === 0 ? "0" : text).replace("-", "−");
 }

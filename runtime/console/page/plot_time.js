@@ -1,4 +1,5 @@
-// The time axis that all plots share: it follows the newest frame until it is zoomed or moved, by wheel, pointer or buttons.
+// The time axis that all plots share: it follows the newest frame until it is zoomed or moved, by wheel, pointer or
+// buttons.
 
 const LEAST_S = 0.5;
 const MOST_S = 1800;
@@ -42,16 +43,21 @@ export class PlotTime {
     this.changed();
   }
 
-  // Zooms by wheel and moves by drag; `span` returns what is shown, `left` is where the axis begins, px. A press without a
+  // Zooms by wheel and moves by drag; `span` returns what is shown, `left` is where the axis begins, px. A press
+  // without a
   // drag is left to others.
   watch(canvas, span, left) {
     const perPixel = () => (({ from, to }) => (to - from) / Math.max(1, canvas.clientWidth - left))(span());
     let held = null;
-    canvas.addEventListener("wheel", (event) => {
-      if (!event.deltaY) return;
-      event.preventDefault();
-      this.zoom(span(), Math.exp(event.deltaY * WHEEL), span().from + (event.offsetX - left) * perPixel());
-    }, { passive: false });
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        if (!event.deltaY) return;
+        event.preventDefault();
+        this.zoom(span(), Math.exp(event.deltaY * WHEEL), span().from + (event.offsetX - left) * perPixel());
+      },
+      { passive: false },
+    );
     canvas.addEventListener("pointerdown", (event) => {
       held = { x: event.clientX };
       canvas.setPointerCapture(event.pointerId);
@@ -61,7 +67,10 @@ export class PlotTime {
       this.pan(span(), (held.x - event.clientX) * perPixel());
       held.x = event.clientX;
     });
-    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(name, () => { held = null; });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
+      canvas.addEventListener(name, () => {
+        held = null;
+      });
     canvas.addEventListener("dblclick", () => this.follow());
   }
 }

@@ -1,4 +1,5 @@
-// The plot panel: any number of a frame over time, live and in playback: a lane for each field, or for two with an axis each.
+// The plot panel: any number of a frame over time, live and in playback: a lane for each field, or for two with an axis
+// each.
 // All lanes share a time axis. Reading a lane at a time: pointer or slider.
 
 import { byId, download, el, setAttribute, setText } from "./dom.js";
@@ -34,9 +35,16 @@ export class Plots {
     this.at.addEventListener("input", () => this.draw());
     byId("plot-filter").addEventListener("input", () => this.#list());
     byId("plot-save").addEventListener("click", () => this.#save());
-    const acts = { "plot-in": () => this.#time.zoom(this.#span, 0.5), "plot-out": () => this.#time.zoom(this.#span, 2), "plot-earlier": () => this.#move(-0.25), "plot-later": () => this.#move(0.25), "plot-follow": () => this.#time.follow() };
+    const acts = {
+      "plot-in": () => this.#time.zoom(this.#span, 0.5),
+      "plot-out": () => this.#time.zoom(this.#span, 2),
+      "plot-earlier": () => this.#move(-0.25),
+      "plot-later": () => this.#move(0.25),
+      "plot-follow": () => this.#time.follow(),
+    };
     for (const [id, act] of Object.entries(acts)) byId(id).addEventListener("click", act);
-    for (const lane of preferred("plot fields", ["twist.v", "ranges.0"])) if (typeof lane === "string") this.#addLane(...lane.split(SECOND));
+    for (const lane of preferred("plot fields", ["twist.v", "ranges.0"]))
+      if (typeof lane === "string") this.#addLane(...lane.split(SECOND));
     run.on("session", () => run.watchesRecording && this.#history.clear());
     run.on("history", (samples) => {
       for (const sample of samples) this.#history.add(sample.robot_s, sample);
@@ -49,7 +57,8 @@ export class Plots {
     if (state === this.#last) return; // a report of the robot beside a recording
     const before = this.#last;
     const isOther = before !== null && (state.playback === null) !== (before.playback === null);
-    if (isOther || (state.playback === null && before !== null && state.robot_s < before.robot_s)) this.#history.clear();
+    if (isOther || (state.playback === null && before !== null && state.robot_s < before.robot_s))
+      this.#history.clear();
     this.#last = state;
     const walls = state.objects.filter(isWall).length;
     const counts = { segments: this.run.segments.size, objects: state.objects.length - walls, walls };
@@ -65,15 +74,23 @@ export class Plots {
   #list() {
     const newest = this.#history.samples.at(-1)?.frame ?? {};
     const wanted = byId("plot-filter").value.trim().toLowerCase();
-    const paths = [...new Set([...this.#fields, ...numericFields(newest)])].filter((path) => wanted === "" || `${fieldName(path)} ${path}`.toLowerCase().includes(wanted));
+    const paths = [...new Set([...this.#fields, ...numericFields(newest)])].filter(
+      (path) => wanted === "" || `${fieldName(path)} ${path}`.toLowerCase().includes(wanted),
+    );
     const names = paths.join();
     if (names === this.#listed.names) return;
     this.#listed.names = names;
-    byId("plot-fields").replaceChildren(...paths.map((path) => {
-      const box = el("input", { type: "checkbox", "data-path": path, onchange: () => this.#choose(path, box.checked) });
-      box.checked = this.#fields.includes(path);
-      return el("li", {}, el("label", {}, box, fieldName(path)));
-    }));
+    byId("plot-fields").replaceChildren(
+      ...paths.map((path) => {
+        const box = el("input", {
+          type: "checkbox",
+          "data-path": path,
+          onchange: () => this.#choose(path, box.checked),
+        });
+        box.checked = this.#fields.includes(path);
+        return el("li", {}, el("label", {}, box, fieldName(path)));
+      }),
+    );
     byId("plot-none").hidden = paths.length > 0;
   }
 
@@ -93,7 +110,10 @@ export class Plots {
   }
 
   #keep() {
-    prefer("plot fields", [...this.#lanes].map(([path, { second }]) => (second === null ? path : `${path}${SECOND}${second}`)));
+    prefer(
+      "plot fields",
+      [...this.#lanes].map(([path, { second }]) => (second === null ? path : `${path}${SECOND}${second}`)),
+    );
     for (const [path, lane] of this.#lanes) this.#offerCombinations(path, lane);
     this.draw();
   }
@@ -101,11 +121,35 @@ export class Plots {
   #addLane(path, second = null) {
     if (this.#fields.includes(path)) return;
     if (this.#lanes.size >= LANES_MAX) this.#remove(this.#lanes.keys().next().value);
-    const value = el("b"), canvas = el("canvas", { role: "img", "aria-label": fieldName(path) }), name = el("span", {}, fieldName(path));
-    const combine = el("select", { class: "combine", "aria-label": `Combine ${fieldName(path)}`, title: "A second axis, the rate, or a difference", onchange: () => this.#combine(path, combine.value) });
-    const remove = el("button", { type: "button", class: "small", "aria-label": `Remove ${fieldName(path)}`, onclick: () => this.#choose(path, false) }, "✕");
-    const element = el("figure", { class: "lane", "data-path": path }, el("figcaption", {}, name, value, combine, remove), canvas);
-    canvas.addEventListener("pointermove", (event) => event.buttons === 0 && this.#readAt((event.offsetX - LEFT) / (canvas.clientWidth - this.#margins)));
+    const value = el("b"),
+      canvas = el("canvas", { role: "img", "aria-label": fieldName(path) }),
+      name = el("span", {}, fieldName(path));
+    const combine = el("select", {
+      class: "combine",
+      "aria-label": `Combine ${fieldName(path)}`,
+      title: "A second axis, the rate, or a difference",
+      onchange: () => this.#combine(path, combine.value),
+    });
+    const remove = el(
+      "button",
+      {
+        type: "button",
+        class: "small",
+        "aria-label": `Remove ${fieldName(path)}`,
+        onclick: () => this.#choose(path, false),
+      },
+      "✕",
+    );
+    const element = el(
+      "figure",
+      { class: "lane", "data-path": path },
+      el("figcaption", {}, name, value, combine, remove),
+      canvas,
+    );
+    canvas.addEventListener(
+      "pointermove",
+      (event) => event.buttons === 0 && this.#readAt((event.offsetX - LEFT) / (canvas.clientWidth - this.#margins)),
+    );
     canvas.addEventListener("pointerleave", () => this.#readAt(1));
     this.#time.watch(canvas, () => this.#span, LEFT);
     byId("plot-lanes").append(element);
@@ -117,9 +161,17 @@ export class Plots {
 
   // What a lane can be combined with: the fields of the other lanes.
   #offerCombinations(path, { combine, second }) {
-    const others = [...this.#lanes].filter(([other, lane]) => other !== path && lane.second === null).map(([other]) => other);
-    const options = [["", "combine…"], ["rate", "its rate"], ...(second === null ? others.map((one) => [`axis ${one}`, `${fieldName(one)} on the right`]) : [["apart", `${fieldName(second)} apart`]]),
-      ...others.map((one) => [`minus ${one}`, `minus ${fieldName(one)}`])];
+    const others = [...this.#lanes]
+      .filter(([other, lane]) => other !== path && lane.second === null)
+      .map(([other]) => other);
+    const options = [
+      ["", "combine…"],
+      ["rate", "its rate"],
+      ...(second === null
+        ? others.map((one) => [`axis ${one}`, `${fieldName(one)} on the right`])
+        : [["apart", `${fieldName(second)} apart`]]),
+      ...others.map((one) => [`minus ${one}`, `minus ${fieldName(one)}`]),
+    ];
     combine.replaceChildren(...options.map(([value, text]) => el("option", { value }, text)));
   }
 
@@ -179,7 +231,8 @@ export class Plots {
 
   draw() {
     if (!this.shown()) return;
-    const span = this.#span, share = Number(this.at.value) / Number(this.at.max);
+    const span = this.#span,
+      share = Number(this.at.value) / Number(this.at.max);
     const read = share >= 1 ? span.now : span.from + share * (span.to - span.from);
     const back = read - span.now;
     const words = back === 0 ? "now" : `${Math.abs(back).toFixed(1)} s ${back < 0 ? "before" : "after"}`;
@@ -196,16 +249,23 @@ export class Plots {
   }
 
   #drawLane(path, { canvas, value, second }, span, read, margins) {
-    const { from, to, now } = span, { ctx, width, height } = fitted(canvas);
+    const { from, to, now } = span,
+      { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
     const x = (t) => LEFT + ((t - from) / (to - from)) * (width - margins);
     timeAxis(ctx, this.theme, span, x, height);
     const curves = [[path, this.theme.accent, []], ...(second === null ? [] : [[second, this.theme.segment, [5, 3]]])];
     const words = curves.map(([of, colour, dash], i) => {
-      const points = this.#points(of, span), { name, isAngle } = shownAs(of, this.units);
+      const points = this.#points(of, span),
+        { name, isAngle } = shownAs(of, this.units);
       const known = points.filter(([, one]) => one !== null).map(([, one]) => one);
-      const [low, high] = bounds(known), y = (one) => height - FOOT - 4 - ((one - low) / (high - low)) * (height - FOOT - 12);
-      valueAxis(ctx, this.theme, y, known.length > 0 ? [low, (low + high) / 2, high] : [], { right: i === 1, width: width - margins + LEFT, colour });
+      const [low, high] = bounds(known),
+        y = (one) => height - FOOT - 4 - ((one - low) / (high - low)) * (height - FOOT - 12);
+      valueAxis(ctx, this.theme, y, known.length > 0 ? [low, (low + high) / 2, high] : [], {
+        right: i === 1,
+        width: width - margins + LEFT,
+        colour,
+      });
       ctx.strokeStyle = colour;
       ctx.lineWidth = 1.6;
       ctx.lineJoin = "round";
@@ -217,9 +277,16 @@ export class Plots {
       ctx.stroke(linePath(points, x, y, isAngle));
       ctx.restore();
       ctx.setLineDash([]);
-      const at = points.reduce((best, point) => (best === null || Math.abs(point[0] - read) < Math.abs(best[0] - read) ? point : best), null);
-      const range = known.length > 0 ? `${digits(Math.min(...known))} to ${digits(Math.max(...known))} ${name}` : "no value";
-      return { read: at === null || at[1] === null ? "none" : `${digits(at[1])} ${name}`.trim(), range: `${fieldName(of)}: ${range}` };
+      const at = points.reduce(
+        (best, point) => (best === null || Math.abs(point[0] - read) < Math.abs(best[0] - read) ? point : best),
+        null,
+      );
+      const range =
+        known.length > 0 ? `${digits(Math.min(...known))} to ${digits(Math.max(...known))} ${name}` : "no value";
+      return {
+        read: at === null || at[1] === null ? "none" : `${digits(at[1])} ${name}`.trim(),
+        range: `${fieldName(of)}: ${range}`,
+      };
     });
     setText(value, words.map((one) => one.read).join(", "));
     ctx.strokeStyle = this.theme.ink;
@@ -233,14 +300,22 @@ export class Plots {
       ctx.stroke();
     }
     ctx.setLineDash([]);
-    setAttribute(canvas, "aria-label", `${words.map(({ range }) => range).join("; ")} in ${Number((to - from).toFixed(to - from < 10 ? 1 : 0))} s`);
+    setAttribute(
+      canvas,
+      "aria-label",
+      `${words.map(({ range }) => range).join("; ")} in ${Number((to - from).toFixed(to - from < 10 ? 1 : 0))} s`,
+    );
   }
 
   // What the lanes show as a table: a row a frame, SI units as on the wire.
   #save() {
-    const { from, to } = this.#span, paths = this.#fields;
+    const { from, to } = this.#span,
+      paths = this.#fields;
     const columns = paths.map((path) => seriesOf(this.#history, path, from, to));
     const rows = (columns[0] ?? []).map(([t], i) => [t, ...columns.map((column) => column[i][1] ?? "")].join());
-    download("echolocate-plot.csv", new Blob([[["robot_s", ...paths].join(), ...rows, ""].join("\n")], { type: "text/csv" }));
+    download(
+      "echolocate-plot.csv",
+      new Blob([[["robot_s", ...paths].join(), ...rows, ""].join("\n")], { type: "text/csv" }),
+    );
   }
 }

@@ -10,7 +10,8 @@ export function watchPointers(canvas, view, tool) {
 
   const spot = (event) => {
     const box = canvas.getBoundingClientRect();
-    const sx = event.clientX - box.left, sy = event.clientY - box.top;
+    const sx = event.clientX - box.left,
+      sy = event.clientY - box.top;
     const [x, y] = view.toWorld(sx, sy);
     return { sx, sy, x, y, shift: event.shiftKey, touch: event.pointerType === "touch" };
   };
@@ -68,10 +69,14 @@ export function watchPointers(canvas, view, tool) {
   canvas.addEventListener("pointercancel", (event) => up(event, true));
   canvas.addEventListener("pointerleave", () => tool().leave?.());
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    const at = spot(event);
-    const pixels = event.deltaMode === 1 ? 30 * event.deltaY : event.deltaY;
-    view.zoom(Math.exp(-Math.max(-400, Math.min(400, pixels)) * WHEEL), at.sx, at.sy);
-  }, { passive: false });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const at = spot(event);
+      const pixels = event.deltaMode === 1 ? 30 * event.deltaY : event.deltaY;
+      view.zoom(Math.exp(-Math.max(-400, Math.min(400, pixels)) * WHEEL), at.sx, at.sy);
+    },
+    { passive: false },
+  );
 }

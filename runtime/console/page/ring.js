@@ -20,12 +20,15 @@ export class Ring {
   draw() {
     const canvas = this.#canvas;
     if (canvas.clientWidth === 0) return;
-    const run = this.#run, theme = this.#theme, ring = run.session?.ring;
+    const run = this.#run,
+      theme = this.#theme,
+      ring = run.session?.ring;
     const { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
     if (!ring || !run.fresh) return;
     const { ranges, age, firing, sensors, pose } = run.state;
-    const cx = width / 2, cy = height / 2;
+    const cx = width / 2,
+      cy = height / 2;
     const rim = Math.min(width, height) / 2 - 15;
     // What is near matters most: along a radius goes the square root of the range.
     const reach = (range) => rim * Math.sqrt(Math.min(1, Math.max(0, range) / ring.range_max));
@@ -35,12 +38,19 @@ export class Ring {
 
     ctx.strokeStyle = theme.line;
     ctx.lineWidth = 1;
-    for (const range of [1, 3, 10, 30].map((step) => step * this.#units.metres).filter((step) => step < ring.range_max).concat(ring.range_max)) {
+    for (const range of [1, 3, 10, 30]
+      .map((step) => step * this.#units.metres)
+      .filter((step) => step < ring.range_max)
+      .concat(ring.range_max)) {
       ctx.beginPath();
       ctx.arc(cx, cy, reach(range), 0, 2 * Math.PI);
       ctx.stroke();
     }
-    const fresh = new Path2D(), old = new Path2D(), firesNow = new Path2D(), silent = new Path2D(), crosses = new Path2D();
+    const fresh = new Path2D(),
+      old = new Path2D(),
+      firesNow = new Path2D(),
+      silent = new Path2D(),
+      crosses = new Path2D();
     let nearest = null;
     ctx.font = theme.font(9.5, 600);
     ctx.textAlign = "center";
@@ -54,7 +64,8 @@ export class Ring {
         firesNow.closePath();
       }
       if (faulty.has(index)) {
-        const x = cx + 0.88 * rim * Math.cos(at), y = cy + 0.88 * rim * Math.sin(at);
+        const x = cx + 0.88 * rim * Math.cos(at),
+          y = cy + 0.88 * rim * Math.sin(at);
         crosses.moveTo(x - 4, y - 4);
         crosses.lineTo(x + 4, y + 4);
         crosses.moveTo(x - 4, y + 4);
@@ -98,7 +109,13 @@ export class Ring {
     this.#heading(ctx, cx, cy, -pose[2]);
     const text = [];
     if (nearest !== null) text.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
-    if (sensors.length > 0) text.push(`not trusted: ${sensors.slice(0, 3).map(([index, fault]) => `${index} (${fault})`).join(", ")}${sensors.length > 3 ? "…" : ""}`);
+    if (sensors.length > 0)
+      text.push(
+        `not trusted: ${sensors
+          .slice(0, 3)
+          .map(([index, fault]) => `${index} (${fault})`)
+          .join(", ")}${sensors.length > 3 ? "…" : ""}`,
+      );
     setText(this.#text, text.join("; ") || "nothing heard");
   }
 
@@ -111,7 +128,8 @@ export class Ring {
     for (const step of [3, 10]) {
       const range = step * this.#units.metres;
       if (range >= range_max) continue;
-      const x = cx + reach(range) * 0.53, y = cy + reach(range) * 0.85;
+      const x = cx + reach(range) * 0.53,
+        y = cy + reach(range) * 0.85;
       ctx.strokeText(`${step} ${this.#units.name}`, x, y);
       ctx.fillText(`${step} ${this.#units.name}`, x, y);
     }

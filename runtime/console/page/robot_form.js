@@ -2,7 +2,21 @@
 
 import { byId, download, el, setText, svg } from "./dom.js";
 
-const FIELDS = ["name", "driver", "count", "radius_m", "beam_half_angle_deg", "resolution_m", "range_min_m", "range_max_m", "preset", "step_period_s", "body_radius_m", "speed_max_m_s", "turn_max_rad_s"];
+const FIELDS = [
+  "name",
+  "driver",
+  "count",
+  "radius_m",
+  "beam_half_angle_deg",
+  "resolution_m",
+  "range_min_m",
+  "range_max_m",
+  "preset",
+  "step_period_s",
+  "body_radius_m",
+  "speed_max_m_s",
+  "turn_max_rad_s",
+];
 const TEXTS = new Set(["name", "driver", "preset"]);
 const SENSORS_MAX = 255; // config.robot.SENSORS_MAX
 const input = (field) => byId(`new-${field.replaceAll("_", "-")}`);
@@ -20,14 +34,17 @@ export class RobotForm {
     form.addEventListener("submit", (event) => this.#save(event));
     byId("robot-each").addEventListener("change", () => this.#each());
     byId("robot-this").addEventListener("click", () => this.#ofRun());
-    byId("robot-add").addEventListener("click", () => this.#change([...this.#sensors, [...(this.#sensors.at(-1) ?? [0.1, 0, 0])]]));
+    byId("robot-add").addEventListener("click", () =>
+      this.#change([...this.#sensors, [...(this.#sensors.at(-1) ?? [0.1, 0, 0])]]),
+    );
     this.draw();
   }
 
   // x, y (m) and direction (rad) of each sensor as the form has it now.
   mounts() {
     if (this.#sensors !== null) return this.#sensors.map(([x, y, turn]) => [x, y, (turn * Math.PI) / 180]);
-    const count = Math.min(SENSORS_MAX, Math.max(0, Math.floor(number("count")) || 0)), radius = number("radius_m") || 0;
+    const count = Math.min(SENSORS_MAX, Math.max(0, Math.floor(number("count")) || 0)),
+      radius = number("radius_m") || 0;
     return Array.from({ length: count }, (_, i) => {
       const angle = (2 * Math.PI * i) / count;
       return [radius * Math.cos(angle), radius * Math.sin(angle), angle];
@@ -36,26 +53,48 @@ export class RobotForm {
 
   // The mounting from above, the front to the right as on the map: body, sensors with their beams and numbers.
   draw() {
-    const mounts = this.mounts(), body = Math.max(0.01, number("body_radius_m") || 0.01);
-    const reach = Math.max(body, ...mounts.map(([x, y]) => Math.hypot(x, y))), beam = 0.45 * reach, size = 1.25 * (reach + beam);
+    const mounts = this.mounts(),
+      body = Math.max(0.01, number("body_radius_m") || 0.01);
+    const reach = Math.max(body, ...mounts.map(([x, y]) => Math.hypot(x, y))),
+      beam = 0.45 * reach,
+      size = 1.25 * (reach + beam);
     const half = (Math.min(89, Math.max(0.1, number("beam_half_angle_deg") || 0.1)) * Math.PI) / 180;
     const at = (x, y, angle, far) => `${round(x + far * Math.cos(angle))},${round(-(y + far * Math.sin(angle)))}`;
     const text = Math.min(0.09, 2.2 / Math.max(1, mounts.length)) * size;
     const sensor = ([x, y, angle], i) => {
-      const name = svg("text", { x: x + 1.18 * beam * Math.cos(angle), y: -(y + 1.18 * beam * Math.sin(angle)), "font-size": text, "text-anchor": "middle", "dominant-baseline": "central", class: "mark" });
+      const name = svg("text", {
+        x: x + 1.18 * beam * Math.cos(angle),
+        y: -(y + 1.18 * beam * Math.sin(angle)),
+        "font-size": text,
+        "text-anchor": "middle",
+        "dominant-baseline": "central",
+        class: "mark",
+      });
       name.textContent = String(i);
       return [
-        svg("path", { d: `M${at(x, y, 0, 0)} L${at(x, y, angle - half, beam)} A${beam},${beam} 0 0 0 ${at(x, y, angle + half, beam)}Z`, class: "beam", "stroke-width": 0.005 * size }),
-        svg("circle", { cx: x, cy: -y, r: 0.014 * size, class: "mark" }), name,
+        svg("path", {
+          d: `M${at(x, y, 0, 0)} L${at(x, y, angle - half, beam)} A${beam},${beam} 0 0 0 ${at(x, y, angle + half, beam)}Z`,
+          class: "beam",
+          "stroke-width": 0.005 * size,
+        }),
+        svg("circle", { cx: x, cy: -y, r: 0.014 * size, class: "mark" }),
+        name,
       ];
     };
     const view = byId("robot-picture");
     view.setAttribute("viewBox", `${-size} ${-size} ${2 * size} ${2 * size}`);
-    view.setAttribute("aria-label", `The ring from above, its front to the right: ${mounts.length} sensor${mounts.length === 1 ? "" : "s"}`);
+    view.setAttribute(
+      "aria-label",
+      `The ring from above, its front to the right: ${mounts.length} sensor${mounts.length === 1 ? "" : "s"}`,
+    );
     view.replaceChildren(
       svg("circle", { cx: 0, cy: 0, r: body, class: "body", "stroke-width": 0.012 * size }),
-      svg("polygon", { points: `${0.55 * body},0 ${-0.3 * body},${0.3 * body} ${-0.12 * body},0 ${-0.3 * body},${-0.3 * body}`, class: "front" }),
-      ...mounts.flatMap(sensor));
+      svg("polygon", {
+        points: `${0.55 * body},0 ${-0.3 * body},${0.3 * body} ${-0.12 * body},0 ${-0.3 * body},${-0.3 * body}`,
+        class: "front",
+      }),
+      ...mounts.flatMap(sensor),
+    );
   }
 
   #change(sensors) {
@@ -72,33 +111,71 @@ export class RobotForm {
   }
 
   #row(sensor, i) {
-    const value = (k, name) => el("input", { class: "number", inputmode: "decimal", autocomplete: "off", value: String(sensor[k]), "aria-label": `${name} of sensor ${i}`,
-      oninput: (event) => {
-        sensor[k] = Number(event.target.value.replace("−", "-").replace(",", ".")) || 0;
-      } });
-    return el("li", {}, el("span", {}, String(i)), value(0, "x (m)"), value(1, "y (m)"), value(2, "direction (degrees)"),
-      el("button", { type: "button", class: "small", "aria-label": `Remove sensor ${i}`, onclick: () => this.#change(this.#sensors.filter((_, k) => k !== i)) }, "✕"));
+    const value = (k, name) =>
+      el("input", {
+        class: "number",
+        inputmode: "decimal",
+        autocomplete: "off",
+        value: String(sensor[k]),
+        "aria-label": `${name} of sensor ${i}`,
+        oninput: (event) => {
+          sensor[k] = Number(event.target.value.replace("−", "-").replace(",", ".")) || 0;
+        },
+      });
+    return el(
+      "li",
+      {},
+      el("span", {}, String(i)),
+      value(0, "x (m)"),
+      value(1, "y (m)"),
+      value(2, "direction (degrees)"),
+      el(
+        "button",
+        {
+          type: "button",
+          class: "small",
+          "aria-label": `Remove sensor ${i}`,
+          onclick: () => this.#change(this.#sensors.filter((_, k) => k !== i)),
+        },
+        "✕",
+      ),
+    );
   }
 
   // From the regular ring to its sensors one by one, and back.
   #each() {
-    this.#change(byId("robot-each").checked ? this.mounts().map(([x, y, angle]) => [round(x), round(y), degrees(angle)]) : null);
+    this.#change(
+      byId("robot-each").checked ? this.mounts().map(([x, y, angle]) => [round(x), round(y), degrees(angle)]) : null,
+    );
   }
 
   // Begins with the robot of this run.
   #ofRun() {
     const { name, ring, body } = this.run.session;
-    const given = { name: name ?? "", beam_half_angle_deg: degrees(ring.half_angle), range_min_m: ring.range_min, range_max_m: ring.range_max,
-      body_radius_m: body.radius, speed_max_m_s: body.speed_max, turn_max_rad_s: body.turn_max };
+    const given = {
+      name: name ?? "",
+      beam_half_angle_deg: degrees(ring.half_angle),
+      range_min_m: ring.range_min,
+      range_max_m: ring.range_max,
+      body_radius_m: body.radius,
+      speed_max_m_s: body.speed_max,
+      turn_max_rad_s: body.turn_max,
+    };
     for (const [field, value] of Object.entries(given)) input(field).value = String(value);
     this.#change(ring.mounts.map(([x, y, angle]) => [round(x), round(y), degrees(angle)]));
   }
 
   async #save(event) {
     event.preventDefault();
-    const isOwn = this.#sensors !== null, shape = isOwn ? { count: null, radius_m: null } : {};
-    const asked = Object.fromEntries(FIELDS.map((field) => [field, TEXTS.has(field) ? input(field).value.trim() : number(field)]));
-    const wrong = FIELDS.find((field) => !TEXTS.has(field) && !(field in shape) && (input(field).value.trim() === "" || !Number.isFinite(asked[field])));
+    const isOwn = this.#sensors !== null,
+      shape = isOwn ? { count: null, radius_m: null } : {};
+    const asked = Object.fromEntries(
+      FIELDS.map((field) => [field, TEXTS.has(field) ? input(field).value.trim() : number(field)]),
+    );
+    const wrong = FIELDS.find(
+      (field) =>
+        !TEXTS.has(field) && !(field in shape) && (input(field).value.trim() === "" || !Number.isFinite(asked[field])),
+    );
     if (wrong) {
       setText(byId("robot-error"), `${input(wrong).labels[0].firstChild.textContent.trim()}: a number is wanted`);
       input(wrong).focus();
@@ -106,7 +183,13 @@ export class RobotForm {
     }
     asked.count = Math.floor(asked.count);
     try {
-      const toml = await this.connection.request({ type: "robot_file", ...asked, sensors: this.#sensors, ...shape, synchro: byId("robot-synchro").checked });
+      const toml = await this.connection.request({
+        type: "robot_file",
+        ...asked,
+        sensors: this.#sensors,
+        ...shape,
+        synchro: byId("robot-synchro").checked,
+      });
       setText(byId("robot-error"), "");
       const file = `${(asked.name || "my-robot").toLowerCase().replace(/[^a-z0-9_-]+/g, "-")}.toml`;
       download(file, new Blob([toml], { type: "application/toml" }));

@@ -57,7 +57,8 @@ export class Route extends Emitter {
   // Adds a waypoint of the plane at the end; heading in radians, null for any.
   add(x, y, heading) {
     if (this.waypoints.length === 0) this.frame = this.run.state.localized?.status === "tracking" ? "map" : "odom";
-    if (this.waypoints.length >= WAYPOINTS_MAX) return this.notifications.toast(`A route has at most ${WAYPOINTS_MAX} waypoints`);
+    if (this.waypoints.length >= WAYPOINTS_MAX)
+      return this.notifications.toast(`A route has at most ${WAYPOINTS_MAX} waypoints`);
     const there = this.#ofPlane(x, y, heading);
     return there && this.#change([...this.waypoints, there], this.waypoints.length);
   }
@@ -69,12 +70,16 @@ export class Route extends Emitter {
 
   // Gives a waypoint its final heading in the plane, radians; null for any.
   turn(i, heading) {
-    const [x, y] = this.waypoints[i], frame = this.frame === "map" ? this.run.state.localized?.frame[2] ?? 0 : 0;
+    const [x, y] = this.waypoints[i],
+      frame = this.frame === "map" ? (this.run.state.localized?.frame[2] ?? 0) : 0;
     return this.set(i, [x, y, heading === null ? null : degrees(heading - frame)]);
   }
 
   set(i, waypoint) {
-    return this.#change(this.waypoints.map((one, k) => (k === i ? waypoint : one)), i);
+    return this.#change(
+      this.waypoints.map((one, k) => (k === i ? waypoint : one)),
+      i,
+    );
   }
 
   remove(i) {
@@ -96,7 +101,11 @@ export class Route extends Emitter {
   }
 
   load(waypoints, frame) {
-    return this.#change(waypoints.map((one) => [...one]), null, frame);
+    return this.#change(
+      waypoints.map((one) => [...one]),
+      null,
+      frame,
+    );
   }
 
   undo() {
@@ -121,16 +130,26 @@ export class Route extends Emitter {
     const { localized } = this.run.state;
     if (this.frame === "odom") return [x, y, heading === null ? null : degrees(heading)];
     if (!localized) {
-      this.notifications.toast("The robot does not know its place in the map, and the route's waypoints are places there");
+      this.notifications.toast(
+        "The robot does not know its place in the map, and the route's waypoints are places there",
+      );
       return null;
     }
-    const [x0, y0, turn] = localized.frame, c = Math.cos(turn), s = Math.sin(turn);
-    return [c * (x - x0) + s * (y - y0), c * (y - y0) - s * (x - x0), heading === null ? null : degrees(heading - turn)];
+    const [x0, y0, turn] = localized.frame,
+      c = Math.cos(turn),
+      s = Math.sin(turn);
+    return [
+      c * (x - x0) + s * (y - y0),
+      c * (y - y0) - s * (x - x0),
+      heading === null ? null : degrees(heading - turn),
+    ];
   }
 
   #change(waypoints, selected, frame = this.frame) {
     if (this.isDriven && !same(waypoints.slice(0, this.behind), this.waypoints.slice(0, this.behind))) {
-      return this.notifications.toast("The robot is past this waypoint: change the ones ahead of it, or HALT and drive another route");
+      return this.notifications.toast(
+        "The robot is past this waypoint: change the ones ahead of it, or HALT and drive another route",
+      );
     }
     this.#history = [...this.#history, { waypoints: this.waypoints, frame: this.frame }].slice(-HISTORY);
     [this.waypoints, this.frame] = [waypoints, frame];

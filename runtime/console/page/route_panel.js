@@ -21,9 +21,19 @@ export class RoutePanel {
   }
 
   #refresh() {
-    const { route, units } = this, { behind, isDriven, waypoints, selected } = route;
+    const { route, units } = this,
+      { behind, isDriven, waypoints, selected } = route;
     const enabled = this.run.state.controller && !this.run.watchesRecording;
-    const shown = JSON.stringify([waypoints, route.frame, selected, behind, isDriven, units.name, enabled, route.canUndo]);
+    const shown = JSON.stringify([
+      waypoints,
+      route.frame,
+      selected,
+      behind,
+      isDriven,
+      units.name,
+      enabled,
+      route.canUndo,
+    ]);
     if (shown === this.#shown) return;
     this.#shown = shown;
     const focused = document.activeElement?.id;
@@ -37,37 +47,77 @@ export class RoutePanel {
     if (selected !== null && selected >= behind) {
       const [x, y, heading] = waypoints[selected];
       setText(byId("route-form-number"), `Waypoint ${selected + 1}`);
-      for (const [id, value] of [["x", units.number(x)], ["y", units.number(y)], ["heading", heading === null ? "" : String(heading)]]) byId(`route-${id}`).value = value;
+      for (const [id, value] of [
+        ["x", units.number(x)],
+        ["y", units.number(y)],
+        ["heading", heading === null ? "" : String(heading)],
+      ])
+        byId(`route-${id}`).value = value;
       setText(byId("route-unit"), units.name);
     }
     if (focused && document.activeElement?.id !== focused) byId(focused)?.focus();
   }
 
   #row([x, y, heading], i, enabled) {
-    const { route, units } = this, number = i + 1, isBehind = i < route.behind;
+    const { route, units } = this,
+      number = i + 1,
+      isBehind = i < route.behind;
     const button = (name, sign, act, off) => {
-      const made = el("button", { type: "button", class: "small", id: `route-${name.replace(" ", "-").toLowerCase()}-${i}`, "aria-label": `${name} waypoint ${number}`, title: name, onclick: act }, sign);
+      const made = el(
+        "button",
+        {
+          type: "button",
+          class: "small",
+          id: `route-${name.replace(" ", "-").toLowerCase()}-${i}`,
+          "aria-label": `${name} waypoint ${number}`,
+          title: name,
+          onclick: act,
+        },
+        sign,
+      );
       made.disabled = !enabled || isBehind || off;
       return made;
     };
-    const name = el("button", { type: "button", class: "place", id: `route-row-${i}`, "aria-pressed": String(route.selected === i), onclick: () => route.select(route.selected === i ? null : i) },
-      el("strong", {}, String(number)), ` ${units.place(x, y)}${heading === null ? "" : `, ${heading}°`}`);
+    const name = el(
+      "button",
+      {
+        type: "button",
+        class: "place",
+        id: `route-row-${i}`,
+        "aria-pressed": String(route.selected === i),
+        onclick: () => route.select(route.selected === i ? null : i),
+      },
+      el("strong", {}, String(number)),
+      ` ${units.place(x, y)}${heading === null ? "" : `, ${heading}°`}`,
+    );
     name.disabled = isBehind;
-    return el("li", {}, name, button("Earlier", "↑", () => route.reorder(i, -1), i <= route.behind), button("Later", "↓", () => route.reorder(i, 1), i === route.waypoints.length - 1), button("Remove", "✕", () => route.remove(i), false));
+    return el(
+      "li",
+      {},
+      name,
+      button("Earlier", "↑", () => route.reorder(i, -1), i <= route.behind),
+      button("Later", "↓", () => route.reorder(i, 1), i === route.waypoints.length - 1),
+      button("Remove", "✕", () => route.remove(i), false),
+    );
   }
 
   #set(event) {
     event.preventDefault();
     const [x, y] = ["route-x", "route-y"].map((id) => this.units.parse(byId(id).value));
-    const given = byId("route-heading").value.trim(), heading = given === "" ? null : Number(given.replace("−", "-"));
+    const given = byId("route-heading").value.trim(),
+      heading = given === "" ? null : Number(given.replace("−", "-"));
     const isWrong = x === null || y === null || (heading !== null && !(Math.abs(heading) <= 360));
-    setText(byId("route-error"), isWrong ? "two numbers are wanted, and a heading from -360 to 360 degrees or none" : "");
+    setText(
+      byId("route-error"),
+      isWrong ? "two numbers are wanted, and a heading from -360 to 360 degrees or none" : "",
+    );
     if (!isWrong) this.route.set(this.route.selected, [x, y, heading]);
   }
 
   async #save(event) {
     event.preventDefault();
-    const { waypoints, frame } = this.route, name = byId("route-name").value.trim() || "my-route";
+    const { waypoints, frame } = this.route,
+      name = byId("route-name").value.trim() || "my-route";
     try {
       const toml = await this.connection.request({ type: "save_route", name, waypoints, frame });
       download(`${name}.toml`, new Blob([toml], { type: "application/toml" }));
@@ -91,7 +141,10 @@ export class RoutePanel {
       } else {
         this.notifications.confirm(`Start the mission ${name}?`, el("p", {}, about || "It is more than a route."), [
           ["Leave it", null],
-          ["Start it", () => void this.connection.request({ type: "run_mission", toml }).catch(this.notifications.showError)],
+          [
+            "Start it",
+            () => void this.connection.request({ type: "run_mission", toml }).catch(this.notifications.showError),
+          ],
         ]);
       }
     } catch (error) {

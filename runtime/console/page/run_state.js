@@ -12,10 +12,45 @@ const CROSS_PATH_AGE_MAX_S = 1;
 const CHART_MAX = 600;
 
 const EMPTY = {
-  cycle: 0, robot_s: 0, mode: "no data", reason: null, hold_reason: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
-  ranges: [], age: [], cross_paths: [], clusters: [], objects: [], areas: [], canyons: [], vectors: [], drive_request: null, valley: null, phases: {}, cycle_us: 0, late_us: 0,
-  waiting: 0, localized: null, missed: null, late: null, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
-  recording: null, paused: false, speed: 1, playback: null,
+  cycle: 0,
+  robot_s: 0,
+  mode: "no data",
+  reason: null,
+  hold_reason: null,
+  arming: false,
+  pose: [0, 0, 0],
+  ring_yaw: 0,
+  twist: [0, 0],
+  flags: [],
+  firing: [],
+  ranges: [],
+  age: [],
+  cross_paths: [],
+  clusters: [],
+  objects: [],
+  areas: [],
+  canyons: [],
+  vectors: [],
+  drive_request: null,
+  valley: null,
+  phases: {},
+  cycle_us: 0,
+  late_us: 0,
+  waiting: 0,
+  localized: null,
+  missed: null,
+  late: null,
+  quanta: 0,
+  refinement: "",
+  link: null,
+  sensors: [],
+  dropped: 0,
+  clients: 0,
+  controller: false,
+  recording: null,
+  paused: false,
+  speed: 1,
+  playback: null,
 };
 
 // What a frame says of the robot itself. While a recording is shown, messages of their own bring it.
@@ -50,7 +85,8 @@ export class RunState extends Emitter {
 
   // What the run was before the page was opened: its trail, and samples for the plots.
   takeHistory({ trail, samples }) {
-    const before = trail.map(([x, y, t]) => ({ x, y, t })), last_s = before.at(-1)?.t ?? -Infinity;
+    const before = trail.map(([x, y, t]) => ({ x, y, t })),
+      last_s = before.at(-1)?.t ?? -Infinity;
     this.trail = [...before, ...this.trail.filter(({ t }) => t > last_s)];
     this.trailVersion++;
     this.emit("history", samples);
@@ -78,7 +114,8 @@ export class RunState extends Emitter {
     const mount = this.session?.ring?.mounts?.[index];
     if (mount === undefined) return null;
     const yaw = this.#turns(index) ? heading : ringYaw;
-    const c = Math.cos(yaw), s = Math.sin(yaw);
+    const c = Math.cos(yaw),
+      s = Math.sin(yaw);
     return { x: x + c * mount[0] - s * mount[1], y: y + s * mount[0] + c * mount[1], angle: yaw + mount[2] };
   }
 
@@ -95,10 +132,14 @@ export class RunState extends Emitter {
     const before = this.state;
     const state = { ...EMPTY, ...frame };
     const jumped = state.robot_s < before.robot_s - 1e-9 || (state.playback === null) !== (before.playback === null);
-    const switched = !this.fresh || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
+    const switched =
+      !this.fresh || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
     this.archived = frame.archived ?? this.archived;
-    state.objects = [...state.objects, ...this.archived].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // frames list them by score, which changes
-    for (const object of state.objects) object.hidden_by = hidingWall(state, object, this.radius(object))?.number ?? null;
+    state.objects = [...state.objects, ...this.archived].sort(
+      (a, b) => (a.number ?? Infinity) - (b.number ?? Infinity),
+    ); // frames list them by score, which changes
+    for (const object of state.objects)
+      object.hidden_by = hidingWall(state, object, this.radius(object))?.number ?? null;
     this.state = state;
     if (jumped) this.#forgetTime();
     this.#applySegments(frame.segments);
@@ -177,7 +218,8 @@ export class RunState extends Emitter {
     const newest = this.crossPaths.at(-1)?.t ?? -Infinity;
     for (const { robot_s: t, pose, paths } of firings.filter((firing) => firing.robot_s > newest)) {
       for (const [from, to, half] of paths) {
-        const transmitter = this.sensor(from, pose), listener = this.sensor(to, pose);
+        const transmitter = this.sensor(from, pose),
+          listener = this.sensor(to, pose);
         if (transmitter !== null && listener !== null) this.crossPaths.push({ transmitter, listener, half, t });
       }
     }
@@ -187,7 +229,10 @@ export class RunState extends Emitter {
   #applyChart({ phases, late_us, missed, late, cycle }, before, follows) {
     if (follows && cycle === before.cycle) return;
     this.chart.push({
-      phases, late_ms: late_us / 1000, missed: follows ? missed - before.missed : 0, late: follows ? late - before.late : 0,
+      phases,
+      late_ms: late_us / 1000,
+      missed: follows ? missed - before.missed : 0,
+      late: follows ? late - before.late : 0,
     });
     if (this.chart.length > CHART_MAX) this.chart.splice(0, this.chart.length - CHART_MAX);
   }

@@ -30,9 +30,9 @@ export class Scene {
     for (const [name, plane] of Object.entries(this.#planes)) {
       if (!plane.dirty) continue;
       plane.dirty = false;
-      const { ctx, width, height, ratio } = fitted(plane.canvas);
+      const { ctx, width, height } = fitted(plane.canvas);
       ctx.clearRect(0, 0, width, height);
-      this.paint(name, frame(ctx, ratio, this.shared));
+      this.paint(name, frame(ctx, this.shared));
     }
   }
 
@@ -47,15 +47,15 @@ export class Scene {
   }
 
   // Everything on one canvas of its own, for a screenshot.
-  picture(ctx, ratio) {
+  picture(ctx) {
     const { width, height } = this.shared.view;
     ctx.fillStyle = this.shared.theme.map;
     ctx.fillRect(0, 0, width, height);
-    for (const name of Object.keys(this.#planes)) this.paint(name, frame(ctx, ratio, this.shared));
+    for (const name of Object.keys(this.#planes)) this.paint(name, frame(ctx, this.shared));
   }
 }
 
-function frame(ctx, ratio, shared) {
+function frame(ctx, shared) {
   const { view } = shared;
   const base = ctx.getTransform();
   return {

@@ -1,4 +1,5 @@
-// The files of the run's settings: their text with what is wrong beside its lines, the difference, saving, and a restart.
+// The files of the run's settings: their text with what is wrong beside its lines, the difference, saving, and a
+// restart.
 
 import { byId, download, el, setText } from "./dom.js";
 
@@ -18,12 +19,21 @@ export class SettingsFiles {
     on("settings-open", () => void this.open());
     on("settings-close", () => this.#close());
     on("settings-save", () => void this.#save());
-    on("settings-copy", () => download(this.#rows[this.#at].name.split("/").at(-1), new Blob([byId("settings-text").value], { type: "application/toml" })));
+    on("settings-copy", () =>
+      download(
+        this.#rows[this.#at].name.split("/").at(-1),
+        new Blob([byId("settings-text").value], { type: "application/toml" }),
+      ),
+    );
     on("settings-restart", () => this.#restart());
-    byId("settings-file").addEventListener("change", () => this.#leave(() => void this.#show(Number(byId("settings-file").value))));
+    byId("settings-file").addEventListener("change", () =>
+      this.#leave(() => void this.#show(Number(byId("settings-file").value))),
+    );
     const text = byId("settings-text");
     text.addEventListener("input", () => this.#changed());
-    text.addEventListener("scroll", () => { byId("settings-lines").scrollTop = text.scrollTop; });
+    text.addEventListener("scroll", () => {
+      byId("settings-lines").scrollTop = text.scrollTop;
+    });
     byId("settings").addEventListener("keydown", (event) => event.key === "Escape" && this.#close());
     run.on("state", () => this.#refresh());
   }
@@ -35,9 +45,18 @@ export class SettingsFiles {
       this.notifications.showError(error);
       return;
     }
-    byId("settings-file").replaceChildren(...this.#rows.map(({ kind, name, shipped }, i) => el("option", { value: i }, `${kind}: ${name}${shipped ? " (comes with the program)" : ""}`)));
+    byId("settings-file").replaceChildren(
+      ...this.#rows.map(({ kind, name, shipped }, i) =>
+        el("option", { value: i }, `${kind}: ${name}${shipped ? " (comes with the program)" : ""}`),
+      ),
+    );
     if (!byId("settings").open) byId("settings").show();
-    await this.#show(Math.max(0, this.#rows.findIndex(({ shipped }) => !shipped)));
+    await this.#show(
+      Math.max(
+        0,
+        this.#rows.findIndex(({ shipped }) => !shipped),
+      ),
+    );
   }
 
   get #isChanged() {
@@ -60,7 +79,12 @@ export class SettingsFiles {
     text.value = this.#held.text;
     text.readOnly = this.#rows[this.#at].shipped;
     this.#list({ problems: [], warnings: [], difference: "" });
-    setText(byId("settings-state"), text.readOnly ? "It comes with the program and is not changed: download a copy, change that, and name it in the command." : "");
+    setText(
+      byId("settings-state"),
+      text.readOnly
+        ? "It comes with the program and is not changed: download a copy, change that, and name it in the command."
+        : "",
+    );
     this.#refresh();
   }
 
@@ -71,7 +95,14 @@ export class SettingsFiles {
       return;
     }
     byId("settings-file").value = String(this.#at);
-    this.notifications.confirm("Leave the change unsaved?", el("p", {}, `${this.#rows[this.#at].name} is changed and not saved.`), [["Go on changing it", null], ["Leave it unsaved", act]]);
+    this.notifications.confirm(
+      "Leave the change unsaved?",
+      el("p", {}, `${this.#rows[this.#at].name} is changed and not saved.`),
+      [
+        ["Go on changing it", null],
+        ["Leave it unsaved", act],
+      ],
+    );
   }
 
   #close() {
@@ -91,7 +122,8 @@ export class SettingsFiles {
   }
 
   async #check() {
-    const asked = ++this.#asked, toml = byId("settings-text").value;
+    const asked = ++this.#asked,
+      toml = byId("settings-text").value;
     try {
       const found = await this.connection.request({ type: "check_settings", file: this.#at, toml });
       if (asked !== this.#asked || toml !== byId("settings-text").value) return; // another check follows
@@ -106,22 +138,52 @@ export class SettingsFiles {
   #list({ problems, warnings, difference }) {
     this.#number(problems.map(({ line }) => line));
     byId("settings-problems").replaceChildren(
-      ...problems.map(({ line, text }) => el("li", { class: "bad" }, line === null ? text : el("button", { type: "button", class: "small", onclick: () => this.#goTo(line) }, `line ${line}: ${text}`))),
+      ...problems.map(({ line, text }) =>
+        el(
+          "li",
+          { class: "bad" },
+          line === null
+            ? text
+            : el(
+                "button",
+                { type: "button", class: "small", onclick: () => this.#goTo(line) },
+                `line ${line}: ${text}`,
+              ),
+        ),
+      ),
       ...warnings.map((text) => el("li", {}, text)),
     );
-    byId("settings-difference").replaceChildren(...difference.split("\n").filter(Boolean).map((line) => el("div", { class: /^\+(?!\+\+ )/.test(line) ? "added" : /^-(?!-- )/.test(line) ? "removed" : "" }, line)));
+    byId("settings-difference").replaceChildren(
+      ...difference
+        .split("\n")
+        .filter(Boolean)
+        .map((line) =>
+          el("div", { class: /^\+(?!\+\+ )/.test(line) ? "added" : /^-(?!-- )/.test(line) ? "removed" : "" }, line),
+        ),
+    );
     byId("settings-difference").hidden = difference === "";
-    if (this.#isChanged) setText(byId("settings-state"), problems.length > 0 ? `${problems.length === 1 ? "One problem" : `${problems.length} problems`}: it is not saved like this.` : "Good. The difference is below.");
+    if (this.#isChanged)
+      setText(
+        byId("settings-state"),
+        problems.length > 0
+          ? `${problems.length === 1 ? "One problem" : `${problems.length} problems`}: it is not saved like this.`
+          : "Good. The difference is below.",
+      );
   }
 
   #number(bad) {
     const count = byId("settings-text").value.split("\n").length;
-    byId("settings-lines").replaceChildren(...Array.from({ length: count }, (_, i) => (bad.includes(i + 1) ? el("b", { title: "there is a problem in this line" }, `✗ ${i + 1}\n`) : `${i + 1}\n`)));
+    byId("settings-lines").replaceChildren(
+      ...Array.from({ length: count }, (_, i) =>
+        bad.includes(i + 1) ? el("b", { title: "there is a problem in this line" }, `✗ ${i + 1}\n`) : `${i + 1}\n`,
+      ),
+    );
     byId("settings-lines").scrollTop = byId("settings-text").scrollTop;
   }
 
   #goTo(line) {
-    const text = byId("settings-text"), lines = text.value.split("\n");
+    const text = byId("settings-text"),
+      lines = text.value.split("\n");
     const from = lines.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
     text.focus();
     text.setSelectionRange(from, from + lines[line - 1].length);
@@ -132,12 +194,20 @@ export class SettingsFiles {
     const { controller } = this.run.state;
     byId("settings-save").disabled = !controller || !this.#isChanged || !this.#good;
     byId("settings-restart").disabled = !controller || this.run.robot?.mode === "DRIVE";
-    byId("settings-restart").title = this.run.robot?.mode === "DRIVE" ? "Disarm the robot first" : controller ? "" : "Ask for control first";
+    byId("settings-restart").title =
+      this.run.robot?.mode === "DRIVE" ? "Disarm the robot first" : controller ? "" : "Ask for control first";
   }
 
   async #save() {
     try {
-      this.#hold(await this.connection.request({ type: "save_settings", file: this.#at, toml: byId("settings-text").value, digest: this.#held.digest }));
+      this.#hold(
+        await this.connection.request({
+          type: "save_settings",
+          file: this.#at,
+          toml: byId("settings-text").value,
+          digest: this.#held.digest,
+        }),
+      );
       byId("settings-text").focus(); // the button that had the focus is disabled now
       setText(byId("settings-state"), "Saved. It counts once the run is started again.");
     } catch (error) {
@@ -146,12 +216,29 @@ export class SettingsFiles {
   }
 
   #restart() {
-    this.#leave(() => this.notifications.confirm("Start the run again?", el("p", {}, "The run ends and begins anew with the files as they are now; its map starts empty. A real robot stays disarmed. This page comes back by itself."), [
-      ["Go on with this run", null],
-      ["Start it again", () => void this.connection.request({ type: "restart_run" }).then(() => {
-        byId("settings").close();
-        this.notifications.toast("The run is starting again");
-      }, (error) => setText(byId("settings-state"), error.message))],
-    ]));
+    this.#leave(() =>
+      this.notifications.confirm(
+        "Start the run again?",
+        el(
+          "p",
+          {},
+          "The run ends and begins anew with the files as they are now; its map starts empty. A real robot stays disarmed. This page comes back by itself.",
+        ),
+        [
+          ["Go on with this run", null],
+          [
+            "Start it again",
+            () =>
+              void this.connection.request({ type: "restart_run" }).then(
+                () => {
+                  byId("settings").close();
+                  this.notifications.toast("The run is starting again");
+                },
+                (error) => setText(byId("settings-state"), error.message),
+              ),
+          ],
+        ],
+      ),
+    );
   }
 }

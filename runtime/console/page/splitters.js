@@ -19,7 +19,8 @@ export function watchSplitters(main) {
 }
 
 function watch(main, { id, property, across, of, grows, least, rest }) {
-  const handle = byId(id), side = byId(of);
+  const handle = byId(id),
+    side = byId(of);
   const size = (element) => (across ? element.getBoundingClientRect().width : element.getBoundingClientRect().height);
   const most = () => Math.max(least, size(main) - rest);
   const put = (px) => {
@@ -46,7 +47,10 @@ function watch(main, { id, property, across, of, grows, least, rest }) {
     from = { at: at(event), size: size(side) };
   });
   handle.addEventListener("pointermove", (event) => from && put(from.size + grows * (at(event) - from.at)));
-  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) handle.addEventListener(name, () => { from = null; });
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
+    handle.addEventListener(name, () => {
+      from = null;
+    });
   handle.addEventListener("dblclick", () => put(0));
   handle.addEventListener("keydown", (event) => {
     const by = { [across ? "ArrowRight" : "ArrowDown"]: 1, [across ? "ArrowLeft" : "ArrowUp"]: -1 }[event.key];

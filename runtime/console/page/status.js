@@ -26,15 +26,24 @@ export class Status {
 
   constructor({ run, units, connection, notifications, alerts, askForToken }) {
     this.askForToken = askForToken;
-    [this.#run, this.#units, this.#connection, this.#notifications, this.#alerts] = [run, units, connection, notifications, alerts];
+    [this.#run, this.#units, this.#connection, this.#notifications, this.#alerts] = [
+      run,
+      units,
+      connection,
+      notifications,
+      alerts,
+    ];
     alerts.on("changed", () => this.#show());
     run.on("session", (session) => {
       setText(byId("robot-name"), session.name || "echolocate");
       setAttribute(byId("robot-name"), "title", session.name || "echolocate"); // a long name is cut
       // The page's own files are those of the program that served it.
       this.#version ??= session.version;
-      notifications.banner("version", session.version === this.#version ? null : "The robot's program was replaced by another version.",
-        { buttons: [["Reload the page", () => location.reload()]] });
+      notifications.banner(
+        "version",
+        session.version === this.#version ? null : "The robot's program was replaced by another version.",
+        { buttons: [["Reload the page", () => location.reload()]] },
+      );
       this.#show();
     });
     run.on("state", () => {
@@ -50,7 +59,9 @@ export class Status {
     connection.on("closed", ({ opened }) => this.#lost(opened));
     setInterval(() => this.#age(), 200);
     const facts = byId("facts"); // on a phone they scroll sideways, by keys too
-    new ResizeObserver(() => (facts.scrollWidth > facts.clientWidth ? setAttribute(facts, "tabindex", 0) : facts.removeAttribute("tabindex"))).observe(facts);
+    new ResizeObserver(() =>
+      facts.scrollWidth > facts.clientWidth ? setAttribute(facts, "tabindex", 0) : facts.removeAttribute("tabindex"),
+    ).observe(facts);
   }
 
   get #isOld() {
@@ -59,17 +70,23 @@ export class Status {
 
   #show() {
     const { robot } = this.#run;
-    const old = this.#isOld, mode = robot.mode.replace("_", " ");
+    const old = this.#isOld,
+      mode = robot.mode.replace("_", " ");
     const special = old ? "NO DATA" : this.#run.watchesRecording ? "PLAYBACK" : robot.paused ? "PAUSED" : null;
-    const reason = old ? this.#trouble ?? "" : reasonOf(robot) ?? "";
-    const named = special === null || robot.mode === "no data" ? "" : old ? `the robot was in ${mode}` : `the robot: ${mode}`;
+    const reason = old ? (this.#trouble ?? "") : (reasonOf(robot) ?? "");
+    const named =
+      special === null || robot.mode === "no data" ? "" : old ? `the robot was in ${mode}` : `the robot: ${mode}`;
     setAttribute(byId("mode"), "data-mode", special === null ? robot.mode : special.replace(" ", "_"));
     setAttribute(byId("mode-icon"), "href", `#${special === null ? `m-${robot.mode.toLowerCase()}` : ICONS[special]}`);
     setText(byId("mode-name"), special ?? mode);
     setText(byId("mode-robot"), named);
     setText(byId("reason"), reason);
     document.body.classList.toggle("old", old);
-    setAttribute(byId("facts"), "aria-label", this.#run.watchesRecording ? "State in the recording" : "State of the run");
+    setAttribute(
+      byId("facts"),
+      "aria-label",
+      this.#run.watchesRecording ? "State in the recording" : "State of the run",
+    );
     if (old) fact("twist", "unknown");
     const warnings = this.#alerts.unseen > 0 ? `(${this.#alerts.unseen}) ` : "";
     const title = `${warnings}${special ?? mode} · ${this.#run.session?.name || "robot"} · echolocate`;
@@ -85,7 +102,8 @@ export class Status {
 
   // The bar has no room for the progress, which counts.
   #preparation(robot) {
-    const { mode } = robot, reason = reasonOf(robot);
+    const { mode } = robot,
+      reason = reasonOf(robot);
     const preparing = mode === "CONNECTING" && Boolean(reason?.startsWith("recognition is being prepared"));
     this.#notifications.banner("preparation", preparing ? "Recognition is being prepared." : null);
     this.#notifications.updateBanner("preparation", `The robot stands: ${reason}.`);
@@ -95,7 +113,10 @@ export class Status {
     const { twist, localized, flags, link, dropped, late, missed, controller } = this.#run.state;
     const { clients, recording } = this.#run.robot;
     const turn = Math.round((twist[1] * 180) / Math.PI);
-    fact("twist", `${this.#units.number(twist[0])} ${this.#units.name}/s ${turn < 0 ? "↻" : turn > 0 ? "↺" : ""} ${Math.abs(turn)}°/s`);
+    fact(
+      "twist",
+      `${this.#units.number(twist[0])} ${this.#units.name}/s ${turn < 0 ? "↻" : turn > 0 ? "↺" : ""} ${Math.abs(turn)}°/s`,
+    );
     byId("place").hidden = localized === null;
     if (localized !== null) fact("place", this.#place(localized), localized.status === "lost");
     if (link === null) fact("link", "not recorded");
@@ -106,7 +127,9 @@ export class Status {
     else fact("late", `${late} / ${missed}`, this.#hasGrown("late", late + missed));
     fact("clients", String(clients));
     fact("role", controller ? "control" : "watch");
-    const size = recording ? `${(recording.bytes / 1e6).toFixed(1)} MB${recording.dropped ? `, ${recording.dropped} lost` : ""}` : "off";
+    const size = recording
+      ? `${(recording.bytes / 1e6).toFixed(1)} MB${recording.dropped ? `, ${recording.dropped} lost` : ""}`
+      : "off";
     fact("recording", recording ? `● ${size}` : size, recording?.dropped > 0);
   }
 
@@ -161,7 +184,11 @@ export class Status {
     if (this.#connection.open) return;
     if (status === 401 || status === 403) {
       const why = this.#was_open ? "The run was started again with another token" : "The token is missing or wrong";
-      this.#notifications.banner("connection", `${why}: open the address that the run printed when it started, or enter its token.`, { bad: true, buttons: [["Enter the token", this.askForToken]] });
+      this.#notifications.banner(
+        "connection",
+        `${why}: open the address that the run printed when it started, or enter its token.`,
+        { bad: true, buttons: [["Enter the token", this.askForToken]] },
+      );
       this.#connection.retryLater();
       this.#trouble = "token missing or wrong";
       this.#show();

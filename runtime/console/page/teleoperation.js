@@ -1,5 +1,7 @@
-// Teleoperation with a deadman: sends a velocity at 20 Hz while a control is held, and zero as soon as it is released, the
-// page loses focus, is hidden or left, a pointer or gamepad disappears, or the network stalls. The robot's process stops
+// Teleoperation with a deadman: sends a velocity at 20 Hz while a control is held, and zero as soon as it is released,
+// the
+// page loses focus, is hidden or left, a pointer or gamepad disappears, or the network stalls. The robot's process
+// stops
 // by itself 250 ms after the last message; this code stops it sooner.
 
 import { Emitter } from "./emitter.js";
@@ -73,7 +75,8 @@ export class Teleoperation extends Emitter {
 
   velocity() {
     const { speed_max = 0, turn_max = 0 } = this.run.session?.body ?? {};
-    let v = 0, w = 0;
+    let v = 0,
+      w = 0;
     for (const held of this.#held.values()) {
       v += held.v;
       w += held.w;

@@ -1,9 +1,40 @@
 // The style sheet's colours for canvas drawing; read again when the colour scheme changes.
 
 const NAMES = [
-  "paper", "panel", "ink", "muted", "line", "edge", "accent", "map", "grid", "axis", "truth", "truth-fill", "echo", "cross", "segment", "occupied", "free",
-  "cluster", "model", "model-fill", "ellipse", "robot", "robot-fill", "vector", "chosen", "stop", "warning", "drive",
-  "phase-0", "phase-1", "phase-2", "phase-3", "phase-4", "phase-5",
+  "paper",
+  "panel",
+  "ink",
+  "muted",
+  "line",
+  "edge",
+  "accent",
+  "map",
+  "grid",
+  "axis",
+  "truth",
+  "truth-fill",
+  "echo",
+  "cross",
+  "segment",
+  "occupied",
+  "free",
+  "cluster",
+  "model",
+  "model-fill",
+  "ellipse",
+  "robot",
+  "robot-fill",
+  "vector",
+  "chosen",
+  "stop",
+  "warning",
+  "drive",
+  "phase-0",
+  "phase-1",
+  "phase-2",
+  "phase-3",
+  "phase-4",
+  "phase-5",
 ];
 
 export const FONT = '"Inter", system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
@@ -33,8 +64,10 @@ export class Theme {
 // Resizes a canvas to its displayed size in device pixels and returns its context, scaled to CSS pixels.
 export function fitted(canvas) {
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
-  const width = canvas.clientWidth, height = canvas.clientHeight;
-  const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
+  const width = canvas.clientWidth,
+    height = canvas.clientHeight;
+  const w = Math.max(1, Math.round(width * ratio)),
+    h = Math.max(1, Math.round(height * ratio));
   if (canvas.width !== w || canvas.height !== h) {
     canvas.width = w;
     canvas.height = h;

@@ -25,13 +25,20 @@ export class Time {
     on("record", () => this.#ask({ type: "record", on: run.robot.recording === null }));
     on("recordings-again", () => this.#list(notifications.showError));
     on("open", () => this.#open());
-    on("play", () => this.#ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
+    on("play", () =>
+      this.#ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }),
+    );
     on("play-step", () => this.#ask({ type: "step_recording", cycles: 1 }));
     on("play-back", () => this.#ask({ type: "step_recording", cycles: -1 }));
     on("live", () => this.#backToLive());
     on("screenshot", () => shoot());
-    byId("speed").addEventListener("change", (event) => this.#ask({ type: "set_speed", factor: Number(event.target.value) }));
-    byId("play-speed").addEventListener("change", (event) => this.#playing && this.#ask({ type: "play_recording", speed: Number(event.target.value) }));
+    byId("speed").addEventListener("change", (event) =>
+      this.#ask({ type: "set_speed", factor: Number(event.target.value) }),
+    );
+    byId("play-speed").addEventListener(
+      "change",
+      (event) => this.#playing && this.#ask({ type: "play_recording", speed: Number(event.target.value) }),
+    );
     byId("bookmark-form").addEventListener("submit", (event) => this.#bookmark(event));
     const scrub = byId("scrub");
     scrub.addEventListener("input", () => this.#scrub(Number(scrub.value)));
@@ -40,7 +47,9 @@ export class Time {
     connection.on("session", (session) => {
       if (this.#liveSession !== null) this.#liveSession = session;
     });
-    connection.on("opening", ({ share }) => this.notifications.updateBanner("opening", `Opening the recording: ${Math.round(100 * share)} %`));
+    connection.on("opening", ({ share }) =>
+      this.notifications.updateBanner("opening", `Opening the recording: ${Math.round(100 * share)} %`),
+    );
     connection.on("closed", () => this.#discard()); // a new connection shows the live run
   }
 
@@ -69,18 +78,29 @@ export class Time {
     const then = `in ${mode.replace("_", " ")}${reason ? ` (${reason})` : ""}`;
     const goes = emulated && playback === null && !paused ? speed : null;
     const reached = this.#pace.measure(robot_s, host_s, goes);
-    const played = this.#playPace.measure(playback?.s ?? 0, performance.now() / 1000, playback?.is_playing ? playback.speed : null);
+    const played = this.#playPace.measure(
+      playback?.s ?? 0,
+      performance.now() / 1000,
+      playback?.is_playing ? playback.speed : null,
+    );
     const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 || reached !== null ? `, ${paceText(speed, reached)}` : ""}`;
     const plays = playback?.is_playing ? `, ${paceText(playback.speed, played)}` : "";
-    setText(byId("time-text"), playback ? `Recording ${name(this.#file)}${plays}: ${at}, the robot then ${then}` : live);
+    setText(
+      byId("time-text"),
+      playback ? `Recording ${name(this.#file)}${plays}: ${at}, the robot then ${then}` : live,
+    );
     setText(byId("pause"), paused ? "Resume" : "Pause");
-    for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated || playback !== null;
+    for (const id of ["pause", "single-step", "speed"])
+      byId(id).disabled = !controller || !emulated || playback !== null;
     if (document.activeElement !== byId("speed")) choose(byId("speed"), String(speed));
     setAttribute(byId("record"), "aria-pressed", recording !== null);
     setText(byId("record-text"), recording ? `to ${name(recording.file)}` : "off");
     if (playback) this.#follow(playback);
-    this.notifications.banner("playback", playback ? `This is a recording, not the live run: ${name(this.#file)}` : null,
-      { buttons: [["Back to the live run", () => this.#backToLive()]] });
+    this.notifications.banner(
+      "playback",
+      playback ? `This is a recording, not the live run: ${name(this.#file)}` : null,
+      { buttons: [["Back to the live run", () => this.#backToLive()]] },
+    );
   }
 
   #follow({ s, is_playing: playing }) {
@@ -105,7 +125,8 @@ export class Time {
   }
 
   async #list(refused = () => {}) {
-    const chooser = byId("recordings"), chosen = chooser.value;
+    const chooser = byId("recordings"),
+      chosen = chooser.value;
     let list;
     try {
       list = await this.connection.request({ type: "list_recordings" });
@@ -113,10 +134,12 @@ export class Time {
       refused(error);
       return;
     }
-    chooser.replaceChildren(...(list ?? []).map(({ file, bytes = null, live = false }) => {
-      const size = bytes === null ? "" : `, ${(bytes / 1e6).toFixed(1)} MB`;
-      return el("option", { value: file }, live ? `this run, up to now` : `${name(file)}${size}`);
-    }));
+    chooser.replaceChildren(
+      ...(list ?? []).map(({ file, bytes = null, live = false }) => {
+        const size = bytes === null ? "" : `, ${(bytes / 1e6).toFixed(1)} MB`;
+        return el("option", { value: file }, live ? `this run, up to now` : `${name(file)}${size}`);
+      }),
+    );
     if ([...chooser.options].some(({ value }) => value === chosen)) chooser.value = chosen;
   }
 
@@ -147,11 +170,19 @@ export class Time {
     this.#file = file;
     byId("playback").hidden = false;
     byId("scrub").max = String(data?.duration_s ?? 1);
-    const places = [...(data?.bookmarks ?? []).map(([s, text]) => [s, `✎ ${text}`]),
-      ...(data?.modes ?? []).map(([s, mode, reason]) => [s, `${mode.replace("_", " ")}${reason ? `: ${reason}` : ""}`])];
-    byId("bookmarks").replaceChildren(...places.sort(([a], [b]) => a - b).map(([s, text]) =>
-      el("li", {}, el("button", { type: "button", onclick: () => this.#scrub(s) }, `${clock(s)}  ${text}`))));
-    if (data?.about) { // the recording may be of another robot with other models
+    const places = [
+      ...(data?.bookmarks ?? []).map(([s, text]) => [s, `✎ ${text}`]),
+      ...(data?.modes ?? []).map(([s, mode, reason]) => [s, `${mode.replace("_", " ")}${reason ? `: ${reason}` : ""}`]),
+    ];
+    byId("bookmarks").replaceChildren(
+      ...places
+        .sort(([a], [b]) => a - b)
+        .map(([s, text]) =>
+          el("li", {}, el("button", { type: "button", onclick: () => this.#scrub(s) }, `${clock(s)}  ${text}`)),
+        ),
+    );
+    if (data?.about) {
+      // the recording may be of another robot with other models
       this.#liveSession ??= this.run.session;
       this.run.beginSession({ ...this.#liveSession, ...data.about, parameters: this.#liveSession.parameters });
     }
@@ -176,7 +207,8 @@ export class Time {
 
   #bookmark(event) {
     event.preventDefault();
-    const input = byId("bookmark-text"), now = performance.now();
+    const input = byId("bookmark-text"),
+      now = performance.now();
     if (now - this.#marked_ms < DOUBLE_MS) return;
     this.#marked_ms = now;
     const text = input.value.trim() || `cycle ${this.run.state.cycle}`;
@@ -187,7 +219,10 @@ export class Time {
   }
 }
 
-const name = (file) => String(file ?? "").split("/").at(-1);
+const name = (file) =>
+  String(file ?? "")
+    .split("/")
+    .at(-1);
 
 function choose(select, value) {
   if ([...select.options].some((option) => option.value === value)) select.value = value;
@@ -195,13 +230,14 @@ function choose(select, value) {
 
 // Saves the map as a picture with a caption: robot, time, mode.
 export function screenshot({ scene, view, run, theme, units }) {
-  const ratio = 2, foot = 34;
+  const ratio = 2,
+    foot = 34;
   const canvas = el("canvas");
   canvas.width = view.width * ratio;
   canvas.height = (view.height + foot) * ratio;
   const ctx = canvas.getContext("2d");
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-  scene.picture(ctx, ratio);
+  scene.picture(ctx);
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   ctx.fillStyle = theme.panel;
   ctx.fillRect(0, view.height, view.width, foot);

@@ -16,8 +16,20 @@ export function takeToken(key = KEY) {
 
 // Shows a field for the token, or for the whole address that the run printed, and loads the page again with it.
 export function askForToken(notifications) {
-  const input = el("input", { id: "token-given", type: "text", size: 34, autocomplete: "off", spellcheck: "false", placeholder: "token, or the whole address" });
-  const form = el("form", { class: "row" }, el("label", {}, "Token ", input), el("button", { type: "submit", class: "primary" }, "Use it"));
+  const input = el("input", {
+    id: "token-given",
+    type: "text",
+    size: 34,
+    autocomplete: "off",
+    spellcheck: "false",
+    placeholder: "token, or the whole address",
+  });
+  const form = el(
+    "form",
+    { class: "row" },
+    el("label", {}, "Token ", input),
+    el("button", { type: "submit", class: "primary" }, "Use it"),
+  );
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const token = tokenIn(input.value);
@@ -25,7 +37,16 @@ export function askForToken(notifications) {
     sessionStorage.setItem(KEY, token);
     location.reload();
   });
-  notifications.confirm("The token of this run", el("div", {}, el("p", { class: "hint" }, "The run prints an address with it when it starts: http://…/?token=…"), form), [["Cancel", null]]);
+  notifications.confirm(
+    "The token of this run",
+    el(
+      "div",
+      {},
+      el("p", { class: "hint" }, "The run prints an address with it when it starts: http://…/?token=…"),
+      form,
+    ),
+    [["Cancel", null]],
+  );
   input.focus();
 }
 

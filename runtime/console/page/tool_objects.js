@@ -33,7 +33,10 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
     redraw();
   };
   return {
-    id: "move", sends: true, name: "Move and turn an object", icon: "i-move",
+    id: "move",
+    sends: true,
+    name: "Move and turn an object",
+    icon: "i-move",
     down(at) {
       const object = picked();
       if (object !== null) {
@@ -45,7 +48,10 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
       }
       const hit = standing(objectAt(run, view, at));
       selection.pick(hit?.number ?? null);
-      held = hit === null ? null : { pose: poseOf(hit), dx: hit.x - at.x, dy: hit.y - at.y, turning: false, model: hit.model, began: at };
+      held =
+        hit === null
+          ? null
+          : { pose: poseOf(hit), dx: hit.x - at.x, dy: hit.y - at.y, turning: false, model: hit.model, began: at };
       redraw();
     },
     move(at) {
@@ -69,7 +75,8 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
         return true;
       }
       if (object === null) return false;
-      const by = ARROWS[event.key], turn = { "[": TURN, "]": -TURN }[event.key];
+      const by = ARROWS[event.key],
+        turn = { "[": TURN, "]": -TURN }[event.key];
       if (!by && !turn) return false;
       const step = NUDGE_M * (event.shiftKey ? 10 : 1);
       const pose = poseOf(object);
@@ -99,11 +106,17 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
   // From odometry's frame, in which the page draws, to the map's.
   const inMap = ({ x, y, theta }) => {
     const [x0, y0, turn] = run.state.localized?.frame ?? [0, 0, 0];
-    const c = Math.cos(turn), s = Math.sin(turn), dx = x - x0, dy = y - y0;
+    const c = Math.cos(turn),
+      s = Math.sin(turn),
+      dx = x - x0,
+      dy = y - y0;
     return { x: c * dx + s * dy, y: c * dy - s * dx, theta: theta - turn };
   };
   return {
-    id: "here", sends: true, name: "Say where the robot is in the known room", icon: "i-here",
+    id: "here",
+    sends: true,
+    name: "Say where the robot is in the known room",
+    icon: "i-here",
     down(at) {
       pose = { x: at.x, y: at.y, theta: 0, dragged: false };
       redraw();
@@ -115,7 +128,8 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
     },
     up() {
       if (pose?.dragged) {
-        connection.request({ type: "place_robot", ...inMap(pose) })
+        connection
+          .request({ type: "place_robot", ...inMap(pose) })
           .then(() => notifications.toast("The next readings check this place"), notifications.showError);
         choose("pan");
       }
@@ -124,9 +138,13 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
     cancel: discard,
     draw(f) {
       if (pose === null) return;
-      const radius = run.session?.body?.radius ?? 0.2, reach = radius + ARM_PX * f.px;
+      const radius = run.session?.body?.radius ?? 0.2,
+        reach = radius + ARM_PX * f.px;
       const disc = { vertices: [], closed: true, arc_radius_m: radius };
-      drawPreview(f, disc, pose, { x: pose.x + reach * Math.cos(pose.theta), y: pose.y + reach * Math.sin(pose.theta) });
+      drawPreview(f, disc, pose, {
+        x: pose.x + reach * Math.cos(pose.theta),
+        y: pose.y + reach * Math.sin(pose.theta),
+      });
     },
   };
 }
@@ -141,14 +159,19 @@ export function placeTool({ run, view, connection, notifications, redraw }) {
     chooser.replaceChildren(...models.map(({ name }) => el("option", { value: name }, name)));
     if (models.some(({ name }) => name === chosen)) chooser.value = chosen;
   });
-  const put = ({ x, y, theta }) => connection.request({ type: "place_model", model: chooser.value, x, y, theta })
-    .then(() => notifications.toast(`${chooser.value} placed; it relaxes from there`), notifications.showError);
+  const put = ({ x, y, theta }) =>
+    connection
+      .request({ type: "place_model", model: chooser.value, x, y, theta })
+      .then(() => notifications.toast(`${chooser.value} placed; it relaxes from there`), notifications.showError);
   const discard = () => {
     pose = null;
     redraw();
   };
   return {
-    id: "place", sends: true, name: "Place a model", icon: "i-place",
+    id: "place",
+    sends: true,
+    name: "Place a model",
+    icon: "i-place",
     begin: () => {
       byId("placing").hidden = false;
     },
@@ -167,7 +190,8 @@ export function placeTool({ run, view, connection, notifications, redraw }) {
     },
     move(at) {
       if (!pose?.pressed) return;
-      if (Math.hypot(at.x - pose.x, at.y - pose.y) * view.scale > 10) pose.theta = Math.atan2(at.y - pose.y, at.x - pose.x);
+      if (Math.hypot(at.x - pose.x, at.y - pose.y) * view.scale > 10)
+        pose.theta = Math.atan2(at.y - pose.y, at.x - pose.x);
       redraw();
     },
     up() {

@@ -9,11 +9,19 @@ export function drawCross(f, { x, y }) {
   const [sx, sy] = f.view.toScreen(x, y);
   f.onScreen();
   ctx.save();
-  for (const [colour, width] of [[theme.map, 5], [theme.ink, 2]]) {
+  for (const [colour, width] of [
+    [theme.map, 5],
+    [theme.ink, 2],
+  ]) {
     ctx.strokeStyle = colour;
     ctx.lineWidth = width;
     ctx.beginPath();
-    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    for (const [dx, dy] of [
+      [1, 0],
+      [-1, 0],
+      [0, 1],
+      [0, -1],
+    ]) {
       ctx.moveTo(sx + 4 * dx, sy + 4 * dy);
       ctx.lineTo(sx + 14 * dx, sy + 14 * dy);
     }
@@ -80,18 +88,26 @@ export function drawPreview(f, model, pose, handle) {
 
 export function drawTape(f, from, to) {
   const { ctx, theme } = f;
-  const [ax, ay] = f.view.toScreen(from.x, from.y), [bx, by] = f.view.toScreen(to.x, to.y);
+  const [ax, ay] = f.view.toScreen(from.x, from.y),
+    [bx, by] = f.view.toScreen(to.x, to.y);
   const angle = Math.atan2(by - ay, bx - ax) + Math.PI / 2;
-  const dx = 7 * Math.cos(angle), dy = 7 * Math.sin(angle);
+  const dx = 7 * Math.cos(angle),
+    dy = 7 * Math.sin(angle);
   ctx.save();
   f.onScreen();
-  for (const [colour, width] of [[theme.map, 5], [theme.ink, 2]]) {
+  for (const [colour, width] of [
+    [theme.map, 5],
+    [theme.ink, 2],
+  ]) {
     ctx.strokeStyle = colour;
     ctx.lineWidth = width;
     ctx.beginPath();
     ctx.moveTo(ax, ay);
     ctx.lineTo(bx, by);
-    for (const [x, y] of [[ax, ay], [bx, by]]) {
+    for (const [x, y] of [
+      [ax, ay],
+      [bx, by],
+    ]) {
       ctx.moveTo(x - dx, y - dy);
       ctx.lineTo(x + dx, y + dy);
     }
@@ -106,6 +122,7 @@ export function drawTape(f, from, to) {
 }
 
 export function describeTape(units, from, to) {
-  const dx = to.x - from.x, dy = to.y - from.y;
+  const dx = to.x - from.x,
+    dy = to.y - from.y;
   return `${units.length(Math.hypot(dx, dy), 3)} at ${degrees(Math.atan2(dy, dx))}`;
 }

@@ -1,4 +1,5 @@
-// The places tool: clicks draw a place, a line or an area, corner by corner; a corner can be dragged elsewhere. A click on
+// The places tool: clicks draw a place, a line or an area, corner by corner; a corner can be dragged elsewhere. A click
+// on
 // the first corner of an area, or on the last one of a line, ends it, and so does Enter there.
 
 import { cornersOf, CORNERS_MIN, KINDS } from "./places.js";
@@ -10,8 +11,11 @@ const REACH_PX = 11;
 const TOUCH_PX = 22;
 
 export function placesTool({ places, view, redraw }) {
-  let kind = "place", draft = []; // corners in the frame of the places
-  let from = null, to = null, grip = null; // the corner that is dragged: [kind, index, corner]
+  let kind = "place",
+    draft = []; // corners in the frame of the places
+  let from = null,
+    to = null,
+    grip = null; // the corner that is dragged: [kind, index, corner]
 
   const screen = (corner) => {
     const at = places.inPlane(corner);
@@ -40,7 +44,10 @@ export function placesTool({ places, view, redraw }) {
   };
   const moved = () => from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4;
   const tool = {
-    id: "places", sends: true, name: "Places and no-go areas: click the corners, on the last one to end; drag a corner to move it", icon: "i-places",
+    id: "places",
+    sends: true,
+    name: "Places and no-go areas: click the corners, on the last one to end; drag a corner to move it",
+    icon: "i-places",
     get kind() {
       return kind;
     },

@@ -5,13 +5,17 @@ import { pressedHeading } from "./tool_route.js";
 
 // A click gives the place, a drag from it the final heading there.
 export function goalTool({ sendGoal, after, redraw }) {
-  let from = null, to = null;
+  let from = null,
+    to = null;
   const stop = () => {
     from = to = null;
     redraw();
   };
   return {
-    id: "goal", sends: true, name: "Drive to a goal; drag for the final heading", icon: "i-goal",
+    id: "goal",
+    sends: true,
+    name: "Drive to a goal; drag for the final heading",
+    icon: "i-goal",
     down(at) {
       from = to = at;
     },
@@ -31,11 +35,15 @@ export function goalTool({ sendGoal, after, redraw }) {
 }
 
 export function tapeTool({ units, announce, redraw }) {
-  let from = null, to = null, pulling = false;
+  let from = null,
+    to = null,
+    pulling = false;
 
   const tell = () => announce(`Tape: ${describeTape(units, from, to)}`);
   return {
-    id: "tape", name: "Measuring tape", icon: "i-tape",
+    id: "tape",
+    name: "Measuring tape",
+    icon: "i-tape",
     down(at) {
       if (from !== null && pulling) return; // the second of two clicks
       from = to = at;

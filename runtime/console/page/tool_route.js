@@ -13,11 +13,14 @@ const TURN_RAD = Math.PI / 12;
 
 // Presses and drags of tools that take a place and, by a drag from it, a direction.
 export function pressedHeading(from, to) {
-  return from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > DRAG_PX ? Math.atan2(to.y - from.y, to.x - from.x) : null;
+  return from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > DRAG_PX
+    ? Math.atan2(to.y - from.y, to.x - from.x)
+    : null;
 }
 
 export function routeTool({ route, view, redraw }) {
-  let from = null, to = null;
+  let from = null,
+    to = null;
   let grip = null; // the waypoint that is dragged: its index, and whether by the end of its heading
 
   const shown = (i) => {
@@ -33,7 +36,8 @@ export function routeTool({ route, view, redraw }) {
       if (dot === null) continue;
       if (Math.hypot(dot.sx - sx, dot.sy - sy) <= reach) return { i, turns: false };
       if (dot.heading === null) continue;
-      const ex = dot.sx + HEADING_PX * Math.cos(dot.heading), ey = dot.sy - HEADING_PX * Math.sin(dot.heading);
+      const ex = dot.sx + HEADING_PX * Math.cos(dot.heading),
+        ey = dot.sy - HEADING_PX * Math.sin(dot.heading);
       if (Math.hypot(ex - sx, ey - sy) <= reach) return { i, turns: true };
     }
     return null;
@@ -44,7 +48,10 @@ export function routeTool({ route, view, redraw }) {
   };
   const moved = () => from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4;
   return {
-    id: "route", sends: true, name: "Waypoints: click to add, drag for the final heading, drag one to move it", icon: "i-route",
+    id: "route",
+    sends: true,
+    name: "Waypoints: click to add, drag for the final heading, drag one to move it",
+    icon: "i-route",
     down(at) {
       from = to = at;
       grip = gripAt(at);
@@ -104,7 +111,8 @@ function drawRoute(f, route) {
     ctx.textBaseline = "middle";
     for (const [i, [x, y, heading]] of points.entries()) {
       if (heading !== null) {
-        const ex = x + HEADING_PX * Math.cos(heading), ey = y - HEADING_PX * Math.sin(heading);
+        const ex = x + HEADING_PX * Math.cos(heading),
+          ey = y - HEADING_PX * Math.sin(heading);
         ctx.lineWidth = 3;
         ctx.beginPath();
         ctx.moveTo(x, y);
@@ -127,7 +135,8 @@ function drawRoute(f, route) {
   }
   const chosen = points[route.selected];
   if (chosen !== undefined) {
-    const [x, y] = chosen, [px, py, turn] = route.waypoints[route.selected];
+    const [x, y] = chosen,
+      [px, py, turn] = route.waypoints[route.selected];
     ctx.lineWidth = 3;
     ctx.strokeStyle = theme.accent;
     ctx.beginPath();

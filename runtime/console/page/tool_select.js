@@ -10,18 +10,22 @@ const REACH_PX = 12;
 const TOUCH_PX = 22;
 
 export const panTool = (view) => ({
-  id: "pan", name: "Move the map", icon: "i-pan",
+  id: "pan",
+  name: "Move the map",
+  icon: "i-pan",
   move: (at, was) => view.pan(at.sx - was.sx, at.sy - was.sy),
 });
 
 // The object under a point: inside its outline's circle, or near its middle.
 export function objectAt(run, view, { x, y, touch }) {
-  let best = null, nearest = Infinity;
+  let best = null,
+    nearest = Infinity;
   for (const object of run.state.objects) {
     if (object.number === null || object.number === undefined) continue;
     const radius = run.model(object.model)?.arc_radius_m ?? 0;
     const away = isWall(object) ? distanceToLine(object.ends, x, y) : Math.hypot(object.x - x, object.y - y);
-    if (away < Math.max(radius, (touch ? TOUCH_PX : REACH_PX) / view.scale) && away < nearest) [best, nearest] = [object, away];
+    if (away < Math.max(radius, (touch ? TOUCH_PX : REACH_PX) / view.scale) && away < nearest)
+      [best, nearest] = [object, away];
   }
   return best;
 }
@@ -56,13 +60,17 @@ export function selectTool({ run, view, selection, redraw }) {
     redraw();
   };
   return {
-    id: "select", name: "Select segments and objects", icon: "i-select",
+    id: "select",
+    name: "Select segments and objects",
+    icon: "i-select",
     // Shows a segment's number and age beside the pointer.
     hover(at) {
       const segment = nearestSegment(run, at.x, at.y, REACH_PX / view.scale);
       tip.hidden = segment === null;
       if (segment === null) return;
-      const age = Number.isFinite(segment.t) ? `${Math.max(0, run.state.robot_s - segment.t).toFixed(1)} s old` : "of unknown age";
+      const age = Number.isFinite(segment.t)
+        ? `${Math.max(0, run.state.robot_s - segment.t).toFixed(1)} s old`
+        : "of unknown age";
       setText(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
       const left = at.sx + 220 > view.width ? at.sx - 190 : at.sx + 14;
       tip.style.transform = `translate(${left}px, ${Math.max(4, at.sy - 34)}px)`;
@@ -93,8 +101,16 @@ export function selectTool({ run, view, selection, redraw }) {
     press: (at) => click({ ...at, shift: true }),
     key(event) {
       if (event.key.toLowerCase() !== "a" || event.shiftKey) return false;
-      const [left, top] = view.toWorld(0, 0), [right, bottom] = view.toWorld(view.width, view.height);
-      selection.choose(within(run, [{ x: left, y: top }, { x: right, y: top }, { x: right, y: bottom }, { x: left, y: bottom }]));
+      const [left, top] = view.toWorld(0, 0),
+        [right, bottom] = view.toWorld(view.width, view.height);
+      selection.choose(
+        within(run, [
+          { x: left, y: top },
+          { x: right, y: top },
+          { x: right, y: bottom },
+          { x: left, y: bottom },
+        ]),
+      );
       return true;
     },
     none() {
@@ -110,10 +126,12 @@ export function selectTool({ run, view, selection, redraw }) {
 function within(run, polygon) {
   const found = [];
   for (const s of run.segments.values()) {
-    const x = (s.x1 + s.x2) / 2, y = (s.y1 + s.y2) / 2;
+    const x = (s.x1 + s.x2) / 2,
+      y = (s.y1 + s.y2) / 2;
     let inside = false;
     for (let i = 0, j = polygon.length - 1; i < polygon.length; j = i++) {
-      const a = polygon[i], b = polygon[j];
+      const a = polygon[i],
+        b = polygon[j];
       if (a.y > y !== b.y > y && x < ((b.x - a.x) * (y - a.y)) / (b.y - a.y) + a.x) inside = !inside;
     }
     if (inside) found.push(s.number);

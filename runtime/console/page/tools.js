@@ -17,8 +17,20 @@ export class Toolbox {
   constructor({ box, canvas, tools, view, redraw }) {
     Object.assign(this, { canvas, tools, view, redraw });
     tools.forEach((tool, index) => {
-      const button = el("button", { type: "button", role: "radio", id: `tool-${tool.id}`, title: `${tool.name} (${index + 1})`,
-        "aria-label": tool.name, "aria-keyshortcuts": String(index + 1), onclick: () => this.choose(tool.id) }, icon(tool.icon), el("kbd", { "aria-hidden": "true" }, String(index + 1)));
+      const button = el(
+        "button",
+        {
+          type: "button",
+          role: "radio",
+          id: `tool-${tool.id}`,
+          title: `${tool.name} (${index + 1})`,
+          "aria-label": tool.name,
+          "aria-keyshortcuts": String(index + 1),
+          onclick: () => this.choose(tool.id),
+        },
+        icon(tool.icon),
+        el("kbd", { "aria-hidden": "true" }, String(index + 1)),
+      );
       button.addEventListener("keydown", (event) => {
         const by = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
         if (by === undefined) return;
@@ -135,7 +147,8 @@ export class Toolbox {
     }
     const step = event.shiftKey ? FINE_PX : STEP_PX;
     const { sx, sy } = this.#spot(event);
-    const tx = Math.max(0, Math.min(this.view.width, sx + dx * step)), ty = Math.max(0, Math.min(this.view.height, sy + dy * step));
+    const tx = Math.max(0, Math.min(this.view.width, sx + dx * step)),
+      ty = Math.max(0, Math.min(this.view.height, sy + dy * step));
     const [x, y] = this.view.toWorld(tx, ty);
     this.#setCross({ x, y });
     this.current.hover?.({ sx: tx, sy: ty, x, y, shift: event.shiftKey, touch: false });

@@ -1,4 +1,5 @@
-// Five steps through the page for a first visit, beside what they explain. Never in the way of HALT, never shown again once
+// Five steps through the page for a first visit, beside what they explain. Never in the way of HALT, never shown again
+// once
 // it was left; a button brings it back.
 
 import { byId, setText } from "./dom.js";
@@ -6,11 +7,33 @@ import { prefer, preferred } from "./preferences.js";
 
 const SEEN = "tour seen";
 const STEPS = [
-  ["halt", "HALT", (mayAct) => mayAct ? "Stops the robot at once; so does the space bar. It stands until you arm it again." : "This page has no token, so it only watches: HALT does nothing here. Use the robot's own stop, or open the address with its token."],
+  [
+    "halt",
+    "HALT",
+    (mayAct) =>
+      mayAct
+        ? "Stops the robot at once; so does the space bar. It stands until you arm it again."
+        : "This page has no token, so it only watches: HALT does nothing here. Use the robot's own stop, or open the address with its token.",
+  ],
   ["mode", "One state", "What the robot does now, and why. NO DATA, grey and dashed, means that what you see is old."],
-  ["map-front", "The map", "What the ring hears and what was recognised. Drag to move it, turn the wheel to zoom. The tools at its edge select, measure, place objects and set goals."],
-  ["tabs", "Panels", "The objects with their evidence, layers, settings, recordings, plots, the log. A number on Log counts new warnings."],
-  ["tab-drive", "To drive", (mayAct) => mayAct ? "Open Drive, press Arm and hold the pad. Let go, and the robot stops. The key ? lists all keys." : "Only a page with the run's token drives. The key ? lists all keys."],
+  [
+    "map-front",
+    "The map",
+    "What the ring hears and what was recognised. Drag to move it, turn the wheel to zoom. The tools at its edge select, measure, place objects and set goals.",
+  ],
+  [
+    "tabs",
+    "Panels",
+    "The objects with their evidence, layers, settings, recordings, plots, the log. A number on Log counts new warnings.",
+  ],
+  [
+    "tab-drive",
+    "To drive",
+    (mayAct) =>
+      mayAct
+        ? "Open Drive, press Arm and hold the pad. Let go, and the robot stops. The key ? lists all keys."
+        : "Only a page with the run's token drives. The key ? lists all keys.",
+  ],
 ];
 
 export class Tour {
@@ -21,7 +44,9 @@ export class Tour {
   // `mayAct` says whether the page has the run's token.
   constructor({ mayAct }) {
     this.mayAct = mayAct;
-    byId("tour-next").addEventListener("click", () => (this.#step + 1 < STEPS.length ? this.#show(this.#step + 1) : this.end()));
+    byId("tour-next").addEventListener("click", () =>
+      this.#step + 1 < STEPS.length ? this.#show(this.#step + 1) : this.end(),
+    );
     byId("tour-back").addEventListener("click", () => this.#show(this.#step - 1));
     byId("tour-skip").addEventListener("click", () => this.end());
     byId("tour-again").addEventListener("click", () => this.begin());
@@ -73,7 +98,8 @@ export class Tour {
   #place() {
     const { left, right, top, bottom } = this.#marked.getBoundingClientRect();
     const { offsetWidth: width, offsetHeight: height } = this.#card;
-    const room = 12, clamp = (at, size, all) => Math.max(room, Math.min(at, all - size - room));
+    const room = 12,
+      clamp = (at, size, all) => Math.max(room, Math.min(at, all - size - room));
     let y = bottom + room;
     if (y + height > innerHeight) y = top - height - room;
     if (y < room) y = (top + bottom - height) / 2;

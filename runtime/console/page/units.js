@@ -46,12 +46,14 @@ export class Units extends Emitter {
 }
 
 // From −180° to 180°, however often the robot has turned.
-export const degrees = (radians) => `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−");
+export const degrees = (radians) =>
+  `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−");
 
 // A probability; no evidence makes it 0 or 100.
 export const percent = (share) => `${share >= 0.995 ? "> 99" : share < 0.005 ? "< 1" : Math.round(100 * share)} %`;
 
-// A natural logarithm of odds as the number of times: 1.2, 11, 10⁵. Readings are not so independent that a greater number could be meant.
+// A natural logarithm of odds as the number of times: 1.2, 11, 10⁵. Readings are not so independent that a greater
+// number could be meant.
 export function times(logarithm) {
   const tens = logarithm / Math.LN10;
   if (tens < 4) return String(Number(Math.exp(logarithm).toPrecision(2)));

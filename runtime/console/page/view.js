@@ -64,7 +64,8 @@ export class View extends Emitter {
 
   // Whether a box lies within the view.
   shows({ left, right, bottom, top }) {
-    const [x1, y1] = this.toScreen(left, top), [x2, y2] = this.toScreen(right, bottom);
+    const [x1, y1] = this.toScreen(left, top),
+      [x2, y2] = this.toScreen(right, bottom);
     return x1 >= 0 && y1 >= 0 && x2 <= this.width && y2 <= this.height;
   }
 

@@ -6,18 +6,22 @@ export const isWall = ({ ends }) => Boolean(ends);
 
 // "6", "6, and 2 walls"
 export function countObjects(objects) {
-  const walls = objects.filter(isWall).length, others = objects.length - walls;
+  const walls = objects.filter(isWall).length,
+    others = objects.length - walls;
   return walls > 0 ? `${others}, and ${walls} wall${walls > 1 ? "s" : ""}` : `${others}`;
 }
 
 // The distance of a point from a line x1, y1, x2, y2, in m.
 export function distanceToLine([x1, y1, x2, y2], x, y) {
-  const dx = x2 - x1, dy = y2 - y1, square = dx * dx + dy * dy;
+  const dx = x2 - x1,
+    dy = y2 - y1,
+    square = dx * dx + dy * dy;
   const along = square > 0 ? Math.max(0, Math.min(1, ((x - x1) * dx + (y - y1) * dy) / square)) : 0;
   return Math.hypot(x - x1 - along * dx, y - y1 - along * dy);
 }
 
-// The wall that hides an object from the robot, null if none does: the sight line to its middle crosses the wall, and the
+// The wall that hides an object from the robot, null if none does: the sight line to its middle crosses the wall, and
+// the
 // whole object (radius in m) lies beyond it.
 export function hidingWall({ pose: [rx, ry], objects }, object, radius) {
   if (isWall(object)) return null;
