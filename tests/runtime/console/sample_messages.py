@@ -84,6 +84,7 @@ OTHERS: list[dict[str, Any]] = [
     {"type": "save_map", "format": "toml"},
     {"type": "rename_recording", "file": "run.mcap", "to": "dock"},
     {"type": "pin_recording", "file": "run.mcap", "pinned": True},
+    {"type": "undo_file"},
     {"type": "delete_recording", "file": "run.mcap"},
     {"type": "make_files", "kind": "map", "file": "run.mcap"},
     {"type": "list_jobs"},
