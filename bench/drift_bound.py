@@ -20,6 +20,7 @@ from config.units import FOOT_M
 from config.world import OdometryConfig
 from drivers.messages import Firing, Floats, Pose
 from perception.kernel import kernel
+from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
 from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, level_name, oval
@@ -171,7 +172,7 @@ def errors_of(settings: Settings, errors: OdometryConfig, seed: int) -> dict[str
             pass
     localized = perception.localized()
     assert localized is not None
-    assert perception.map_frame is not None
+    assert isinstance(perception.map_frame, MapFrame)
     estimate = perception.map_frame.drift.e[0]
     objects = np.array([(one.x, one.y) for one in perception.mapped_objects()]).reshape(-1, 2)
     own = seen_from(localized.pose, objects)

@@ -35,7 +35,7 @@ from perception.kernel import Floats
 from perception.localization.equal_edit import edit_equally
 from perception.localization.known_room.known_room import KnownRoom, place_robot
 from perception.localization.localized_pose import LocalizedPose
-from perception.localization.map_frame import MapFrame
+from perception.localization.odometry_frame import OdometryFrame
 from perception.mapping.canyons import ENDS_M, CanyonMap
 from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method
@@ -78,7 +78,7 @@ class Perception:
         self.method: Method = NoMethod()
         self.sensor_monitor = SensorMonitor(ring)
         self.ring_monitor = RingMonitor(ring)
-        self.map_frame: MapFrame | None = None
+        self.map_frame = OdometryFrame()
         """Corrects drift, where the settings say so."""
         self._other: Method | None = None
         """A second method, which enters firings at corrected poses; its objects are the landmarks. Once odometry is
@@ -161,12 +161,11 @@ class Perception:
 
     def _correct(self, firing: Firing) -> Firing:
         """Return a firing at the pose at which `method` enters it: by odometry, until that is refuted."""
-        if self.map_frame is None or self._other is None:
+        if self._other is None:
             return firing
-        drift = self.map_frame.drift
-        was_corrected, corrected = drift.is_applied, self._fed()[-1]
+        was_corrected, corrected = self.map_frame.is_applied, self._fed()[-1]
         placed = self.map_frame.follow(firing, self.vacant.outside(corrected.near_objects()), corrected.shift_object)
-        if not drift.is_applied:
+        if not self.map_frame.is_applied:
             self._other.observe(placed)
             return firing
         if not was_corrected:
@@ -195,14 +194,13 @@ class Perception:
 
     def mapped_objects(self) -> tuple[DetectedObject, ...]:
         """Return the same objects in the map frame; without correction of drift that is odometry's."""
-        seen = self.vacant.outside(self.method.objects())
-        return seen if self.map_frame is None else self.map_frame.in_map(seen)
+        return self.map_frame.in_map(self.vacant.outside(self.method.objects()))
 
     def localized(self) -> LocalizedPose | None:
         """Return where the robot was at the last firing in the map frame; None where that is odometry's."""
         if self.known_room is not None:
             return self.known_room.localized()
-        return None if self.map_frame is None else self.map_frame.localized()
+        return self.map_frame.localized()
 
     def known_map_frame(self) -> Pose | None:
         """Return the pose of the map frame in odometry's frame, None while the place is not known."""
@@ -213,7 +211,7 @@ class Perception:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
         if self.known_room is not None:
             return self.known_room.odometry_from_map()
-        return Pose(0.0, 0.0, 0.0) if self.map_frame is None else self.map_frame.drift.odometry_from_map()
+        return self.map_frame.odometry_from_map()
 
     def near_objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
@@ -229,23 +227,20 @@ class Perception:
 
     def vacant_areas(self) -> tuple[VacantArea, ...]:
         """Return the areas in which nothing stands, in odometry's frame."""
-        held = self.vacant.listed()
-        return held if self.map_frame is None else self.map_frame.areas_in_odometry(held)
+        return self.map_frame.areas_in_odometry(self.vacant.listed())
 
     def _in_odometry(self, seen: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return what the method holds in odometry's frame."""
-        return seen if self.map_frame is None else self.map_frame.objects_in_odometry(seen)
+        return self.map_frame.objects_in_odometry(seen)
 
     def segment_geometry(self) -> Floats:
         """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
-        geometry = self.method.segment_geometry()
-        return geometry if self.map_frame is None else self.map_frame.segments_in_odometry(geometry)
+        return self.map_frame.segments_in_odometry(self.method.segment_geometry())
 
     def segments(self) -> Segments:
         """Return copies of the outline segments with their numbers, times and pins."""
         held = self.method.segments()
-        to = self.map_frame
-        return held if to is None else held._replace(geometry=to.segments_in_odometry(held.geometry))
+        return held._replace(geometry=self.map_frame.segments_in_odometry(held.geometry))
 
     def edit(self, edit: Edit) -> str | None:
         """Apply an operator's edit; return None, or why it cannot be applied, as text for the operator.
@@ -257,14 +252,13 @@ class Perception:
         if isinstance(edit, PlaceRobot):
             return place_robot(self.known_room, edit)
         if isinstance(edit, AreaEdit):
-            placed = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
-            return edit_areas(self.vacant, placed, self._known, self._models)
+            return edit_areas(self.vacant, self.map_frame.edit_in_filter(edit), self._known, self._models)
         refused = invalid_edit(edit)
         if refused is None and isinstance(edit, ConfirmObject | WithdrawConfirmation | RemoveObject):
             refused = rejected(self.vacant, edit.object, self._known())
         if refused is not None:
             return refused
-        inside = edit if self.map_frame is None else self.map_frame.edit_in_filter(edit)
+        inside = self.map_frame.edit_in_filter(edit)
         for other in self._fed()[1:]:
             edit_equally(inside, self.method, other)
         refused = self.method.edit(inside)
@@ -282,8 +276,7 @@ class Perception:
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""
-        found = self.method.evidence(number)
-        return found if self.map_frame is None else self.map_frame.evidence_in_odometry(found)
+        return self.map_frame.evidence_in_odometry(self.method.evidence(number))
 
     def obstacles(self, robot_s: float, age_max_s: float) -> Floats:
         """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
@@ -352,16 +345,16 @@ class Perception:
         """Recognise these models: the present ones, and possibly further ones after them."""
         if tuple(models) != self._models:
             self._models = tuple(models)
-            for part in (*self._methods(), self.map_frame):
-                if part is not None:
-                    part.set_models(models)
+            for method in self._methods():
+                method.set_models(models)
+            self.map_frame.set_models(models)
 
     def _methods(self) -> tuple[Method, ...]:
         return (self.method,) if self._other is None else (self.method, self._other)
 
     def _fed(self) -> tuple[Method, ...]:
         """Return the methods that enter firings."""
-        return (self.method,) if self.map_frame is not None and self.map_frame.drift.is_applied else self._methods()
+        return (self.method,) if self.map_frame.is_applied else self._methods()
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""

@@ -12,11 +12,11 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from config.world import WorldConfig
+from perception.localization.odometry_frame import OdometryFrame
 from perception.no_method import NoMethod
 
 if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
-    from perception.localization.map_frame import MapFrame
     from perception.mapping.grid.evidence_grid import EvidenceGrid
     from perception.method import Method
 
@@ -27,12 +27,12 @@ class Recognition(NamedTuple):
     method: Method
     other: Method | None
     """A second method, for the correction of drift."""
-    map_frame: MapFrame | None
+    map_frame: OdometryFrame
     known_room: KnownRoom | None
     grid: EvidenceGrid | None
 
 
-NO_RECOGNITION: Final = Recognition(NoMethod(), None, None, None, None)
+NO_RECOGNITION: Final = Recognition(NoMethod(), None, OdometryFrame(), None, None)
 
 
 def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Recognition:
@@ -45,7 +45,7 @@ def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: P
     return Recognition(
         make_method(ring, models, config),
         make_method(ring, models, config) if corrects else None,
-        MapFrame(ring, models) if corrects else None,
+        MapFrame(ring, models) if corrects else OdometryFrame(),
         find_in_room(config.localization.known_room, ring),
         None if config.grid.method == "off" else EvidenceGrid(ring, config.grid),
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Final, TypeAlias, TypeVar
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -20,9 +20,7 @@ from drivers.messages import Firing, Pose
 from perception.bayes.reports.object_report import worst_sigma
 from perception.detected_object import DetectedObject
 from perception.edits import (
-    AreaEdit,
     Evidence,
-    MapEdit,
     MarkVacant,
     MoveObject,
     ObjectRow,
@@ -34,14 +32,14 @@ from perception.edits import (
 from perception.kernel import Floats
 from perception.localization.drift.drift_correction import DriftCorrection, LandmarkPlace, SeenObject
 from perception.localization.localized_pose import LocalizedPose
+from perception.localization.odometry_frame import AnyEdit, OdometryFrame
 from perception.vacant_areas import VacantArea
 
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
-AnyEdit = TypeVar("AnyEdit", bound=MapEdit | AreaEdit)
 
 
-class MapFrame:
+class MapFrame(OdometryFrame):
     """Poses corrected by what is recognised, and conversions between the frames.
 
     Parameters
@@ -61,6 +59,11 @@ class MapFrame:
         self.drift = DriftCorrection(ring)
         self._near: set[int] = set()
         self.set_models(models)
+
+    @property
+    def is_applied(self) -> bool:
+        """Whether odometry is refuted, so that poses are corrected."""
+        return self.drift.is_applied
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Make landmarks of the round ones of these models."""
@@ -101,6 +104,10 @@ class MapFrame:
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing."""
         return self.drift.localized()
+
+    def odometry_from_map(self) -> Pose:
+        """Return the pose of the map frame in odometry's frame, at the last firing."""
+        return self.drift.odometry_from_map()
 
     def in_map(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the filter's frame in the map frame."""

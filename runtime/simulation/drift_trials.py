@@ -21,6 +21,7 @@ from config.world import DrumConfig, OdometryConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
+from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
 from runtime.simulation.random_halls import ACOUSTICS
 from runtime.simulation.scenes import OCTET, SPEED_M_S
@@ -226,7 +227,7 @@ def drive(
         tuple(error for _, _, error in pairs), len(drums) - len(pairs), len(seen) - len(pairs),
         math.dist((robot.x, robot.y), (true.x, true.y)), abs(wrap_angle(robot.theta - true.theta)),
     )  # fmt: skip
-    if localized is None or perception.map_frame is None:
+    if localized is None or not isinstance(perception.map_frame, MapFrame):
         return outcome
     off = np.array([robot.x - true.x, robot.y - true.y, wrap_angle(robot.theta - true.theta)])
     object_nees = [_nees(seen[k].x - drums[i][0], seen[k].y - drums[i][1], seen[k].covariance) for i, k, _ in pairs]

@@ -25,7 +25,7 @@ FIRINGS = 700
 
 def map_frame(perception: Perception) -> MapFrame:
     """Return the map frame of a perception that corrects drift."""
-    assert perception.map_frame is not None
+    assert isinstance(perception.map_frame, MapFrame)
     return perception.map_frame
 
 
@@ -123,9 +123,9 @@ def test_without_recognition_the_pose_is_odometrys() -> None:
     assert map_frame(perception).drift.localized().pose == Pose(0.0, 0.0, 0.0)
 
 
-def test_without_correction_there_is_no_map_frame() -> None:
+def test_without_correction_the_map_frame_is_that_of_odometry() -> None:
     perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
-    assert perception.map_frame is None
+    assert not perception.map_frame.is_applied
     assert perception.localized() is None
     assert perception.mapped_objects() == ()
 

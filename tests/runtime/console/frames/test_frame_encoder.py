@@ -18,6 +18,7 @@ from drivers.driver import LineState, Received
 from drivers.messages import CrossPaths, Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.localization.drift.drift_correction import SeenObject
+from perception.localization.map_frame import MapFrame
 from perception.percept import Canyon
 from perception.pipeline import Perception
 from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, FrameContext, FrameEncoder, _canyon, _object
@@ -82,7 +83,7 @@ async def test_the_place_in_the_map_and_its_frame_are_shown_where_drift_is_corre
         assert (first["status"], first["pose"], first["frame"]) == ("localizing", [0.02, 0.0, 0.0], [0.0, 0.0, 0.0])
 
         frame = case.run.state.perception.map_frame
-        assert frame is not None
+        assert isinstance(frame, MapFrame)
         frame.drift._evidence.is_refuted = True
         frame.drift.learn(SeenObject(k, 3.0 * math.cos(k), 3.0 * math.sin(k), 0.3) for k in (1, 2, 3))
         frame.drift.e[0].x += 0.5

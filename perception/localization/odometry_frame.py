@@ -1,0 +1,69 @@
+"""The map frame of a run without correction of drift: odometry's own, in which everything is as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from config.model import ModelConfig
+from drivers.messages import Firing, Pose
+from perception.detected_object import DetectedObject
+from perception.edits import AreaEdit, Evidence, MapEdit
+from perception.kernel import Floats
+from perception.localization.localized_pose import LocalizedPose
+from perception.vacant_areas import VacantArea
+
+AnyEdit = TypeVar("AnyEdit", bound=MapEdit | AreaEdit)
+
+
+class OdometryFrame:
+    """The identity; `perception.localization.map_frame.MapFrame` corrects drift instead."""
+
+    @property
+    def is_applied(self) -> bool:
+        """Whether poses are corrected."""
+        return False
+
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
+        """Make landmarks of the round ones of these models."""
+
+    def reset(self) -> None:
+        """Start again: the next firing's odometry defines the map frame."""
+
+    def follow(
+        self, firing: Firing, _objects: Sequence[DetectedObject], _shift: Callable[[int, float, float], object]
+    ) -> Firing:  # fmt: skip
+        """Return a firing at its pose in the frame in which the method enters it."""
+        return firing
+
+    def localized(self) -> LocalizedPose | None:
+        """Return where the robot was at the last firing; None where the map frame is odometry's."""
+        return None
+
+    def odometry_from_map(self) -> Pose:
+        """Return the pose of the map frame in odometry's frame."""
+        return Pose(0.0, 0.0, 0.0)
+
+    def in_map(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return objects of the method's frame in the map frame."""
+        return objects
+
+    def objects_in_odometry(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return objects of the method's frame in odometry's frame."""
+        return objects
+
+    def segments_in_odometry(self, geometry: Floats) -> Floats:
+        """Return segments in odometry's frame: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
+        return geometry
+
+    def areas_in_odometry(self, areas: tuple[VacantArea, ...]) -> tuple[VacantArea, ...]:
+        """Return vacant areas of the method's frame in odometry's frame."""
+        return areas
+
+    def evidence_in_odometry(self, evidence: Evidence | None) -> Evidence | None:
+        """Return the evidence for an object of the method's frame in odometry's frame."""
+        return evidence
+
+    def edit_in_filter(self, edit: AnyEdit) -> AnyEdit:
+        """Return an operator's edit, whose places are in odometry's frame, in the method's frame."""
+        return edit
