@@ -23,10 +23,10 @@ from drivers.messages import Firing, Floats, Pose, wrap_angle
 from perception.localization.known_room.known_room import KnownRoom
 from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
 from perception.localization.known_room.particle_update import TEMPER
-from perception.localization.known_room.pose_grid import CELL_M, DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
+from perception.localization.known_room.pose_grid import GRID_CELL_M, GRID_DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
 from perception.localization.localized_pose import Status
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges, surfaces_near
-from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 
 HEADINGS: Final = 72
@@ -70,14 +70,14 @@ class Grid(NamedTuple):
 def make_grid(room: Room, ring: RingConfig) -> Grid:
     """Return the grid of a room for a ring whose sensors stand at its centre."""
     low, high = room.bounds
-    shape = tuple(np.ceil((high - low) / CELL_M).astype(int).tolist())
-    origin = low + 0.5 * CELL_M
+    shape = tuple(np.ceil((high - low) / GRID_CELL_M).astype(int).tolist())
+    origin = low + 0.5 * GRID_CELL_M
     axes: Floats = STEP_RAD * np.arange(HEADINGS, dtype=np.float64)
     free, half = np.zeros(shape, dtype=np.bool_), math.radians(ring.beam_half_angle_deg)
     silent = np.full((HEADINGS, *shape), CODES, np.uint8)
     codes: dict[Reflection, Codes] = {"cone": silent, "specular": silent.copy()}
     for i, j in np.ndindex(*shape):
-        x, y = (origin + CELL_M * np.array([i, j])).tolist()
+        x, y = (origin + GRID_CELL_M * np.array([i, j])).tolist()
         near = surfaces_near(room, x, y, 0.0, ring.window_m)
         beams = Beams(np.full(HEADINGS, x), np.full(HEADINGS, y), axes)
         for reflection, table in codes.items():
@@ -161,10 +161,10 @@ def _moved(chances: Floats, step: Pose) -> Floats:
     steps = math.floor(turn / STEP_RAD)
     share = turn / STEP_RAD - steps
     moved = np.empty_like(chances)
-    spread = min(0.2, 0.5 * SCALE_WALK * way / CELL_M**2)
+    spread = min(0.2, 0.5 * SCALE_WALK * way / GRID_CELL_M**2)
     for heading, layer in enumerate(chances):
         middle = heading * STEP_RAD + 0.5 * turn
-        cos, sin = math.cos(middle) / CELL_M, math.sin(middle) / CELL_M
+        cos, sin = math.cos(middle) / GRID_CELL_M, math.sin(middle) / GRID_CELL_M
         shifted = _shifted(layer, cos * step.x - sin * step.y, sin * step.x + cos * step.y)
         beside = (
             _shifted(shifted, 1, 0) + _shifted(shifted, -1, 0) + _shifted(shifted, 0, 1) + _shifted(shifted, 0, -1)
@@ -210,14 +210,14 @@ def _ratios(range_m: float, window_m: float, specular: float) -> Floats:
     expected = np.append((np.arange(CODES) + 0.5) * (window_m / CODES), math.inf)
     answers, heard = np.isfinite(expected), math.isfinite(range_m)
     anything = WILD_HEARD / window_m if heard else 1.0 - WILD_HEARD
-    anywhere = HEARD_SHARE / window_m if heard else 1.0 - HEARD_SHARE
+    anywhere = HEARD_PRIOR / window_m if heard else 1.0 - HEARD_PRIOR
     if heard:
         sigma = np.hypot(SIGMA_M, SIGMA_SHARE * np.where(answers, expected, 0.0))
         error = np.where(answers, range_m - np.where(answers, expected, 0.0), math.inf)
-        echo = (1.0 - DROPOUT) * np.exp(-0.5 * (error / sigma) ** 2) / (sigma * math.sqrt(math.tau))
+        echo = (1.0 - GRID_DROPOUT) * np.exp(-0.5 * (error / sigma) ** 2) / (sigma * math.sqrt(math.tau))
         away = np.where((error > 0.0) & (error <= LATE_M), LATE / LATE_M, 0.0)[:, None]
     else:
-        echo = np.where(answers, DROPOUT, 1.0)
+        echo = np.where(answers, GRID_DROPOUT, 1.0)
         away = np.full((CODES + 1, 1), 1.0 - LATE)
     mirror = np.where(answers, echo, away)
     mixed: Floats = (1.0 - WILD_MIN) * ((1.0 - specular) * echo[:, None] + specular * mirror) + WILD_MIN * anything
@@ -227,10 +227,10 @@ def _ratios(range_m: float, window_m: float, specular: float) -> Floats:
 def _best(grid: Grid, chances: Floats) -> tuple[Floats, float, float]:
     """Return place and heading of the most likely region, and its probability."""
     heading, i, j = np.unravel_index(int(chances.argmax()), chances.shape)
-    place, angle, share = grid.origin + CELL_M * np.array([i, j]), float(heading) * STEP_RAD, 0.0
+    place, angle, share = grid.origin + GRID_CELL_M * np.array([i, j]), float(heading) * STEP_RAD, 0.0
     for _ in range(2):
-        cells = np.rint((place - grid.origin) / CELL_M).astype(int)
-        reach, turns = math.ceil(NEAR_M / CELL_M), math.floor(NEAR_RAD / STEP_RAD)
+        cells = np.rint((place - grid.origin) / GRID_CELL_M).astype(int)
+        reach, turns = math.ceil(NEAR_M / GRID_CELL_M), math.floor(NEAR_RAD / STEP_RAD)
         middle = round(angle / STEP_RAD)
         low_i, low_j = (max(0, int(cell) - reach) for cell in cells)
         around = np.arange(middle - turns, middle + turns + 1)
@@ -238,6 +238,6 @@ def _best(grid: Grid, chances: Floats) -> tuple[Floats, float, float]:
         share = float(part.sum())
         at_i = low_i + np.arange(part.shape[1]) @ part.sum(axis=(0, 2)) / share
         at_j = low_j + np.arange(part.shape[2]) @ part.sum(axis=(0, 1)) / share
-        place = grid.origin + CELL_M * np.array([at_i, at_j])
+        place = grid.origin + GRID_CELL_M * np.array([at_i, at_j])
         angle = float(around @ part.sum(axis=(1, 2))) / share * STEP_RAD
     return place, angle, share

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from config.model import ModelConfig
 from perception.detected_object import DetectedObject
 from perception.edits import (
-    COORDINATE_MAX_M,
+    EDIT_COORDINATE_MAX_M,
     AreaEdit,
     LiftArea,
     MarkVacant,
@@ -41,10 +41,10 @@ def edit_areas(
     if isinstance(edit, LiftArea):
         return None if vacant.lift(edit.area) else f"no vacant area {edit.area}: look at the list again"
     if isinstance(edit, RestoreArea):
-        refused = invalid_area(edit.x, edit.y, edit.radius, COORDINATE_MAX_M)
+        refused = invalid_area(edit.x, edit.y, edit.radius, EDIT_COORDINATE_MAX_M)
         return refused or vacant.restore(VacantArea(edit.area, edit.x, edit.y, edit.radius, edit.object))
     if isinstance(edit, MarkVacant):
-        refused = invalid_area(edit.x, edit.y, edit.radius, COORDINATE_MAX_M)
+        refused = invalid_area(edit.x, edit.y, edit.radius, EDIT_COORDINATE_MAX_M)
         return refused or vacant.mark(edit.x, edit.y, edit.radius)
     found = next((o for o in known() if o.number == edit.object and not vacant.hides(o)), None)
     if found is None:

@@ -201,7 +201,7 @@ Edit: TypeAlias = MapEdit | AreaEdit | PlaceRobot
 
 NUMBER_MAX: Final = 2**53
 """Numbers of objects and segments are below this: a browser stores them as floats."""
-COORDINATE_MAX_M: Final = 10_000.0
+EDIT_COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate accepted, m; a larger one is a mistake."""
 TIME_MAX_S: Final = 1e9
 """Latest time of a segment that is put back, s."""
@@ -281,18 +281,18 @@ def invalid_pose(x: float, y: float, theta: float) -> str | None:
     theta : float
         Heading, rad; it need not be wrapped.
     """
-    if abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M and abs(theta) <= COORDINATE_MAX_M:
+    if abs(x) <= EDIT_COORDINATE_MAX_M and abs(y) <= EDIT_COORDINATE_MAX_M and abs(theta) <= EDIT_COORDINATE_MAX_M:
         return None
     return (
         f"invalid pose ({x:g} m, {y:g} m, {theta:g} rad): expected metres and radians, "
-        f"each finite and within ±{COORDINATE_MAX_M:g}"
+        f"each finite and within ±{EDIT_COORDINATE_MAX_M:g}"
     )
 
 
 def invalid_rows(edit: RestoreSegments) -> str | None:
     """Return why segments cannot be put back, None if each row is one that a map can have held."""
     for row in edit.rows:
-        if len(row) != len(SEGMENT_ROW) or not all(abs(value) <= COORDINATE_MAX_M for value in row[1:6]):
+        if len(row) != len(SEGMENT_ROW) or not all(abs(value) <= EDIT_COORDINATE_MAX_M for value in row[1:6]):
             return "invalid segment: expected a number, four coordinates in m, a direction, a time and a pin"
         if not (0 < row[0] < NUMBER_MAX and row[0] == int(row[0]) and abs(row[6]) < TIME_MAX_S):
             return f"invalid segment {row[0]:g} of {row[6]:g} s"

@@ -27,11 +27,11 @@ GATE_M: Final = 0.06
 by 4 cm at the shortest range and the longest baseline."""
 NEAR_RAD: Final = math.radians(24.0)
 """Transmitters that look farther off a surface's direction are left out."""
-NOISE_M: Final = 1e-3
+UNKNOWN_NOISE_M: Final = 1e-3
 """Standard deviation of a range where no path was heard often enough to know it."""
 REPEATS_MIN: Final = 3
 """Readings of a path from which on they show the noise."""
-MISFIT_MAX: Final = 9.0
+ONE_SURFACE_MISFIT_MAX: Final = 9.0
 """Mean square of the residuals, in their variance, above which the readings are not those of one surface."""
 
 
@@ -46,7 +46,7 @@ class StandSurface(NamedTuple):
     @property
     def is_one(self) -> bool:
         """Whether the readings fit one surface; the odds mean nothing otherwise."""
-        return self.echo.misfit <= MISFIT_MAX
+        return self.echo.misfit <= ONE_SURFACE_MISFIT_MAX
 
     @property
     def kind(self) -> str:
@@ -155,7 +155,7 @@ def _steady(readings: Floats) -> tuple[Floats, float]:
     off = np.abs(readings[:, 2] - middle[path]) if len(readings) else np.zeros(0)
     often = np.bincount(path)[path] >= REPEATS_MIN if len(readings) else np.zeros(0, dtype=np.bool_)
     # 1.4826: a normal distribution's standard deviation, in medians of the distance from its middle.
-    noise_m = max(NOISE_M, 1.4826 * float(np.median(off[often]))) if often.any() else NOISE_M
+    noise_m = max(UNKNOWN_NOISE_M, 1.4826 * float(np.median(off[often]))) if often.any() else UNKNOWN_NOISE_M
     return readings[off <= max(5.0 * noise_m, 0.5 * GATE_M)], noise_m
 
 

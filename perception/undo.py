@@ -12,7 +12,7 @@ from typing import Final, TypeAlias
 
 from perception.detected_object import DetectedObject
 from perception.edits import (
-    COORDINATE_MAX_M,
+    EDIT_COORDINATE_MAX_M,
     ClearMap,
     ConfirmObject,
     DeleteSegments,
@@ -107,7 +107,7 @@ def _restored(held: Segments, numbers: set[int]) -> list[Edit]:
     for number, ends, time_s, pinned in zip(
         held.numbers.tolist(), held.geometry.tolist(), held.times.tolist(), held.pinned.tolist(), strict=True
     ):
-        if number in numbers and all(abs(value) <= COORDINATE_MAX_M for value in ends):
+        if number in numbers and all(abs(value) <= EDIT_COORDINATE_MAX_M for value in ends):
             x1, y1, x2, y2, normal = ends
             known_s = time_s if math.isfinite(time_s) else 0.0
             rows.append((float(number), x1, y1, x2, y2, normal, known_s, float(pinned)))

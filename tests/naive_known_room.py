@@ -12,7 +12,7 @@ from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEA
 from perception.localization.known_room.particle_update import FIT_STEPS, TEMPER
 from perception.localization.known_room.surroundings import FRINGE_RAD
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.room.range_likelihood import HEARD_SHARE, RangeModel
+from perception.localization.room.range_likelihood import HEARD_PRIOR, RangeModel
 from perception.localization.room.room import Room
 
 
@@ -58,7 +58,7 @@ def naive_causes(
 
 def naive_ratio(model: RangeModel, measured: float, causes: Causes) -> float:
     """Log likelihood ratio of a reading to one from anywhere."""
-    return math.log(sum(causes) / (1.0 - HEARD_SHARE if math.isinf(measured) else HEARD_SHARE / model.window_m))
+    return math.log(sum(causes) / (1.0 - HEARD_PRIOR if math.isinf(measured) else HEARD_PRIOR / model.window_m))
 
 
 class Fitted(NamedTuple):

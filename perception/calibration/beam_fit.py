@@ -25,7 +25,7 @@ HALF_ANGLES_RAD: Final = tuple(math.radians(degrees) for degrees in range(4, 31,
 """Half angles of the beam that are tried, and then those between."""
 HALF_ANGLE_STEP_RAD: Final = math.radians(0.25)
 """Step of the second search."""
-HIT: Final = 0.97
+HIT_SHARE: Final = 0.97
 """Probability that a surface in the beam answers; and that there is silence without one."""
 STRAY_M: Final = 5.0
 """Width of the ranges over which a stray reading may fall, m."""
@@ -129,8 +129,14 @@ def _likelihoods(looks: Looks, sensors: int, turns: Floats, half_angle: float, *
         expected = _expected_m(looks, beside) if everything else np.where(beside > 0.0, np.inf, looks.distance)
         answers = np.isfinite(expected)
         off = np.where(answers & heard, (looks.read - np.where(answers, expected, 0.0)) / looks.sigma, 0.0)
-        echo = HIT * np.exp(-0.5 * off**2) / (math.sqrt(2.0 * math.pi) * looks.sigma) + (1.0 - HIT) / STRAY_M
-        chance = np.where(heard, np.where(answers, echo, (1.0 - HIT) / STRAY_M), np.where(answers, 1.0 - HIT, HIT))
+        echo = (
+            HIT_SHARE * np.exp(-0.5 * off**2) / (math.sqrt(2.0 * math.pi) * looks.sigma) + (1.0 - HIT_SHARE) / STRAY_M
+        )
+        chance = np.where(
+            heard,
+            np.where(answers, echo, (1.0 - HIT_SHARE) / STRAY_M),
+            np.where(answers, 1.0 - HIT_SHARE, HIT_SHARE),
+        )
         total[:, k] = np.bincount(looks.sensor, weights=np.log(chance), minlength=sensors)
     return total
 

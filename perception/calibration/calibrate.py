@@ -22,7 +22,7 @@ PRIORS: Final = Priors()
 """What is known of any robot before the drive."""
 WALLS_MAX: Final = 4
 """Most walls that are looked for."""
-ROUNDS: Final = 2
+CALIBRATION_ROUNDS: Final = 2
 """Rounds of places and directions, each with the other's result."""
 TURN_SCALES: Final = (1.0, *(1.0 + sign * 0.005 * k for k in range(1, 11) for sign in (1, -1)))
 """Turn scales that are tried first: a wall is smeared over two turns by twice the error."""
@@ -120,7 +120,7 @@ def calibrate(
     start = _first_guess(drive, echoes, nominal, inside, half_angle, radii, way_m, synchro=synchro)
     if start is None:
         return None
-    for _ in range(ROUNDS):
+    for _ in range(CALIBRATION_ROUNDS):
         fit = fit_geometry(drive, echoes, angles, inside, start, PRIORS, way_m, synchro=synchro)
         beam_fit = fit_beams(_looks(drive, fit, nominal[:, 2], synchro=synchro), len(nominal))
         angles = nominal[:, 2] + beam_fit.turns

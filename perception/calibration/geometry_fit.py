@@ -18,7 +18,7 @@ from perception.calibration.drive import KNOT_M, Drive, Path, Scales
 from perception.calibration.surfaces import Beams, Echoes, Surfaces
 from perception.kernel import Floats
 
-ROUNDS_MAX: Final = 40
+GAUSS_NEWTON_ROUNDS_MAX: Final = 40
 """Most rounds of Gauss-Newton, each with readings chosen anew."""
 CONVERGED: Final = 1e-7
 """A round that changes no parameter by more is the last one, in the parameters' units."""
@@ -187,7 +187,7 @@ def fit_geometry(
     sigma = _prior_sigmas(vector, start, priors)
     range_sigma = np.full(len(echoes.sensor), GATES_M[0])
     information, chosen = np.zeros((len(at), len(at))), np.zeros(0, dtype=np.intp)
-    for k in range(ROUNDS_MAX):
+    for k in range(GAUSS_NEWTON_ROUNDS_MAX):
         geometry = vector.unpack(at)
         path = drive.path(geometry.scales, geometry.bends, synchro=synchro)
         beams = sensors_at(path, echoes, geometry.mounts, angles)

@@ -21,7 +21,7 @@ from perception.edits import (
 )
 from perception.method import Method
 
-SAME_M: Final = 0.5
+SAME_OBJECT_M: Final = 0.5
 """Objects of one model, one of each map, that are nearer to each other are the same: two drums are farther apart."""
 MOVED_M: Final = 0.05
 """An object of the other map within this of a place is not moved there: its own readings place it better."""
@@ -65,6 +65,6 @@ def _same(number: int, of: Method, to: Method) -> DetectedObject | None:
         for one in (*to.labelled_objects(), *to.archived_objects())
         if one.model == seen.model
         and one.number is not None
-        and (apart := math.dist((one.x, one.y), (seen.x, seen.y))) < SAME_M
+        and (apart := math.dist((one.x, one.y), (seen.x, seen.y))) < SAME_OBJECT_M
     ]
     return min(near)[2] if near else None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from perception.bounds import COUNT, Fields, bounds
 
-CELL_M: Final = 4.0
+ARCHIVE_CELL_M: Final = 4.0
 """Edge of a grid cell: a ring looks as far as two."""
 START: Final = 16
 """Room at the start; it doubles when it is full."""
@@ -147,4 +147,4 @@ class Archive:
 
     @staticmethod
     def _cell(x: float, y: float) -> tuple[int, int]:
-        return math.floor(x / CELL_M), math.floor(y / CELL_M)
+        return math.floor(x / ARCHIVE_CELL_M), math.floor(y / ARCHIVE_CELL_M)

@@ -21,7 +21,7 @@ from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.percept import Canyon
 
-REACH_M: Final = 9.0
+SURFACE_REACH_M: Final = 9.0
 """Surfaces farther from the place than this do not count."""
 WIDTH_MAX_M: Final = 5.0
 DEPTH_MIN_M: Final = 0.8
@@ -51,10 +51,10 @@ NUDGE_RAD: Final = 1e-4
 """Directions just beside the end of a surface, so that no opening is missed between two directions."""
 CLEAR_M: Final = 0.3
 """A place nearer to a surface than this is none of the robot's."""
-SAME_M: Final = 1.0
-SAME_RAD: Final = math.radians(40.0)
+SAME_MOUTH_M: Final = 1.0
+SAME_MOUTH_RAD: Final = math.radians(40.0)
 """Mouths nearer than this, of canyons that point alike, are of the same canyon."""
-REMEMBERED_MAX: Final = 16
+CANYONS_MAX: Final = 16
 DOUBT: Final = 0.6
 FORGOTTEN: Final = 0.3
 """The probability of a canyon that is not found again falls by this factor, down to where it is forgotten."""
@@ -151,7 +151,7 @@ def canyon_round(x: float, y: float, surfaces: Surfaces, sealed_m: float) -> Can
     ranges = np.hypot(points[:, 0] - x, points[:, 1] - y)
     if len(ranges) == 0 or ranges.min() < CLEAR_M:
         return None
-    heard = ranges < REACH_M
+    heard = ranges < SURFACE_REACH_M
     after = np.roll(points, -1, axis=0)
     gaps = np.hypot(after[:, 0] - points[:, 0], after[:, 1] - points[:, 1])
     joined = heard & np.roll(heard, -1) & ((items == np.roll(items, -1)) | (gaps < sealed_m))
@@ -272,7 +272,7 @@ class CanyonMap:
 
     def __init__(self, sealed_m: float) -> None:
         self.sealed_m = sealed_m
-        self.rows: NDArray[Any] = np.zeros(REMEMBERED_MAX, CANYON_DTYPE)
+        self.rows: NDArray[Any] = np.zeros(CANYONS_MAX, CANYON_DTYPE)
         self.numbered = 0
         self.firings = 0
         self.is_wanted = False
@@ -314,7 +314,7 @@ class CanyonMap:
         found = canyon_round(x, y, surfaces, self.sealed_m)
         if found is not None:
             self._enter(found, x, y)
-        elif row is not None and math.hypot(x - at_x, y - at_y) < 0.5 * REACH_M:
+        elif row is not None and math.hypot(x - at_x, y - at_y) < 0.5 * SURFACE_REACH_M:
             self.rows["probability"][row] *= DOUBT
             if self.rows["probability"][row] < FORGOTTEN:
                 self.rows[row] = 0
@@ -326,7 +326,7 @@ class CanyonMap:
         away = np.hypot(*(0.5 * (rows["mouth"][:, :2] + rows["mouth"][:, 2:]) - middle).T)
         off = np.abs(np.remainder(rows["axis"] - found.axis_rad + math.pi, 2.0 * math.pi) - math.pi)
         inside = np.hypot(*(rows["inside"] - (x, y)).T)
-        same = (rows["number"] > 0) & (off < SAME_RAD) & ((away < SAME_M) | (inside < SAME_M))
+        same = (rows["number"] > 0) & (off < SAME_MOUTH_RAD) & ((away < SAME_MOUTH_M) | (inside < SAME_MOUTH_M))
         if same.any():
             at = int(np.flatnonzero(same)[0])
             number = int(rows["number"][at])

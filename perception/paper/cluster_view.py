@@ -10,7 +10,7 @@ from config.settings import PerceptionConfig
 from drivers.messages import Floats
 from perception.paper.clusters import cluster_segments
 
-PLACES: Final = 3
+DECIMALS: Final = 3
 """Decimals of coordinates: millimetres."""
 
 
@@ -71,9 +71,9 @@ class ClusterView:
         ends = contiguous[order, :4]
         low, high = np.minimum.reduceat(ends, first), np.maximum.reduceat(ends, first)
         low, high = np.minimum(low[:, :2], low[:, 2:]), np.maximum(high[:, :2], high[:, 2:])
-        middles = np.round(0.5 * (low + high), PLACES).tolist()
-        sides = np.round(high - low, PLACES).tolist()
-        centres = np.round(self._centres[:count], PLACES).tolist()
+        middles = np.round(0.5 * (low + high), DECIMALS).tolist()
+        sides = np.round(high - low, DECIMALS).tolist()
+        centres = np.round(self._centres[:count], DECIMALS).tolist()
         rows = zip(middles, sides, self._sizes[:count].tolist(), centres, strict=True)
         return [
             ClusterBox(x, y, length, width, 0.0, size, centre_x, centre_y)

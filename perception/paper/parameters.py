@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-READINGS_KEPT: Final = 16
+SENSOR_READINGS_KEPT: Final = 16
 """Readings kept of each sensor. They are a fraction of a baseline apart, so that they span several baselines."""
 READING_SPACING: Final = 0.25
 """A reading is kept once its sensor has moved by this share of the shortest baseline since the last one kept."""

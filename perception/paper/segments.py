@@ -16,7 +16,7 @@ from config.settings import SegmentsConfig
 from drivers.messages import Firing
 from perception.bounds import CONSTANT, RANGE, Place, bounds, index_of, up_to
 from perception.kernel import Floats, kernel
-from perception.paper.parameters import READING_SPACING, READINGS_KEPT
+from perception.paper.parameters import READING_SPACING, SENSOR_READINGS_KEPT
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
@@ -36,11 +36,11 @@ class KeptReading(Record):
 class SensorReadings(Record):
     """The last readings of a sensor, a ring buffer."""
 
-    newest: Annotated[int, index_of(READINGS_KEPT)]
+    newest: Annotated[int, index_of(SENSOR_READINGS_KEPT)]
     """Index of the newest reading."""
-    count: Annotated[int, up_to(READINGS_KEPT)]
+    count: Annotated[int, up_to(SENSOR_READINGS_KEPT)]
     """Readings kept."""
-    kept: Annotated[Records[KeptReading], READINGS_KEPT]
+    kept: Annotated[Records[KeptReading], SENSOR_READINGS_KEPT]
 
 
 @kernel
@@ -146,7 +146,7 @@ def pair_readings(
             if t - last.robot_s <= gap_max and math.hypot(x - last.x, y - last.y) < spacing:
                 continue
         for back in range(sensor.count):
-            old = sensor.kept[(sensor.newest - back) % READINGS_KEPT]
+            old = sensor.kept[(sensor.newest - back) % SENSOR_READINGS_KEPT]
             if t - old.robot_s > gap_max:
                 break
             baseline = math.hypot(x - old.x, y - old.y)
@@ -164,8 +164,8 @@ def pair_readings(
                     out[count, 4] = normal
                     count += 1
             break
-        sensor.newest = (sensor.newest + 1) % READINGS_KEPT
-        sensor.count = min(sensor.count + 1, READINGS_KEPT)
+        sensor.newest = (sensor.newest + 1) % SENSOR_READINGS_KEPT
+        sensor.count = min(sensor.count + 1, SENSOR_READINGS_KEPT)
         new = sensor.kept[sensor.newest]
         new.x, new.y, new.axis, new.range_m, new.robot_s = x, y, axis, r, t
     return count

@@ -13,7 +13,7 @@ from bench.trials.known_room_trials import KnownDrive
 from drivers.messages import Firing, Pose
 from perception.localization.known_room.mixed_reflection import WILD_HEARD
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import make_room
 
 ROOM = make_room(np.array([
@@ -42,7 +42,7 @@ def test_what_leaves_the_grid_is_gone() -> None:
 
 @pytest.mark.parametrize("range_m", [1.2, 4.0, math.inf])
 def test_readings_of_anything_are_the_least_likelihood(range_m: float) -> None:
-    least = 0.2 * (WILD_HEARD / HEARD_SHARE if math.isfinite(range_m) else (1.0 - WILD_HEARD) / (1.0 - HEARD_SHARE))
+    least = 0.2 * (WILD_HEARD / HEARD_PRIOR if math.isfinite(range_m) else (1.0 - WILD_HEARD) / (1.0 - HEARD_PRIOR))
 
     ratios = _ratios(range_m, RING.window_m, 0.8)
 

@@ -10,7 +10,7 @@ import math
 from typing import Final
 
 from perception.bayes.inference.noise_estimation import noise_variance
-from perception.bayes.inference.range_fit import fit_circle, fit_line, score_circle, score_line
+from perception.bayes.inference.range_fit import fit_circle, fit_reading_line, score_circle, score_line
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import FIT_SOFTNESS
 from perception.bayes.memory.scratch import Predictions
@@ -137,7 +137,7 @@ def fit_other_line(
     if ux == 0.0 and uy == 0.0:
         return HOPELESS_NAT
     var0, rel2 = noise_variance(s, p)
-    fit_line(
+    fit_reading_line(
         readings,
         ux,
         uy,

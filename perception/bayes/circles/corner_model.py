@@ -12,7 +12,7 @@ from typing import Final
 from perception.bayes.circles.alternatives import bearing_if_near
 from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
-from perception.bayes.inference.range_fit import fit_line
+from perception.bayes.inference.range_fit import fit_reading_line
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
@@ -192,7 +192,7 @@ def fit_faces(
                 face.normal_y = ay / length
                 face.distance = -radius
             if k >= CORNER_FACE_READINGS_MIN:
-                fit_line(
+                fit_reading_line(
                     face_readings[:k], face.normal_x, face.normal_y, cx, cy, face.distance,
                     cos_may - CORNER_LEEWAY_COS, gate, FIT_SOFTNESS, var0, rel2, CORNER_FIT_STEPS, fit,
                 )  # fmt: skip

@@ -11,7 +11,7 @@ import math
 
 from perception.bayes.circles.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
 from perception.bayes.inference.cross_path import is_crossed
-from perception.bayes.inference.lines import add_line
+from perception.bayes.inference.lines import enter_line
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.outline_map import enter_attracting, relax_hypothesis, segments_near
@@ -21,7 +21,6 @@ from perception.bayes.inference.track_labels import assign_number, clear_track, 
 from perception.bayes.memory.elements import ATTRACTING_MAX
 from perception.bayes.memory.parameters import (
     ATTRACTING_MIN,
-    CELL_M,
     CENTRE_VARIANCE_MAX_M2,
     CIRCLE_AROUND_M,
     CIRCLE_EVIDENCE_MIN_NAT,
@@ -34,6 +33,7 @@ from perception.bayes.memory.parameters import (
     INITIATION_STEPS,
     LINE_LENGTH_MIN_M,
     NEW_LINE_HITS_MIN,
+    OUTLINE_CELL_M,
     RIVAL_OVER_UNKNOWN_NAT,
     SWITCH_LEAD_NAT,
 )
@@ -81,7 +81,7 @@ def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
     scratch = s[0].scratch
     x, y = scratch.hypothesis.x, scratch.hypothesis.y
     radius = p[0].circles[kind].radius_m
-    near = segments_near(s[0].buckets, CELL_M, x, y, radius + CIRCLE_AROUND_M, scratch.near)
+    near = segments_near(s[0].buckets, OUTLINE_CELL_M, x, y, radius + CIRCLE_AROUND_M, scratch.near)
     attracting = 0
     for j in range(near):
         segment = scratch.near[j]
@@ -251,7 +251,7 @@ def initiate_circle(
     if fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
-            add_line(s, scratch.line_fit, x, y, line)
+            enter_line(s, scratch.line_fit, x, y, line)
         return 1
     chosen = kind
     best = own

@@ -17,7 +17,7 @@ from perception.bayes.memory.parameters import (
     CIRCLE_WALL_BEHIND,
     CIRCLE_WALL_BEYOND_M,
     CIRCLE_WALL_FRONT,
-    EXPLAINED_SIGMAS,
+    EXPLAINED_ERROR_SIGMAS,
     LINE_ANGLE_DRIFT_RAD2,
     LINE_ANGLE_VARIANCE_RAD2,
     LINE_DISTANCE_DRIFT_M2,
@@ -77,7 +77,7 @@ def reaches(line: Line, along: float, beyond: float) -> bool:
 
 
 @kernel
-def is_wall(line: Line) -> bool:
+def is_sure_line(line: Line) -> bool:
     """Return whether a line is long enough and has enough echoes to be called a wall."""
     return bool(line.echoes > WALL_ECHOES_MIN and line.high - line.low > WALL_LENGTH_MIN_M)
 
@@ -93,7 +93,7 @@ def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
     """
     for k in range(MAX_LINES):
         line = s[0].lines[k]
-        if is_wall(line):
+        if is_sure_line(line):
             off, along = off_and_along(line, x, y)
             if (
                 reaches(line, along, CIRCLE_WALL_BEYOND_M)
@@ -104,7 +104,7 @@ def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
 
 
 @kernel
-def add_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineScore) -> None:
+def enter_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineScore) -> None:
     """Add a fitted line about the origin (ox, oy), unless it is known; replace the least credible line if full.
 
     Parameters
@@ -213,7 +213,7 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
                 across = line.normal_x * q.listener_x + line.normal_y * q.listener_y
                 expected, _, _ = over_line(q, line.normal_x, line.normal_y, expected + 0.5 * across)
             var = var0 + rel2 * expected * expected
-            tight = half_box + LINE_SLACK_M + EXPLAINED_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
+            tight = half_box + LINE_SLACK_M + EXPLAINED_ERROR_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
             associates = line.high - line.low > p[0].associating_line_m
             if dot >= p[0].cos_may_answer:
                 e = r - expected

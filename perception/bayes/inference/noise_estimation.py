@@ -17,7 +17,7 @@ from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
     CURVATURE_VARIANCE_M2,
     ELSEWHERE_PER_M,
-    EXPLAINED_SIGMAS,
+    EXPLAINED_ERROR_SIGMAS,
     RANGE_VARIANCE_MIN_M2,
     RESIDUAL_EVERY,
     RESIDUAL_HITS_MIN,
@@ -44,7 +44,7 @@ def noise_variance(s: Records[State], p: Records[Settings]) -> tuple[float, floa
 @kernel
 def tolerance_m(half_box: float, var: float) -> float:
     """Return the greatest error of an explained range, m, for rounding ± `half_box` (m) and variance `var` (m²)."""
-    return half_box + EXPLAINED_SIGMAS * math.sqrt(var)
+    return half_box + EXPLAINED_ERROR_SIGMAS * math.sqrt(var)
 
 
 @kernel

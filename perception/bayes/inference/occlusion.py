@@ -83,7 +83,7 @@ def find_others(
 
 
 @kernel
-def is_hidden(
+def is_behind_body(
     others: Records[OtherCircle], x: float, y: float, cx: float, cy: float, d: float, radius: float
 ) -> bool:  # fmt: skip
     """Return whether another circle lies between (x, y) and a circle about (cx, cy).
@@ -120,7 +120,7 @@ def is_explained_elsewhere(
     Parameters
     ----------
     others
-        As for `is_hidden`.
+        As for `is_behind_body`.
     p : (1,) Settings
         Beam and gate.
     q : Reading
@@ -193,7 +193,7 @@ def is_relevant(
     if is_crossed(q) and (abs(e) > p[0].gate_m or answers_before(others, p, q)):
         return False
     if e > p[0].gate_m:
-        return not (d > radius and is_hidden(others, q.x, q.y, cx, cy, d, radius))
+        return not (d > radius and is_behind_body(others, q.x, q.y, cx, cy, d, radius))
     return not is_explained_elsewhere(others, p, q, abs(e), var0, rel2)
 
 

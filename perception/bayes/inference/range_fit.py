@@ -214,7 +214,7 @@ def fit_circle(
 
 
 @kernel
-def fit_line(
+def fit_reading_line(
     readings: Records[Reading], nx: float, ny: float, ox: float, oy: float, distance: float, cos_may: float,
     gate: float, soft: float, var0: float, rel2: float, steps: int, fit: LineFit,
 ) -> None:  # fmt: skip

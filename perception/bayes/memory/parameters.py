@@ -64,7 +64,7 @@ ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else."""
 RANGE_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 """Least variance of a range, so that perfect ones do not divide by zero."""
-EXPLAINED_SIGMAS: Final = 3.0
+EXPLAINED_ERROR_SIGMAS: Final = 3.0
 """Greatest error of an explained range, in σ, beyond half its rounding."""
 RESIDUAL_PROBABILITY_MIN: Final = 0.95
 """An object's residuals count from this probability on, …"""
@@ -88,7 +88,7 @@ HYPOTHESIS_MARGIN_M: Final = 0.02 * FOOT_M
 
 # --- The outline map and its segments ------------------------------------------------------------------------------
 
-CELL_M: Final = 1.0 * FOOT_M
+OUTLINE_CELL_M: Final = 1.0 * FOOT_M
 """A cell of the outline map."""
 PAIR_RANGE_MAX_M: Final = 12.0 * FOOT_M
 """Segments farther than this start no hypotheses, and silence from farther is not evidence."""
@@ -329,7 +329,7 @@ UNKNOWN_HITS_MIN: Final = 5.0
 
 # --- Whether a model is right where it is the best explanation ----------------------------------------------------
 
-MISFIT_MAX: Final = 3.0
+HITS_MISFIT_MAX: Final = 3.0
 """Greatest shortfall of the hits' log likelihood, in σ, of a model where an echo says little."""
 VARIANCE_MIN_NAT2: Final = 0.25
 """Least variance assumed of a hit's log likelihood: exact ranges have none, and one outlier would decide."""
@@ -396,5 +396,5 @@ RESERVOIR_OFFSET: Final = 8.0
 """Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6
 """Value of a final refinement above the threshold."""
-PASSES_MAX: Final = 60
+PASSED_OVER_MAX: Final = 60
 """Quanta that may go to others; then a track goes before all that are not passed over as often."""

@@ -14,7 +14,7 @@ from perception.bayes.inference.reservoir import copy_reading, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
 from perception.bayes.memory.job_records import INITIATION
-from perception.bayes.memory.parameters import CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.polygon_parameters import (
     APART,
     APART_WHOLE,
@@ -108,7 +108,12 @@ def relax_polygon(s: StateRecord, p: SettingsRecord, model: int) -> None:
     hypothesis = scratch.hypothesis
     outline = p[0].polygons[model]
     near = segments_near(
-        s[0].buckets, CELL_M, hypothesis.x, hypothesis.y, outline.outer_radius_m + POLYGON_AROUND_M, scratch.near
+        s[0].buckets,
+        OUTLINE_CELL_M,
+        hypothesis.x,
+        hypothesis.y,
+        outline.outer_radius_m + POLYGON_AROUND_M,
+        scratch.near,
     )
     attracting = min(near, ATTRACTING_MAX)
     for j in range(attracting):

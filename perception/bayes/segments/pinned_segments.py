@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.memory.elements import BUCKET_CAPACITY, BUCKETS, MappedSegment
-from perception.bayes.memory.parameters import CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.state import Memory
 from perception.bayes.segments.segment_list import count_again, mapped_segments, put_segment
 from perception.bounds import bounds, index_of, up_to
@@ -92,8 +92,8 @@ class Pins:
     def _has_room(self, bucket: int, segment: Any) -> bool:  # noqa: ANN401 - numpy's record
         """Return whether another segment can be pinned in a bucket: not the last two, and of one cell only."""
         others = self.segments[: self.count][self.buckets[: self.count] == bucket]
-        is_same = (np.floor(others["x"] / CELL_M) == np.floor(segment["x"] / CELL_M)) & (
-            np.floor(others["y"] / CELL_M) == np.floor(segment["y"] / CELL_M)
+        is_same = (np.floor(others["x"] / OUTLINE_CELL_M) == np.floor(segment["x"] / OUTLINE_CELL_M)) & (
+            np.floor(others["y"] / OUTLINE_CELL_M) == np.floor(segment["y"] / OUTLINE_CELL_M)
         )
         return len(others) < BUCKET_CAPACITY - UNPINNED_MIN and bool(is_same.all())
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.inference.outline_map import add_to_map, bucket_index
 from perception.bayes.memory.elements import BUCKET_CAPACITY, MappedSegment
-from perception.bayes.memory.parameters import CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.state import FREE, CircleTracks, Memory, StateRecord
 from perception.kernel import Floats, kernel
 from perception.records import Records, records, zeros
@@ -31,7 +31,7 @@ def put_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number
         As for `outline_map.add_to_map`.
     """
     buckets = s[0].buckets
-    k = bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), len(buckets))
+    k = bucket_index(math.floor(x / OUTLINE_CELL_M), math.floor(y / OUTLINE_CELL_M), len(buckets))
     bucket = buckets[k]
     before = min(bucket.count, BUCKET_CAPACITY)
     if before == 0:
@@ -42,7 +42,7 @@ def put_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number
             at -= 1
         used[at] = k
         s[0].buckets_used += 1
-    add_to_map(buckets, CELL_M, x, y, nx, ny, number, time_s)
+    add_to_map(buckets, OUTLINE_CELL_M, x, y, nx, ny, number, time_s)
     s[0].segments_held += min(bucket.count, BUCKET_CAPACITY) - before
 
 

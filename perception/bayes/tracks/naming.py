@@ -16,7 +16,7 @@ from perception.bayes.memory.parameters import (
     ALONE_LEAD_NAT,
     CAREFUL_SIDES,
     CONFIRMED_SIDES,
-    MISFIT_MAX,
+    HITS_MISFIT_MAX,
     NAME_KEPT_PROBABILITY,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
@@ -58,7 +58,7 @@ class Reported(Record):
 
 
 @kernel
-def is_doubtful(track: CircleTrack, careful: bool) -> bool:
+def is_name_doubtful(track: CircleTrack, careful: bool) -> bool:
     """Return whether a model's checks speak against its name; see `perception.bayes.tracks.model_check`.
 
     Parameters
@@ -71,7 +71,7 @@ def is_doubtful(track: CircleTrack, careful: bool) -> bool:
     if track.room_lead > ROOM_LEAD_NAT:
         return True
     sides_min = CONFIRMED_SIDES if track.is_confirmed == 1 else CAREFUL_SIDES
-    return bool(careful and (track.misfit > MISFIT_MAX or track.sides < sides_min))
+    return bool(careful and (track.misfit > HITS_MISFIT_MAX or track.sides < sides_min))
 
 
 @kernel
@@ -113,7 +113,7 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
         track.status != ESTABLISHED
         or track.kind >= p[0].model_count
         or track.probability < min(least, NAME_KEPT_PROBABILITY)
-        or is_doubtful(track, careful)
+        or is_name_doubtful(track, careful)
     ):
         track.is_named = 0
         return

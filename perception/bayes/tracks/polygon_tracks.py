@@ -74,7 +74,7 @@ from perception.kernel import kernel
 
 
 @kernel
-def update_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> None:
+def update_polygon_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> None:
     """Establish a track, make it tentative again, or end it.
 
     A track is established only after its covariance has been determined.
@@ -177,7 +177,7 @@ def is_sure(track: PolygonTrack, p: SettingsRecord) -> bool:
 
 
 @kernel
-def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
+def judge_polygon(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
     """Update a track's pose, evidence and status from the pose search.
 
     Parameters
@@ -201,7 +201,7 @@ def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> No
     if is_part_of_wall(s, p, track) and drop_track(track):
         return
     compare_circles(s, tracks, p, track)
-    update_status(s, p, track)
+    update_polygon_status(s, p, track)
     if track.marks != 0:
         is_near = math.hypot(found.x - x, found.y - y) < PLACED_STRAY_MAX_M
         if is_sure(track, p) and (is_near or track.marks == CONFIRMED):
@@ -256,7 +256,7 @@ def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
             next_restart(s, p, t)
         return spent
     if stage == JUDGE:
-        judge(s, tracks, p, t)
+        judge_polygon(s, tracks, p, t)
         if track.status != FREE and job.stage == LATTICE:
             begin_lattice(s, p, model, t)
         else:

@@ -15,7 +15,7 @@ from perception.bayes.circles.lateral_search import search_across
 from perception.bayes.circles.outline_check import other_bodies, outline_lead, round_lead
 from perception.bayes.circles.posterior import posterior_circle
 from perception.bayes.inference.likelihood import bounded_exp
-from perception.bayes.inference.lines import add_line, is_in_wall
+from perception.bayes.inference.lines import enter_line, is_in_wall
 from perception.bayes.inference.noise_estimation import add_residuals, noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.prediction import predict_circle
@@ -77,7 +77,7 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
     Parameters
     ----------
     s, p, track, n
-        As for `locate`.
+        As for `locate_circle`.
     """
     fit = s[0].scratch.circle_fit
     var0, rel2 = noise_variance(s, p)
@@ -106,7 +106,7 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
 
 
 @kernel
-def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
+def locate_circle(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
     """Update a track's position, mean and covariance, by a robust fit and a search across the beam.
 
     Parameters
@@ -156,7 +156,7 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     Parameters
     ----------
     s, p, track, n
-        As for `locate`.
+        As for `locate_circle`.
     """
     scratch = s[0].scratch
     said = scratch.score
@@ -213,7 +213,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
     Parameters
     ----------
     s, p, track, n
-        As for `locate`.
+        As for `locate_circle`.
     prior : float
         From `update_score`.
     """
@@ -247,7 +247,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score
                 if said.hits >= REPLACING_LINE_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
-                    add_line(s, s[0].scratch.line_fit, track.x, track.y, said)
+                    enter_line(s, s[0].scratch.line_fit, track.x, track.y, said)
                 return False
         else:
             v = score_corner(s, p, n, track.x, track.y, track.radius, var0, rel2)
@@ -284,7 +284,7 @@ def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack,
 
 
 @kernel
-def update_status(track: CircleTrack, p: SettingsRecord) -> None:
+def update_circle_status(track: CircleTrack, p: SettingsRecord) -> None:
     """Establish a track that is probable and well located; make an improbable one tentative again."""
     if track.status == TENTATIVE and track.probability > ESTABLISH_PROBABILITY and track.hits >= ESTABLISH_HITS:
         if track.dispersion >= p[0].dispersion_min and max(track.root_xx, track.root_yy) < ESTABLISH_ROOT_M:
@@ -318,7 +318,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         drop_track(track)
         return
     x, y = track.x, track.y
-    locate(s, p, track, n)
+    locate_circle(s, p, track, n)
     if track.marks & PLACED and math.hypot(track.x - x, track.y - y) > PLACED_STRAY_MAX_M:
         track.x = x  # Another body's echoes lead there.
         track.y = y
@@ -335,7 +335,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     evidence = track.log_likelihood_ratio
     if (evidence < 0.0 or evidence < track.unknown_nat - UNKNOWN_LEAD_NAT) and drop_track(track):
         return
-    update_status(track, p)
+    update_circle_status(track, p)
     if track.status == ESTABLISHED and track.kind < p[0].model_count and is_due:
         check_model(s, p, track, n)
     report = p[0].report_probability

@@ -3,7 +3,7 @@
 The value of a quantum is the unseen evidence for an object's size, more where its place is unsure; among those above
 the threshold the nearer to the robot goes first, as the robot meets it next. A budget that is spent in every cycle
 would leave some waiting for ever: a track that was passed over too often goes before all others, longest wait first,
-so that none waits for more than `PASSES_MAX` quanta and one for each other track.
+so that none waits for more than `PASSED_OVER_MAX` quanta and one for each other track.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.parameters import (
     CERTAIN_PROBABILITY,
     FINAL_VALUE,
-    PASSES_MAX,
+    PASSED_OVER_MAX,
     RESERVOIR_OFFSET,
     UNSURE_FACTOR,
     UNSURE_ROOT_M,
@@ -25,7 +25,7 @@ from perception.bayes.memory.state import FREE, AnyTrack, CircleTrack, CircleTra
 from perception.kernel import kernel
 
 OVERDUE: Final = 1e9
-"""Priority of a track that was passed over more than `PASSES_MAX` times."""
+"""Priority of a track that was passed over more than `PASSED_OVER_MAX` times."""
 
 
 @kernel
@@ -85,7 +85,7 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
     track : CircleTrack
         The circle.
     """
-    if track.passed_over > PASSES_MAX:
+    if track.passed_over > PASSED_OVER_MAX:
         return OVERDUE + track.passed_over
     return value * p[0].range_max_m / (p[0].range_max_m + math.hypot(track.x - s[0].ring_x, track.y - s[0].ring_y))
 
@@ -155,7 +155,7 @@ def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
         if track.status != FREE:
             v = unseen_evidence(track, p[0].idle_firings, threshold, 1.0)
         if v > threshold:
-            v = OVERDUE + track.passed_over if track.passed_over > PASSES_MAX else v
+            v = OVERDUE + track.passed_over if track.passed_over > PASSED_OVER_MAX else v
             track.passed_over += 1
             if v > best:
                 best = v

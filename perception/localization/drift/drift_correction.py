@@ -37,7 +37,7 @@ from perception.sensor_mounts import mounts_array
 
 LOST_SHARE: Final = 0.25
 """With fewer than this the robot is lost."""
-FIRST_SIGMA_M: Final = 0.05
+FIRST_LANDMARK_SIGMA_M: Final = 0.05
 NEW_SIGMA_M: Final = 0.04
 MOVED_SIGMA_M: Final = 0.1
 """Standard deviation of a landmark's place relative to the ring, which is perception's from a drifting path: of the
@@ -186,7 +186,7 @@ class DriftCorrection:
                 for tracker in self._trackers():
                     remove_landmark(tracker.e, tracker.covariance, i)
         for number in sorted(objects.keys() - (set(numbers) - moved)):
-            sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
+            sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_LANDMARK_SIGMA_M
             self._add(objects[number], sigma, moved=int(number in moved))
         if not self._has_started:
             self._turn_landmarks(self.heading_walk**2 * self._way_m)

@@ -19,7 +19,7 @@ from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 
 PLACE_SIGMA_M: Final = 0.4
-TURN_SIGMA: Final = math.radians(15.0)
+SLIP_TURN_SIGMA: Final = math.radians(15.0)
 """Standard deviations of the displacement before the echoes."""
 BEARING_SHARE: Final = 0.6
 """Standard deviation of a heard landmark's bearing from the sensor's axis, as a share of half the beam."""
@@ -103,7 +103,7 @@ def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle:
     """
     nearest = _nearest(echoes)
     least = max(PAIRS_MIN, math.ceil(PAIRED_SHARE * len(nearest)))
-    prior = (PLACE_SIGMA_M**2, 0.0, 0.0, PLACE_SIGMA_M**2, 0.0, TURN_SIGMA**2)
+    prior = (PLACE_SIGMA_M**2, 0.0, 0.0, PLACE_SIGMA_M**2, 0.0, SLIP_TURN_SIGMA**2)
     stack = [(0, _Branch(HERE, prior, 0.0, ()))]
     best: _Branch | None = None
     is_ambiguous = False

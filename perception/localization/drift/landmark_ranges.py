@@ -52,7 +52,7 @@ CURVATURE_MIN: Final = 1e-6
 """With less, as a share of the squared slope, nothing would change."""
 HIDING_RADII: Final = 1.1
 """A line of sight this near to a landmark's centre is hidden by it."""
-BEHIND_M: Final = 0.3
+PASSED_M: Final = 0.3
 """A range this much beyond a landmark's has passed it."""
 
 
@@ -99,7 +99,7 @@ def bearing_variance(covariance: Floats, i: int, dx: float, dy: float) -> float:
 
 
 @kernel
-def is_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
+def is_landmark_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
     """Return whether another landmark stands between a sensor at (x, y) (m) and the centre of landmark `i`."""
     est = e[0]
     dx, dy = est.landmarks[i].x - x, est.landmarks[i].y - y
@@ -313,8 +313,8 @@ def update_with_range(
         is_expected = False
     if is_expected:
         est.fit_share += FIT_MEMORY * ((1.0 if best != NONE else 0.0) - est.fit_share)
-    is_missed = first != NONE and first != best and r > nearest + BEHIND_M and nearest < range_max
-    if is_missed and not is_hidden(e, first, x, y):
+    is_missed = first != NONE and first != best and r > nearest + PASSED_M and nearest < range_max
+    if is_missed and not is_landmark_hidden(e, first, x, y):
         update_with_edge(e, covariance, first, mx, my, axis, half_angle, UNHEARD)
     elif best == NONE and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1

@@ -40,7 +40,7 @@ HEADING_PRIOR: Final = HEADING_RATES**-0.25
 filter begin with about 1 °/√m."""
 WALK_WINDOW_M: Final = 0.25
 """The way after which the rates are weighed again."""
-PLACE_WALK: Final = 0.0005**2
+DRIFT_PLACE_WALK: Final = 0.0005**2
 """Variance of a displacement by odometry on each axis, m²/m. A base's distance errs by its scale, which the filter
 finds, and where wheels slip; what is left is below what the echoes show."""
 SLIP_SHARE: Final = 0.4
@@ -223,7 +223,7 @@ class LandmarkTracker:
         self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > TURNED_RAD
         way = math.hypot(dx, dy)
         self._renew_walk(way)
-        turn_variance, place_variance = self._rates.rate * way, PLACE_WALK * way
+        turn_variance, place_variance = self._rates.rate * way, DRIFT_PLACE_WALK * way
         slip_m2, slip_rad2 = FAILING_M**2 if np.any(self._failing()) else 0.0, 0.0
         if self.e[0].fit_share < SLIP_SHARE:
             slip_m2, slip_rad2 = SLIP_M**2, SLIP_RAD**2

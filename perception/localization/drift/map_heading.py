@@ -25,8 +25,8 @@ from perception.localization.drift.landmark_tracker import OFFSET_SIGMA_RAD, POS
 
 FIRST_FIRINGS: Final = 160
 """So many are kept, …"""
-APART_M: Final = 0.01
-APART_RAD: Final = math.radians(0.5)
+ENTERED_APART_M: Final = 0.01
+ENTERED_APART_RAD: Final = math.radians(0.5)
 """… each at least so far from the one before, or turned so much."""
 BEGIN_M: Final = 10.0
 AGAIN: Final = 3.0
@@ -84,7 +84,7 @@ class MapHeading:
             self.start_x, self.start_y = row[:2].tolist()
         else:
             x, y, _, yaw = (row[:POSE] - self._rows[self._kept - 1, :POSE]).tolist()
-            if math.hypot(x, y) < APART_M and abs(wrap_angle(yaw)) < APART_RAD:
+            if math.hypot(x, y) < ENTERED_APART_M and abs(wrap_angle(yaw)) < ENTERED_APART_RAD:
                 return
         self._rows[self._kept] = row
         self._kept += 1

@@ -10,9 +10,9 @@ from perception.kernel import Floats
 from perception.localization.room.expected_ranges import Beams, crossed
 from perception.localization.room.room import Room
 
-RAYS: Final = 5
+BEAM_RAYS: Final = 5
 """Rays across a beam. The echo may come from anywhere in the beam, so that one free ray is enough."""
-TOLERANCE_M: Final = 0.3
+BEHIND_WALL_M: Final = 0.3
 """A ray may end this far behind a wall, m."""
 
 
@@ -38,8 +38,8 @@ def blocked_share(room: Room, beams: Beams, measured: Floats, half_angle: float)
         return np.zeros(len(beams.x))
     x, y, axis = beams.x[:, heard], beams.y[:, heard], beams.axis[:, heard]
     blocked = np.ones(x.shape, dtype=np.bool_)
-    for off in np.linspace(-half_angle, half_angle, RAYS):
+    for off in np.linspace(-half_angle, half_angle, BEAM_RAYS):
         to_x, to_y = x + measured[heard] * np.cos(axis + off), y + measured[heard] * np.sin(axis + off)
-        hit = crossed(room, x.reshape(-1), y.reshape(-1), to_x.reshape(-1), to_y.reshape(-1), TOLERANCE_M)
+        hit = crossed(room, x.reshape(-1), y.reshape(-1), to_x.reshape(-1), to_y.reshape(-1), BEHIND_WALL_M)
         blocked &= hit.reshape(x.shape)
     return np.asarray(blocked.mean(axis=1))

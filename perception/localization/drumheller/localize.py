@@ -32,8 +32,8 @@ SEGMENTS_MAX: Final = 8
 """Segments of a panorama that enter the tree. The paper takes the longest 3 or 4; on mirrors many are corners."""
 BLOCKED_MAX: Final = 0.4
 """Largest share of echoes from behind walls: outliers are mostly long, and on mirrors eight echoes may be all."""
-CELL_M: Final = 0.1
-CELL_RAD: Final = math.radians(3.0)
+START_CELL_M: Final = 0.1
+START_CELL_RAD: Final = math.radians(3.0)
 """Of the poses in one cell of this size, one is tried."""
 BATCH: Final = 256
 """Poses that are tried in one call; bounds the memory."""
@@ -46,12 +46,12 @@ WIDE_TURNS_RAD: Final = tuple(math.radians(turn) for turn in range(-12, 13, 3))
 FINE_TURN_RAD: Final = math.radians(1.0)
 FINE_TURNS: Final = 13
 """Step and number of the headings over which a pose's evidence is summed."""
-FIT_STEPS: Final = 4
+FINE_FIT_STEPS: Final = 4
 """Steps of the fine fit."""
 REFINED_MAX: Final = 24
 """Poses that are fitted finely."""
-MERGE_M: Final = 0.2
-MERGE_RAD: Final = math.radians(7.0)
+SAME_POSE_M: Final = 0.2
+SAME_POSE_RAD: Final = math.radians(7.0)
 """Poses nearer to each other than this are one."""
 LOST_SIGMAS: Final = 2.0
 """A pose that the search has missed is given a true pose's likelihood, so many standard deviations below its mean."""
@@ -150,7 +150,7 @@ class _Mode(NamedTuple):
 
 def _promising(stand: Stand, poses: Floats, turns: Sequence[float]) -> Floats:
     """Return those of many poses that pass the barrier test, fitted coarsely, the best few, shape (m, 3)."""
-    cells = np.rint(poses / (CELL_M, CELL_M, CELL_RAD))
+    cells = np.rint(poses / (START_CELL_M, START_CELL_M, START_CELL_RAD))
     first = np.sort(np.unique(cells, axis=0, return_index=True)[1])[:POSES_MAX]
     fitted, score = [np.empty((0, 3))], [np.empty(0)]
     for begin in range(0, len(first), BATCH):
@@ -168,7 +168,7 @@ def _promising(stand: Stand, poses: Floats, turns: Sequence[float]) -> Floats:
 def _refined(stand: Stand, starts: Floats) -> list[_Mode]:
     """Return the modes of the posterior near some starts, that of the largest evidence first."""
     turns = np.array([FINE_TURN_RAD * (k - FINE_TURNS // 2) for k in range(FINE_TURNS)])
-    fit = fit_poses(stand, starts, turns, FIT_STEPS)
+    fit = fit_poses(stand, starts, turns, FINE_FIT_STEPS)
     log_cell = math.log(FINE_TURN_RAD / (2.0 * math.pi * stand.room.area_m2))
     log_density = fit.log_ratio + fit.log_area + log_cell
     log_evidence = np.logaddexp.reduce(log_density, axis=1)
@@ -199,7 +199,7 @@ def _distinct(poses: Floats, score: Floats) -> list[int]:
     for i in np.argsort(-score, kind="stable").tolist():
         off = poses[kept] - poses[i]
         turned = np.abs((off[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-        if ((np.hypot(off[:, 0], off[:, 1]) > MERGE_M) | (turned > MERGE_RAD)).all():
+        if ((np.hypot(off[:, 0], off[:, 1]) > SAME_POSE_M) | (turned > SAME_POSE_RAD)).all():
             kept.append(i)
         if len(kept) == REFINED_MAX:
             break

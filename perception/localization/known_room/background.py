@@ -15,20 +15,20 @@ import numpy as np
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats
 from perception.localization.known_room.mixed_reflection import LATE_M, LearnedShares
-from perception.localization.known_room.pose_grid import DIRECTIONS, SILENT, fill_cell
+from perception.localization.known_room.pose_grid import GRID_DIRECTIONS, SILENT_CODE, fill_cell
 from perception.localization.known_room.surroundings import Surroundings
-from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 
-PLACES: Final = 100
+BACKGROUND_PLACES: Final = 100
 """Places at which the map's ranges are taken."""
 SMOOTH_M: Final = 0.1
 """Standard deviation of the smoothing of their distribution."""
 EVEN_SHARE: Final = 0.1
 """So much of it is the same at all ranges."""
-MEMORY: Final = 300.0
+MEMORY_READINGS: Final = 300.0
 """Readings over which it is learned how often the sensors hear something."""
-HEARD_MIN: Final = 0.1
+HEARD_SHARE_MIN: Final = 0.1
 """Least share, and with its complement the greatest."""
 
 
@@ -52,22 +52,22 @@ class Background:
 
     SCRATCH: Final = ("_densities", "_window_m")
     """What follows from the room."""
-    BOUNDS: Final = bounds(heard_share=Bound(HEARD_MIN, 1.0 - HEARD_MIN))
+    BOUNDS: Final = bounds(heard_share=Bound(HEARD_SHARE_MIN, 1.0 - HEARD_SHARE_MIN))
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
         self._window_m = float(surroundings.sensor[0].window_m)
         self._densities = _range_densities(room, surroundings, clear_m)
-        self.heard_share = HEARD_SHARE
+        self.heard_share = HEARD_PRIOR
 
     def reset(self) -> None:
         """Forget how often the sensors hear something."""
-        self.heard_share = HEARD_SHARE
+        self.heard_share = HEARD_PRIOR
 
     def observe(self, ranges_m: Floats) -> None:
         """Take the ranges (m; inf for silence) of a keyframe."""
         heard = float(np.isfinite(ranges_m).sum())
-        share = self.heard_share + (heard - self.heard_share * len(ranges_m)) / MEMORY
-        self.heard_share = min(1.0 - HEARD_MIN, max(HEARD_MIN, share))
+        share = self.heard_share + (heard - self.heard_share * len(ranges_m)) / MEMORY_READINGS
+        self.heard_share = min(1.0 - HEARD_SHARE_MIN, max(HEARD_SHARE_MIN, share))
 
     def log_ratio(self, ranges_m: Floats, shares: LearnedShares) -> float:
         """Return the log likelihood ratio of readings without a place to evenly distributed ones, nat.
@@ -88,8 +88,8 @@ class Background:
         heard = ranges_m[np.isfinite(ranges_m)]
         codes = np.minimum(heard * (254.0 / self._window_m) + 0.5, 254.0).astype(np.int64)
         silent = len(ranges_m) - len(heard)
-        found = np.log(density[codes] * (self._window_m * self.heard_share / HEARD_SHARE)).sum()
-        return float(found) + silent * math.log((1.0 - self.heard_share) / (1.0 - HEARD_SHARE))
+        found = np.log(density[codes] * (self._window_m * self.heard_share / HEARD_PRIOR)).sum()
+        return float(found) + silent * math.log((1.0 - self.heard_share) / (1.0 - HEARD_PRIOR))
 
 
 def _range_densities(room: Room, surroundings: Surroundings, clear_m: float) -> Floats:
@@ -98,12 +98,12 @@ def _range_densities(room: Room, surroundings: Surroundings, clear_m: float) -> 
     Shape (3, 255): by the code of a range, as in the table of `perception.localization.known_room.pose_grid`.
     """
     low, high = room.bounds
-    side = math.sqrt(room.area_m2 / PLACES) or 1.0
+    side = math.sqrt(room.area_m2 / BACKGROUND_PLACES) or 1.0
     counts = np.maximum(1, np.ceil((high - low) / side)).astype(np.int64)
     x, y = (
         lower + (np.arange(n) + 0.5) * (upper - lower) / n for lower, upper, n in zip(low, high, counts, strict=True)
     )
-    table = np.full((2, DIRECTIONS, len(x), len(y)), SILENT, dtype=np.uint8)
+    table = np.full((2, GRID_DIRECTIONS, len(x), len(y)), SILENT_CODE, dtype=np.uint8)
     free = np.zeros((len(x), len(y)), dtype=np.uint8)
     for i, at_x in enumerate(x.tolist()):
         for j, at_y in enumerate(y.tolist()):
@@ -113,7 +113,7 @@ def _range_densities(room: Room, surroundings: Surroundings, clear_m: float) -> 
     blur = np.exp(-0.5 * (near / SMOOTH_M) ** 2)
     late = ((near > 0.0) & (near <= LATE_M)).astype(np.float64)
     cone, mirror = (
-        np.bincount(codes[:, free == 1].ravel(), minlength=256)[:SILENT].astype(np.float64) for codes in table
+        np.bincount(codes[:, free == 1].ravel(), minlength=256)[:SILENT_CODE].astype(np.float64) for codes in table
     )
     rows = [_density(ranges, kernel, step_m) for ranges, kernel in ((cone, blur), (mirror, blur), (cone, late))]
     return np.array(rows)

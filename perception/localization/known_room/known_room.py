@@ -22,7 +22,7 @@ from perception.edits import PlaceRobot, invalid_pose
 from perception.localization.known_room.background import Background
 from perception.localization.known_room.keyframes import Keyframes
 from perception.localization.known_room.mixed_reflection import LearnedShares
-from perception.localization.known_room.pose_grid import CELL_M, READINGS_MAX, STEP_RAD, PoseGrid
+from perception.localization.known_room.pose_grid import GRID_CELL_M, READINGS_MAX, STEP_RAD, PoseGrid
 from perception.localization.known_room.pose_particles import HYPOTHESES_MAX, MERGE_M, MERGE_RAD
 from perception.localization.known_room.pose_track import LEAST_LOG, SEARCH_LEAST_LOG, PoseTrack, heading_noise
 from perception.localization.known_room.surroundings import make_surroundings
@@ -31,7 +31,7 @@ from perception.localization.room.range_likelihood import RangeModel
 from perception.localization.room.room import Room
 from perception.sensor_mounts import mounts_array
 
-NOISE_M: Final = 0.03
+MAP_NOISE_M: Final = 0.03
 DROPOUT: Final = 0.15
 OUTLIERS: Final = 0.1
 """Errors of a range compared with the map, whose own errors they contain."""
@@ -54,9 +54,9 @@ SUSPECT_LOG: Final = 4.5
 """Evidence for a tracked place below which a search looks for a better one, nat: the robot may have been carried."""
 LEAD_LOG: Final = 2.0
 """What a search finds must explain its readings better by this than what is tracked, nat."""
-SURE: Final = 0.9
+PLACE_SURE: Final = 0.9
 """Probability above which a place is the robot's."""
-DOUBT: Final = 0.5
+PLACE_DOUBT: Final = 0.5
 """Probability below which a tracked place is no longer its own."""
 STATUSES: Final[tuple[Status, ...]] = ("localizing", "tracking", "lost")
 LOCALIZING, TRACKING, LOST = range(3)
@@ -100,12 +100,12 @@ class KnownRoom:
 
     def __init__(self, room: Room, ring: RingConfig, model: RangeModel | None = None, seed: int = 0) -> None:
         model = model or RangeModel(
-            ring.resolution_m, ring.window_m, noise_m=NOISE_M, dropout=DROPOUT, outliers=OUTLIERS
+            ring.resolution_m, ring.window_m, noise_m=MAP_NOISE_M, dropout=DROPOUT, outliers=OUTLIERS
         )
         surroundings = make_surroundings(room, model, math.radians(ring.beam_half_angle_deg))
         radius_m = max(math.hypot(x, y) for x, y, _ in ring.mounts)
         noise = heading_noise(seed)
-        clear_m = max(CELL_M, radius_m - CELL_M)
+        clear_m = max(GRID_CELL_M, radius_m - GRID_CELL_M)
         self._grid = PoseGrid(room, surroundings, clear_m)
         self._background = Background(room, surroundings, clear_m)
         self._search_evidence = -math.log(max(1.0, room.area_m2 / MERGE_M**2) * math.pi / MERGE_RAD)
@@ -168,7 +168,7 @@ class KnownRoom:
         if self._status == TRACKING:
             if self._tracked.evidence <= SUSPECT_LOG:
                 self._window_begin = max(self._window_begin, min(self._tracked.peak_at + 1, keyframes.count - 1))
-            elif self.probability > SURE and not self._is_named:
+            elif self.probability > PLACE_SURE and not self._is_named:
                 return
         way_m = keyframes.driven_m - self._searched_at_m
         if way_m >= self._pause_m or (keyframes.is_stand and way_m >= STAND_SEARCH_M):
@@ -218,7 +218,7 @@ class KnownRoom:
                     self.shares.guess(self._grid.best_profile)
                 starts, self._is_complete = self._grid.best_starts(HYPOTHESES_MAX), self._grid.is_complete
                 self._candidates.start(
-                    starts, CELL_M, STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
+                    starts, GRID_CELL_M, STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
                 )
                 self._stage = WEIGHING if len(starts) else IDLE
         elif self._stage == WEIGHING:
@@ -262,8 +262,8 @@ class KnownRoom:
         before = track.entered
         least_log = LEAST_LOG if track is self._tracked else SEARCH_LEAST_LOG
         readings = track.enter(self._keyframes, self.shares, least_log)
-        is_place = track is self._tracked and float(track.best.share) > SURE
-        if readings and is_place and min(track.explains, track.fits) > SURE:
+        is_place = track is self._tracked and float(track.best.share) > PLACE_SURE
+        if readings and is_place and min(track.explains, track.fits) > PLACE_SURE:
             self.shares.learn(track.best, readings)
         return track.entered > before
 
@@ -283,14 +283,14 @@ class KnownRoom:
             is_same = math.hypot(one.x - other.x, one.y - other.y) <= MERGE_M and turn <= MERGE_RAD
         begin = max(self._search_begin, self._named_at)
         is_sure = len(tracked) > 0 and float(tracked.best.share) * tracked.explains > (
-            DOUBT if self._is_named else SURE
+            PLACE_DOUBT if self._is_named else PLACE_SURE
         )
         heard_before = found.gained_since(self._search_begin) - found.gained_since(begin)
         is_chance = heard_before <= -self._search_evidence
         lead = LEAD_LOG - (self._search_evidence if is_sure and is_chance else 0.0)
         ahead = found.gained_since(begin) - tracked.gained_since(begin) if len(tracked) else math.inf
-        is_choice = self._status != TRACKING or float(found.best.share) > DOUBT
-        if ahead > lead and is_choice and not (is_same and tracked.explains > DOUBT):
+        is_choice = self._status != TRACKING or float(found.best.share) > PLACE_DOUBT
+        if ahead > lead and is_choice and not (is_same and tracked.explains > PLACE_DOUBT):
             self._tracked, self._candidates = found, tracked
             self._status = LOCALIZING if self._status == TRACKING else self._status
             self._is_confirmed = self._is_complete
@@ -309,16 +309,20 @@ class KnownRoom:
         """Set status and probability after a keyframe."""
         track = self._tracked
         explains = track.explains
-        self.probability = float(track.best.share) * min(explains, track.fits) * (1.0 if self._is_confirmed else SURE)
-        if self._is_named and explains < DOUBT:
+        self.probability = (
+            float(track.best.share) * min(explains, track.fits) * (1.0 if self._is_confirmed else PLACE_SURE)
+        )
+        if self._is_named and explains < PLACE_DOUBT:
             self._refute()
         if not self._is_named:
             self.rivals = track.rivals
         if self._status == TRACKING:
-            if explains < DOUBT:
+            if explains < PLACE_DOUBT:
                 self._lose()
         elif self._stage == IDLE:
-            self._status = TRACKING if self.probability > SURE else LOST if explains < DOUBT else LOCALIZING
+            self._status = (
+                TRACKING if self.probability > PLACE_SURE else LOST if explains < PLACE_DOUBT else LOCALIZING
+            )
             if self._named_at < self._keyframes.count:
                 self._compare_named(explains)
 
@@ -334,7 +338,7 @@ class KnownRoom:
         """
         if not self._is_compared:
             self._is_compared, self._stage = True, DUE
-        elif explains < DOUBT and self._window_begin < self._named_at:
+        elif explains < PLACE_DOUBT and self._window_begin < self._named_at:
             self._window_begin, self._stage = self._named_at, DUE
 
     def _lose(self) -> None:

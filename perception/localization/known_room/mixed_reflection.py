@@ -17,7 +17,7 @@ import numpy as np
 from perception.bounds import Share, bounds
 from perception.kernel import Floats, kernel
 from perception.localization.known_room.surroundings import SensorModel
-from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.records import Record, Records, records, zeros
 
 WILD_HEARD: Final = 0.9
@@ -46,7 +46,7 @@ class Shares(Record):
     """Share of the smooth surfaces a little beside the beam that answer."""
 
 
-MEMORY: Final = 300.0
+MEMORY_READINGS: Final = 300.0
 """Readings over which the shares are learned."""
 MEMORY_BESIDE: Final = 60.0
 """Readings of smooth surfaces beside the beam over which it is learned how many answer: they are few."""
@@ -109,9 +109,9 @@ class LearnedShares:
         """Take the causes of some readings."""
         self.is_learned = True
         share, least, most = self.records[0], SHARES_MIN, SHARES_MAX
-        specular = share.specular + (causes.specular - share.specular * readings) / MEMORY
-        late = share.late + (causes.late - share.late * causes.turned_away) / MEMORY
-        wild = share.wild + (causes.wild - share.wild * readings) / MEMORY
+        specular = share.specular + (causes.specular - share.specular * readings) / MEMORY_READINGS
+        late = share.late + (causes.late - share.late * causes.turned_away) / MEMORY_READINGS
+        wild = share.wild + (causes.wild - share.wild * readings) / MEMORY_READINGS
         beside = share.beside + (causes.beside - share.beside * causes.could_beside) / MEMORY_BESIDE
         share.specular = min(most[0], max(least[0], specular))
         share.late = min(most[1], max(least[1], late))
@@ -195,7 +195,7 @@ def mixed_ratio(
     total = rough + mirror + beside + away + late + wild
     if beside_m <= window_m:
         could_beside = (mirror + beside + away + late) / total
-    anywhere = 1.0 - HEARD_SHARE if is_silent else HEARD_SHARE / window_m
+    anywhere = 1.0 - HEARD_PRIOR if is_silent else HEARD_PRIOR / window_m
     causes = (
         rough / total, mirror / total, beside / total, (mirror + beside + away + late) / total,
         (away + late) / total, late / total, wild / total, could_beside,

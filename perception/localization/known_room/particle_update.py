@@ -22,7 +22,7 @@ FIT_STEPS: Final = 2
 TEMPER: Final = 0.5
 """Weight of a reading, in the likelihood and in the fit of the place: errors of the map are common to readings of one
 wall."""
-SPREAD_M: Final = 1.0
+PARTICLE_SPREAD_M: Final = 1.0
 """Greatest distance of a particle from its hypothesis's mean for which all surfaces in reach are found."""
 COLUMNS: Final = 5
 """A reading is a row: place of the sensor in the ring's frame (m), cosine and sine of its axis, range (m)."""
@@ -155,6 +155,6 @@ def update_particles(
         y += particles[i].y / len(particles)
     for k in range(count):
         within_m = max(within_m, math.hypot(readings[k, 0], readings[k, 1]))
-    look_around(s, x, y, within_m + SPREAD_M)
+    look_around(s, x, y, within_m + PARTICLE_SPREAD_M)
     for i in range(first, end):
         update_particle(s, particles, i, readings, count, shares)

@@ -20,13 +20,13 @@ from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEA
 from perception.localization.known_room.pose_starts import PROFILES_MAX, STARTS_MAX, Starts, offer
 from perception.localization.known_room.surroundings import Surroundings, expect_cone, expect_specular, look_around
 from perception.localization.room.expected_ranges import Reflection
-from perception.localization.room.range_likelihood import HEARD_SHARE
+from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros
 
-CELL_M: Final = 0.2
-DIRECTIONS: Final = 60
-STEP_RAD: Final = 2.0 * math.pi / DIRECTIONS
+GRID_CELL_M: Final = 0.2
+GRID_DIRECTIONS: Final = 60
+STEP_RAD: Final = 2.0 * math.pi / GRID_DIRECTIONS
 OPEN_M: Final = 3.0
 """The grid reaches so far beyond the surfaces of a room without walls."""
 CELLS_PER_QUANTUM: Final = 4
@@ -38,14 +38,14 @@ READINGS_MAX: Final = 108
 SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
-DROPOUT: Final = 0.2
+GRID_DROPOUT: Final = 0.2
 WILD_MIN: Final = 0.2
 """Shares of expected echoes that are not heard, and at least of readings that are anything: it is coarse."""
 OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""
 FACTORS: Final = 24
 """Ratios that are multiplied before their logarithm is taken: neither too small nor too large for a float."""
-SILENT: Final = 255
+SILENT_CODE: Final = 255
 """Code of silence in the table; a range is a share of 254 of the window."""
 START_LOG: Final = 40.0
 """A start less likely than the best one by more than this, nat, is not the place."""
@@ -89,13 +89,13 @@ def fill_cell(
     near, window_m = s.near[0], s.sensor[0].window_m
     is_free = near.wall_count == 0 or near.wall_m[0] > clear_m
     free[i, j] = 1 if is_free and (near.circle_count == 0 or near.circle_m[0] > clear_m) else 0
-    for d in range(DIRECTIONS):
+    for d in range(GRID_DIRECTIONS):
         cos, sin = math.cos(STEP_RAD * d), math.sin(STEP_RAD * d)
         cone_m, _, _ = expect_cone(s, x, y, cos, sin)
         inside, beside = expect_specular(s, x, y, cos, sin, s.sensor[0].cos_fringe)
         specular_m = min(inside[0], beside[0])
-        table[0, d, i, j] = int(cone_m * (254.0 / window_m) + 0.5) if cone_m <= window_m else SILENT
-        table[1, d, i, j] = int(specular_m * (254.0 / window_m) + 0.5) if specular_m <= window_m else SILENT
+        table[0, d, i, j] = int(cone_m * (254.0 / window_m) + 0.5) if cone_m <= window_m else SILENT_CODE
+        table[1, d, i, j] = int(specular_m * (254.0 / window_m) + 0.5) if specular_m <= window_m else SILENT_CODE
 
 
 @kernel
@@ -129,9 +129,9 @@ def score_block(
     score[:] = 0.0
     for n in range(count):
         x, y, c, s, _ = readings[n]
-        shift_i = math.floor((cos * x - sin * y) / CELL_M + 0.5)
-        shift_j = math.floor((sin * x + cos * y) / CELL_M + 0.5)
-        d = math.floor((STEP_RAD * direction + math.atan2(s, c)) / STEP_RAD + 0.5) % DIRECTIONS
+        shift_i = math.floor((cos * x - sin * y) / GRID_CELL_M + 0.5)
+        shift_j = math.floor((sin * x + cos * y) / GRID_CELL_M + 0.5)
+        d = math.floor((STEP_RAD * direction + math.atan2(s, c)) / STEP_RAD + 0.5) % GRID_DIRECTIONS
         for a in range(BLOCK):
             i = begin_i + a + shift_i
             for b in range(BLOCK):
@@ -140,7 +140,7 @@ def score_block(
                 if 0 <= i < rows and 0 <= j < columns:
                     cone, specular = table[0, d, i, j], table[1, d, i, j]
                     ratio = likely[n, 0, cone] + likely[n, 1, specular]
-                    if specular == SILENT:
+                    if specular == SILENT_CODE:
                         ratio += likely[n, 2, cone]
                 product[BLOCK * a + b] *= ratio
         if n % FACTORS == FACTORS - 1 or n == count - 1:
@@ -182,7 +182,7 @@ def offer_peaks(
                 for j in range(max(0, b - 1), min(BLOCK, b + 2)):
                     is_peak = is_peak and here >= score[BLOCK * i + j]
             if is_peak:
-                offer(to, x + CELL_M * a, y + CELL_M * b, heading, here, profile)
+                offer(to, x + GRID_CELL_M * a, y + GRID_CELL_M * b, heading, here, profile)
 
 
 class PoseGrid:
@@ -216,10 +216,10 @@ class PoseGrid:
         low, high = room.bounds
         if not len(room.walls):
             low, high = low - OPEN_M, high + OPEN_M
-        self.shape = tuple(max(1, math.ceil(side / CELL_M)) for side in (high - low).tolist())
+        self.shape = tuple(max(1, math.ceil(side / GRID_CELL_M)) for side in (high - low).tolist())
         # Symmetric about the room's middle: the answers of a symmetric room are then exactly alike.
-        self._origin = 0.5 * (low + high) - 0.5 * CELL_M * (np.array(self.shape) - 1.0)
-        self._table = np.full((2, DIRECTIONS, *self.shape), SILENT, dtype=np.uint8)
+        self._origin = 0.5 * (low + high) - 0.5 * GRID_CELL_M * (np.array(self.shape) - 1.0)
+        self._table = np.full((2, GRID_DIRECTIONS, *self.shape), SILENT_CODE, dtype=np.uint8)
         self._free = np.zeros(self.shape, dtype=np.uint8)
         self._filled = 0
         """Cells whose part of the table is filled."""
@@ -235,7 +235,7 @@ class PoseGrid:
         self._shares = np.zeros((PROFILES_MAX, 3))
         self._quantum = NONE
         """Of the search; `NONE` without one."""
-        self._likely = np.zeros((PROFILES_MAX, READINGS_MAX, 3, SILENT + 1))
+        self._likely = np.zeros((PROFILES_MAX, READINGS_MAX, 3, SILENT_CODE + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""
 
@@ -280,17 +280,17 @@ class PoseGrid:
                 self._likely[profile, : self._count] = self._likelihoods(profile)
             self._likely_search = self._searches
         blocks_i, blocks_j = (math.ceil(side / BLOCK) for side in self.shape)
-        profile, part = divmod(self._quantum, DIRECTIONS * blocks_i * blocks_j)
+        profile, part = divmod(self._quantum, GRID_DIRECTIONS * blocks_i * blocks_j)
         direction, block = divmod(part, blocks_i * blocks_j)
         i, j = BLOCK * (block // blocks_j), BLOCK * (block % blocks_j)
         score_block(
             self._table, self._free, self._likely[profile], self._readings, self._count, direction, i, j,
             self._scratch,
         )  # fmt: skip
-        x, y = (self._origin + CELL_M * np.array([i, j])).tolist()
+        x, y = (self._origin + GRID_CELL_M * np.array([i, j])).tolist()
         offer_peaks(self.starts, self._scratch, x, y, direction * STEP_RAD, profile)
         self._quantum += 1
-        if self._quantum >= self._profiles * DIRECTIONS * blocks_i * blocks_j:
+        if self._quantum >= self._profiles * GRID_DIRECTIONS * blocks_i * blocks_j:
             self._quantum = NONE
 
     def best_starts(self, most: int) -> Floats:
@@ -336,11 +336,11 @@ class PoseGrid:
         self._due = self.shape[0] * self.shape[1]
         self._fill()
         codes = self._table[("cone", "specular").index(reflection)]
-        return np.where(codes == SILENT, np.inf, codes * (self._window_m / 254.0))
+        return np.where(codes == SILENT_CODE, np.inf, codes * (self._window_m / 254.0))
 
     def places(self, i: NDArray[Any], j: NDArray[Any]) -> Floats:
         """Return the middles of cells, m, shape (n, 2)."""
-        return np.asarray(self._origin + CELL_M * np.column_stack([i, j]))
+        return np.asarray(self._origin + GRID_CELL_M * np.column_stack([i, j]))
 
     @property
     def _window_m(self) -> float:
@@ -351,7 +351,7 @@ class PoseGrid:
         origin_x, origin_y = self._origin.tolist()
         while self._filled < min(self._due, self.shape[0] * self.shape[1]):
             i, j = divmod(self._filled, self.shape[1])
-            x, y = origin_x + CELL_M * i, origin_y + CELL_M * j
+            x, y = origin_x + GRID_CELL_M * i, origin_y + GRID_CELL_M * j
             fill_cell(self._surroundings, self._table, self._free, i, j, x, y, self._clear_m)
             self._filled += 1
 
@@ -363,7 +363,7 @@ class PoseGrid:
         `cone`, where `specular` is silent.
         """
         measured = self._readings[: self._count, 4:5]
-        expected = np.append(np.arange(SILENT) * (self._window_m / 254.0), np.inf)
+        expected = np.append(np.arange(SILENT_CODE) * (self._window_m / 254.0), np.inf)
         answers, heard = np.isfinite(expected), np.isfinite(measured)
         specular, late, wild = self._shares[profile].tolist()
         wild = max(WILD_MIN, wild)
@@ -371,7 +371,9 @@ class PoseGrid:
         with np.errstate(invalid="ignore"):
             after = np.where(heard, measured, 0.0) - expected
             echo = np.exp(-0.5 * (after / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
-        echo = np.where(heard, np.where(answers, (1.0 - DROPOUT) * echo, 0.0), np.where(answers, DROPOUT, 1.0))
+        echo = np.where(
+            heard, np.where(answers, (1.0 - GRID_DROPOUT) * echo, 0.0), np.where(answers, GRID_DROPOUT, 1.0)
+        )
         turned_away = np.where(heard, 0.0, 1.0 - late) * ~answers
         anything = np.where(heard, WILD_HEARD / self._window_m, 1.0 - WILD_HEARD)
         second = heard & answers & (after > 0.0) & (after <= LATE_M)
@@ -380,5 +382,5 @@ class PoseGrid:
             (1.0 - wild) * specular * np.where(answers, echo, turned_away),
             (1.0 - wild) * specular * late / LATE_M * second,
         )
-        anywhere = np.where(heard, HEARD_SHARE / self._window_m, 1.0 - HEARD_SHARE)
+        anywhere = np.where(heard, HEARD_PRIOR / self._window_m, 1.0 - HEARD_PRIOR)
         return np.stack([cause / anywhere for cause in causes], axis=1)

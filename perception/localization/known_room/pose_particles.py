@@ -41,8 +41,8 @@ RESAMPLE_SHARE: Final = 0.5
 MERGE_M: Final = 0.3
 MERGE_RAD: Final = math.radians(10.0)
 """Hypotheses nearer to each other than this are one."""
-SAME_M: Final = 0.5
-SAME_RAD: Final = math.radians(15.0)
+SAME_PLACE_M: Final = 0.5
+SAME_PLACE_RAD: Final = math.radians(15.0)
 """Hypotheses as near to the best one as this are of the same place."""
 
 
@@ -343,7 +343,7 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
         odds = math.exp(SHARE_TEMPER * (other.log_evidence - middle.log_evidence))
         turn = (other.heading - middle.heading + math.pi) % (2.0 * math.pi) - math.pi
         total += odds
-        if math.hypot(other.x - middle.x, other.y - middle.y) <= SAME_M and abs(turn) <= SAME_RAD:
+        if math.hypot(other.x - middle.x, other.y - middle.y) <= SAME_PLACE_M and abs(turn) <= SAME_PLACE_RAD:
             near += odds
     normalise(of, h, scratch)
     best.share, best.x, best.y, best.heading = near / total, middle.x, middle.y, middle.heading

@@ -12,8 +12,8 @@ from perception.records import Record, Records
 STARTS_MAX: Final = 200
 PROFILES_MAX: Final = 2
 """Guesses of the causes of readings that a search tries."""
-APART_M: Final = 0.3
-APART_RAD: Final = math.radians(9.0)
+START_APART_M: Final = 0.3
+START_APART_RAD: Final = math.radians(9.0)
 """Starts nearer to each other than this, on each axis, are one: one and a half steps of the search."""
 
 
@@ -54,7 +54,7 @@ def offer(to: Records[Starts], x: float, y: float, heading: float, score: float,
     for k in range(to[0].count):
         other = starts[k]
         turn = abs((heading - other.heading + math.pi) % (2.0 * math.pi) - math.pi)
-        if abs(x - other.x) < APART_M and abs(y - other.y) < APART_M and turn < APART_RAD:
+        if abs(x - other.x) < START_APART_M and abs(y - other.y) < START_APART_M and turn < START_APART_RAD:
             if score > other.score:
                 other.x, other.y, other.heading, other.score, other.profile = x, y, heading, score, profile
             return

@@ -17,8 +17,8 @@ from perception.localization.known_room.particle_update import TEMPER, update_pa
 from perception.localization.known_room.pose_particles import (
     HEADINGS,
     HYPOTHESES_MAX,
-    SAME_M,
-    SAME_RAD,
+    SAME_PLACE_M,
+    SAME_PLACE_RAD,
     SHARE_TEMPER,
     Best,
     Hypotheses,
@@ -56,13 +56,13 @@ INDEPENDENT_M: Final = 0.5
 """Readings on a way as short as this have errors in common, those of the map and of what it lacks."""
 RIVAL_SHARE: Final = 0.1
 """A hypothesis that has this share of the best one's probability is a rival: the best is not sure beside it."""
-NOISES: Final = 512
+HEADING_NOISES: Final = 512
 
 
 def heading_noise(seed: int) -> Floats:
     """Return numbers from the standard normal distribution for the walk of the headings, shape (NOISES, HEADINGS)."""
     rng = np.random.default_rng(seed)
-    return rng.standard_normal((NOISES, HEADINGS))
+    return rng.standard_normal((HEADING_NOISES, HEADINGS))
 
 
 class PoseTrack:
@@ -218,7 +218,7 @@ class PoseTrack:
         """Hypotheses elsewhere that are not much less likely than the best one."""
         rows, best = self._memory["hypotheses"][0][: len(self)], self.best
         turns = np.abs((rows["heading"] - best.heading + math.pi) % (2.0 * math.pi) - math.pi)
-        away = (np.hypot(rows["x"] - best.x, rows["y"] - best.y) > SAME_M) | (turns > SAME_RAD)
+        away = (np.hypot(rows["x"] - best.x, rows["y"] - best.y) > SAME_PLACE_M) | (turns > SAME_PLACE_RAD)
         odds = SHARE_TEMPER * (rows["log_evidence"] - rows["log_evidence"].max(initial=-math.inf))
         return int((away & (odds > math.log(RIVAL_SHARE))).sum())
 
@@ -241,7 +241,7 @@ class PoseTrack:
         there = keyframes.pose(self.entered)
         x, y, yaw = self._at.tolist()
         step = Pose(x, y, yaw).inverse().compose(there)
-        noise = self._noise[self.entered % NOISES]
+        noise = self._noise[self.entered % HEADING_NOISES]
         move(self._hypotheses, step.x, step.y, wrap_angle(step.theta), noise)
         self._at[:] = there.x, there.y, there.theta
 

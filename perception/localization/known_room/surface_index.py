@@ -12,7 +12,7 @@ from perception.kernel import Floats, Ints, kernel
 from perception.localization.room.room import Room
 from perception.records import Record, Records, zeros
 
-BIN_M: Final = 4.0
+INDEX_BIN_M: Final = 4.0
 """Edge of a bin of the index: each lists what sensors at its places can hear."""
 WITHIN_M: Final = 2.0
 """The lists are good for sensors up to this far from a place in the bin."""
@@ -46,15 +46,15 @@ def make_index(room: Room, window_m: float) -> tuple[NDArray[Any], Ints, Ints]:
         where k is (kind · columns + column) · rows + row.
     """
     low, high = room.bounds
-    columns, rows = (max(1, math.ceil(side / BIN_M)) for side in (high - low).tolist())
+    columns, rows = (max(1, math.ceil(side / INDEX_BIN_M)) for side in (high - low).tolist())
     bins = zeros(Bins, 1)
     bins[0] = (*low.tolist(), columns, rows)
-    reach_m = window_m + WITHIN_M + BIN_M / math.sqrt(2.0)
+    reach_m = window_m + WITHIN_M + INDEX_BIN_M / math.sqrt(2.0)
     lists: list[Ints] = []
     for kind in (WALLS, CORNERS, CIRCLES):
         for column in range(columns):
             for row in range(rows):
-                x, y = (low + BIN_M * (np.array([column, row]) + 0.5)).tolist()
+                x, y = (low + INDEX_BIN_M * (np.array([column, row]) + 0.5)).tolist()
                 lists.append(np.flatnonzero(_distances(room, kind, x, y) <= reach_m))
     starts = np.concatenate([[0], np.cumsum([len(found) for found in lists])]).astype(np.int64)
     return bins, starts, np.concatenate(lists).astype(np.int64)
@@ -93,7 +93,7 @@ def listed(
         Greatest distance of a sensor from it, m.
     """
     bins = of[0]
-    column, row = math.floor((x - bins.low_x) / BIN_M), math.floor((y - bins.low_y) / BIN_M)
+    column, row = math.floor((x - bins.low_x) / INDEX_BIN_M), math.floor((y - bins.low_y) / INDEX_BIN_M)
     if within_m > WITHIN_M or not 0 <= column < bins.columns or not 0 <= row < bins.rows:
         return -1, -1
     n = (kind * bins.columns + column) * bins.rows + row

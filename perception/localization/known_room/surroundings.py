@@ -227,7 +227,7 @@ def way_into(circle_x: float, circle_y: float, radius: float, ux: float, uy: flo
 
 
 @kernel
-def is_hidden(s: Surroundings, x: float, y: float, dx: float, dy: float) -> bool:
+def is_surface_hidden(s: Surroundings, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether a surface near the place crosses the line of sight from (x, y) to (x + dx, y + dy), m."""
     near = s.near[0]
     length, off = math.hypot(dx, dy), math.hypot(x - near.x, y - near.y)
@@ -348,7 +348,7 @@ def expect_specular(s: Surroundings, x: float, y: float, cos: float, sin: float,
         if distance >= (best if is_inside else min(best, beside)) or ahead < distance * cos_fringe:
             continue
         ax, ay, bx, by = wall.x1 - x - px, wall.y1 - y - py, wall.x2 - x - px, wall.y2 - y - py
-        if ax * bx + ay * by <= 0.0 and not is_hidden(s, x, y, px, py):
+        if ax * bx + ay * by <= 0.0 and not is_surface_hidden(s, x, y, px, py):
             if is_inside:
                 best, best_x, best_y = distance, px, py
             else:
@@ -366,7 +366,7 @@ def expect_specular(s: Surroundings, x: float, y: float, cos: float, sin: float,
         if corner.opening >= math.pi and distance > EDGE_REACH_M:
             continue
         back = (math.atan2(-py, -px) - corner.start) % (2.0 * math.pi)
-        if back < corner.opening and not is_hidden(s, x, y, px, py):
+        if back < corner.opening and not is_surface_hidden(s, x, y, px, py):
             if is_inside:
                 best, best_x, best_y = distance, px, py
             else:
@@ -381,7 +381,7 @@ def expect_specular(s: Surroundings, x: float, y: float, cos: float, sin: float,
         is_inside = ahead >= centre * cos_half
         if 0.0 < gap < (best if is_inside else min(best, beside)) and ahead >= centre * cos_fringe:
             px, py = cx * gap / centre, cy * gap / centre
-            if not is_hidden(s, x, y, px, py):
+            if not is_surface_hidden(s, x, y, px, py):
                 if is_inside:
                     best, best_x, best_y = gap, px, py
                 else:

@@ -11,7 +11,7 @@ import numpy as np
 from config.robot import RingConfig
 from perception.kernel import Floats
 
-HEARD_SHARE: Final = 0.5
+HEARD_PRIOR: Final = 0.5
 """Share of the sensors that hear something, at a place of which nothing is known."""
 
 
@@ -77,8 +77,8 @@ def log_ratio(model: RangeModel, measured: Floats, expected: Floats) -> tuple[Fl
         error = np.where(both, measured - expected, 0.0) / sigma
     fits = np.where(both, model.peak(sigma) * np.exp(-0.5 * error * error), 0.0)
     wild = model.outliers / model.window_m
-    silent = np.where(answers, model.dropout, 1.0 - model.outliers) / (1.0 - HEARD_SHARE)
-    ratio = np.where(heard, (fits + wild) / (HEARD_SHARE / model.window_m), silent)
+    silent = np.where(answers, model.dropout, 1.0 - model.outliers) / (1.0 - HEARD_PRIOR)
+    ratio = np.where(heard, (fits + wild) / (HEARD_PRIOR / model.window_m), silent)
     return np.log(ratio), fits / (fits + wild)
 
 
@@ -96,8 +96,8 @@ def log_ratio_of_true_pose(model: RangeModel, measured: Floats) -> tuple[float, 
     """
     heard = np.isfinite(measured)
     typical = model.peak(model.sigma(measured)) * math.exp(-0.5) + model.outliers / model.window_m
-    good = np.where(heard, typical / (HEARD_SHARE / model.window_m), (1.0 - model.outliers) / (1.0 - HEARD_SHARE))
-    bad = np.where(heard, model.outliers / HEARD_SHARE, model.dropout / (1.0 - HEARD_SHARE))
+    good = np.where(heard, typical / (HEARD_PRIOR / model.window_m), (1.0 - model.outliers) / (1.0 - HEARD_PRIOR))
+    bad = np.where(heard, model.outliers / HEARD_PRIOR, model.dropout / (1.0 - HEARD_PRIOR))
     rare = model.dropout + model.outliers
     mean = (1.0 - rare) * np.log(good) + rare * np.log(bad)
     variance = rare * (1.0 - rare) * (np.log(good) - np.log(bad)) ** 2

@@ -19,7 +19,7 @@ from pydantic_core import from_json
 from config.errors import UserError
 from config.mission_step import STEPS_MAX
 from config.robot import SENSORS_MAX
-from perception.edits import COORDINATE_MAX_M
+from perception.edits import EDIT_COORDINATE_MAX_M
 
 MESSAGE_MAX_BYTES: Final = 64 * 1024
 TEXT_MAX: Final = 500
@@ -33,7 +33,7 @@ ID_MAX: Final = 2**53
 FIELD_MAX: Final = 120
 """Characters of a field's path in an error message."""
 
-Coordinate: TypeAlias = Annotated[float, Field(ge=-COORDINATE_MAX_M, le=COORDINATE_MAX_M)]
+Coordinate: TypeAlias = Annotated[float, Field(ge=-EDIT_COORDINATE_MAX_M, le=EDIT_COORDINATE_MAX_M)]
 Angle: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 Size: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 Number: TypeAlias = Annotated[int, Field(ge=0, le=ID_MAX)]

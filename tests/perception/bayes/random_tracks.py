@@ -16,7 +16,7 @@ from perception.bayes.inference.outline_map import bucket_index
 from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import BUCKETS, MAX_LINES, Reading
-from perception.bayes.memory.parameters import CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.scratch import Predictions
 from perception.bayes.memory.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.memory.state import Memory
@@ -192,7 +192,7 @@ def add_segment(memory: Memory, row: np.ndarray, number: int) -> int:
     """Put a segment (middle, normal) into the map; return its bucket."""
     x, y, nx, ny = row.tolist()
     put_segment(memory.s, x, y, nx, ny, number, 0.1 * number)
-    return bucket_index(math.floor(x / CELL_M), math.floor(y / CELL_M), BUCKETS)
+    return bucket_index(math.floor(x / OUTLINE_CELL_M), math.floor(y / OUTLINE_CELL_M), BUCKETS)
 
 
 def places(memory: Memory) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from config.load import load_settings
-from perception.paper.parameters import PINNED_SHARE_MAX, READING_SPACING, READINGS_KEPT
+from perception.paper.parameters import PINNED_SHARE_MAX, READING_SPACING, SENSOR_READINGS_KEPT
 
 PERCEPTION = load_settings("hallway").perception
 
@@ -11,7 +11,7 @@ PERCEPTION = load_settings("hallway").perception
 def test_the_readings_kept_of_a_sensor_span_its_longest_baseline() -> None:
     """Otherwise no pair of readings would be far enough apart."""
     segments = PERCEPTION.segments
-    assert (READINGS_KEPT - 1) * READING_SPACING * segments.baseline_min_m >= segments.baseline_max_m
+    assert (SENSOR_READINGS_KEPT - 1) * READING_SPACING * segments.baseline_min_m >= segments.baseline_max_m
 
 
 def test_a_map_full_of_pins_still_has_room_for_a_cluster() -> None:

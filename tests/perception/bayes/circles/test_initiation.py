@@ -11,7 +11,7 @@ from perception.bayes.circles import initiation as track_initiation
 from perception.bayes.inference.outline_map import add_to_map
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
-from perception.bayes.memory.parameters import CELL_M, NEW_LINE_HITS_MIN
+from perception.bayes.memory.parameters import NEW_LINE_HITS_MIN, OUTLINE_CELL_M
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, Memory
 from perception.records import records, zeros
 from tests.perception.bayes.random_tracks import (
@@ -77,7 +77,7 @@ def map_drum(memory: Memory, x: float, y: float, radius: float) -> None:
     """Put segments of the same half circle into the map."""
     for number, angle in enumerate(np.linspace(-math.pi, 0.0, 7)[1:-1].tolist(), start=1):
         nx, ny = unit(angle).tolist()
-        add_to_map(memory.s[0].buckets, CELL_M, x - radius * nx, y - radius * ny, nx, ny, number, 0.0)
+        add_to_map(memory.s[0].buckets, OUTLINE_CELL_M, x - radius * nx, y - radius * ny, nx, ny, number, 0.0)
 
 
 def initiate(memory: Memory, off: float = 0.0) -> int:

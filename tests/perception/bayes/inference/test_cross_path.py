@@ -154,7 +154,7 @@ def test_one_stand_gives_the_place_of_a_circle_and_a_line() -> None:
         t = complex(row[0], row[1])
         row[4] = half_over_line(t, t + complex(row[5], row[6]), normal, 1.2)
     line, fields = one(LineFit)
-    range_fit.fit_line(
+    range_fit.fit_reading_line(
         crosses(rows), 1.0, 0.0, 0.0, 0.0, 1.21, P[0].cos_may_answer, GATE, 9.0, 1e-6, 0.0, 40, line[0]
     )
     assert fields == pytest.approx([normal.real, normal.imag, 1.2], abs=1e-4)

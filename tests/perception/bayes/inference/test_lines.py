@@ -96,7 +96,7 @@ def test_a_new_line_is_known_or_replaces_the_least_credible(examples: int) -> No
         before = line_rows(memory).copy()
         fit[0] = (*new.normal, new.c)
         score[0] = (0.0, new.echoes, 0.0, new.low, new.high)
-        walls.add_line(memory.s, records(LineFit, fit)[0], *pair(new.origin), records(LineScore, score)[0])
+        walls.enter_line(memory.s, records(LineFit, fit)[0], *pair(new.origin), records(LineScore, score)[0])
         if any(naive_tracks.same_line(line, new) for line in lines.values()):
             assert (line_rows(memory) == before).all()
             known += 1

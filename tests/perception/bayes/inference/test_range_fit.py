@@ -59,7 +59,7 @@ def test_a_circles_fit_equals_its_oracle(examples: int) -> None:
 def test_a_lines_fit_and_score_equal_their_oracles(examples: int) -> None:
     for case in cases(examples, 3):
         n0, (fit, out), (score, fields) = first_normal(case), one(LineFit), one(LineScore)
-        range_fit.fit_line(
+        range_fit.fit_reading_line(
             case.readings, *pair(n0), *case.place, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4, fit[0]
         )
         n, c = naive_bayes.fit_line(case.used, n0, case.centre, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4)

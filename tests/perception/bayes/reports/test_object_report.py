@@ -63,7 +63,7 @@ def test_greatest_deviation_lines_and_names_of_rivals_equal_their_oracles(exampl
             line_rows(memory)[k, 0] for k in long
         ]
         for k in lines:
-            assert walls.is_wall(memory.s[0].lines[k]) == (k in long)
+            assert walls.is_sure_line(memory.s[0].lines[k]) == (k in long)
         random_track(rng, memory, 0)
         memory.circles["radius"][0] = radius = float(rng.choice([0.0, 0.1, 0.6]))
         place = place_of(memory, 0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from perception.bayes.inference.outline_map import bucket_index
 from perception.bayes.memory.elements import BUCKET_CAPACITY, BUCKETS
-from perception.bayes.memory.parameters import CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.state import Memory
 from perception.bayes.segments.pinned_segments import Pins, delete, places_of, restore
 from perception.bayes.segments.segment_list import drawn, mapped_segments
@@ -38,7 +38,7 @@ def test_a_bucket_drops_its_oldest_segment_first_and_pinned_segments_are_restore
         some = tuple(int(n) for n in rng.choice(present, min(2, len(present)), replace=False)) if present else ()
         if turn < 0.7:
             added += 1
-            place = (cells[rng.integers(len(cells))] + rng.uniform(0.1, 0.9, 2)) * CELL_M
+            place = (cells[rng.integers(len(cells))] + rng.uniform(0.1, 0.9, 2)) * OUTLINE_CELL_M
             add_segment(memory, np.array([*place, 1.0, 0.0]), added)
             pins.renew(memory)
         elif turn < 0.8:

@@ -22,7 +22,7 @@ def test_no_reading_ends_a_polygon_that_a_user_marked() -> None:
     track = memory.s[0].polygons[2]
     for mark, left in ((0, FREE), (PLACED, TENTATIVE)):
         track.status, track.log_likelihood_ratio, track.marks = ESTABLISHED, -50.0, mark
-        polygon_tracks.update_status(memory.s, P, track)
+        polygon_tracks.update_polygon_status(memory.s, P, track)
         assert track.status == left
 
 
@@ -85,7 +85,7 @@ def test_a_polygon_is_established_doubted_and_ended_by_its_evidence(
     track.status, job.stage, track.covariance.xx = before, JUDGE, 1e-4
     for name, value in (values | fields).items():
         setattr(track, name, value)
-    polygon_tracks.update_status(memory.s, P, track)
+    polygon_tracks.update_polygon_status(memory.s, P, track)
     assert (track.status, job.stage) == (after, stage)
 
 

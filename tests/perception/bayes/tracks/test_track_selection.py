@@ -11,7 +11,7 @@ from config.load import load_settings
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.inference.kernel_settings import make_settings
 from perception.bayes.memory.elements import MAX_POLYGONS
-from perception.bayes.memory.parameters import PASSES_MAX
+from perception.bayes.memory.parameters import PASSED_OVER_MAX
 from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE, Memory
 from perception.bayes.tracks import track_selection as selection
 from runtime.simulation.scenes import halls, readings
@@ -22,7 +22,7 @@ SETTINGS = load_settings("hallway", models=("semicircle", "box"))
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
 TRACKS = 8
 THRESHOLD = 0.08
-WAIT_MAX = PASSES_MAX + TRACKS + 1
+WAIT_MAX = PASSED_OVER_MAX + TRACKS + 1
 
 
 def new_memory() -> Memory:
@@ -51,7 +51,7 @@ def test_the_choice_equals_its_oracle(examples: int) -> None:
         has_evidence = rng.integers(2)
         circles["unseen"], circles["reservoir"] = counts[0] * has_evidence, counts[1]
         circles["idle_firings"], circles["final_refinements"] = counts[2], counts[3] * has_evidence
-        circles["passed_over"] = rng.integers(PASSES_MAX + 4, size=TRACKS) * rng.integers(2)
+        circles["passed_over"] = rng.integers(PASSED_OVER_MAX + 4, size=TRACKS) * rng.integers(2)
         circles["x"], circles["y"] = rng.normal(0, 4, (2, TRACKS))
         circles["root_xx"], circles["root_yy"] = rng.uniform(0, 0.02, (2, TRACKS))
         circles["probability"] = rng.uniform(0.9, 1.0, TRACKS)
@@ -69,7 +69,7 @@ def test_the_choice_equals_its_oracle(examples: int) -> None:
         expected = passed + waits
         if want >= 0:
             expected[want] = 0
-            overdue += int(passed[want] > PASSES_MAX)
+            overdue += int(passed[want] > PASSED_OVER_MAX)
         assert (circles["passed_over"] == expected).all()
         none += want < 0
     assert none > 0.003 * examples
@@ -94,7 +94,7 @@ def test_polygons_are_chosen_by_evidence_and_waiting_time_alone() -> None:
     polygons["status"][:TRACKS], polygons["reservoir"][:TRACKS], polygons["unseen"][:TRACKS] = ESTABLISHED, 100, 10
     polygons["unseen"][2] += 1
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == 2
-    polygons["passed_over"][7] = PASSES_MAX + 1
+    polygons["passed_over"][7] = PASSED_OVER_MAX + 1
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == 7
     polygons["unseen"] = 0
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == -1
@@ -143,7 +143,7 @@ def test_in_a_hall_with_one_quantum_a_firing_no_track_waits_longer_than_the_boun
         tracks = (perception.memory.circles, perception.memory.polygons)
         longest = max(longest, *(int(of["passed_over"].max()) for of in tracks))
     assert cut > 100, "one quantum was enough, so nothing was tested"
-    assert 3 < longest <= PASSES_MAX + SETTINGS.perception.bayes.tracks_max + 1
+    assert 3 < longest <= PASSED_OVER_MAX + SETTINGS.perception.bayes.tracks_max + 1
 
 
 @pytest.mark.compiled

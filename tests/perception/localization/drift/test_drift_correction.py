@@ -85,7 +85,7 @@ def test_the_first_landmarks_share_an_error_of_the_heading() -> None:
     for seen in SEEN:
         xx, _, yy = drift.places()[seen.number].covariance
         shared = drift.heading_walk**2 * way * ((seen.x - way) ** 2 + seen.y**2)
-        assert xx + yy == pytest.approx(2.0 * drift_correction.FIRST_SIGMA_M**2 + shared)
+        assert xx + yy == pytest.approx(2.0 * drift_correction.FIRST_LANDMARK_SIGMA_M**2 + shared)
 
 
 @pytest.mark.compiled

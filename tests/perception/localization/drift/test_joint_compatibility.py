@@ -10,7 +10,7 @@ import pytest
 from drivers.messages import Pose, wrap_angle
 from perception.localization.drift.joint_compatibility import (
     PLACE_SIGMA_M,
-    TURN_SIGMA,
+    SLIP_TURN_SIGMA,
     Disc,
     Echo,
     _corrected,
@@ -99,4 +99,4 @@ def test_a_scalar_correction_is_that_of_the_whole_matrices() -> None:
     assert squared == pytest.approx(innovation**2 / variance)
     assert (pose.x, pose.y, pose.theta) == pytest.approx(tuple(np.array([1.0, 2.0, 0.1]) + gain * innovation))
     assert after == pytest.approx((covariance - np.outer(gain, gain) * variance)[np.triu_indices(3)])
-    assert PLACE_SIGMA_M > 0.0 < TURN_SIGMA
+    assert PLACE_SIGMA_M > 0.0 < SLIP_TURN_SIGMA

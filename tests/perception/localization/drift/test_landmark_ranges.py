@@ -245,8 +245,8 @@ def test_landmarks_at_hardly_known_places_do_not_change_the_estimate_of_the_nois
 def test_a_hidden_landmark_is_not_missed() -> None:
     near, far = (1.1, 0.33), (3.0, 0.62)
     e, covariance = new_filter([far, near])
-    assert kernels.is_hidden(e, 0, 0.4, 0.0)
-    assert not kernels.is_hidden(e, 1, 0.4, 0.0)
+    assert kernels.is_landmark_hidden(e, 0, 0.4, 0.0)
+    assert not kernels.is_landmark_hidden(e, 1, 0.4, 0.0)
     before = covariance.copy()
     assert enter(e, covariance, math.inf) == kernels.NONE
     np.testing.assert_array_equal(covariance[FIRST : FIRST + 2], before[FIRST : FIRST + 2])

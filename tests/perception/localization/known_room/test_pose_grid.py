@@ -12,7 +12,7 @@ from bench.trials.random_rooms import ACOUSTICS
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.known_room.mixed_reflection import ROOMS, LearnedShares
-from perception.localization.known_room.pose_grid import CELL_M, STEP_RAD, PoseGrid
+from perception.localization.known_room.pose_grid import GRID_CELL_M, STEP_RAD, PoseGrid
 from perception.localization.known_room.surroundings import FRINGE_RAD, make_surroundings
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
 from perception.localization.room.range_likelihood import RangeModel
@@ -65,7 +65,7 @@ def test_a_search_offers_the_pose_and_another_one_needs_no_table() -> None:
     assert quanta[0] > quanta[1] > 60
     starts = grid.best_starts(100)
     assert len(starts) <= 100
-    near = np.hypot(starts[:, 0] - TRUTH.x, starts[:, 1] - TRUTH.y) < 1.5 * CELL_M
+    near = np.hypot(starts[:, 0] - TRUTH.x, starts[:, 1] - TRUTH.y) < 1.5 * GRID_CELL_M
     turned = np.array([abs(wrap_angle(theta - TRUTH.theta)) for theta in starts[:, 2].tolist()])
     assert np.flatnonzero(near & (turned < math.radians(7.0)))[0] < 5
 

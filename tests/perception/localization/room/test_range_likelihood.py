@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.localization.room.range_likelihood import HEARD_SHARE, RangeModel, log_ratio, log_ratio_of_true_pose
+from perception.localization.room.range_likelihood import HEARD_PRIOR, RangeModel, log_ratio, log_ratio_of_true_pose
 from tests.perception.localization.rooms import RING
 
 MODEL = RangeModel.of_ring(RING)
@@ -17,8 +17,8 @@ MODEL = RangeModel.of_ring(RING)
 def test_all_readings_together_have_probability_one(expected: float) -> None:
     step = 1e-3
     measured = np.arange(0.5 * step, MODEL.window_m, step)
-    density = np.exp(log_ratio(MODEL, measured, np.array(expected))[0]) * HEARD_SHARE / MODEL.window_m
-    silence = np.exp(log_ratio(MODEL, np.array(math.inf), np.array(expected))[0]) * (1.0 - HEARD_SHARE)
+    density = np.exp(log_ratio(MODEL, measured, np.array(expected))[0]) * HEARD_PRIOR / MODEL.window_m
+    silence = np.exp(log_ratio(MODEL, np.array(math.inf), np.array(expected))[0]) * (1.0 - HEARD_PRIOR)
     assert density.sum() * step + silence == pytest.approx(1.0, abs=1e-3)
 
 
