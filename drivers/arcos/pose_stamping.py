@@ -13,6 +13,7 @@ from drivers.arcos.odometer import Odometer
 from drivers.arcos.sip_clock import SipClock
 from drivers.arcos.sonar import SonarRing
 from drivers.arcos.wire_units import Polling
+from drivers.dropped_count import LATE_FIRINGS, DroppedCount
 from drivers.messages import Firing, Flags, Odometry, Pose
 from drivers.odometry_history import OdometryHistory
 from drivers.odometry_jumps import OdometryJumps
@@ -56,7 +57,8 @@ class PoseStamper:
     """
 
     def __init__(self, config: RobotConfig, discs: tuple[int, ...]) -> None:
-        self.late_echoes = self.excess_echoes = 0
+        self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
+        self.excess_echoes = 0
         self._odometer = Odometer(config.arcos)
         self._jumps = OdometryJumps(config.body)
         self._history = OdometryHistory(_HISTORY)
@@ -162,7 +164,7 @@ class PoseStamper:
         for fired_s, ranges in self._sonar.firings(sip.sonar, sip_s, period_s):
             place = self._history.at(fired_s, _GAP_PERIODS * period_s)
             if place is None:
-                self.late_echoes += 1
+                self.late_echoes.add()
             elif not self._firing_limit.take(arrived_s):
                 self.excess_echoes += 1
                 if self.excess_echoes % _EXCESS_NOTED == 1:

@@ -17,6 +17,7 @@ from config.robot import BodyConfig
 from drivers.denning import diagnostics
 from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
 from drivers.denning.wire_units import cross_paths_of, odometry_of, ranges_of
+from drivers.dropped_count import LATE_FIRINGS, RANGES_BEYOND, DroppedCount
 from drivers.messages import CrossPaths, Firing, Floats, Odometry, Pose
 from drivers.odometry_history import OdometryHistory
 from drivers.odometry_jumps import OdometryJumps
@@ -67,8 +68,8 @@ class PoseStamper:
     """
 
     def __init__(self, axes: tuple[float, ...], body: BodyConfig) -> None:
-        self.late_echoes = 0
-        self.out_of_window = 0
+        self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
+        self.out_of_window = DroppedCount(RANGES_BEYOND, self.note)
         self.excess_echoes = 0
         self._axes = axes
         self._jumps = OdometryJumps(body)
@@ -145,7 +146,7 @@ class PoseStamper:
     def drop_held(self) -> None:
         """Drop the echoes that wait for odometry: the line or the robot's clock may be another from now on."""
         self._clock.break_off()
-        self.late_echoes += len(self._held)
+        self.late_echoes.add(len(self._held))
         self._held.clear()
 
     def odometry(self, odom: Odom, run_s: float) -> Odometry | Jump:
@@ -175,13 +176,13 @@ class PoseStamper:
         window_m = self._window * TENTH_FT_M + slack_m
         beyond = [sensor for sensor, range_m in enumerate(ranges.tolist()) if window_m < range_m < math.inf]
         if beyond:
-            self.out_of_window += len(beyond)
+            self.out_of_window.add(len(beyond))
             ranges[beyond] = math.nan
         if heard is not None:
             heard = self._within(heard, window_m)
         if len(self._held) >= _HELD_MAX:
             self._held.popleft()
-            self.late_echoes += 1
+            self.late_echoes.add()
         self._held.append((echo.t_us, ranges, heard))
 
     def firings(self, run_s: float) -> list[Firing]:
@@ -200,14 +201,14 @@ class PoseStamper:
             _, ranges, heard = self._held.popleft()
             # Times passed on only grow: this drops firings older than the last one, and copies of it.
             if self._last_firing_us is not None and t_us <= self._last_firing_us:
-                self.late_echoes += 1
+                self.late_echoes.add()
                 continue
             if not self._firing_limit.take(run_s):
                 self._drop_excess(run_s)
                 continue
             place = self._history.at(t_us * 1e-6, self._gap_max_s)
             if place is None:
-                self.late_echoes += 1
+                self.late_echoes.add()
                 continue
             self._last_firing_us = t_us
             pose, ring_yaw = place
@@ -219,7 +220,7 @@ class PoseStamper:
         beyond = np.isfinite(heard.half_paths_m) & (heard.half_paths_m > window_m)
         if not beyond.any():
             return heard
-        self.out_of_window += int(np.count_nonzero(beyond))
+        self.out_of_window.add(int(np.count_nonzero(beyond)))
         if beyond.all():
             return None
         kept = ~beyond

@@ -14,6 +14,7 @@ import numpy as np
 
 from config.robot import RobotConfig
 from drivers import se2
+from drivers.dropped_count import EXCESS_FIRINGS, LATE_FIRINGS, DroppedCount
 from drivers.messages import Firing, Flags, Floats, Odometry, Pose, Twist
 from drivers.odometry_history import OdometryHistory
 from drivers.odometry_jumps import OdometryJumps
@@ -77,7 +78,8 @@ class Measurements:
     _is_new: bool
 
     def __init__(self, config: RobotConfig, ids: tuple[int, ...]) -> None:
-        self.late_echoes = self.excess_echoes = 0
+        self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
+        self.excess_echoes = DroppedCount(EXCESS_FIRINGS, self.note)
         self._config = config
         self._sensors = {one: sensor for sensor, one in enumerate(ids)}
         self._clock = RobotClock()
@@ -194,9 +196,9 @@ class Measurements:
             self._held.popleft()
             place = self._history.at(fired_s, _GAP_S)
             if place is None or fired_s <= self._fired_s:
-                self.late_echoes += 1
+                self.late_echoes.add()
             elif not self._limit.take(run_s):
-                self.excess_echoes += 1
+                self.excess_echoes.add()
             else:
                 self._fired_s = fired_s
                 ready.append(Firing(fired_s, *place, ranges))

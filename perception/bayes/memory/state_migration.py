@@ -19,7 +19,7 @@ from perception.bayes.memory.state import FREE, Memory
 from perception.kernel import Floats, Ints
 from perception.records import column
 
-SAME_RADIUS_M: Final = 1e-9
+EQUAL_RADIUS_M: Final = 1e-9
 """Radii nearer than this are one."""
 
 
@@ -57,7 +57,7 @@ def _migrate_circles(circles: NDArray[Any], old: Floats, new: Floats, index: Int
     for k, to in enumerate(index.tolist()):
         leads[:, to] = circles["leads"][:, k]
     leads[:, len(new) : len(new) + 2] = circles["leads"][:, len(old) : len(old) + 2]
-    is_changed = np.abs(new[index] - old) > SAME_RADIUS_M
+    is_changed = np.abs(new[index] - old) > EQUAL_RADIUS_M
     for t in np.flatnonzero(circles["status"] != FREE).tolist():
         kind = int(circles["kind"][t])
         circles["kind"][t], circles["alternative"][t] = index[kind], 0

@@ -61,7 +61,7 @@ def test_the_bytes_of_a_sip_take_their_time_on_the_line() -> None:
 def test_a_firing_before_the_first_sip_is_dropped() -> None:
     driven = Driven()
     assert driven.sip(0, 8)[1] == []
-    assert driven.stamper.late_echoes == 1
+    assert driven.stamper.late_echoes.count == 1
 
 
 def test_an_odometry_that_was_set_is_continued_with_a_note() -> None:
@@ -129,5 +129,5 @@ def test_a_flood_of_ranges_is_bounded_and_reported() -> None:
         driven.now -= 0.099  # a hundred times as often
         passed += len(driven.sip(*range(16), speed=0)[1])
     assert passed <= 64 + 4 / 0.041 + 1
-    assert passed + driven.stamper.excess_echoes + driven.stamper.late_echoes == 1000
+    assert passed + driven.stamper.excess_echoes + driven.stamper.late_echoes.count == 1000
     assert sum("many more ranges than its sonar can measure" in note for note in driven.stamper.notes()) == 1

@@ -210,7 +210,7 @@ def test_after_a_jump_of_clock_or_pose_the_robot_is_identified_and_nothing_inter
     assert heard.odometry is not None
     assert heard.odometry.pose == Pose(0.0, 0.0, 0.0), "no base moves so far at once"
     assert harness.robot.odometry_origin == Pose(x * 1e-4, 0.0, 0.0)
-    assert harness.robot.stamper.late_echoes == 1
+    assert harness.robot.stamper.late_echoes.count == 1
 
 
 @pytest.mark.promise("P25")

@@ -47,7 +47,7 @@ def test_an_echo_waits_for_the_odometry_after_it(harness: DriverHarness) -> None
     harness.odom(2 * PERIOD_US, x_0p1mm=300)
     (second,) = harness.robot.take_received().firings
     assert second.pose.x == pytest.approx(0.02)
-    assert harness.robot.stamper.late_echoes == 0
+    assert harness.robot.stamper.late_echoes.count == 0
 
 
 def test_one_chunk_or_byte_by_byte_is_the_same(harness: DriverHarness) -> None:
@@ -76,12 +76,12 @@ def test_one_chunk_or_byte_by_byte_is_the_same(harness: DriverHarness) -> None:
 def test_an_echo_without_odometry_around_it_is_dropped_and_counted(harness: DriverHarness) -> None:
     harness.odom(1_000_000)
     harness.send(Echo(0, 990_000, 0, 1, (10,)))
-    assert harness.robot.stamper.late_echoes == 1, "older than the history"
+    assert harness.robot.stamper.late_echoes.count == 1, "older than the history"
     harness.send(Echo(0, 1_040_000, 0, 1, (10,)))
     harness.odom(1_100_000)
-    assert harness.robot.stamper.late_echoes == 2, "between two samples too far apart"
+    assert harness.robot.stamper.late_echoes.count == 2, "between two samples too far apart"
     harness.send(Echo(0, 1_100_000, 0, 1, (10,)), Echo(0, 1_090_000, 0, 1, (10,)), Echo(0, 9_000_000, 0, 1, (10,)))
-    assert harness.robot.stamper.late_echoes == 4, "before the one before it, and from a far future"
+    assert harness.robot.stamper.late_echoes.count == 4, "before the one before it, and from a far future"
     assert [f.robot_s for f in harness.robot.take_received().firings] == pytest.approx([1.1])
 
 
@@ -109,14 +109,17 @@ def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[
         if good:
             harness.send(good[-1])
         good.append(echo)
-    firings = harness.robot.take_received().firings
+    received = harness.robot.take_received()
+    firings = received.firings
     assert [f.robot_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
+    for what in ("firings", "ranges"):
+        assert any(f"{what} were dropped so far" in note for note in received.notes), "the operator hears of it"
     for firing in firings:
         heard = firing.ranges_m[np.isfinite(firing.ranges_m)]
         assert (heard <= window * 0.03048 + 1e-9).all()
         assert heard.size + np.isinf(firing.ranges_m).sum() == 6, "the others are kept"
-    assert harness.robot.stamper.late_echoes == 200 + 199
-    assert harness.robot.stamper.out_of_window == (200 + 200 + 199) * 2
+    assert harness.robot.stamper.late_echoes.count == 200 + 199
+    assert harness.robot.stamper.out_of_window.count == (200 + 200 + 199) * 2
     measured(
         f"200 firings, each echo twice and once late, a quarter of the ranges beyond the window: {len(firings)} "
         f"firings and 0 such ranges came through"
@@ -176,7 +179,7 @@ def test_the_number_of_echoes_that_wait_for_odometry_is_bounded(harness: DriverH
     harness.odom(0)
     for k in range(200):
         harness.send(Echo(0, 1000 + k, 0, 1, (10,)))
-    assert harness.robot.stamper.late_echoes == 200 - 64
+    assert harness.robot.stamper.late_echoes.count == 200 - 64
     harness.odom(PERIOD_US)
     assert len(harness.robot.take_received().firings) == 64
 

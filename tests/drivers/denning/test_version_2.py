@@ -163,7 +163,7 @@ def test_a_listener_with_a_fault_or_beyond_the_window_is_left_out() -> None:
     assert second is None
     assert third is not None
     assert third.listeners.tolist() == [1]
-    assert harness.robot.stamper.out_of_window == 2
+    assert harness.robot.stamper.out_of_window.count == 2
 
 
 # The host asks sensors to listen.
@@ -250,7 +250,7 @@ def test_a_range_beyond_the_window_is_dropped_but_for_the_rounding_of_a_count() 
     (firing,) = harness.robot.take_received().firings
     assert firing.ranges_m[0] == at_end * (1e-6 * 172)
     assert math.isnan(firing.ranges_m[1])
-    assert harness.robot.stamper.out_of_window == 1
+    assert harness.robot.stamper.out_of_window.count == 1
 
 
 def test_echo2_of_a_robot_that_speaks_version_1_is_ignored() -> None:

@@ -108,7 +108,7 @@ def test_a_firing_lies_one_step_before_its_report() -> None:
     assert firing.ranges_m[12] == pytest.approx(7000 / 1476)
     assert robot.fires((0, 1476)) == [], "none twice"
     assert robot.fires((240, 1476)) == []
-    assert robot.measurements.late_echoes == 1
+    assert robot.measurements.late_echoes.count == 1
 
 
 def test_timestamps_that_are_no_microseconds_are_noted_once() -> None:
