@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
-from behaviors.avoid_past import Trail
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.commitment import Commitment
 from behaviors.field_of_view import unseen_way
 from behaviors.follow_valley import SCHEMA as VALLEY
 from behaviors.leave_canyon import SCHEMA as CANYON
@@ -29,12 +27,13 @@ from config.mission import StepConfig
 from config.settings import Settings
 from drivers.messages import Pose, Twist
 from perception.percept import Percept, wrap_angle
-from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
+from runtime.cycle.drive_requests import STANDSTILL
+from runtime.cycle.drive_state import DriveState, Moment, StepSettings
 from runtime.cycle.escape_schemas import escape_schemas
-from runtime.cycle.goal_drive import GoalDrive, drive_through_valley, drive_to_goal
+from runtime.cycle.goal_drive import drive_through_valley, drive_to_goal
 from runtime.cycle.motion_monitor import CRAWL
 from runtime.cycle.stalled_drives import DriveMemory, observe_way
-from runtime.cycle.velocity_limits import ZoneLimits, zone_of_goal
+from runtime.cycle.velocity_limits import zone_of_goal
 
 SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""
@@ -62,100 +61,52 @@ NO_WAY: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class StepSettings:
-    """The run's settings with the gains and times of a mission's step, and the two that they were made from."""
-
-    step: StepConfig
-    run: Settings
-    settings: Settings
-
-
-NO_MEMORY: Final = DriveMemory()
-
-
-@dataclass(frozen=True, slots=True)
 class DriveResult:
     """What a drive request led to in one cycle."""
 
     decision: Decision
     vectors: tuple[Response, ...]
     """The schemas' responses and, last, their sum under the name `SUM`."""
-    drive_request: DriveRequest
-    """The request after the cycle: a goal may have been reached, a velocity may have expired."""
-    leg: Leg
+    state: DriveState
+    """For the next cycle."""
     hold_reason: str | None = None
     """Why the robot does not move although it may drive, for the operator."""
-    goal_drive: GoalDrive | None = None
-    """What a drive to a goal keeps for the next cycle."""
-    trail: Trail = ()
-    """Where the robot has been, if avoid-past is in use."""
-    step_settings: StepSettings | None = None
-    """Of the mission's step, for the next cycle."""
-    memory: DriveMemory = NO_MEMORY
-    """For the next cycle."""
 
 
-def drive(
-    drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
-    place: GoalPlace | None = None, goal_drive: GoalDrive | None = None, map_frame: Pose | None = None,
-    cycle_s: float = 0.0, trail: Trail = (), step_settings: StepSettings | None = None,
-    memory: DriveMemory = NO_MEMORY, zones: ZoneLimits | None = None,
-) -> DriveResult:  # fmt: skip
+def drive(state: DriveState, percept: Percept, settings: Settings, now: Moment) -> DriveResult:
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
     Parameters
     ----------
-    drive_request : DriveRequest
-        The motion requested of the robot.
-    requested_run_s, run_s : float
-        When that was requested, and now, by the run's clock.
-    leg : Leg
-        How far the current leg has come, for `Legs`.
+    state : DriveState
+        Of the cycle before, with the request; not changed.
     percept : Percept
         What the robot sees.
     settings : Settings
         The run's.
-    place : GoalPlace, optional
-        Where a goal lies, from `goal_place`.
-    goal_drive : GoalDrive, optional
-        Of the cycle before, for a goal or a mission's step with one.
-    map_frame : Pose, optional
-        The map frame in odometry's, while a mission needs it and the robot's place there is known.
-    cycle_s : float
-        Time since the cycle before, s.
-    trail : Trail
-        Of the cycle before.
-    step_settings : StepSettings, optional
-        Of the cycle before, for a mission.
-    memory : DriveMemory, optional
-        Of the cycle before.
-    zones : ZoneLimits, optional
-        A goal in one is given up at once.
+    now : Moment
+        When this is decided.
     """
-    commitment = memory.commitment
-    match drive_request:
-        case Teleoperate():
-            result = _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings)
-        case Goal():
-            result = _to_goal(
-                drive_request, place, run_s, leg, goal_drive, percept, settings, trail, map_frame, commitment, zones
-            )
-        case Mission():
-            result = _on_mission(
-                drive_request, run_s, leg, goal_drive, percept, settings, map_frame, cycle_s, step_settings,
-                commitment, zones,
-            )  # fmt: skip
+    leg = Leg.starting_at(percept.pose) if state.leg is None else state.leg
+    match state.drive_request:
+        case Teleoperate() as velocity:
+            result = _teleoperate(state, velocity, leg, percept, settings, now)
+        case Goal() as goal:
+            result = _to_goal(state, goal, leg, percept, settings, now)
+        case Mission() as mission:
+            result = _on_mission(state, mission, leg, percept, settings, now)
         case _:
-            result = _along_legs(drive_request, run_s, leg, percept, settings, trail, commitment)
+            result = _along_legs(state, leg, percept, settings, now)
     stands = (
         isinstance(result.decision, Drive) and result.decision.twist == STANDSTILL and result.hold_reason is not None
     )
+    after, memory = result.state, state.drive_memory
     progress, leg, stalled = observe_way(
-        result.drive_request, result.leg, None if stands else memory.progress, result.goal_drive, percept.pose,
-        requested_run_s, run_s, settings.behaviors.move_ahead,
+        after.drive_request, leg if after.leg is None else after.leg, None if stands else memory.progress,
+        after.goal_drive, percept.pose, state.requested_run_s, now.run_s, settings.behaviors.move_ahead,
     )  # fmt: skip
-    hold_reason, memory = result.hold_reason or stalled, DriveMemory(memory.commitment, progress)
-    return replace(result, leg=leg, hold_reason=hold_reason, memory=memory)
+    after = replace(after, leg=leg, drive_memory=DriveMemory(memory.commitment, progress))
+    return replace(result, state=after, hold_reason=result.hold_reason or stalled)
 
 
 def commit(result: DriveResult, twist: Twist, requested_run_s: float, run_s: float) -> tuple[Twist, DriveResult]:
@@ -163,24 +114,25 @@ def commit(result: DriveResult, twist: Twist, requested_run_s: float, run_s: flo
 
     `twist` is the velocity after all limits; the times are those of `drive`, s.
     """
-    request, requested, before = result.drive_request, 0, result.memory.commitment
+    request, requested, before = result.state.drive_request, 0, result.state.drive_memory.commitment
     if isinstance(request, Teleoperate):  # each message is a request: only another direction is a new one
         requested = (request.v > 0.0) - (request.v < 0.0)
     elif before.started_run_s is not None and before.started_run_s < requested_run_s:
         before = replace(before, started_run_s=None, side=0, turned_run_s=None)
     decided, (twist, commitment) = twist, before.commit(twist, run_s, requested)
     hold_reason = result.hold_reason or (WAITS_TO_START if twist == STANDSTILL != decided else None)
-    return twist, replace(result, hold_reason=hold_reason, memory=replace(result.memory, commitment=commitment))
+    memory = replace(result.state.drive_memory, commitment=commitment)
+    return twist, replace(result, state=replace(result.state, drive_memory=memory), hold_reason=hold_reason)
 
 
 def _teleoperate(
-    drive_request: Teleoperate, age_s: float, leg: Leg, percept: Percept, settings: Settings
+    state: DriveState, drive_request: Teleoperate, leg: Leg, percept: Percept, settings: Settings, now: Moment
 ) -> DriveResult:
     """Return what an operator's velocity leads to."""
     behaviors, body = settings.behaviors, settings.body
     # The last cycle before the deadline stops: the next one would come after it.
     if drive_request != TELEOPERATION_ENDED and is_expired(
-        drive_request, age_s + 1.0 / settings.cycle.rate_hz, behaviors.teleoperation
+        drive_request, now.run_s - state.requested_run_s + 1.0 / settings.cycle.rate_hz, behaviors.teleoperation
     ):
         drive_request = TELEOPERATION_ENDED
     steer = teleoperation(percept, drive_request, behaviors.arbiter.base_velocity_m_s)
@@ -198,29 +150,23 @@ def _teleoperate(
         way = percept.pose.theta + (0.0 if requested.v > 0.0 else math.pi)
         unseen = unseen_way(percept, way, body, behaviors.arbiter.clearance_m)
         hold_reason = blocked_by(percept, requested.v, body.radius_m) if unseen is None else unseen.reason
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
+    return DriveResult(decision, with_sum(responses, decision), state.after(drive_request, leg), hold_reason)
 
 
 def _to_goal(
-    drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
-    percept: Percept, settings: Settings, trail: Trail, map_frame: Pose | None, commitment: Commitment,
-    zones: ZoneLimits | None,
-) -> DriveResult:  # fmt: skip
+    state: DriveState, drive_request: Goal, leg: Leg, percept: Percept, settings: Settings, now: Moment
+) -> DriveResult:
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
+    place = state.goal_place
     if place is None and not drive_request.reached:
-        return DriveResult(Drive(STANDSTILL), (), drive_request, leg, NO_PLACE, goal_drive)
+        waits = state.after(drive_request, leg, goal_drive=state.goal_drive)
+        return DriveResult(Drive(STANDSTILL), (), waits, NO_PLACE)
     there = drive_request if place is None else replace(drive_request, x=place.x, y=place.y)
     way_rad = math.atan2(there.y - percept.pose.y, there.x - percept.pose.x)
-    others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
+    others, trail = escape_schemas(percept, way_rad, now.run_s, state.trail, settings)
+    forbidden = None if drive_request.reached else zone_of_goal(there, now.zones, settings)
     there, goal_drive, responses, decision, hold_reason = drive_to_goal(
-        there,
-        goal_drive,
-        percept,
-        run_s,
-        others,
-        settings,
-        commitment,
-        None if drive_request.reached else zone_of_goal(there, zones, settings),
+        there, state.goal_drive, percept, now.run_s, others, settings, state.drive_memory.commitment, forbidden
     )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
@@ -228,15 +174,17 @@ def _to_goal(
         hold_reason = f"{goal_drive.progress.given_up}; clear the way or set another goal"
     if drive_request.reached and isinstance(decision, Drive):
         if place is None:
-            return DriveResult(Drive(STANDSTILL), (), drive_request, leg, PLACE_LOST, goal_drive)
-        drive_request, decision, hold_reason = _at_goal(drive_request, responses, percept, settings, map_frame)
+            waits = state.after(drive_request, leg, goal_drive=goal_drive)
+            return DriveResult(Drive(STANDSTILL), (), waits, PLACE_LOST)
+        drive_request, decision, hold_reason = _at_goal(drive_request, responses, percept, settings, now.map_frame)
         away_m = math.hypot(place.x - percept.pose.x, place.y - percept.pose.y)
         if decision == Drive(STANDSTILL) and away_m > settings.behaviors.move_to_goal.success_radius_m + AWAY_M:
             hold_reason = (
                 f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) was reached, but the robot is "
                 f"{away_m:.1f} m from it now: it was moved, or its place was wrong; set the goal again"
             )
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive, trail)
+    after = state.after(drive_request, leg, goal_drive=goal_drive, trail=trail)
+    return DriveResult(decision, with_sum(responses, decision), after, hold_reason)
 
 
 def _at_goal(
@@ -267,67 +215,58 @@ def _turn_to(
     return limit_velocity(turning, responses, percept, settings.body, behaviors.arbiter, expected)
 
 
-def _along_legs(
-    drive_request: DriveRequest, run_s: float, leg: Leg, percept: Percept, settings: Settings, trail: Trail,
-    commitment: Commitment,
-) -> DriveResult:  # fmt: skip
+def _along_legs(state: DriveState, leg: Leg, percept: Percept, settings: Settings, now: Moment) -> DriveResult:
     """Return what the configured legs lead to."""
     ahead, leg = move_ahead(percept, leg, settings.behaviors.move_ahead)
+    trail = state.trail
     others: tuple[Response, ...] = ()
     if not leg.done:
         way_rad = math.radians(settings.behaviors.move_ahead.move_ahead_direction_deg)
         way_rad += 0.0 if leg.outbound else math.pi
-        others, trail = escape_schemas(percept, way_rad, run_s, trail, settings)
+        others, trail = escape_schemas(percept, way_rad, now.run_s, trail, settings)
     away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     responses = (ahead, away, *others)
     expected = (AHEAD, AVOID, *(response.schema for response in others))
     decision = arbitrate(
-        responses, percept, settings.body, settings.behaviors.arbiter, expected, commitment=commitment, run_s=run_s
-    )
+        responses, percept, settings.body, settings.behaviors.arbiter, expected,
+        commitment=state.drive_memory.commitment, run_s=now.run_s,
+    )  # fmt: skip
+    after = state.after(state.drive_request, leg, trail=trail)
     if leg.gave_up and isinstance(decision, Drive):
-        return DriveResult(Drive(STANDSTILL), (), drive_request, leg, LEG_GIVEN_UP, trail=trail)
+        return DriveResult(Drive(STANDSTILL), (), after, LEG_GIVEN_UP)
     hold_reason = LEG_DONE if leg.done else None
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, trail=trail)
+    return DriveResult(decision, with_sum(responses, decision), after, hold_reason)
 
 
 def _on_mission(
-    mission: Mission, run_s: float, leg: Leg, goal_drive: GoalDrive | None, percept: Percept, settings: Settings,
-    map_frame: Pose | None, cycle_s: float, step_settings: StepSettings | None, commitment: Commitment,
-    zones: ZoneLimits | None,
-) -> DriveResult:  # fmt: skip
+    state: DriveState, mission: Mission, leg: Leg, percept: Percept, settings: Settings, now: Moment
+) -> DriveResult:
     """Return what a mission leads to; where it asks for no motion, or gets none, the result says why."""
     behaviors, body = settings.behaviors, settings.body
     radii_m = {model.name: model.reach_m for model in settings.models}
     scene = Scene(
-        percept, body, behaviors, ODOM_FRAME, 0.0, cycle_s, map_frame, radii_m=radii_m, run_s=run_s,
+        percept, body, behaviors, ODOM_FRAME, 0.0, now.cycle_s, now.map_frame, radii_m=radii_m, run_s=now.run_s,
         places=settings.places, places_frame=settings.places_frame,
     )  # fmt: skip
     asked = drive_mission(mission, scene)
     if asked.hold_reason is not None:
-        return DriveResult(Drive(STANDSTILL), (), asked.mission, leg, asked.hold_reason)
+        return DriveResult(Drive(STANDSTILL), (), state.after(asked.mission, leg), asked.hold_reason)
     if asked.turn_to_rad is not None:
         responses = (*asked.leads, *asked.helpers)
         decision = _turn_to(asked.turn_to_rad, responses, asked.schemas, percept, settings)
-        return DriveResult(decision, with_sum(responses, decision), asked.mission, leg)
-    if asked.mission.progress.changes != mission.progress.changes:
-        goal_drive = None
+        return DriveResult(decision, with_sum(responses, decision), state.after(asked.mission, leg))
+    goal_drive = state.goal_drive if asked.mission.progress.changes == mission.progress.changes else None
     mission, step = asked.mission, asked.mission.step
-    step_settings = of_step(step, settings, step_settings)
+    step_settings = of_step(step, settings, state.step_settings)
     settings = step_settings.settings
     others = percept if asked.own_echoes is None else replace(percept, obstacles=percept.obstacles[~asked.own_echoes])
-    hold_reason = None
+    hold_reason, commitment = None, state.drive_memory.commitment
     if asked.goal is not None:
         beside = (r for r in (*asked.leads, *asked.helpers) if r.schema not in {TO_GOAL, VALLEY, CANYON})
         _, goal_drive, responses, decision, hold_reason = drive_to_goal(
-            asked.goal,
-            goal_drive,
-            percept,
-            run_s,
-            tuple(beside),
-            settings,
-            commitment,
-            zone_of_goal(asked.goal, zones, settings),
-        )
+            asked.goal, goal_drive, percept, now.run_s, tuple(beside), settings, commitment,
+            zone_of_goal(asked.goal, now.zones, settings),
+        )  # fmt: skip
         if goal_drive.progress.fault is not None:
             mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")
             goal_drive, hold_reason = None, mission.progress.reason or hold_reason
@@ -335,7 +274,7 @@ def _on_mission(
         remaining_m = math.inf if asked.remaining_m is None else asked.remaining_m
         beside = (r for r in asked.helpers if r.schema != VALLEY)
         goal_drive, responses, decision, hold_reason = drive_through_valley(
-            Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, run_s, tuple(beside), settings,
+            Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, now.run_s, tuple(beside), settings,
             commitment,
         )  # fmt: skip
     else:
@@ -343,12 +282,12 @@ def _on_mission(
         responses = (*asked.leads, *asked.helpers, away)
         expected = (*asked.schemas, AVOID)
         decision = arbitrate(
-            responses, percept, body, behaviors.arbiter, expected, commitment=commitment, run_s=run_s
+            responses, percept, body, behaviors.arbiter, expected, commitment=commitment, run_s=now.run_s
         )
     if hold_reason is None and isinstance(decision, Drive) and decision.twist == STANDSTILL:
         hold_reason = NO_WAY.format(step.name)
-    vectors = with_sum(responses, decision)
-    return DriveResult(decision, vectors, mission, leg, hold_reason, goal_drive, step_settings=step_settings)
+    after = state.after(mission, leg, goal_drive=goal_drive, step_settings=step_settings)
+    return DriveResult(decision, with_sum(responses, decision), after, hold_reason)
 
 
 def of_step(step: StepConfig, settings: Settings, before: StepSettings | None) -> StepSettings:

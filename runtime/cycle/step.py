@@ -13,7 +13,6 @@ from enum import Enum
 from typing import Final, Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
-from behaviors.avoid_past import Trail
 from behaviors.move_ahead import Leg
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
@@ -31,7 +30,6 @@ from runtime.cycle.drive_requests import (
     STANDSTILL,
     DriveInput,
     DriveRequest,
-    GoalPlace,
     Legs,
     after_reboot,
     after_stop,
@@ -44,8 +42,9 @@ from runtime.cycle.drive_requests import (
     refusal,
     requested,
 )
-from runtime.cycle.driving import StepSettings, commit, drive
-from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
+from runtime.cycle.drive_state import DriveState, Moment
+from runtime.cycle.driving import commit, drive
+from runtime.cycle.goal_drive import can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.line_messages import blind_reason
 from runtime.cycle.modes import Mode, ModeState, advance
@@ -88,38 +87,25 @@ class Refused:
 
 
 @dataclass(slots=True)
-class State:
-    """The state that a cycle passes to the next one."""
+class State(DriveState):
+    """The state that a cycle passes to the next one, that of its drive included."""
 
     perception: Perception
     mode: ModeState = field(default_factory=ModeState)
-    leg: Leg | None = None
     odometry: Odometry | None = None
     last_firing_robot_s: float = 0.0
     """When the ring last fired, by the robot's clock."""
     run_s: float | None = None
     """When the last cycle began, by the run's clock."""
     cycle: int = 0
-    drive_request: DriveRequest = field(default_factory=Legs)
-    """What is driven in DRIVE."""
-    requested_run_s: float = 0.0
-    """When the operator requested that, by the run's clock."""
-    goal_place: GoalPlace | None = None
-    """Where the goal lies in odometry's frame; None without a goal, or while its place is not known."""
-    trail: Trail = ()
-    """Where the robot has been since the drive request, if avoid-past is in use."""
     vectors: tuple[Response, ...] = ()
     """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
     """Why the robot does not move although it may drive; None if it moves."""
-    drive_memory: DriveMemory = field(default_factory=DriveMemory)
-    """What the last cycle in DRIVE left, whatever is driven."""
     motion_monitor: MotionMonitor = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
     clock_monitor: ClockMonitor = field(default_factory=ClockMonitor)
     """Whether the robot's clock keeps time."""
-    goal_drive: GoalDrive | None = None
-    """The drive to a goal so far; None without a goal, or before its first cycle in DRIVE."""
     ring_problem: str | None = None
     """Why the readings of the newest firings cannot be true; None if they can. Made anew each cycle, not recorded."""
     preparing: str | None = None
@@ -128,8 +114,6 @@ class State:
     """What the last cycle decided on; None if it did not drive. It is made anew each cycle and not recorded."""
     undos: tuple[Undo, ...] = ()
     """What takes each of the last cycle's edits back. Made anew each cycle and not recorded."""
-    step_settings: StepSettings | None = None
-    """Of the mission's step; None without one. They follow from mission and settings and are not recorded."""
     zones: ZoneLimits | None = None
     """No-go zones and speed areas; None without any. They follow from the settings and are not recorded."""
     void_places: PlacesConfig | None = None
@@ -349,12 +333,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         if state.hold_reason is not None:
             state.goal_drive, state.drive_memory = None, DriveMemory()  # standing here is no lack of progress
             return Drive(STANDSTILL)
-    result = drive(
-        state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
-        state.goal_drive, map_frame, gap_s, state.trail, state.step_settings, state.drive_memory, zones,
-    )  # fmt: skip
-    state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
-    state.trail, state.step_settings, state.percept = result.trail, result.step_settings, percept
+    result = drive(state, percept, settings, Moment(inputs.run_s, gap_s, map_frame, zones))
+    state.percept = percept
     decision, reason = result.decision, result.hold_reason
     if isinstance(decision, Unseen):
         driven_s = inputs.run_s - state.mode.entered_run_s
@@ -369,12 +349,13 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         if zones is not None:
             commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
             last = commands[-1].twist if commands else STANDSTILL
-            twist, by_zone = zones.applied(twist, last, state.drive_request, odometry, age_s, settings)
+            twist, by_zone = zones.applied(twist, last, result.state.drive_request, odometry, age_s, settings)
             slowed = slowed or by_zone
         result = replace(result, hold_reason=reason or slowed)
         twist, result = commit(result, twist, state.requested_run_s, inputs.run_s)
         decision = Drive(twist)
-    state.vectors, state.hold_reason, state.drive_memory = result.vectors, result.hold_reason, result.memory
+    state.vectors, state.hold_reason = result.vectors, result.hold_reason
+    state.take_over(result.state)
     return decision
 
 

@@ -16,8 +16,8 @@ from config.mission import MissionConfig
 from config.settings import Settings
 from drivers.messages import Twist
 from perception.percept import DetectedObject, Percept, Pose
-from runtime.cycle.driving import DriveResult
-from runtime.cycle.driving import drive as drive_request
+from runtime.cycle.drive_state import DriveState, Moment
+from runtime.cycle.driving import DriveResult, drive
 from runtime.cycle.goal_drive import GoalDrive
 from tests.behaviors.hall import STEP_S, World, clamp, echoes
 from tests.behaviors.views import EVERYWHERE
@@ -60,14 +60,12 @@ class MissionRobot:
         """Decide once, and move for a cycle; every stand has a reason."""
         percept = Percept(self.pose, echoes(self.world, self.pose, wide=False, noise=None), EVERYWHERE, self.objects)
         self.run_s += STEP_S
-        result = drive_request(
-            self.mission, 0.0, self.run_s, Leg(0.0, 0.0), percept, self.settings,
-            goal_drive=self.goal_drive, map_frame=self.map_frame, cycle_s=STEP_S,
-        )  # fmt: skip
+        before = DriveState(drive_request=self.mission, leg=Leg(0.0, 0.0), goal_drive=self.goal_drive)
+        result = drive(before, percept, self.settings, Moment(self.run_s, STEP_S, self.map_frame))
         assert isinstance(result.decision, Drive), result.decision
-        assert isinstance(result.drive_request, Mission)
-        self.result, self.mission, twist = result, result.drive_request, result.decision.twist
-        self.goal_drive = result.goal_drive
+        assert isinstance(result.state.drive_request, Mission)
+        self.result, self.mission, twist = result, result.state.drive_request, result.decision.twist
+        self.goal_drive = result.state.goal_drive
         assert result.hold_reason is not None or twist != Twist(0.0, 0.0), "it stands and does not say why"
         body = self.settings.body
         v = self.velocity.v + clamp(twist.v - self.velocity.v, body.acceleration_max_m_s2 * STEP_S)

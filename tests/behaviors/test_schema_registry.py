@@ -52,7 +52,7 @@ def test_a_goal_in_the_map_moves_smoothly_with_it_and_waits_while_its_place_is_u
     robot = MissionRobot(mission({"schemas": [goal]}), map_frame=Pose(0.0, 0.0, 0.0))
     robot.cycle()
     robot.map_frame = Pose(0.0, 1.0, 0.0)
-    ways = [robot.cycle().drive_request for _ in range(5)]
+    ways = [robot.cycle().state.drive_request for _ in range(5)]
     places = [way.progress.memories[0].y for way in ways]  # type: ignore[union-attr]
     assert places == pytest.approx([GOAL_SLEW_M_S * STEP_S * (i + 1) for i in range(5)], abs=1e-9)
     robot.map_frame = None
