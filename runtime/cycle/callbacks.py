@@ -11,7 +11,8 @@ COLLECTION: Final = "garbage collection"
 CONSOLE_RECEIVE: Final = "console receive"
 CONSOLE_FRAME: Final = "console frame"
 CONSOLE_SEND: Final = "console send"
+VIEW: Final = "view"
 CALLBACKS: Final = (
-    LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION, CONSOLE_RECEIVE, CONSOLE_FRAME, CONSOLE_SEND
+    LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION, CONSOLE_RECEIVE, CONSOLE_FRAME, CONSOLE_SEND, VIEW
 )  # fmt: skip
 """All of them."""

@@ -132,6 +132,8 @@ def run(
     settings = files.read()
     console = EscapingConsole(stderr=True)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
+    if live:
+        console.print(f"echolocate {VERSION} is starting", highlight=False)
     was_chosen = False
     plugged = [] if (port or settings.link.port) is not None else plugged_in()
     if plugged and live and sys.stdin.isatty() and not emulator.is_chosen:

@@ -96,14 +96,15 @@ async def run_process(
     """
     from runtime.cli.terminal.keys import keys
     from runtime.cli.terminal.time_keys import TimeKeys
-    from runtime.cli.terminal.view import View
+    from runtime.cli.terminal.view import View, after_each_cycle
+    from runtime.cycle.callbacks import VIEW
     from runtime.cycle.process import RobotProcess
     from runtime.cycle.reloader import Reloader
     from runtime.support.kernel_loader import KernelLoader
 
     async with contextlib.AsyncExitStack() as stack:
         view = View(settings, console, units) if live else None
-        listeners: list[OnCycle] = [] if view is None else [view.on_cycle]
+        listeners: list[OnCycle] = []
 
         def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
             for listener in listeners:
@@ -114,6 +115,8 @@ async def run_process(
             settings, log, observers, clock, stack.enter_context(SdNotifier.from_environment()), preparation,
             line_messages,
         )  # fmt: skip
+        if view is not None:
+            listeners.append(after_each_cycle(process.timing_monitor.timed(VIEW, view.on_cycle)))
         if preparation is not None:
             stack.push_async_callback(preparation.close)
         kernel_loader = KernelLoader(log, preparation=preparation)

@@ -6,6 +6,7 @@ only stores a snapshot of the latest cycle, a thread passes it on, and `python -
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import pickle
 import subprocess
@@ -27,17 +28,29 @@ if TYPE_CHECKING:
 
     from config.settings import Settings
     from drivers.driver import RobotDriver
+    from runtime.cycle.process import OnCycle
     from runtime.cycle.step import CycleRecord, State
     from runtime.support.length_format import Units
-    from runtime.timing.cycle_stats import CycleStats
+    from runtime.timing.cycle_stats import CycleStats, Quantiles
 
 EVERY_CYCLES: Final = 5
 """Draw every fifth cycle: 4 Hz at 20 Hz."""
 TRAIL: Final = 400
+UNKNOWN_US: Final[Quantiles] = {"p50": 0.0, "p99": 0.0, "max": 0.0}
+"""Stands for the quantiles until they are computed."""
 PICTURE: Final = "runtime.cli.terminal"
 """The module that draws, run as a program."""
 LAST_S: Final = 5.0
 """Time that the last picture may take, s: a terminal that is held by Ctrl-S would never show it."""
+
+
+def after_each_cycle(call: OnCycle) -> OnCycle:
+    """Return what calls `call` when a cycle has ended, before the loop sleeps: the cycle itself takes no longer."""
+
+    def soon(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
+        asyncio.get_running_loop().call_soon(call, record, state, stats, driver)
+
+    return soon
 
 
 class View:
@@ -68,6 +81,7 @@ class View:
         """Whether time is paused now."""
         self._lines: deque[str] = deque()
         self._slot: Snapshot | None = None
+        self._stats: CycleStats | None = None
         self._wake = threading.Event()
         self._done = False
         self._thread = Worker("view", self._pass_on)
@@ -102,11 +116,12 @@ class View:
             record.mode.mode.value, state.hold_reason or record.mode.reason or state.preparing, pose,
             list(self._trail), state.perception.segment_geometry(), state.perception.counts,
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
-            stats.cycles, stats.late, stats.cycle_us(), stats.lag_us(), stats.missed, tuple(stats.causes.items()),
+            stats.cycles, stats.late, UNKNOWN_US, UNKNOWN_US, stats.missed, tuple(stats.causes.items()),
             tuple(report.reason for report in state.perception.sensor_reports()),
             None if localized is None else localized_place(localized, self._scale.units),
             None if state.odometry is None else state.odometry.twist, self.console_url,
         )  # fmt: skip
+        self._stats = stats
         self._wake.set()
 
     def draw_again(self) -> None:
@@ -140,6 +155,12 @@ class View:
             with contextlib.suppress(BrokenPipeError), picture:  # closes the pipes
                 pass
 
+    def _completed(self, snapshot: Snapshot) -> Snapshot:
+        """Add what would take a cycle too long: the quantiles of all cycles, from half a millisecond to several."""
+        if self._stats is not None:
+            snapshot = replace(snapshot, cycle_us=self._stats.cycle_us(), lag_us=self._stats.lag_us())
+        return replace(snapshot, is_paused=self.is_paused())
+
     def _pass_on(self) -> None:
         """Pass on what is new, the newest snapshot only; at the end, close the pipe, which ends the other process.
 
@@ -162,7 +183,7 @@ class View:
                 newest, self._slot = self._slot, None
                 snapshot = newest or snapshot
                 if snapshot is not None:
-                    pickle.dump(replace(snapshot, is_paused=self.is_paused()), picture.stdin)
+                    pickle.dump(self._completed(snapshot), picture.stdin)
                 picture.stdin.flush()
             picture.stdin.close()
         except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
 import os
@@ -11,6 +12,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ from drivers.registry import make_driver
 from perception.detected_object import MapCounts
 from runtime.cli.terminal import view
 from runtime.cli.terminal.picture import Snapshot
-from runtime.cli.terminal.view import EVERY_CYCLES, View
+from runtime.cli.terminal.view import EVERY_CYCLES, View, after_each_cycle
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
 from runtime.timing.cycle_stats import CycleStats
@@ -173,3 +175,12 @@ def test_the_reason_why_the_robot_holds_is_shown() -> None:
         shown.on_cycle(record, run.state, CycleStats(0.005), make_driver(SETTINGS))
     assert shown._slot is not None
     assert shown._slot.reason == "the goal is reached"
+
+
+async def test_a_snapshot_is_taken_when_the_cycle_has_ended() -> None:
+    cycle: Any = ("record", "state", "stats", "driver")
+    taken: list[Any] = []
+    after_each_cycle(lambda *given: taken.append(given))(*cycle)
+    assert taken == []
+    await asyncio.sleep(0.0)
+    assert taken == [cycle]
