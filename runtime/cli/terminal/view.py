@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 EVERY_CYCLES: Final = 5
 """Draw every fifth cycle: 4 Hz at 20 Hz."""
 TRAIL: Final = 400
-UNKNOWN_US: Final[Quantiles] = {"p50": 0.0, "p99": 0.0, "max": 0.0}
-"""Stands for the quantiles until they are computed."""
 PICTURE: Final = "runtime.cli.terminal"
 """The module that draws, run as a program."""
 LAST_S: Final = 5.0
@@ -112,11 +110,12 @@ class View:
         if pose is not None:
             self._trail.append((pose.x, pose.y))
         localized = state.perception.localized()
+        later: Quantiles = {"p50": 0.0, "p99": 0.0, "max": 0.0}  # see `_completed`
         self._slot = Snapshot(
             record.mode.mode.value, state.hold_reason or record.mode.reason or state.preparing, pose,
             list(self._trail), state.perception.segment_geometry(), state.perception.counts,
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
-            stats.cycles, stats.late, UNKNOWN_US, UNKNOWN_US, stats.missed, tuple(stats.causes.items()),
+            stats.cycles, stats.late, later, later, stats.missed, tuple(stats.causes.items()),
             tuple(report.reason for report in state.perception.sensor_reports()),
             None if localized is None else localized_place(localized, self._scale.units),
             None if state.odometry is None else state.odometry.twist, self.console_url,
