@@ -15,7 +15,7 @@ from typing import Final, TypeAlias
 
 from behaviors.clearance import stoppable_speed_m_s
 from behaviors.commitment import Commitment
-from behaviors.field_of_view import UnseenWay, seen_speed_m_s, unseen_way
+from behaviors.field_of_view import UnseenWay, angle_to_look, seen_speed_m_s, unseen_way
 from behaviors.response import Response, summed
 from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
@@ -69,7 +69,7 @@ def arbitrate(
     The sum's length is clamped to 1. The speed is the base velocity times that length, reduced while the robot has to
     turn, and limited to what it can stop from before the nearest echo ahead, and before what it has seen ahead is too
     old. The base limits its own acceleration. A robot that does not see along its heading turns on the spot to a
-    direction in which it does.
+    direction in which it does. One that knows nothing of a blind side of its course turns there first.
 
     Parameters
     ----------
@@ -104,6 +104,9 @@ def arbitrate(
         return Drive(Twist(0.0, 0.0))
     course = math.atan2(y, x)
     angle = wrap_angle(course - percept.pose.theta)
+    look = None if body.synchro else angle_to_look(percept, course)
+    if look is not None:
+        return Drive(Twist(0.0, max(-body.turn_max_rad_s, min(body.turn_max_rad_s, config.turn_gain_per_s * look))))
     speed = magnitude * _course_speed_m_s(abs(angle), config)
     w = config.turn_gain_per_s * (angle if commitment is None else commitment.kept_angle(angle, run_s))
     w = max(turn_rad_s[0], min(turn_rad_s[1], w))
@@ -170,6 +173,9 @@ def limit_velocity(
         stoppable = stoppable_speed_m_s(behind, body, config.clearance_m, config.cautious_velocity_m_s)
         seen = seen_speed_m_s(behind, body, config.clearance_m, w)
         v = min(0.0, max(along, requested.v, -body.speed_max_m_s, -stoppable, -seen))
+    way = percept.pose.theta + (0.0 if v > 0.0 else math.pi)
+    if angle_to_look(percept, way) is not None:
+        v = max(-config.cautious_velocity_m_s, min(config.cautious_velocity_m_s, v))
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
     if not (abs(v) <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
         return _outside(v, w)

@@ -141,6 +141,28 @@ def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearan
     return UnseenWay(f"the ring has not looked {where} {lasting}: {cause}", age_s, tuple(missing))
 
 
+def angle_to_look(percept: Percept, course_rad: float) -> float | None:
+    """Return the angle to the nearest direction in which the robot must look before it drives, None if there is none.
+
+    On a course the robot comes nearer to walls that face it from anywhere within 90°, and a mirror answers only beams
+    that meet it at a right angle.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    course_rad
+        The direction of the way, in the odometry's frame.
+    """
+    unknown = percept.field_of_view.unknown_rad
+    if not len(unknown):
+        return None
+    angles: list[float] = turn(percept.pose.theta, unknown)[
+        np.abs(turn(course_rad, unknown)) < 0.5 * math.pi
+    ].tolist()
+    return min(angles, key=abs, default=None)
+
+
 def listed(sensors: Sequence[int]) -> str:
     """Return the numbers of sensors as text; of many, the first ones."""
     return ", ".join(map(str, sensors[:SENSORS_NAMED_MAX])) + (" …" if len(sensors) > SENSORS_NAMED_MAX else "")

@@ -31,7 +31,8 @@ def lies(
     json
         File to write.
     robots, kinds
-        Names with commas between them; all shipped robots, and all kinds of lies, if not given.
+        Names with commas between them; all shipped robots, and all kinds of lies, if not given. `bench.sparse_rings`
+        has robots with blind sides: front-4, front-6, front-9, front-back, left-6.
     rooms
         Of room, office, hallway, furnished, goal and corridor.
     seeds, first

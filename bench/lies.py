@@ -19,6 +19,7 @@ import numpy as np
 from pydantic import TypeAdapter
 from rich.table import Table
 
+from bench.sparse_rings import RINGS, with_ring
 from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
 from config.load import load_settings
 from config.settings import Settings
@@ -155,27 +156,33 @@ def make_drive(robot: str, room: str, seed: int) -> Drive:
     Parameters
     ----------
     robot
-        A shipped robot file.
+        A shipped robot file, or one of `RINGS`.
     room
         One of `ROOMS`.
     seed
         Of a generated world, and of a mission's schemas.
     """
     if room in {"office", "hallway"}:
-        settings = load_settings(room, robot=robot)
+        settings = _settings(room, robot)
         assert settings.world is not None
         return Drive(settings, settings.world)
     if room == "corridor":
-        settings = load_settings("room", ["behaviors.move_ahead.distance_m=30.0"], robot=robot)
+        settings = _settings("room", robot, "behaviors.move_ahead.distance_m=30.0")
         return Drive(settings, _corridor(settings.body.radius_m, seed))
     if room == "goal":
-        world = _furnished(seed, load_settings("room", robot=robot).body.radius_m)
+        world = _furnished(seed, _settings("room", robot).body.radius_m)
         goal = _goal(seed, world)
-        settings = load_settings("office", [f"goal={{x_m={goal.x:.2f}, y_m={goal.y:.2f}}}"], robot=robot)
-        return Drive(settings, world)
-    settings = load_settings("room", robot=robot, mission="wander")
+        return Drive(_settings("office", robot, f"goal={{x_m={goal.x:.2f}, y_m={goal.y:.2f}}}"), world)
+    settings = _settings("room", robot, mission="wander")
     assert settings.world is not None
     return Drive(settings, settings.world if room == "room" else _furnished(seed, settings.body.radius_m))
+
+
+def _settings(run: str, robot: str, *sets: str, mission: str | None = None) -> Settings:
+    """Return the settings of a shipped run with a shipped robot, or with one of `RINGS`."""
+    if robot in RINGS:
+        return with_ring(load_settings(run, sets, robot="denning", mission=mission), robot)
+    return load_settings(run, sets, robot=robot, mission=mission)
 
 
 def _furnished(seed: int, radius_m: float) -> WorldConfig:
@@ -307,7 +314,7 @@ def trials(
 ) -> Iterator[Plan]:
     """Yield the arguments of each trial, without errors of clocks that a robot does not have."""
     for robot in robots:
-        stamped = load_settings("room", robot=robot).robot.driver != "arcos"
+        stamped = _settings("room", robot).robot.driver != "arcos"
         for room, seed, moment in product(rooms, seeds, range(moments)):
             for kind in kinds:
                 if stamped or CLOCK not in kind:

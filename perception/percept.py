@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,8 @@ class FieldOfView:
         Distance from the centre to which a silence shows free space, m.
     age_max_s : float
         Longest age at which a direction counts as seen, s.
+    unknown_rad : (u,) float
+        Directions on the ring's blind sides of which nothing is known, in the odometry's frame, rad.
     """
 
     bearings_rad: Floats
@@ -55,6 +57,7 @@ class FieldOfView:
     half_angle_rad: float
     reach_m: float
     age_max_s: float
+    unknown_rad: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

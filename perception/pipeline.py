@@ -292,9 +292,9 @@ class Perception:
         return self._echoes.unheard
 
     def surroundings(
-        self, robot_s: float, ring_yaw: float, travel: float, age_max_s: float
+        self, robot_s: float, ring_yaw: float, pose: Pose, age_max_s: float
     ) -> tuple[FieldOfView, Floats]:
-        """Return where the ring has looked, and the obstacles that it heard there, as `obstacles`.
+        """Return where the ring has looked, and the obstacles: as `obstacles`, and walls beside its blind sides.
 
         Parameters
         ----------
@@ -302,16 +302,17 @@ class Perception:
             The robot's time now, s.
         ring_yaw : float
             Direction of the ring now, rad.
-        travel : float
-            Direction of travel now, rad: that of the sensors that turn with the wheels.
+        pose : Pose
+            The robot's now; its direction is that of the sensors that turn with the wheels.
         age_max_s : float
             Longest age at which a direction counts as seen, s.
         """
         bearings, ages, sensor_ages, points = self._echoes.looks(robot_s, age_max_s)
         axes = ring_yaw + self._axes
         if self._turning:
-            axes[self._turning] += travel - ring_yaw
-        view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s)
+            axes[self._turning] += pose.theta - ring_yaw
+        points, unknown = self._echoes.with_blind_sides(points, pose, axes)
+        view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s, unknown)
         return view, points
 
     def canyons(self) -> tuple[Canyon, ...]:

@@ -1,1 +1,1 @@
-"""The echoes that stay obstacles: the last ones of each sensor, and those that fell silent on approach."""
+"""The echoes that stay obstacles: the last of each sensor, those that fell silent, and walls beside a ring's gaps."""

@@ -9,7 +9,8 @@ A look whose echo is replaced still counts as a look. Neighbours whose beams jus
 while the ring turns, only the looks before close the gap that the turn leaves between their newest ones.
 
 Steady echoes that fall silent as the robot comes nearer are kept apart (`perception.obstacle_echoes.unheard_echoes`).
-While no sensor hears anything, they stay obstacles and do not age.
+While no sensor hears anything, they stay obstacles and do not age. A ring with wide gaps remembers the walls beside
+it, too (`perception.obstacle_echoes.blind_walls`).
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.messages import Firing
+from drivers.messages import Firing, Pose
 from perception.angles import wrapped
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
+from perception.obstacle_echoes.blind_walls import BlindWalls, has_blind_sides
 from perception.obstacle_echoes.unheard_echoes import (
     ALONE,
     UnheardEcho,
@@ -259,6 +261,7 @@ class FreshEchoes:
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.unheard = UnheardEchoes(mounts)
         """What the ring has lost."""
+        self._blind_walls = BlindWalls(mounts, half_angle, turning) if has_blind_sides(mounts, half_angle) else None
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
@@ -276,6 +279,8 @@ class FreshEchoes:
         if self.unheard.falls_silent:
             since = float(firing.robot_s) - STEADY_S
             keep_sudden(self._points, self._times, self._heard, since, x, y, self.unheard.records)
+        if self._blind_walls is not None:
+            self._blind_walls.update(firing)
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
         """Return a copy of the echoes no older than `age_max_s` at the robot's time `robot_s`: shape (k, 2), m."""
@@ -300,8 +305,25 @@ class FreshEchoes:
             echoes = np.concatenate([echoes, self.unheard.points(ALONE)])
         return Looks(fresh[:k], ages[:k], sensor_ages, echoes)
 
+    def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats]:
+        """Return echoes with those of remembered walls, and the directions of which nothing is known.
+
+        Parameters
+        ----------
+        points : (h, 2) float
+            Places of echoes, m.
+        pose, axes_rad
+            As of `BlindWalls.sides`.
+        """
+        if self._blind_walls is None:
+            return points, np.zeros(0)
+        walls, unknown = self._blind_walls.sides(pose, axes_rad)
+        return np.concatenate([points, walls]), unknown
+
     def clear(self) -> None:
         """Remove all readings."""
+        if self._blind_walls is not None:
+            self._blind_walls.clear()
         self._heard[:] = False
         self._steady[:] = False
         self.unheard.clear()

@@ -51,7 +51,7 @@ from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.unheard_limit import limit_unheard
-from runtime.cycle.velocity_limits import ZoneLimits, goal_in_zone, wants_map, zone_limits
+from runtime.cycle.velocity_limits import ZoneLimits, wants_map, way_refused, zone_limits
 from runtime.timing.phases import Phase, ignore_phase
 
 __all__ = [
@@ -265,10 +265,10 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
         state.leg = None
 
 
-def _refusal(state: State, drive_request: DriveInput, settings: Settings) -> str | None:
+def _refusal(state: State, asked: DriveInput, settings: Settings) -> str | None:
     """Return why a drive request cannot be carried out, None if it can."""
-    no_map = NO_MAP if needs_map(drive_request) and settings.places_frame != "map" else None
-    return no_map or refusal(state.drive_request, drive_request) or goal_in_zone(drive_request, state.zones, settings)
+    no_map = NO_MAP if needs_map(asked) and settings.places_frame != "map" else None
+    return no_map or refusal(state.drive_request, asked) or way_refused(asked, state.zones, state.odometry, settings)
 
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
@@ -305,7 +305,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         return Stop(state.ring_problem)
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
     now_s = state.clock_monitor.now_s(odometry.robot_s, inputs.run_s)
-    view, obstacles = state.perception.surroundings(now_s, odometry.ring_yaw, odometry.pose.theta, age_max_s)
+    view, obstacles = state.perception.surroundings(now_s, odometry.ring_yaw, odometry.pose, age_max_s)
     blind_s = min(*view.sensor_ages_s.tolist(), now_s)  # numpy's call would take longer
     if blind_s > age_max_s:
         return Stop(blind_reason(blind_s, inputs.line_problem, fires=now_s - state.last_firing_robot_s <= age_max_s))

@@ -7,6 +7,7 @@ to find its place.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,6 +23,7 @@ from drivers.messages import Odometry, Pose, Twist
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.cycle.drive_requests import DriveInput, DriveRequest, needs_map
+from runtime.support.blind_sides import way_refusal
 
 UNKNOWN_PLACE: Final = (
     "the no-go areas and speed limits cannot be kept, because the robot does not know its place in the map, so it "
@@ -137,6 +139,31 @@ def zone_limits(
         return ZoneLimits(zones, perception.known_map_frame(), is_void=False)
     is_void = void is not None and void == places
     return ZoneLimits(zones, None if is_void else Pose(0.0, 0.0, 0.0), is_void)
+
+
+def way_refused(
+    asked: DriveInput, zones: ZoneLimits | None, odometry: Odometry | None, settings: Settings
+) -> str | None:
+    """Return why a goal or a mission leads where the robot must not or cannot drive; None if it does not.
+
+    Parameters
+    ----------
+    asked : DriveInput
+        What the operator requests.
+    zones : ZoneLimits or None
+        The run's.
+    odometry : Odometry or None
+        The newest; without it, blind sides are not looked at.
+    settings : Settings
+        The run's.
+    """
+    blind = None
+    if isinstance(asked, Mission):
+        blind = way_refusal(settings, None)
+    elif isinstance(asked, Goal) and odometry is not None and asked.frame == "odom":
+        pose = odometry.pose
+        blind = way_refusal(settings, math.atan2(asked.y - pose.y, asked.x - pose.x) - odometry.ring_yaw)
+    return blind or goal_in_zone(asked, zones, settings)
 
 
 def goal_in_zone(asked: DriveInput, zones: ZoneLimits | None, settings: Settings) -> str | None:

@@ -12,12 +12,15 @@ from typing import Final
 import numpy as np
 
 from behaviors.field_of_view import path_half_angle_rad, seen_speed_m_s
+from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from perception.percept import Pose
 from runtime.support.pattern_check import oldest_percept
 
 STEP_DEG: Final = 1
 """Step of the directions that are tried."""
+COURSE_DEG: Final = 2
+"""Step of the courses that are tried."""
 SLOW_SHARE: Final = 0.99
 """A speed below this share of the base velocity is named."""
 
@@ -70,21 +73,60 @@ def blind_notes(settings: Settings) -> list[str]:
                 f"ring: backwards the robot drives {allowed}; out of a dead end it turns on the spot, which needs no "
                 "look as the body is round, and then stands until the ring has looked along the new way"
             )
-    return [*notes, *_blind_goal(settings)]
+    return notes
 
 
-def _blind_goal(settings: Settings) -> list[str]:
-    """Return a note on the run's goal if it lies where a ring that does not turn never looks."""
-    goal = settings.goal
-    if goal is None or goal.frame != "odom" or not settings.body.synchro:
-        return []
-    course = math.atan2(goal.y_m, goal.x_m)
-    if _speed_m_s(settings, course) > 0.0:
-        return []
-    return [
-        f"goal: ({goal.x_m:g} m, {goal.y_m:g} m) lies at {math.degrees(course):.0f}°, where the ring never looks: "
-        "the robot cannot drive straight to it"
-    ]
+def way_refusal(settings: Settings, course_rad: float | None) -> str | None:
+    """Return why a ring that does not turn with the wheels forbids a way, None if it does not.
+
+    The robot comes to any place if the courses that it may drive lie all round. Otherwise it comes only to directions
+    between two of them that are less than 180° apart.
+
+    Parameters
+    ----------
+    settings : Settings
+        The run's.
+    course_rad : float or None
+        Direction of the place from the robot, in the ring's frame, rad; None: it may lie anywhere.
+    """
+    if not settings.body.synchro or not blind_sides_deg(settings):
+        return None
+    courses = [deg for deg in range(0, 360, COURSE_DEG) if _speed_m_s(settings, math.radians(deg)) > 0.0]
+    if not courses:
+        return None  # `refuse_undrivable` says so
+    gaps = [((after - before - 1) % 360 + 1, before) for before, after in zip(courses, [*courses[1:], courses[0]],
+                                                                             strict=True)]  # fmt: skip
+    widest, begin = max(gaps)
+    if widest < 180:
+        return None
+    if course_rad is None:
+        what = "the mission may lead anywhere"
+    else:
+        into = (math.degrees(course_rad) - begin) % 360.0
+        if not COURSE_DEG < into < widest - COURSE_DEG:
+            return None
+        what = f"the goal lies at {math.degrees(course_rad):.0f}° from the ring's front"
+    first, last = (begin + widest) % 360, begin
+    return (
+        f"{what}, and the robot drives only at {first - 360 if first > last else first}° to {last}°: its ring does "
+        "not turn with the wheels and looks nowhere else; choose a place that lies there, or mount sensors all round"
+    )
+
+
+def refuse_blind_ways(settings: Settings) -> None:
+    """Raise an error if the run's goal or mission leads where the ring never looks.
+
+    Raises
+    ------
+    UserError
+        It does; the text says where the robot can drive.
+    """
+    goal, course_rad = settings.goal, None
+    if goal is not None and goal.frame == "odom":
+        course_rad = math.atan2(goal.y_m, goal.x_m)
+    why = None if course_rad is None and settings.mission is None else way_refusal(settings, course_rad)
+    if why is not None:
+        raise UserError(why, WRONG_CALL)
 
 
 def _speed_m_s(settings: Settings, course_rad: float) -> float:

@@ -81,7 +81,7 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS, *
             perception.refine()
     perception.labelled_objects()
     perception.segment_geometry()
-    perception.surroundings(0.1 * firings, 0.0, 0.0, 1.0)
+    perception.surroundings(0.1 * firings, 0.0, Pose(0.0, 0.0, 0.0), 1.0)
     perception.counts  # noqa: B018 - a property that runs kernels
 
 

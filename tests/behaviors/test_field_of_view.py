@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from behaviors.arbiter import Drive, Unseen, arbitrate, limit_velocity
 from behaviors.field_of_view import (
     REACTION_S,
+    angle_to_look,
     listed,
     oldest_look_s,
     path_half_angle_rad,
@@ -244,3 +246,27 @@ def test_no_field_of_view_lets_the_arbiter_drive_towards_an_unseen_direction() -
 
 def test_the_view_of_other_tests_limits_nothing() -> None:
     assert seen_speed_m_s(percept(EVERYWHERE, 2.0), BODY, 0.0, 1.0) > BODY.speed_max_m_s
+
+
+def unknown(*directions_deg: float, theta: float = 0.0) -> Percept:
+    return percept(replace(EVERYWHERE, unknown_rad=np.radians(directions_deg)), theta)
+
+
+def test_it_looks_at_the_nearest_unknown_direction_within_a_right_angle_of_its_course() -> None:
+    assert angle_to_look(unknown(), 0.0) is None
+    assert angle_to_look(unknown(80.0, -60.0, 170.0), 0.0) == pytest.approx(math.radians(-60.0))
+    assert angle_to_look(unknown(80.0, -60.0, theta=math.radians(30.0)), 0.0) == pytest.approx(math.radians(50.0))
+    assert angle_to_look(unknown(120.0, -95.0), 0.0) is None
+
+
+def test_the_arbiter_turns_there_before_it_drives_and_an_operator_drives_cautiously() -> None:
+    config, ahead = ArbiterConfig(clearance_m=CLEARANCE_M), (Response("s", 1.0, 0.0),)
+    turning = arbitrate(ahead, unknown(-60.0), BODY, config, ["s"])
+    assert isinstance(turning, Drive)
+    assert turning.twist.v == 0.0
+    assert turning.twist.w < -0.5
+    on_synchro = arbitrate(ahead, unknown(-60.0), BODY.model_copy(update={"synchro": True}), config, ["s"])
+    assert on_synchro == arbitrate(ahead, unknown(), BODY, config, ["s"])
+    stick = limit_velocity(Twist(0.3, 0.0), ahead, unknown(-60.0), BODY, config, ["s"])
+    assert isinstance(stick, Drive)
+    assert stick.twist.v == config.cautious_velocity_m_s

@@ -20,7 +20,7 @@ def test_perception_fills_a_percept_that_cannot_be_changed() -> None:
     ranges[0] = 1.0
     pose = Pose(1.0, 0.0, 0.0)
     perception.observe(Firing(0.0, pose, 0.0, ranges))
-    view = perception.surroundings(0.0, 0.0, 0.0, 1.0)[0]
+    view = perception.surroundings(0.0, 0.0, pose, 1.0)[0]
     percept = Percept(pose, perception.obstacles(0.0, 1.0), view, perception.objects())
     assert percept.obstacles.shape == (1, 2)
     assert np.isfinite(percept.obstacles).all()

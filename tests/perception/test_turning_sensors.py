@@ -83,8 +83,8 @@ def test_a_ring_of_which_every_sensor_turns_is_a_ring_that_turns(extra: tuple[st
     for found, known in zip(*by_place, strict=True):
         assert (found.x, found.y) == pytest.approx((known.x, known.y), abs=tolerance_m)
     last = drive[-1]
-    mine = got.surroundings(last.robot_s, BASE_YAW, last.pose.theta, 1.0)[0]
-    known_view = expected.surroundings(last.robot_s, last.pose.theta, last.pose.theta, 1.0)[0]
+    mine = got.surroundings(last.robot_s, BASE_YAW, last.pose, 1.0)[0]
+    known_view = expected.surroundings(last.robot_s, last.pose.theta, last.pose, 1.0)[0]
     assert mine.axes_rad == pytest.approx(known_view.axes_rad, abs=1e-12)
     assert mine.bearings_rad == pytest.approx(known_view.bearings_rad, abs=1e-9)
     assert got.sensor_reports() == expected.sensor_reports()

@@ -160,7 +160,7 @@ class EvidenceGrid:
         lines, holds = SightLines(self.window, self.ring), self.window.rolled(holding)
         for firing, bearings, place in firings:
             lines.observe(firing, bearings, place, holds)
-        return self.window.unrolled(lines.crossed(self.method.mirrors))
+        return self.window.unrolled(lines.crossed(self.method.mirrors, self.sight_lines.trust))
 
     @property
     def silence_m(self) -> float:

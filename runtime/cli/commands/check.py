@@ -26,12 +26,14 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     from config.load import load_any
     from config.places import check_places
     from config.settings import Settings
+    from runtime.support.blind_sides import refuse_blind_ways
     from runtime.support.config_lint import lint_settings
     from runtime.support.pattern_check import refuse_undrivable
 
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
         refuse_undrivable(settings)
+        refuse_blind_ways(settings)
         check_places(settings.mission, settings.places)
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")

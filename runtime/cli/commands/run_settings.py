@@ -11,6 +11,7 @@ from config.load import ConfigError, list_shipped, load_settings, with_goal, wit
 from config.mission_step import Frame
 from config.places import check_places, no_such_place
 from config.settings import GoalConfig, Settings
+from runtime.support.blind_sides import refuse_blind_ways
 from runtime.support.pattern_check import refuse_undrivable
 
 
@@ -51,6 +52,7 @@ class SettingsFiles:
             settings = with_goal(settings, parse_goal(self.goal, frame, settings))
         check_places(settings.mission, settings.places)
         refuse_undrivable(settings)
+        refuse_blind_ways(settings)
         return without_console(settings) if self.no_console else settings
 
     def read_again(self, port: str | None, emulator_port: str | None) -> Settings:

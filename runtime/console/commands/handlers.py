@@ -37,7 +37,7 @@ from runtime.console.commands.messages import (
 from runtime.console.frames.grid_message import grid_message
 from runtime.cycle.drive_requests import NO_MAP, DriveInput, Legs, needs_map, refusal
 from runtime.cycle.inputs import Request
-from runtime.cycle.velocity_limits import goal_in_zone
+from runtime.cycle.velocity_limits import way_refused
 
 MISSION_EDITS: Final[Mapping[str, MissionEdit]] = MappingProxyType({
     "hold_mission": MissionEdit("hold"),
@@ -178,7 +178,7 @@ def _request_drive(call: Call, asked: DriveInput) -> None:
     if needs_map(asked) and state.perception.localized() is None:
         raise CommandError(NO_MAP)
     settings = call.context.tuning.current
-    _refuse_if(refusal(state.drive_request, asked) or goal_in_zone(asked, state.zones, settings))
+    _refuse_if(refusal(state.drive_request, asked) or way_refused(asked, state.zones, state.odometry, settings))
     call.context.is_teleoperated = False
     call.context.robot.drive_request(asked, call.remains_valid())
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from behaviors.field_of_view import path_half_angle_rad, seen_speed_m_s
+from config.errors import UserError
 from config.load import load_settings
 from config.robot import SensorConfig
 from config.settings import Settings
 from perception.percept import Pose
-from runtime.support.blind_sides import blind_notes, blind_sides_deg
+from runtime.support.blind_sides import blind_notes, blind_sides_deg, refuse_blind_ways, way_refusal
 from runtime.support.pattern_check import oldest_percept
 
 
@@ -41,12 +42,32 @@ def test_four_sensors_in_front_are_blind_behind_and_do_not_back() -> None:
     assert "backwards the robot drives not at all" in back
 
 
-def test_a_goal_to_a_blind_side_of_a_ring_that_does_not_turn_is_named() -> None:
-    settings = robot(-30.0, -10.0, 10.0, 30.0, synchro=True)
+@pytest.mark.parametrize(("course_deg", "is_refused"), [(0.0, False), (5.0, False), (30.0, True), (178.0, True)])
+def test_a_ring_that_does_not_turn_refuses_what_lies_on_its_blind_side(
+    course_deg: float, *, is_refused: bool
+) -> None:
+    settings = robot(-42.0, -30.0, -10.0, 10.0, 30.0, 42.0, half_deg=20.0, synchro=True)
+    why = way_refusal(settings, math.radians(course_deg))
+    assert (why is not None) == is_refused
+    if why is not None:
+        assert f"the goal lies at {course_deg:.0f}° from the ring's front, and the robot drives only at -" in why
+    assert "the mission may lead anywhere" in str(way_refusal(settings, None))
+
+
+def test_a_ring_that_turns_or_looks_all_round_refuses_nothing() -> None:
+    for settings in (robot(-30.0, -10.0, 10.0, 30.0), robot(*np.arange(0.0, 360.0, 20.0).tolist(), synchro=True)):
+        assert way_refusal(settings, math.pi) is way_refusal(settings, None) is None
+
+
+def test_a_run_with_a_goal_or_a_mission_to_a_blind_side_is_refused() -> None:
+    settings = robot(-42.0, -30.0, -10.0, 10.0, 30.0, 42.0, half_deg=20.0, synchro=True)
+    refuse_blind_ways(settings.model_copy(update={"goal": None, "mission": None}))
     goal = load_settings("hallway", ["goal.x_m=-3.0", "goal.y_m=0.1"]).goal
-    assert "goal: (-3 m, 0.1 m) lies at 178°, where the ring never looks" in blind_notes(
-        settings.model_copy(update={"goal": goal})
-    )[-1]  # fmt: skip
+    with pytest.raises(UserError, match="the goal lies at 178°"):
+        refuse_blind_ways(settings.model_copy(update={"goal": goal}))
+    mission = load_settings("room", mission="wander").mission
+    with pytest.raises(UserError, match="the mission may lead anywhere"):
+        refuse_blind_ways(settings.model_copy(update={"goal": None, "mission": mission}))
     assert "leads to a blind" in blind_notes(settings)[-1]
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.messages import Firing, Floats, Pose
-from perception.mapping.grid.sight_lines import COUNT, LINE, LOCATED_RAD, PLACES_MIN, SightLines
+from perception.mapping.grid.sight_lines import COUNT, LINE, LINES, LOCATED_RAD, NOW, PLACES_MIN, SightLines
 from perception.mapping.grid.window import Ring, Window
 
 CELL_M = 0.1
@@ -32,7 +32,7 @@ def fire(ranges: list[float], x: float = 0.0, y: float = 0.0, yaw: float = 0.0) 
 def evidence(lines: SightLines, window: Window) -> Floats:
     """Return the evidence of each cell, row by row from the smallest y."""
     sights = lines.sights.astype(np.float64)
-    return window.unrolled(sights[..., COUNT] + sights[..., LINE])
+    return window.unrolled(sights[..., [COUNT, LINE, LINES, NOW]].sum(axis=2))
 
 
 @settings(deadline=None, max_examples=30)
@@ -107,6 +107,25 @@ def test_an_echo_proves_its_own_line_and_elsewhere_little(
         among_mirrors, elsewhere = (window.unrolled(lines.crossed(mirrors))[64, 64 + 12] for mirrors in (1.0, 0.0))
         assert among_mirrors == has_line
         assert elsewhere == (has_line or (has_count and place >= PLACES_MIN))
+
+
+def test_an_echo_from_what_the_grid_holds_opens_its_lines_as_far_as_such_echoes_are_believed() -> None:
+    lines, window = make()
+    holds = np.zeros((128, 128), np.bool_)
+    holds[64, 64 + 22] = True  # 2.05 m before the first sensor
+    rolled, among_mirrors = window.rolled(holds), 1.0
+    for place in range(1, 40):
+        lines.observe(fire([2.05, math.nan, math.nan], 0.0, 0.05), UNKNOWN, place, rolled)
+    assert lines.trust > 0.5
+    crossed = window.unrolled(lines.crossed(among_mirrors))
+    assert crossed[64, 64 + 12]
+    assert not crossed[64 + 2, 64 + 16], "beside the line, in the beam"
+    assert not crossed[64, 64 + 24], "behind what holds"
+    for place in range(40, 120):
+        lines.observe(fire([4.0, math.nan, math.nan], 0.0, 0.05), UNKNOWN, place, rolled)
+    assert lines.trust == 0.0, "most echoes passed over it"
+    assert not lines.crossed(among_mirrors).any()
+    assert window.unrolled(lines.crossed(among_mirrors, 0.5))[64, 64 + 12]
 
 
 def test_cells_that_come_into_the_window_are_unknown_and_an_impossible_pose_changes_nothing() -> None:

@@ -1,0 +1,193 @@
+"""What stood on a ring's blind sides when the ring last looked there: it is an obstacle while no sensor looks there.
+
+A mirror answers only where a beam meets it at a right angle. A robot whose ring has gaps can drive towards a wall
+whose normal lies in a gap, and never hear it. So the ring remembers walls as it heard them: for each direction in
+the odometry's frame, how far away a wall stood that faces from there. As the robot moves, the foot of the
+perpendicular on that wall moves along it, and stands for it as an echo would.
+
+An echo may come from any direction in its beam, so it stands for a wall in each. The beams that cover a direction
+decide by a likelihood ratio: an echo at the wall's distance is for it, silence and longer ranges are against it.
+A look counts for some metres of way; then the direction is unknown, and the robot looks there before it drives on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+import numpy as np
+
+from drivers.messages import Firing, Pose
+from perception.angles import wrapped
+from perception.bounds import CONSTANT, Bound, Flag, Place, bounds
+from perception.kernel import Floats, kernel
+from perception.records import Record, Records, records, zeros
+from perception.sensor_mounts import mounts_at
+
+DIRECTIONS: Final = 36
+"""Directions of a turn that are distinguished: a wall's normal is known to about the width of a beam."""
+WIDTH_RAD: Final = math.tau / DIRECTIONS
+SAME_M: Final = 0.15
+"""A range this near to that of the wall is its echo: half a direction's width on a way of 1.7 m."""
+HIT_NAT: Final = math.log(0.92 / 0.03)
+MISS_NAT: Final = math.log(0.08 / 0.97)
+"""Log of the likelihood ratio of an echo at the wall's distance, and of a look without it: a sensor hears the wall 92
+times in 100, and by chance three times in 100 something at its distance, as the emulator's noise has it."""
+SURE_NAT: Final = 2.0 * HIT_NAT
+"""Two echoes are as sure as it gets, so that a wall that has left is soon forgotten."""
+KEPT_M: Final = 2.5
+"""A look counts while the robot is within this of where it looked, m; as `behaviors.near_memory`."""
+AGAIN_SHARE: Final = 0.5
+"""Once a direction ahead is unknown, those count as unknown, too, that were looked in farther away than this share of
+`KEPT_M`: so the robot looks round in one place."""
+
+
+class BlindWall(Record):
+    """What is remembered of a direction."""
+
+    is_known: Flag
+    """Whether the ring has looked there from near by."""
+    odds: Annotated[float, Bound(0.0, SURE_NAT)]
+    """Log odds of a wall that faces from there, nat; 0: it saw none."""
+    offset: Place
+    """Distance of its line from the odometry's origin along the direction, m."""
+    x: Place
+    """Place of the ring at the last look, m."""
+    y: Place
+
+
+@kernel
+def enter_looks(
+    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, heading: float, half_angle: float,
+    walls: Records[BlindWall],
+) -> None:  # fmt: skip
+    """Enter the readings of a firing.
+
+    Parameters
+    ----------
+    ranges : (n,) float
+        As in a `Firing`, m.
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    x, y, yaw, heading : float
+        Place (m) and direction (rad) of the ring; the robot's heading, rad.
+    half_angle : float
+        Half the width of a beam, rad.
+    walls : (`DIRECTIONS`,) records
+        What is remembered. Updated.
+    """
+    c, s = math.cos(yaw), math.sin(yaw)
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if math.isnan(r):
+            continue
+        own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
+        axis = yaw + mounts[i, 2]
+        for k in range(len(walls)):
+            off = abs(wrapped(k * WIDTH_RAD - axis))
+            if off > half_angle:
+                continue
+            one = walls[k]
+            if math.hypot(x - one.x, y - one.y) > KEPT_M:
+                one.odds = 0.0
+            along = own_x * math.cos(k * WIDTH_RAD) + own_y * math.sin(k * WIDTH_RAD)
+            away = one.offset - along
+            if one.odds > 0.0 and abs(r - away) <= SAME_M:
+                one.odds = min(SURE_NAT, one.odds + HIT_NAT)
+                one.offset += 0.5 * (r - away)
+            elif math.isfinite(r) and (one.odds <= 0.0 or r < away):  # what is nearer hides the wall
+                one.odds = HIT_NAT
+                one.offset = along + r
+            elif off <= half_angle - 0.5 * WIDTH_RAD:  # the whole direction lies in the beam
+                one.odds = max(0.0, one.odds + MISS_NAT)
+            else:
+                continue
+            one.is_known, one.x, one.y = 1, x, y
+    least = KEPT_M
+    for _ in range(2):
+        for k in range(len(walls)):
+            one = walls[k]
+            is_ahead = abs(wrapped(k * WIDTH_RAD - heading)) < 0.5 * math.pi
+            if is_ahead and one.is_known == 1 and math.hypot(x - one.x, y - one.y) > least:
+                one.is_known, one.odds = 0, 0.0
+        for k in range(len(walls)):
+            if abs(wrapped(k * WIDTH_RAD - heading)) < 0.5 * math.pi and walls[k].is_known == 0:
+                least = AGAIN_SHARE * KEPT_M
+
+
+class BlindWalls:
+    """The walls that a ring heard in each direction.
+
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    half_angle : float
+        Half the width of a beam, rad.
+    turning : tuple of int
+        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
+    """
+
+    SCRATCH: Final = ("records",)
+    """A view of `_walls`."""
+    BOUNDS: Final = bounds(_mounts=CONSTANT, _half_angle=CONSTANT, _radius_m=CONSTANT)
+
+    def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
+        self._mounts, self._turning, self._half_angle = mounts, turning, half_angle
+        self._walls = zeros(BlindWall, DIRECTIONS)
+        self.records = records(BlindWall, self._walls)
+        self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
+
+    def update(self, firing: Firing) -> None:
+        """Enter a firing."""
+        mounts, pose = mounts_at(firing, self._mounts, self._turning), firing.pose
+        enter_looks(
+            firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(pose.theta),
+            self._half_angle, self.records,
+        )  # fmt: skip
+
+    def sides(self, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats]:
+        """Return what is known of the directions in which no sensor looks now, within 90° of the robot's heading.
+
+        Parameters
+        ----------
+        pose : Pose
+            The robot's now.
+        axes_rad : (n,) float
+            The axis of each sensor now, in the odometry's frame, rad.
+
+        Returns
+        -------
+        (k, 2) float
+            The feet of the perpendiculars on the walls there, m.
+        (u,) float
+            The directions of which nothing is known, in the odometry's frame, rad.
+        """
+        directions = WIDTH_RAD * np.arange(DIRECTIONS)
+        off = np.abs(np.remainder(directions[:, None] - axes_rad + math.pi, math.tau) - math.pi)
+        nearest = off.min(axis=1)
+        nearest[np.cos(directions - pose.theta) <= 0.0] = 0.0
+        c, s = np.cos(directions), np.sin(directions)
+        away = self._walls["offset"] - pose.x * c - pose.y * s
+        is_known = self._walls["is_known"] == 1
+        stands = (nearest > self._half_angle) & is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
+        is_unknown = (nearest > self._half_angle - 0.5 * WIDTH_RAD) & ~is_known
+        return np.stack([pose.x + away * c, pose.y + away * s], axis=1)[stands], directions[is_unknown]
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._walls["is_known"] = 0
+        self._walls["odds"] = 0.0
+
+
+def has_blind_sides(mounts: Floats, half_angle: float) -> bool:
+    """Return whether a ring has a gap as wide as a beam: narrower ones close as the robot turns a little.
+
+    Parameters
+    ----------
+    mounts, half_angle
+        As of `BlindWalls`.
+    """
+    axes = np.sort(np.remainder(mounts[:, 2], math.tau))
+    gaps = np.diff(axes, append=axes[0] + math.tau)
+    return bool(gaps.max() > 4.0 * half_angle)

@@ -1,0 +1,95 @@
+"""What a ring with gaps remembers of walls on its blind sides, against the walls that stand there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.load import load_robot
+from drivers.messages import Firing, Floats, Pose
+from perception.obstacle_echoes.blind_walls import KEPT_M, BlindWalls, has_blind_sides
+from perception.sensor_mounts import mounts_array
+
+HALF = math.radians(15.0)
+REACH_M = 5.0
+MOUNTS = np.array([[0.2 * math.cos(a), 0.2 * math.sin(a), a] for a in np.radians([-30.0, -10.0, 10.0, 30.0])])
+
+
+def heard(pose: Pose, normal_rad: float, offset_m: float) -> Floats:
+    """Return what the ring hears of an endless mirror."""
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    x, y = pose.x + c * MOUNTS[:, 0] - s * MOUNTS[:, 1], pose.y + s * MOUNTS[:, 0] + c * MOUNTS[:, 1]
+    ranges = offset_m - x * math.cos(normal_rad) - y * math.sin(normal_rad)
+    off = np.abs(np.remainder(pose.theta + MOUNTS[:, 2] - normal_rad + math.pi, math.tau) - math.pi)
+    return np.where((off <= HALF) & (ranges > 0.0) & (ranges < REACH_M), ranges, math.inf)
+
+
+def look_round(walls: BlindWalls, x: float, y: float, normal_rad: float, offset_m: float) -> None:
+    """Turn once on the spot."""
+    for theta in np.arange(0.0, math.tau, 0.1).tolist():
+        pose = Pose(x, y, theta)
+        walls.update(Firing(0.0, pose, theta, heard(pose, normal_rad, offset_m)))
+
+
+def sides(walls: BlindWalls, pose: Pose) -> tuple[Floats, Floats]:
+    return walls.sides(pose, pose.theta + MOUNTS[:, 2])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_mirror_that_the_ring_hears_no_more_stands_where_it_stood(seed: int) -> None:
+    """Wherever the robot goes with the mirror on its blind side, the foot on it is right to half a direction."""
+    rng = np.random.default_rng(seed)
+    normal, offset = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(1.0, 2.0))
+    walls = BlindWalls(MOUNTS, HALF)
+    look_round(walls, 0.0, 0.0, normal, offset)
+    heading = normal + float(rng.choice([-1.0, 1.0])) * math.radians(float(rng.uniform(55.0, 85.0)))
+    for way in np.arange(0.0, min(1.0, 0.8 * offset), 0.03).tolist():
+        pose = Pose(way * math.cos(heading), way * math.sin(heading), heading)
+        walls.update(Firing(0.0, pose, heading, heard(pose, normal, offset)))
+        points, _ = sides(walls, pose)
+        true_m = offset - pose.x * math.cos(normal) - pose.y * math.sin(normal)
+        away = np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y)
+        towards = np.arctan2(points[:, 1] - pose.y, points[:, 0] - pose.x)
+        near = np.abs(np.remainder(towards - normal + math.pi, math.tau) - math.pi) < math.radians(6.0)
+        assert np.abs(away[near] - true_m).min() < 0.02 + 0.1 * way
+        assert away.min() > true_m - 0.05 - 0.5 * way, "an echo from the edge of a beam counts in all of it"
+
+
+def test_silence_and_something_behind_it_remove_a_wall() -> None:
+    walls = BlindWalls(MOUNTS, HALF)
+    look_round(walls, 0.0, 0.0, 0.5, 1.0)
+    pose = Pose(0.0, 0.0, 1.7)
+    assert len(sides(walls, pose)[0])
+    look_round(walls, 0.0, 0.0, 0.5, 9.0)
+    assert not len(sides(walls, pose)[0])
+    look_round(walls, 0.0, 0.0, 0.5, 3.0)
+    points, _ = sides(walls, pose)
+    assert np.hypot(points[:, 0], points[:, 1]).min() == pytest.approx(3.0, abs=0.05)
+
+
+def test_a_direction_is_unknown_until_the_ring_looks_there_and_again_some_metres_on() -> None:
+    walls = BlindWalls(MOUNTS, HALF)
+    start = Pose(0.0, 0.0, 0.0)
+    assert len(sides(walls, start)[1]) >= 8
+    look_round(walls, 0.0, 0.0, 0.0, 90.0)
+    assert not len(sides(walls, start)[1])
+    for x in np.arange(0.0, KEPT_M + 0.1, 0.1).tolist():
+        unknown = sides(walls, Pose(x, 0.0, 0.0))[1]
+        assert not len(unknown)
+        walls.update(Firing(0.0, Pose(x, 0.0, 0.0), 0.0, np.full(4, math.inf)))
+    there = Pose(KEPT_M + 0.1, 0.0, 0.0)
+    walls.update(Firing(0.0, there, 0.0, np.full(4, math.inf)))
+    unknown = np.degrees(np.abs(np.remainder(sides(walls, there)[1] + math.pi, math.tau) - math.pi))
+    assert set(np.rint(unknown)) == {50.0, 60.0, 70.0, 80.0}
+    walls.clear()
+    assert len(sides(walls, there)[1]) >= 8
+
+
+def test_shipped_robots_have_no_gap_as_wide_as_a_beam() -> None:
+    """But the AmigoBot, behind, where it does not drive."""
+    for name in ("denning", "b21r", "p3dx", "p3at", "peoplebot", "powerbot", "magellan"):
+        ring = load_robot(name).ring
+        assert not has_blind_sides(mounts_array(ring.mounts), math.radians(ring.beam_half_angle_deg)), name
+    assert has_blind_sides(MOUNTS, HALF)
