@@ -52,7 +52,8 @@ LIMITS: Sequence[str] = (
     "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
     "since it is there after .33 s.",
     "Something that no beam meets, or that returns no echo: glass at a slant, cloth, what is above or below the "
-    "beams.",
+    "beams, or the end of a thin wall or a leg between two beams. Beams that overlap at a distance leave gaps near a "
+    "ring: those of the Denning within half a metre.",
     "A smooth wall whose normal lies in a blind side of the ring: a robot that only looks ahead hears nothing of it "
     "as it draws near at a slant. `check` names the blind sides.",
     "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",

@@ -3,9 +3,9 @@
 What a sensor heard stands where it was heard, and comes nearer as the robot does. A mirror may leave the beam, and a
 sensor may have failed, or not hear what is near: the robot must not drive fast at what it heard before. One such echo
 of each sensor is kept, the nearest. It is dropped when a sensor that looks there hears it again, or something behind
-it; when the robot is farther from it than where it was lost, so that it could have heard it again; and when the ring
-stands on it. Echoes of the same surface in other directions contradict nothing. What falls silent before a robot that
-stands has left, and is not kept.
+it; when the ring hears, and is farther from it than where it was lost, so that it could have heard it again; and when
+the ring stands on it. Echoes of the same surface in other directions contradict nothing. What falls silent before a
+robot that stands has left, and is not kept.
 
 While no sensor hears anything, the ring itself may have failed: several echoes that are lost in such a silence are
 kept, even if the robot stood or turned on the spot.
@@ -117,10 +117,13 @@ def contradict_echoes(
         if one.state == NONE:
             continue
         away = math.hypot(one.x - x, one.y - y)
-        if away > one.lost_m + AWAY_M or away < radius:
+        if away < radius:
             one.state = NONE
             continue
-        if not hears:
+        if not hears:  # nor has it had the chance to hear the echo again
+            continue
+        if away > one.lost_m + AWAY_M:
+            one.state = NONE
             continue
         one.state = KEPT if one.state >= KEPT else NONE
         for i in range(ranges.shape[0]):

@@ -120,8 +120,10 @@ def test_a_ring_that_loses_several_echoes_at_once_keeps_them_although_it_only_tu
         ring.update(Firing(0.1 * k, Pose(0.0, 0.0, 0.0), 0.02 * k, ranges))
     assert ring.unheard.is_ring_silent == is_kept
     assert len(ring.unheard.points()) == (sensors if is_kept else 0)
+    ring.update(Firing(1.0, Pose(-5.0 * AWAY_M, 0.0, 0.0), 0.2, np.full(12, math.inf)))
+    assert ring.unheard.is_ring_silent == is_kept, "a ring that hears nothing could not hear them again either"
     ranges[11] = 3.0
-    ring.update(Firing(1.0, Pose(0.0, 0.0, 0.0), 0.2, ranges))
+    ring.update(Firing(1.1, Pose(0.0, 0.0, 0.0), 0.2, ranges))
     assert not ring.unheard.is_ring_silent
 
 
