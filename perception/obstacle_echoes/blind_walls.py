@@ -130,7 +130,7 @@ class BlindWalls:
 
     SCRATCH: Final = ("records",)
     """A view of `_walls`."""
-    BOUNDS: Final = bounds(_mounts=CONSTANT, _half_angle=CONSTANT, _radius_m=CONSTANT)
+    BOUNDS: Final = bounds(_mounts=CONSTANT, _half_angle=CONSTANT, _radius_m=CONSTANT, _walls=BlindWall.BOUNDS)
 
     def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
         self._mounts, self._turning, self._half_angle = mounts, turning, half_angle

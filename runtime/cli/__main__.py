@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
-from typing import Final
 
 from runtime.cli.first_signals import handle_first_signals
 
-GARBAGE_MAX: Final = 10_000
+GARBAGE_MAX = 10_000
 """Objects from one garbage collection to the next: Python's 700 make a thousand collections of a start, which find
 nothing."""
 
@@ -17,6 +15,8 @@ nothing."""
 def main() -> None:
     """Run the command line and exit."""
     handle_first_signals()
+    import gc
+
     gc.set_threshold(GARBAGE_MAX)
     from runtime.cli.standard_streams import open_standard_streams
 

@@ -217,4 +217,4 @@ async def test_no_script_or_style_is_inline() -> None:
         assert "innerHTML" not in text, file
         assert "eval(" not in text, file
         assert text.startswith("//"), f"{file} does not say why it exists"
-        assert text.count("\n") < 260, file
+        assert text.count("\n") <= 400, file
