@@ -55,8 +55,8 @@ LIMITS: Sequence[str] = (
     "beams, or the end of a thin wall or a leg between two beams. Beams that overlap at a distance leave gaps near a "
     "ring: those of the Denning within half a metre.",
     "A smooth wall whose normal lies in a blind side of the ring: a robot that only looks ahead hears nothing of it "
-    "as it draws near at a slant. Such a robot turns and looks to both sides every 2.5 m, remembers the walls that it "
-    "heard, and presumes that they go on; a wall that begins between two looks is not known. A ring that does not "
+    "as it draws near at a slant. Such a robot turns and looks to both sides every 2.5 m, remembers the walls that "
+    "it heard, and presumes that they go on; a wall that begins between two looks is not known. A ring that does not "
     "turn with the wheels cannot look: a goal or mission that leads to its blind side is refused.",
     "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",
     "Odometry that is wrong by less than a quarter: the map suffers, and the distances that are kept do not.",

@@ -27,6 +27,7 @@ from perception.sensor_mounts import mounts_at
 DIRECTIONS: Final = 36
 """Directions of a turn that are distinguished: a wall's normal is known to about the width of a beam."""
 WIDTH_RAD: Final = math.tau / DIRECTIONS
+ROUNDING_RAD: Final = 1e-9
 SAME_M: Final = 0.15
 """A range this near to that of the wall is its echo: half a direction's width on a way of 1.7 m."""
 HIT_NAT: Final = math.log(0.92 / 0.03)
@@ -171,7 +172,8 @@ class BlindWalls:
         away = self._walls["offset"] - pose.x * c - pose.y * s
         is_known = self._walls["is_known"] == 1
         stands = (nearest > self._half_angle) & is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
-        is_unknown = (nearest > self._half_angle - 0.5 * WIDTH_RAD) & ~is_known
+        # What lies partly in a beam is seen as the robot turns a little; beams that touch miss nothing between them.
+        is_unknown = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
         return np.stack([pose.x + away * c, pose.y + away * s], axis=1)[stands], directions[is_unknown]
 
     def clear(self) -> None:
