@@ -96,6 +96,8 @@ def source(i: int, turn: float, half_angle: float, echoes: Records[EchoTrace]) -
             away = abs(wrapped(echoes[k].before.axis - axis))
             if away < off:
                 found, off = k, away - SAME_RAD
+                if off <= 0.0:  # none looked there more exactly, which is the rule while the ring does not turn
+                    break
     return found
 
 
