@@ -14,11 +14,12 @@ from typing import Final, TypeAlias, get_args
 import numpy as np
 
 from bench.trials.furnished_rooms import furnished_room
-from bench.trials.wall_trials import CORNER_WITHIN_M, RIGHT_RAD, Segment, true_corners
+from bench.trials.wall_trials import CORNER_WITHIN_M, RIGHT_RAD, Segment, reported_walls, true_corners
 from config.load import load_robot
 from config.robot import RingConfig
 from config.settings import Settings
 from config.world import AcousticsConfig, WorldConfig
+from drivers.messages import Floats
 from perception.detected_object import DetectedObject
 from perception.localization.room.expected_ranges import Reflection
 from perception.pipeline import Perception
@@ -53,21 +54,10 @@ def ring_of_room(seed: int) -> RingConfig:
     return random_robot(seed).ring if name == "random" else load_robot(name).ring
 
 
-def pieces(wall: DetectedObject) -> list[tuple[float, float]]:
-    """Return points along a wall, `PIECE_M` apart."""
-    assert wall.ends is not None
-    x1, y1, x2, y2 = wall.ends
-    count = max(1, round(math.hypot(x2 - x1, y2 - y1) / PIECE_M))
-    return [(x1 + (k + 0.5) / count * (x2 - x1), y1 + (k + 0.5) / count * (y2 - y1)) for k in range(count)]
-
-
-def distance(wall: DetectedObject, x: float, y: float) -> float:
-    """Return the distance of a point from a wall, m."""
-    assert wall.ends is not None
-    x1, y1, x2, y2 = wall.ends
-    dx, dy = x2 - x1, y2 - y1
-    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy)))
-    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
+def pieces(wall: Segment) -> Floats:
+    """Return points along a wall, `PIECE_M` apart, shape (n, 2)."""
+    count = max(1, round(wall.length_m / PIECE_M))
+    return wall.begin + ((np.arange(count) + 0.5) / count)[:, None] * (wall.end - wall.begin)
 
 
 def moved_m(before: DetectedObject, now: Sequence[DetectedObject]) -> float:
@@ -75,15 +65,16 @@ def moved_m(before: DetectedObject, now: Sequence[DetectedObject]) -> float:
     same = [one for one in now if one.model == before.model]
     if before.ends is None:
         return min((math.dist((one.x, one.y), (before.x, before.y)) for one in same), default=math.inf)
-    away = sorted(min((distance(wall, *at) for wall in same), default=math.inf) for at in pieces(before))
-    return away[min(len(away) - 1, math.ceil(KEPT_SHARE * len(away)) - 1)]
+    (own,), walls = reported_walls([before]), reported_walls(same)
+    away = np.sort(np.min([wall.distance(pieces(own)) for wall in walls], axis=0)) if walls else np.array([math.inf])
+    return float(away[math.ceil(KEPT_SHARE * len(away)) - 1])
 
 
 def is_true(one: DetectedObject, world: WorldConfig) -> bool:
     """Return whether such an object stands there."""
     walls = [Segment(np.array([w.x1_m, w.y1_m]), np.array([w.x2_m, w.y2_m])) for w in world.wall]
     if one.ends is not None:
-        points, (tx, ty) = np.array(pieces(one)), (math.cos(one.theta), math.sin(one.theta))
+        points, (tx, ty) = pieces(*reported_walls([one])), (math.cos(one.theta), math.sin(one.theta))
         beside = [wall for wall in walls if abs(tx * wall.direction[1] - ty * wall.direction[0]) < FALSE_SINE]
         away = np.min([wall.distance(points) for wall in beside], axis=0, initial=math.inf)
         return bool(np.mean(away > FALSE_WALL_M) <= FALSE_SHARE)

@@ -86,10 +86,11 @@ def _decode(message: bytes) -> Iterator[Frame]:
             (length,) = struct.unpack_from(f"{order}I", data, at)
             names.append(data[at + 4 : at + 3 + length].decode())
             at += 4 + length
+        parent, child = names
         at += -at % 8
-        x, y, z, *turn = struct.unpack_from(f"{order}7d", data, at)
+        x, y, z, qx, qy, qz, qw = struct.unpack_from(f"{order}7d", data, at)
         at += 56
-        yield Frame(sec * 1_000_000_000 + nanosec, *names, (x, y, z), tuple(turn))  # type: ignore[arg-type,call-arg]
+        yield Frame(sec * 1_000_000_000 + nanosec, parent, child, (x, y, z), (qx, qy, qz, qw))
 
 
 def create_publisher(node: Any, topic: str, qos: Any) -> Any:  # noqa: ANN401 - objects of rclpy

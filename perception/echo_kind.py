@@ -107,10 +107,12 @@ def echo_kind(
         return None
     half_paths_m = np.bincount(path.ravel(), half_paths_m) / times
     sigma_m = np.sqrt(noise_m**2 / times + resolution_m**2 / 12.0)
-    t, l = pairs[:, :2] @ [1.0, 1j], pairs[:, 2:] @ [1.0, 1j]  # noqa: E741
+    t, listener = pairs[:, :2] @ [1.0, 1j], pairs[:, 2:] @ [1.0, 1j]
     hypotheses: list[tuple[Kind, float]] = [("plane", math.inf), ("corner", 0.0), ("edge", 0.0)]
     hypotheses += [("cylinder", radius_m) for radius_m in RADII_M]
-    fits = [_fit(_path_function(kind, radius_m, t, l), t, half_paths_m, sigma_m) for kind, radius_m in hypotheses]
+    fits = [
+        _fit(_path_function(kind, radius_m, t, listener), t, half_paths_m, sigma_m) for kind, radius_m in hypotheses
+    ]
     evidence = np.array([fit.evidence for fit in fits])
     evidence[3:] -= math.log(len(RADII_M))
     weights = np.exp(evidence - evidence.max())
@@ -128,29 +130,29 @@ Paths: TypeAlias = Callable[[float, float], Floats]
 """Half paths for a bearing and a range, shape (n,)."""
 
 
-def _path_function(kind: Kind, radius_m: float, t: np.ndarray, l: np.ndarray) -> Paths:  # noqa: E741
+def _path_function(kind: Kind, radius_m: float, t: np.ndarray, listener: np.ndarray) -> Paths:
     """Return the half paths of a kind as a function of its bearing and range; places are complex numbers."""
 
     def paths(bearing: float, range_m: float) -> Floats:
         out = complex(math.cos(bearing), math.sin(bearing))
         if kind == "plane":
-            beyond = 2.0 * range_m - 2.0 * (l * out.conjugate()).real
-            return np.asarray(0.5 * abs(l + beyond * out - t))
+            beyond = 2.0 * range_m - 2.0 * (listener * out.conjugate()).real
+            return np.asarray(0.5 * abs(listener + beyond * out - t))
         if kind == "corner":
-            return np.asarray(abs(range_m * out - 0.5 * (t + l)))
+            return np.asarray(abs(range_m * out - 0.5 * (t + listener)))
         if kind == "edge":
-            return np.asarray(0.5 * (abs(range_m * out - t) + abs(range_m * out - l)))
-        return half_paths_over_circle(t, l, (range_m + radius_m) * out, radius_m)
+            return np.asarray(0.5 * (abs(range_m * out - t) + abs(range_m * out - listener)))
+        return half_paths_over_circle(t, listener, (range_m + radius_m) * out, radius_m)
 
     return paths
 
 
-def half_paths_over_circle(t: np.ndarray, l: np.ndarray, centre: complex, radius_m: float) -> Floats:  # noqa: E741
+def half_paths_over_circle(t: np.ndarray, listener: np.ndarray, centre: complex, radius_m: float) -> Floats:
     """Return half the shortest way over a circle between pairs of points outside it (Alhazen's problem).
 
     Parameters
     ----------
-    t, l
+    t, listener
         The points as complex numbers, shape (n,), m.
     centre, radius_m
         The circle, m.
@@ -160,7 +162,7 @@ def half_paths_over_circle(t: np.ndarray, l: np.ndarray, centre: complex, radius
     (n,) float
         Where the circle parts the points, the way over the point that is least wrong.
     """
-    a, b = t - centre, l - centre
+    a, b = t - centre, listener - centre
     from_t, from_l = np.maximum(abs(a), radius_m), np.maximum(abs(b), radius_m)
     between = np.abs(np.angle(b * a.conj()))
     turned = np.where(np.angle(b * a.conj()) < 0.0, -1.0, 1.0)

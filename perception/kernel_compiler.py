@@ -63,7 +63,7 @@ class _Pipeline(compiler.CompilerBase):  # type: ignore[misc]  # numba has no ty
         return [passes]
 
 
-class _Options(compiler.Flags):  # type: ignore[misc]
+class _Options(compiler.Flags):  # type: ignore[misc]  # numba has no types
     """Compared by what was set; numba's own compares all options, at every operation that it resolves."""
 
     __slots__ = ()
@@ -75,7 +75,7 @@ class _Options(compiler.Flags):  # type: ignore[misc]
         return isinstance(other, _Options) and self._values == other._values
 
 
-class _TypingContext(typing.Context):  # type: ignore[misc]
+class _TypingContext(typing.Context):  # type: ignore[misc]  # numba has no types
     """Numba's own context, which resolves the same operation on the same types once."""
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ def _typing_context() -> _TypingContext:
     return _TypingContext()
 
 
-class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
+class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
     """The code of a kernel for its callers: it is linked, and never run by itself."""
 
     def finalize(self) -> None:
@@ -112,7 +112,7 @@ class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
 
-class _Compiler(_FunctionCompiler):  # type: ignore[misc]
+class _Compiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no types
     """Compiles a kernel for Python or for other kernels."""
 
     def _compile_core(self, args: Args, return_type: Untyped, *, inner: bool = False) -> Untyped:
@@ -165,7 +165,7 @@ def _record_type(dtype: np.dtype[np.void]) -> Untyped:
     return from_struct_dtype(dtype)
 
 
-class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
+class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
     """Compiles a kernel once for each type of its arguments; numba's own does so for each constant in a call."""
 
     def __init__(self, function: Callable[..., object], **options: object) -> None:

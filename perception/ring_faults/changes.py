@@ -26,7 +26,7 @@ from perception.sensor_faults.wall import NOISE_SHARE
 NO_CHANGE, LENGTHENED, EXCHANGED = range(3)
 """The changes; see the module."""
 NOISE_M: Final = 0.02
-"""Noise of a range that is no share of it, m; as `motion_tests.NOISE_M`."""
+"""Noise of a range that is no share of it, m."""
 ROUND_M: Final = 0.5
 """A sensor that moved farther since its reading before is not compared, m."""
 SAME_M: Final = 1e-3

@@ -37,14 +37,12 @@ class EchoTrace(Record):
 
     is_known: Flag
     """Whether it has made a reading."""
-    last_m: Annotated[float, PLACE]
-    """The last reading, m; `SILENCE_M` without an echo."""
     latest: SensorPlace
-    """Where the ring, not the sensor, was at that reading …"""
+    """The last reading; its place is the ring's, not the sensor's."""
     before: SensorPlace
-    """… and the one before …"""
+    """The one before, likewise."""
     is_compared: Flag
-    """… if there is one."""
+    """Whether there is one before."""
     standstill: Count
     """The standstill of the ring's readings to which `repeated` belongs."""
     repeated: SensorPlace

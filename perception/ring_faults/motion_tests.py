@@ -13,7 +13,7 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_faults.changes import NO_CHANGE, Expected, weigh_changes
+from perception.ring_faults.changes import NO_CHANGE, NOISE_M, Expected, weigh_changes
 from perception.ring_faults.memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
 from perception.ring_faults.repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat
 from perception.sensor_faults.wall import NOISE_SHARE
@@ -34,8 +34,6 @@ REACH_SHARE: Final = 0.8
 """What is expected beyond this share of the ring's reach may be out of reach next time."""
 MOVES: Final = 1.2
 """A reading changes by no more than this times the sensor's motion; rough walls that the beam grazes change more."""
-NOISE_M: Final = 0.02
-"""Noise of a range that is no share of it, m."""
 MISSED: Final = 0.9
 """Share of looks that miss a known echo, if readings do not depend on what is there."""
 MISS_MIN: Final = 0.04

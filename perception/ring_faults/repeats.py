@@ -96,6 +96,7 @@ def changes_due(
         The ring's way so far, m.
     """
     c = echoes[i]
+    r = c.latest.range_m
     dx, dy, turned = x - c.repeated.x, y - c.repeated.y, axis - c.repeated.axis
     if abs(turned) <= half_angle:
         beam = half_angle + abs(turned)
@@ -105,7 +106,7 @@ def changes_due(
         if due < 1:
             return 0.0
         lean = min(1.0, tolerance / math.hypot(dx, dy))  # the range stays within the tolerance for so long
-        if is_parallel_wall(i, c.last_m, dx, dy, yaw, mounts, half_angle, tolerance, lean, reach, echoes, path_m):
+        if is_parallel_wall(i, r, dx, dy, yaw, mounts, half_angle, tolerance, lean, reach, echoes, path_m):
             return 0.0
         return min(REPEATS_MAX, float(due))
     if abs(turned) <= 2.0 * half_angle:
@@ -115,7 +116,7 @@ def changes_due(
         away = abs(wrapped(mounts[k, 2] - mounts[i, 2] - turned))
         if k != i and echoes[k].is_known and away < off:
             nearest, off = k, away
-    if nearest < 0 or abs(echoes[nearest].last_m - c.last_m) <= tolerance + 0.1 * c.last_m:
+    if nearest < 0 or abs(echoes[nearest].latest.range_m - r) <= tolerance + 0.1 * r:
         return 0.0
     return min(REPEATS_MAX, math.floor(abs(turned) / (2.0 * half_angle)))
 
@@ -132,7 +133,7 @@ def weigh_repeat(
     i : int
         The sensor.
     r : float
-        Its reading, m; `SILENCE_M` without an echo.
+        Its reading, m, entered in `echoes`; `SILENCE_M` without an echo.
     x, y, axis : float
         Its place (m) and the direction of its axis (rad).
     yaw, mounts, half_angle, tolerance, reach, echoes, ring
@@ -141,14 +142,14 @@ def weigh_repeat(
         Whether it looks in the direction of travel.
     """
     c, all_of = echoes[i], ring[0]
-    if not c.is_known or r != c.last_m:
+    if not c.is_known or r != c.before.range_m:
         if c.is_known and is_ahead:
             all_of.standstill += 1
             all_of.repeated_nat = 0.0
         elif c.is_known and c.standstill == all_of.standstill:
             all_of.repeated_nat = max(0.0, all_of.repeated_nat - c.repeated_nat)
         c.standstill, c.repeated_nat = 0, 0.0
-        c.is_known, c.last_m = 1, r
+        c.is_known = 1
     elif c.standstill != all_of.standstill:
         c.standstill, c.repeated_nat = all_of.standstill, 0.0
         mark(c.repeated, r, x, y, axis, all_of.path_m)

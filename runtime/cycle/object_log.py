@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
+from behaviors.no_go import side_distances_m
 from drivers.token_bucket import LineLimit
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
@@ -53,11 +56,7 @@ def _is_at(one: DetectedObject, gone: DetectedObject) -> bool:
     """Return whether an object stands in the place of another one."""
     if one.ends is None:
         return math.dist((one.x, one.y), (gone.x, gone.y)) < NEAR_M
-    x1, y1, x2, y2 = one.ends
-    dx, dy = x2 - x1, y2 - y1
-    along = ((gone.x - x1) * dx + (gone.y - y1) * dy) / max(dx * dx + dy * dy, 1e-12)
-    share = min(1.0, max(0.0, along))
-    return math.dist((gone.x, gone.y), (x1 + share * dx, y1 + share * dy)) < NEAR_M
+    return float(side_distances_m(np.array([one.ends]), np.array((gone.x, gone.y)))[0]) < NEAR_M
 
 
 class ObjectLog:
@@ -83,13 +82,7 @@ class ObjectLog:
             return
         self._due_s = run_s + LOOK_S
         now = (*perception.labelled_objects(), *perception.archived_objects())
-        sure = {
-            one.number: one
-            for one in now
-            if one.number is not None
-            and ((one.probability or 0.0) > SURE or one.confirmed)
-            and one.model != "unknown"
-        }
+        sure = {one.number: one for one in now if one.number is not None and _is_sure(one)}
         for number, one in self._sure.items():
             if number not in sure or sure[number].model != one.model:
                 left_out = self._limit.take(run_s)

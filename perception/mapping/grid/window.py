@@ -123,7 +123,7 @@ def placed(firing: Firing, ring: Ring) -> list[list[float]]:
     c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
     x = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
     y = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
-    return np.column_stack([x, y, firing.ring_yaw + mounts[:, 2]]).tolist()  # type: ignore[no-any-return]
+    return np.column_stack([x, y, firing.ring_yaw + mounts[:, 2]]).tolist()  # type: ignore[no-any-return]  # numpy's own
 
 
 def _corner_bound(window: Window) -> Bound:

@@ -46,9 +46,9 @@ def cross_arcs(rows: CrossPathRows, half_angle: float) -> Floats:
     half_angle : float
         Of a beam, rad.
     """
-    t, l = rows["x"] + 1j * rows["y"], rows["listener_x"] + 1j * rows["listener_y"]  # noqa: E741
+    t, listener = rows["x"] + 1j * rows["y"], rows["listener_x"] + 1j * rows["listener_y"]
     bearing, half = rows["bearing"], rows["half_path_m"]
-    focus, across = 0.5 * abs(l - t), np.angle(l - t)
+    focus, across = 0.5 * abs(listener - t), np.angle(listener - t)
 
     def point(at: Complex, direction: Floats, other: Floats) -> Complex:
         """Return the ellipse's point in a direction from a focus; `other` is the direction of the other focus."""
@@ -57,7 +57,7 @@ def cross_arcs(rows: CrossPathRows, half_angle: float) -> Floats:
 
     low, high = np.full(len(rows), -half_angle), np.full(len(rows), half_angle)
     for width in (LISTENING_LOBE * half_angle, half_angle):
-        edges = (point(l, rows["listener_bearing"] + off, across + np.pi) for off in (-width, width))
+        edges = (point(listener, rows["listener_bearing"] + off, across + np.pi) for off in (-width, width))
         first, last = (np.angle((edge - t) * np.exp(-1j * bearing)) for edge in edges)
         first, last = np.maximum(first, -half_angle), np.minimum(last, half_angle)
         meet = first < last

@@ -108,12 +108,12 @@ class TimedProtocol(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._is_aborted = False
         # asyncio looks its callbacks up on the object, so attributes can take the place of methods.
-        self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]
-        self.data_received = timed(CONSOLE_RECEIVE, self._received)  # type: ignore[method-assign]
-        self.connection_lost = timed(CONSOLE_RECEIVE, self._lost)  # type: ignore[method-assign]
-        self.eof_received = inner.eof_received  # type: ignore[method-assign]
-        self.pause_writing = inner.pause_writing  # type: ignore[method-assign]
-        self.resume_writing = inner.resume_writing  # type: ignore[method-assign]
+        self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]  # as said above
+        self.data_received = timed(CONSOLE_RECEIVE, self._received)  # type: ignore[method-assign]  # as said above
+        self.connection_lost = timed(CONSOLE_RECEIVE, self._lost)  # type: ignore[method-assign]  # as said above
+        self.eof_received = inner.eof_received  # type: ignore[method-assign]  # as said above
+        self.pause_writing = inner.pause_writing  # type: ignore[method-assign]  # as said above
+        self.resume_writing = inner.resume_writing  # type: ignore[method-assign]  # as said above
 
     def abort(self) -> None:
         """Drop the connection, at once or as soon as it is made."""

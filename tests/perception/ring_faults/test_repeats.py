@@ -20,7 +20,7 @@ def heard(*ranges: tuple[int, float]) -> Records[EchoTrace]:
     """Return a memory in which sensors, by number, have repeated a range since the ring was at the origin."""
     echoes = records(EchoTrace, zeros(EchoTrace, 24))
     for k, r in ranges:
-        echoes[k].is_known, echoes[k].last_m, echoes[k].agreed_m = 1, r, r
+        echoes[k].is_known, echoes[k].latest.range_m, echoes[k].agreed_m = 1, r, r
         mark(echoes[k].repeated, r, 0.0, 0.0, MOUNTS[k, 2], 0.0)
     return echoes
 
@@ -62,6 +62,8 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
 
     def fire(i: int, r: float, x: float) -> None:
         axis = MOUNTS[i, 2]
+        echoes[i].before.range_m = echoes[i].latest.range_m
+        mark(echoes[i].latest, r, x, 0.0, axis, x)
         weigh_repeat(i, r, x, 0.0, axis, 0.0, i != 12, MOUNTS, HALF, TOLERANCE, 5.0, echoes, ring)
 
     for x in (0.0, 0.01, 0.08):
