@@ -18,7 +18,16 @@ from drivers.registry import make_driver
 from runtime.analysis.timeline import BookmarkEntry, LogEntry, ModeEntry, Timeline
 from runtime.analysis.timeline_builder import FIRST_INTERVAL_S, TimelineBuilder
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, KEYFRAME, LOG, SERIAL, SUMMARY, RawMessage, decode
+from runtime.recording.channels import (
+    BOOKMARK,
+    BOOKMARK_WITHDRAWN,
+    KEYFRAME,
+    LOG,
+    SERIAL,
+    SUMMARY,
+    RawMessage,
+    decode,
+)
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.reading import open_ring_log
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
@@ -168,6 +177,8 @@ class _Collector:
             mark = decode(Bookmark, message.data)
             t_s = 0.0 if self._first_run_s is None else max(0.0, mark.run_s - self._first_run_s)
             self._timeline.bookmarks.append(BookmarkEntry(t_s, mark.text, self._builder.pose))
+        elif message.topic == BOOKMARK_WITHDRAWN:
+            del self._timeline.bookmarks[-1:]
         elif message.topic == SUMMARY:
             self._timeline.summary = decode(RunEnd, message.data).summary
 

@@ -91,6 +91,9 @@ class RecordingControl(Protocol):
     async def bookmark(self, text: str) -> str | None:
         """Add a bookmark."""
 
+    async def undo_bookmark(self) -> str:
+        """Withdraw the last bookmark and return its text; a UserError says why that is impossible."""
+
 
 class ReplayControl(Protocol):
     """Shows recordings, to each client its own; a CommandError of any call is the client's answer."""

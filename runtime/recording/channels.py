@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError, SchemaValidator
 
 from runtime.recording.schema import (
     Bookmark,
+    BookmarkWithdrawn,
     Cycle,
     Keyframe,
     LogLine,
@@ -38,6 +39,7 @@ KEYFRAME: Final = "/keyframe"
 SETTINGS: Final = "/settings"
 SUMMARY: Final = "/summary"
 BOOKMARK: Final = "/bookmark"
+BOOKMARK_WITHDRAWN: Final = "/bookmark_withdrawn"
 
 CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
     {
@@ -53,6 +55,7 @@ CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
         SETTINGS: SettingsChange,
         SUMMARY: RunEnd,
         BOOKMARK: Bookmark,
+        BOOKMARK_WITHDRAWN: BookmarkWithdrawn,
     }
 )
 """Payload type by topic. The order gives the channel numbers in a file, from 1; append new topics at the end."""

@@ -17,11 +17,23 @@ from typing import Any, Final
 
 from llvmlite.binding import get_host_cpu_name
 
+from config.errors import UserError
 from config.settings import Settings
 from runtime import VERSION
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
-from runtime.recording.schema import FORMAT, Bookmark, LogLine, RunEnd, RunInfo, carried_state
+from runtime.recording.channels import (
+    BOOKMARK,
+    BOOKMARK_WITHDRAWN,
+    CYCLE,
+    KEYFRAME,
+    LOG,
+    OBJECTS,
+    SEGMENTS,
+    SERIAL,
+    SETTINGS,
+    SUMMARY,
+)
+from runtime.recording.schema import FORMAT, Bookmark, BookmarkWithdrawn, LogLine, RunEnd, RunInfo, carried_state
 from runtime.recording.storage import RecordingTarget
 from runtime.recording.writer import (
     QUEUE_MAX,
@@ -123,6 +135,8 @@ class Recorder:
         self._last_keyframe_run_s: float | None = None
         self._has_gap = False
         self._cycle = 0
+        self._bookmarks: list[tuple[str | None, str]] = []
+        """File and text of each that stands."""
 
     def __enter__(self) -> Recorder:
         self._writer.start()
@@ -173,8 +187,31 @@ class Recorder:
             return f"a bookmark has from 1 to {BOOKMARK_MAX} characters, not {len(words)}"
         run_s, host_s = self._clock.both()
         mark = Bookmark.model_construct(run_s=run_s, cycle=self._cycle, text=words)
-        self._put((BOOKMARK, host_s, run_s, mark))
+        if self._is_starting or not self._queue_item((BOOKMARK, host_s, run_s, mark)):
+            return "the bookmark was not written: the recording is starting or the disk is too slow; try it again"
+        self._bookmarks.append((self._writer.status.file, words))
         return None
+
+    def undo_bookmark(self) -> str:
+        """Withdraw the last bookmark that was not withdrawn; return its text.
+
+        Raises
+        ------
+        UserError
+            There is none, its file is finished, or the disk is too slow.
+        """
+        if not self._bookmarks:
+            raise UserError("there is no bookmark of this run to withdraw")
+        file, words = self._bookmarks[-1]
+        status = self._writer.status
+        if not self._on or not status.is_writing or status.file != file:
+            raise UserError(f"the recording with the bookmark {words!r} is finished: it keeps that")
+        run_s, host_s = self._clock.both()
+        withdrawn = BookmarkWithdrawn.model_construct(run_s=run_s, cycle=self._cycle)
+        if not self._queue_item((BOOKMARK_WITHDRAWN, host_s, run_s, withdrawn)):
+            raise UserError("the disk is too slow: the bookmark stays, try it again")
+        self._bookmarks.pop()
+        return words
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Record a cycle that has just ended, and the map, the objects or a keyframe if one is due.

@@ -158,6 +158,13 @@ class Bookmark(TimedPayload):
     text: str
 
 
+class BookmarkWithdrawn(TimedPayload):
+    """The last bookmark of this file that was not withdrawn is withdrawn."""
+
+    cycle: Count
+    """The last cycle before it."""
+
+
 class MapChange(TimedPayload):
     """Changes of the outline map since the previous message of this type."""
 

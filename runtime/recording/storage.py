@@ -19,7 +19,7 @@ from typing import Final, NamedTuple, Protocol
 
 from config.files import is_utf8
 from config.settings import RecordingConfig
-from runtime.recording.channels import BOOKMARK
+from runtime.recording.channels import BOOKMARK, BOOKMARK_WITHDRAWN
 from runtime.recording.folder_index import create_listed, is_finished_recording, listed_names
 from runtime.support.file_lock import is_locked
 from runtime.support.user_folders import expanded, state_folder
@@ -51,8 +51,12 @@ class RecordingTarget(Protocol):
         """
         ...
 
-    def pin(self, current: Path) -> None:
-        """Keep a file: it has a bookmark."""
+    def pin(self, current: Path) -> bool:
+        """Keep a file: it has a bookmark. Return whether it was not kept before."""
+        ...
+
+    def unpin(self, current: Path) -> None:
+        """Keep a file no longer: its bookmarks are withdrawn."""
         ...
 
     def remove_empty(self, current: Path) -> bool:
@@ -92,8 +96,12 @@ class SingleFile:
     def enforce_limits(self, current: Path) -> None:
         """Do nothing: files that the user named are never deleted."""
 
-    def pin(self, current: Path) -> None:
-        """Do nothing: files that the user named are never deleted."""
+    def pin(self, current: Path) -> bool:  # noqa: ARG002 - the user named it
+        """Return False: files that the user named are never deleted."""
+        return False
+
+    def unpin(self, current: Path) -> None:
+        """Do nothing, for the same reason."""
 
     def remove_empty(self, current: Path) -> bool:  # noqa: ARG002 - the user named it
         """Return False."""
@@ -187,9 +195,15 @@ class RotatingFolder:
             f"{due.path.name}{PIN_SUFFIX} beside it, or raise recording.cap_mb and recording.keep"
         )
 
-    def pin(self, current: Path) -> None:
-        """Create the file that pins a recording."""
+    def pin(self, current: Path) -> bool:
+        """Create the file that pins a recording; return whether it was not there."""
+        was_pinned = is_pinned(current)
         pin_of(current).touch()
+        return not was_pinned
+
+    def unpin(self, current: Path) -> None:
+        """Remove the file that pins a recording."""
+        pin_of(current).unlink(missing_ok=True)
 
     def remove_empty(self, current: Path) -> bool:
         """Remove a closed file in which nothing happened, unless it is pinned; return whether it was removed."""
@@ -265,7 +279,7 @@ def is_pinned(path: Path) -> bool:
 
 
 def has_bookmark(path: Path) -> bool:
-    """Return whether the index of a recording lists bookmarks: those of older versions have no pin. Pins it if so."""
+    """Return whether a recording has bookmarks by its index: those of older versions have no pin. Pins it if so."""
     from mcap.exceptions import McapError
     from mcap.reader import SeekingReader
 
@@ -277,7 +291,8 @@ def has_bookmark(path: Path) -> bool:
     if summary is None or summary.statistics is None:
         return False
     counts = summary.statistics.channel_message_counts
-    found = any(channel.topic == BOOKMARK and counts.get(number) for number, channel in summary.channels.items())
+    of = {channel.topic: counts.get(number, 0) for number, channel in summary.channels.items()}
+    found = of.get(BOOKMARK, 0) > of.get(BOOKMARK_WITHDRAWN, 0)
     if found:
         with contextlib.suppress(OSError):
             pin_of(path).touch()

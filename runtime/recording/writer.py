@@ -25,6 +25,7 @@ from runtime.recording.channels import CYCLE, KEYFRAME, MODE, OBJECTS, RUN_INFO,
 from runtime.recording.mcap_file import McapFile
 from runtime.recording.schema import (
     Bookmark,
+    BookmarkWithdrawn,
     Cycle,
     MapChange,
     ModeChange,
@@ -153,6 +154,8 @@ class RecordingWriter:
         self._bytes_before = 0
         self._unflushed = 0
         self._is_empty = True
+        self._have_pinned: list[bool] = []
+        """Of each bookmark of the file that stands, whether it pinned it."""
         self._mode: ModeState | None = None
         self._map: dict[bytes, int] = {}
         self._map_count = 0
@@ -244,6 +247,7 @@ class RecordingWriter:
         path, files = utf8(str(self._file.path)), self._status.files + 1
         self._status = replace(self._status, file=path, files=files, is_writing=True)
         self._is_empty = True
+        self._have_pinned = []
         self._enforce_limits(self._file.path)
 
     def _finish(self) -> None:
@@ -315,8 +319,13 @@ class RecordingWriter:
                 self._enter_snapshot(content, run_s, log_ns)
             case Bookmark():
                 self._is_empty = False
-                self._target.pin(self._file.path)
+                self._have_pinned.append(self._target.pin(self._file.path))
                 self._add(topic, content, log_ns)
+            case BookmarkWithdrawn():
+                if self._have_pinned:
+                    self._add(topic, content, log_ns)
+                    if self._have_pinned.pop():
+                        self._target.unpin(self._file.path)
             case SettingsReload(cycle, _):
                 change = SettingsChange.model_construct(run_s=run_s, cycle=cycle, settings=self._info.settings)
                 self._add(SETTINGS, change, log_ns)

@@ -57,6 +57,19 @@ async def test_a_double_click_makes_one_bookmark(server: FakeServer, opener: Ope
     await server.wait("bookmark", 2)
 
 
+async def test_the_last_bookmark_is_taken_back_by_button_and_key(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await opened.tab("Time")
+    server.data["undo_bookmark"] = "the cupboard"
+    await opened.page.locator("#bookmark-undo").click()
+    assert await server.wait("undo_bookmark") == {}
+    await expect(opened.page.get_by_text("No longer bookmarked: the cupboard").first).to_be_visible()
+    await opened.page.locator("#map-front").focus()
+    await opened.page.keyboard.press("Control+z")
+    await server.wait("undo_bookmark", 2)
+    assert server.of("undo_edit") == []
+
+
 async def test_lines_of_the_log_are_sentences(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.tab("Log")

@@ -105,6 +105,10 @@ class RunRecording:
         """Add a bookmark to the recording; return None, or why that is impossible."""
         return self._recorder.bookmark(text)
 
+    async def undo_bookmark(self) -> str:
+        """Withdraw the last bookmark of this run; return its text."""
+        return self._recorder.undo_bookmark()
+
     def probe(self) -> str | None:
         """Return how the thread of recorder or ring log ended; None while they run. See `runtime.support.health`."""
         return self._recorder.probe() or (None if self._ring_log is None else self._ring_log.probe())

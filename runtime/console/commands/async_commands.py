@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from typing import Any, TypeVar
 
+from config.errors import UserError
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import (
@@ -74,6 +75,14 @@ async def record(call: Call, switch: Record) -> None:
 async def add_bookmark(call: Call, bookmark: AddBookmark) -> None:
     """Add a bookmark to the recording."""
     await _refuse_if(_recording(call).bookmark(bookmark.text))
+
+
+async def undo_bookmark(call: Call, _: NoArguments) -> str:
+    """Withdraw the last bookmark; return its text."""
+    try:
+        return await _recording(call).undo_bookmark()
+    except UserError as error:
+        raise CommandError(str(error)) from error
 
 
 async def list_recordings(call: Call, _: NoArguments) -> list[dict[str, Any]]:

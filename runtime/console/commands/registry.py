@@ -90,6 +90,7 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("set_speed", arguments.SetSpeed, CONTROL, async_commands.set_speed),
     Command("record", arguments.Record, CONTROL, async_commands.record),
     Command("bookmark", arguments.AddBookmark, CONTROL, async_commands.add_bookmark),
+    Command("undo_bookmark", NoArguments, CONTROL, async_commands.undo_bookmark),
     Command("list_recordings", NoArguments, TOKEN, async_commands.list_recordings),
     Command("open_recording", arguments.OpenRecording, TOKEN, async_commands.open_recording),
     Command("seek_recording", arguments.SeekRecording, TOKEN, async_commands.seek_recording),

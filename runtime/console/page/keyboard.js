@@ -25,7 +25,7 @@ const WORDS = [
   ["K", "pause or resume the emulator"],
   [
     "Ctrl+Z",
-    "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; in Tune, the last parameter; in Files, the last name or pin",
+    "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; in Tune, the last parameter; in Files, the last name or pin; in Time, the last bookmark",
   ],
   ["Escape", "cancel; clear the selection"],
   ["?", "this list"],

@@ -348,7 +348,9 @@ watchKeyboard({
           ? parameters
           : tabs.shown === "files"
             ? files
-            : mapEdits
+            : tabs.shown === "time"
+              ? time
+              : mapEdits
     ).undo(),
   notifications,
   drivingByKeys: () => byId("teleop-keys").checked,

@@ -40,6 +40,7 @@ export class Time {
       (event) => this.#playing && this.#ask({ type: "play_recording", speed: Number(event.target.value) }),
     );
     byId("bookmark-form").addEventListener("submit", (event) => this.#bookmark(event));
+    on("bookmark-undo", () => this.undo());
     const scrub = byId("scrub");
     scrub.addEventListener("input", () => this.#scrub(Number(scrub.value)));
     scrub.addEventListener("change", () => this.#scrub(Number(scrub.value)));
@@ -216,6 +217,12 @@ export class Time {
       input.value = "";
       this.notifications.toast(`Bookmarked: ${text}`);
     }, this.notifications.showError);
+  }
+
+  undo() {
+    return this.connection
+      .request({ type: "undo_bookmark" })
+      .then((text) => this.notifications.toast(`No longer bookmarked: ${text}`), this.notifications.showError);
   }
 }
 

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, CYCLE, MODE, decode
+from runtime.recording.channels import BOOKMARK, BOOKMARK_WITHDRAWN, CYCLE, MODE, decode
 from runtime.recording.reader import Recording, RecordingError, cycle_head, first_error
 from runtime.recording.replayer import (
     Checkpoint,
@@ -186,6 +186,8 @@ class ReplayCursor:
                     mark = decode(Bookmark, message.data)
                     s = 0.0 if first_run_s is None else max(0.0, mark.run_s - first_run_s)
                     self.bookmarks.append((s, mark.text))
+                elif message.topic == BOOKMARK_WITHDRAWN:
+                    del self.bookmarks[-1:]
                 elif message.topic == MODE and first_run_s is not None:
                     change = decode(ModeChange, message.data)
                     last = self.modes[-1][1] if self.modes else None

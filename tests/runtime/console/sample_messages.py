@@ -61,6 +61,7 @@ ASYNC_COMMANDS: list[tuple[dict[str, Any], str]] = [
     ({"type": "set_speed", "factor": 2}, "speed 2.0"),
     ({"type": "record", "on": True}, "record True"),
     ({"type": "bookmark", "text": "here"}, "bookmark here"),
+    ({"type": "undo_bookmark"}, "undo_bookmark"),
     ({"type": "list_recordings"}, "recordings"),
     ({"type": "open_recording", "file": "run.mcap"}, "open run.mcap"),
     ({"type": "seek_recording", "s": 1.5}, "seek 1.5"),

@@ -11,7 +11,16 @@ import orjson
 import pytest
 from pydantic import ValidationError
 
-from runtime.recording.channels import BOOKMARK, CHANNELS, CYCLE, RUN_INFO, decode, encode, schema_of
+from runtime.recording.channels import (
+    BOOKMARK,
+    BOOKMARK_WITHDRAWN,
+    CHANNELS,
+    CYCLE,
+    RUN_INFO,
+    decode,
+    encode,
+    schema_of,
+)
 from runtime.recording.schema import Bookmark, LogLine, MapChange, Payload, RunInfo
 
 MARK = Bookmark(run_s=1.5, cycle=30, text="“here” <b>\n")
@@ -20,7 +29,7 @@ MARK = Bookmark(run_s=1.5, cycle=30, text="“here” <b>\n")
 def test_the_order_of_topics_gives_the_channel_numbers() -> None:
     """New topics are appended, so the first ones never change."""
     assert list(CHANNELS)[:2] == [RUN_INFO, CYCLE]
-    assert list(CHANNELS)[-1] == BOOKMARK
+    assert list(CHANNELS)[-2:] == [BOOKMARK, BOOKMARK_WITHDRAWN]
 
 
 @pytest.mark.parametrize("payload", [

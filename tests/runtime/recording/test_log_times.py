@@ -57,6 +57,8 @@ def paused(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 host.s += PAUSE_S
                 recorder.on_log({"level": "info", "event": "paused"})
                 assert recorder.bookmark("in the pause") is None
+                assert recorder.bookmark("by mistake") is None
+                assert recorder.undo_bookmark() == "by mistake"
                 clock.resume()
 
         simulate(settings, settings.world, 0, CYCLES / 20.0, on_state=on_state)
@@ -104,12 +106,14 @@ def test_replay_timeline_and_playback_use_the_run_s_time(paused: Path) -> None:
     with open_recording(paused) as recording:
         cursor = ReplayCursor(recording)
         assert cursor.duration_s == pytest.approx(0.05 * (CYCLES - 1), abs=1e-6)
+        assert [text for _, text in cursor.bookmarks] == ["in the pause"]
         assert cursor.bookmarks[0][0] == pytest.approx(0.05 * (PAUSED_AFTER - 1), abs=1e-6)
     result = verify_file(paused)
     assert (result.cycles, result.differences) == (CYCLES, 0)
     assert result.recorded_s == pytest.approx(0.05 * (CYCLES - 1), abs=1e-6)
     timeline = load_timeline(TimelineSource(str(paused)), lambda _settings: None)
     assert timeline.seconds == pytest.approx(0.05 * (CYCLES - 1), abs=1e-6)
+    assert [mark.text for mark in timeline.bookmarks] == ["in the pause"]
     assert timeline.bookmarks[0].t_s == timeline.log[0].t_s == pytest.approx(0.05 * (PAUSED_AFTER - 1), abs=1e-6)
     # Exports have true Unix times on both sides of the pause.
     gap_ns = timeline.unix_ns(timeline.seconds) - timeline.start_unix_ns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import statistics
 import threading
 import time
@@ -13,8 +14,10 @@ import jsonschema
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
+from config.errors import UserError
 from runtime.recording.channels import (
     BOOKMARK,
+    BOOKMARK_WITHDRAWN,
     CHANNELS,
     CYCLE,
     KEYFRAME,
@@ -32,15 +35,16 @@ from runtime.recording.folder_index import create_listed
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.schema import Cycle, LogLine, MapChange, Payload, SerialBytes
-from runtime.recording.storage import MEGABYTE, RotatingFolder, SingleFile
+from runtime.recording.storage import MEGABYTE, RotatingFolder, SingleFile, has_bookmark, is_pinned, pin_of
 from runtime.simulation.closed_loop import simulate
-from tests.recorded import SECONDS, entries_of, hall, record, verify_file
+from tests.recorded import SECONDS, entries_of, hall, record, until, verify_file
 
 
 def test_a_recording_holds_everything_that_happened(run: Path) -> None:
     entries = entries_of(run)
     by_topic = {topic: [e for e in entries if e.topic == topic] for topic in CHANNELS}
-    assert [topic for topic, found in by_topic.items() if not found] == [SETTINGS, BOOKMARK], "neither was requested"
+    absent = [topic for topic, found in by_topic.items() if not found]
+    assert absent == [SETTINGS, BOOKMARK, BOOKMARK_WITHDRAWN], "none was requested"
     (end,) = by_topic[SUMMARY]
     assert json.loads(end.data)["summary"] == {"mode": "DRIVE", "cycles": 240.0}
     assert [decode(Cycle, e.data).record.cycle for e in by_topic[CYCLE]] == list(range(1, int(20 * SECONDS) + 1))
@@ -96,7 +100,7 @@ def test_the_stock_reader_reads_it_and_messages_fit_their_schemas(run: Path) -> 
                 validators[schema.id].validate(json.loads(message.data))
             seen[channel.topic] = seen.get(channel.topic, 0) + 1
         assert summary.statistics.message_count == sum(seen.values()) == len(entries_of(run))
-    assert set(seen) == set(CHANNELS) - {SETTINGS, BOOKMARK}
+    assert set(seen) == set(CHANNELS) - {SETTINGS, BOOKMARK, BOOKMARK_WITHDRAWN}
     with run.open("rb") as file:
         assert sum(1 for _ in NonSeekingReader(file, validate_crcs=True).iter_messages()) == sum(seen.values())
 
@@ -210,3 +214,46 @@ def test_the_run_info_comes_first_and_before_every_keyframe(run: Path) -> None:
     assert entries[0].topic == RUN_INFO
     frames = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME]
     assert all(entries[i - 1].topic == RUN_INFO for i in frames)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_each_undo_leaves_bookmarks_and_pins_as_they_were(tmp_path: Path, seed: int) -> None:
+    """Over random bookmarks and undos."""
+    rng, settings, undone = random.Random(seed), hall("perception.method=paper"), 0
+    held, had_pin = list[str](), rng.random() < 0.5
+    with Recorder(settings, RotatingFolder(tmp_path, "run", settings.recording), clock=lambda: 0.0) as recorder:
+        until(lambda: recorder.status.is_writing, "a file")
+        path = Path(str(recorder.status.file))
+        if had_pin:  # by the operator
+            pin_of(path).touch()
+        for step in range(40):
+            if rng.random() < 0.5:
+                assert recorder.bookmark(f"mark  {step}") is None
+                held.append(f"mark {step}")
+            elif held:
+                assert recorder.undo_bookmark() == held.pop()
+                undone += 1
+            else:
+                with pytest.raises(UserError, match="there is no bookmark"):
+                    recorder.undo_bookmark()
+            until(lambda: is_pinned(path) == (had_pin or bool(held)), "the pin")
+        assert recorder.bookmark("last") is None
+        recorder.set_enabled(on=False)
+        with pytest.raises(UserError, match="'last' is finished"):
+            recorder.undo_bookmark()
+    assert undone >= 5
+    with open_recording(path) as recording:
+        topics = [message.topic for message in recording.messages()]
+    assert topics.count(BOOKMARK) - topics.count(BOOKMARK_WITHDRAWN) == len(held) + 1
+    assert topics.count(BOOKMARK_WITHDRAWN) == undone
+
+
+def test_a_recording_whose_bookmarks_are_withdrawn_has_none(tmp_path: Path) -> None:
+    settings = hall("perception.method=paper")
+    with Recorder(settings, RotatingFolder(tmp_path, "run", settings.recording), clock=lambda: 0.0) as recorder:
+        until(lambda: recorder.status.is_writing, "a file")
+        assert recorder.bookmark("here") is None
+        assert recorder.undo_bookmark() == "here"
+    path = Path(str(recorder.status.file))
+    assert not has_bookmark(path)
+    assert not is_pinned(path)

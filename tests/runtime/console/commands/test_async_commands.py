@@ -55,6 +55,10 @@ class StubControl:
     async def bookmark(self, text: str) -> str | None:
         return await self._do(f"bookmark {text}")
 
+    async def undo_bookmark(self) -> str:
+        await self._show("undo_bookmark")
+        return "here"
+
     async def recordings(self) -> list[dict[str, Any]]:
         await self._show("recordings")
         return [{"file": "run.mcap"}]
