@@ -43,6 +43,7 @@ from perception.no_method import NOT_READY, NoMethod
 from perception.obstacle_echoes.fresh_echoes import FreshEchoes
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
+from perception.polyline import Polyline
 from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room
 from perception.ring_faults.monitor import RingMonitor
 from perception.sensor_faults.monitor import SensorMonitor
@@ -224,6 +225,10 @@ class Perception:
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label and was left behind; without correction the same tuple until it changes."""
         return self._in_odometry(self.vacant.archived_outside(self.method.archived_objects()))
+
+    def polylines(self) -> tuple[Polyline, ...]:
+        """Return what is not straight; without correction the same tuple until it changes."""
+        return self.map_frame.polylines_in_odometry(())
 
     def vacant_areas(self) -> tuple[VacantArea, ...]:
         """Return the areas in which nothing stands, in odometry's frame."""

@@ -33,6 +33,7 @@ from perception.kernel import Floats
 from perception.localization.drift.drift_correction import DriftCorrection, LandmarkPlace, SeenObject
 from perception.localization.localized_pose import LocalizedPose
 from perception.localization.odometry_frame import AnyEdit, OdometryFrame
+from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
 SHIFT_MIN_M: Final = 0.002
@@ -127,6 +128,13 @@ class MapFrame(OdometryFrame):
             return tuple(objects)
         to = self.drift.odometry_from_filter()
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
+
+    def polylines_in_odometry(self, polylines: tuple[Polyline, ...]) -> tuple[Polyline, ...]:
+        """Return polylines of the filter's frame in odometry's frame."""
+        if not self.drift.is_applied:
+            return polylines
+        to = self.drift.odometry_from_filter()
+        return tuple(polyline.in_frame(to) for polyline in polylines)
 
     def segments_in_odometry(self, geometry: Floats) -> Floats:
         """Return segments in odometry's frame: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""

@@ -11,6 +11,7 @@ from perception.detected_object import DetectedObject
 from perception.edits import AreaEdit, Evidence, MapEdit
 from perception.kernel import Floats
 from perception.localization.localized_pose import LocalizedPose
+from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
 AnyEdit = TypeVar("AnyEdit", bound=MapEdit | AreaEdit)
@@ -51,6 +52,10 @@ class OdometryFrame:
     def objects_in_odometry(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return objects of the method's frame in odometry's frame."""
         return objects
+
+    def polylines_in_odometry(self, polylines: tuple[Polyline, ...]) -> tuple[Polyline, ...]:
+        """Return polylines of the method's frame in odometry's frame."""
+        return polylines
 
     def segments_in_odometry(self, geometry: Floats) -> Floats:
         """Return segments in odometry's frame: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""

@@ -15,6 +15,7 @@ from perception.detected_object import DetectedObject
 from perception.edits import Arc, ClearMap, Evidence, Line, PlaceModel
 from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
+from perception.polyline import Polyline
 from runtime.simulation.drift_trials import LEVELS, drum_hall, firings, oval
 
 SETTINGS = load_settings("hallway")
@@ -128,6 +129,8 @@ def test_without_correction_the_map_frame_is_that_of_odometry() -> None:
     assert not perception.map_frame.is_applied
     assert perception.localized() is None
     assert perception.mapped_objects() == ()
+    polylines = (Polyline(1, np.ones((2, 2)), 0.9),)
+    assert perception.map_frame.polylines_in_odometry(polylines) is polylines
 
 
 def test_results_are_turned_into_odometrys_frame_and_edits_into_the_maps() -> None:
@@ -142,6 +145,8 @@ def test_results_are_turned_into_odometrys_frame_and_edits_into_the_maps() -> No
     assert frame.segments_in_odometry(np.array([[1.0, 0.0, 0.0, 1.0, 0.2]]))[0] == pytest.approx(
         [1.0, 3.0, 0.0, 2.0, 0.2 + 0.5 * math.pi]
     )
+    (polyline,) = frame.polylines_in_odometry((Polyline(1, np.array([[1.0, 0.0], [0.0, 1.0]]), 0.9),))
+    assert polyline.points == pytest.approx(np.array([[1.0, 3.0], [0.0, 2.0]]))
     edit = frame.edit_in_filter(PlaceModel("drum", 1.0, 3.0, 0.0))
     assert (edit.x, edit.y, edit.theta) == pytest.approx((1.0, 0.0, -0.5 * math.pi))
     assert frame.edit_in_filter(ClearMap()) == ClearMap()

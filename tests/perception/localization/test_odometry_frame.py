@@ -8,6 +8,7 @@ from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.edits import Evidence, MoveObject
 from perception.localization.odometry_frame import OdometryFrame
+from perception.polyline import Polyline
 
 FRAME = OdometryFrame()
 
@@ -20,6 +21,8 @@ def test_nothing_is_moved() -> None:
     assert FRAME.objects_in_odometry(seen) is seen
     assert FRAME.segments_in_odometry(geometry) is geometry
     assert FRAME.areas_in_odometry(()) == ()
+    polylines = (Polyline(1, np.ones((2, 2)), 0.9),)
+    assert FRAME.polylines_in_odometry(polylines) is polylines
     edit, evidence = MoveObject(1, 1.0, 2.0, 0.0), Evidence(1, "drum")
     assert FRAME.edit_in_filter(edit) is edit
     assert FRAME.evidence_in_odometry(evidence) is evidence
