@@ -11,10 +11,6 @@ LATE_FIRINGS: Final = (
     "{} firings were dropped so far: no odometry lies around their moment, or a later one came first; likely the "
     "line loses bytes or the robot's clock jumps: check the cable and what else uses the line"
 )
-EXCESS_FIRINGS: Final = (
-    "{} firings were dropped so far: the robot sends many more than its pattern has; its firmware is faulty, or "
-    "another device sends on the line: restart the robot, and check what else is connected"
-)
 RANGES_BEYOND: Final = (
     "{} ranges were dropped so far: they lie beyond the window of their firing, as echoes of an earlier one do; if "
     "there are ever more, set a longer ring.firing.window_m or step_period_s"
@@ -27,7 +23,7 @@ class DroppedCount:
     Parameters
     ----------
     text
-        `LATE_FIRINGS`, `EXCESS_FIRINGS` or `RANGES_BEYOND`.
+        `LATE_FIRINGS` or `RANGES_BEYOND`.
     note
         Takes the message.
     """

@@ -6,28 +6,15 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Final, Generic, TypeVar
 
 from drivers.driver import LineState, Received
 from drivers.heard_bytes import HeardBytes
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.stamper import Stamper
 
 FIRINGS_MAX: Final = 1024
 """Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
-
-
-class Stamper(Protocol):
-    """What gives firings and samples of the odometry their poses, and keeps the messages for the operator."""
-
-    @property
-    def origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry."""
-
-    def note(self, text: str) -> None:
-        """Add a message for the operator."""
-
-    def notes(self) -> tuple[str, ...]:
-        """Return the messages for the operator, and remove them."""
 
 
 S = TypeVar("S", bound=Stamper)

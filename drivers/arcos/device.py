@@ -6,7 +6,6 @@ each SIP holds only the ranges measured since the last one, and nothing is sent 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from enum import Enum
 
@@ -24,10 +23,8 @@ from drivers.arcos.firmware import Firmware
 from drivers.arcos.frames import BAUDS, Packet, ResetNotice, RobotName, SyncEcho
 from drivers.arcos.wire_frame_counter import WireFrameCounter
 from drivers.driver import DriverError
-from drivers.emulator.acoustics import clearance
-from drivers.emulator.body import BRAKE_S, Body
+from drivers.emulator.body import BRAKE_S
 from drivers.emulator.event_device import EventDevice
-from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlockedWheels,
     Bumper,
@@ -40,13 +37,9 @@ from drivers.emulator.faults import (
     Reboot,
     Runaway,
     StopButton,
-    SuddenObject,
 )
-from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.faulty_sonar import FaultySonar
-from drivers.emulator.scene import compile_scene
-from drivers.emulator.sonar import Sonar
-from drivers.messages import Flags, Pose, Twist
+from drivers.messages import Flags, Twist
 
 TICK_US = 5_000
 """Longest step of the body's simulation, µs."""
@@ -54,6 +47,7 @@ PAUSE_MAX_US = 100_000
 """Longest pause inside a packet, µs."""
 STALL_US = 200_000
 """The wheels are let go for this long after a stall, µs."""
+RESET_NOTICE, MAINTENANCE_NOTICE = 0xFF, 0xFE
 BATTERY_FULL, BATTERY_LOW, BATTERY_EMPTY = 126, 110, 107
 """The battery, 0.1 V: full, where it is called low, and nearly empty."""
 
@@ -106,23 +100,15 @@ class ArcosDevice(EventDevice):
         seeds = np.random.SeedSequence(seed).spawn(5)
         sonar_rng, drift_rng, outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
         self._firmware = firmware
-        schedule = FaultSchedule(faults)
-        scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
-        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        body = Body(robot.body, scene, start, world.odometry, drift_rng)
-        sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
-        self._touch = Touch(firmware, scene, robot.body.radius_m)
+        super().__init__(robot, world, faults, firmware.baud, sonar_rng, drift_rng, line_rngs)
+        self._touch = Touch(firmware, self._scene, robot.body.radius_m)
         self._heard_us = 0
-        super().__init__(body, schedule, FaultyLine(firmware.baud, schedule, *line_rngs))
-        faulty = FaultySonar(sonar, len(robot.ring.mounts), schedule, outlier_rng)
+        faulty = FaultySonar(self._true_sonar, len(robot.ring.mounts), self._faults, outlier_rng)
         self._readings = SonarReadings(firmware, faulty, robot.ring.window_m)
         self._watchdog_ms = firmware.watchdog_ms
         self._driven = STILL
         self._stalled_until_us = 0
         self._boot()
-        # Load the compiled kernels now, so that the first firing is not late.
-        clearance(start.x, start.y, scene.circles, scene.segments)
-        sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
 
     @property
     def flags(self) -> Flags:
@@ -218,7 +204,7 @@ class ArcosDevice(EventDevice):
             case CommandNumber.BATTEST:
                 self._battery = command.value or BATTERY_FULL
             case CommandNumber.RESET | CommandNumber.MAINTENANCE:
-                self._restart(0xFF if command.number == CommandNumber.RESET else 0xFE)
+                self._restart(RESET_NOTICE if command.number == CommandNumber.RESET else MAINTENANCE_NOTICE)
 
     # Events.
 
@@ -309,17 +295,6 @@ class ArcosDevice(EventDevice):
         """Return whether the motors cannot be switched on."""
         return self._faults.has(MotorFault) or self._faults.has(StopButton)
 
-    def _update_faults(self) -> None:
-        """Start and end the faults whose time has come."""
-        if self._faults.next_us is None:
-            return
-        for begins, fault in self._faults.due(self._now_us):
-            self._set_active(fault, on=begins)
-            if begins:
-                self._start_fault(fault)
-            elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
-                self._restart(0xFF)
-
     def _start_fault(self, fault: Fault) -> None:
         match fault:
             case Reboot():
@@ -332,7 +307,7 @@ class ArcosDevice(EventDevice):
             case OdometryJump():
                 self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
 
-    def _restart(self, notice: int) -> None:
+    def _restart(self, notice: int = RESET_NOTICE) -> None:
         """Start again as after the reset button, and say so."""
         self._body.reset_odometry()
         self._boot()

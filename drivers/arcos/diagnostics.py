@@ -41,11 +41,6 @@ ODOMETRY_AT_ZERO: Final = (
     "meanwhile, restart this program"
 )
 
-EXCESS_FIRINGS: Final = (
-    "the robot sends many more ranges than its sonar can measure, and the excess is dropped; its firmware is faulty, "
-    "or another device sends on the line: restart the robot, and check what else is connected"
-)
-
 SONAR_OFF: Final = (
     "the robot reports its sonar as off, and it is switched on again; another client or a switch on the robot may "
     "turn it off: find it if this message returns"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from typing import Final
 
 from config.robot import RobotConfig
@@ -13,11 +11,9 @@ from drivers.arcos.odometer import Odometer
 from drivers.arcos.sip_clock import SipClock
 from drivers.arcos.sonar import SonarRing
 from drivers.arcos.wire_units import Polling
-from drivers.dropped_count import LATE_FIRINGS, DroppedCount
-from drivers.messages import Firing, Flags, Odometry, Pose
+from drivers.messages import Firing, Flags, Odometry
 from drivers.odometry_history import OdometryHistory
-from drivers.odometry_jumps import OdometryJumps
-from drivers.token_bucket import TokenBucket
+from drivers.stamper import Stamper
 
 SIP_PERIOD_S: Final = 0.1
 """Time from one SIP to the next of a robot that does not report it, s."""
@@ -28,15 +24,9 @@ _GAP_PERIODS: Final = 4.5
 _SIP_BYTES, _TAIL_BYTES, _READING_BYTES = 30, 11, 3
 """Length of a SIP with its frame, of the tail that newer firmware sends, and of one range."""
 _BITS_PER_BYTE: Final = 10
-_FIRINGS_SHARE, _FIRINGS_BURST = 4.0, 64.0
-"""Firings passed on are at most so many times as frequent as those of the pattern, and so many at once."""
-_EXCESS_NOTED: Final = 1000
-"""Firings dropped from one note about it to the next."""
-_NOTES_MAX: Final = 16
-"""Notes kept if they are not taken."""
 
 
-class PoseStamper:
+class PoseStamper(Stamper):
     """Gives samples of the odometry their times, and firings their times and poses.
 
     The robot's clock is that of the run, from the first SIP after the robot's last known restart.
@@ -47,48 +37,22 @@ class PoseStamper:
         The robot file.
     discs
         The robot's number of each sensor of the ring.
-
-    Attributes
-    ----------
-    late_echoes
-        Firings dropped because their pose is not known.
-    excess_echoes
-        Firings dropped because the robot sends many more than its pattern has.
     """
 
     def __init__(self, config: RobotConfig, discs: tuple[int, ...]) -> None:
-        self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
-        self.excess_echoes = 0
+        super().__init__(config.body)
         self._odometer = Odometer(config.arcos)
-        self._jumps = OdometryJumps(config.body)
         self._history = OdometryHistory(_HISTORY)
         self._sonar = SonarRing(discs, config.arcos.range_factor)
         self._clock = SipClock(SIP_PERIOD_S)
-        self._firing_limit = TokenBucket(math.inf, math.inf)
         self._epoch_s: float | None = None
         self._is_set_to_zero = False
-        self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
-
-    @property
-    def origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry; the identity until that jumps."""
-        return self._jumps.origin
-
-    def note(self, text: str) -> None:
-        """Add a message for the operator."""
-        self._notes.append(text)
-
-    def notes(self) -> tuple[str, ...]:
-        """Return the messages for the operator, and remove them."""
-        notes = tuple(self._notes)
-        self._notes.clear()
-        return notes
 
     def set_polling(self, polling: Polling) -> None:
         """Set the firing pattern that the robot carries out."""
         cycle_s = 1e-3 * polling.cycle_ms
         self._sonar.set_cycle(cycle_s, polling.window_m)
-        self._firing_limit = TokenBucket(_FIRINGS_SHARE / cycle_s, _FIRINGS_BURST)
+        self._limit_firings(cycle_s)
 
     def set_period(self, period_s: float) -> None:
         """Set the time from one SIP to the next."""
@@ -153,9 +117,7 @@ class PoseStamper:
             self._is_set_to_zero = False
             self._jumps.rebase(reported)
             self.note(diagnostics.ODOMETRY_AT_ZERO)
-        sample, note = self._jumps.remove(reported)
-        if note is not None:
-            self.note(note)
+        sample = self._without_jump(reported)
         self._history.add(sample)
         return sample, self._firings(sip, sample.robot_s, arrived_s)
 
@@ -165,10 +127,6 @@ class PoseStamper:
             place = self._history.at(fired_s, _GAP_PERIODS * period_s)
             if place is None:
                 self.late_echoes.add()
-            elif not self._firing_limit.take(arrived_s):
-                self.excess_echoes += 1
-                if self.excess_echoes % _EXCESS_NOTED == 1:
-                    self.note(diagnostics.EXCESS_FIRINGS)
-            else:
+            elif not self._is_excess(arrived_s):
                 firings.append(Firing(fired_s, *place, ranges))
         return firings

@@ -23,10 +23,8 @@ from drivers.denning.reported_echoes import EchoReporter
 from drivers.denning.wire_frame_counter import WireFrameCounter
 from drivers.denning.wire_units import emulated_version
 from drivers.driver import DriverError
-from drivers.emulator.acoustics import clearance
-from drivers.emulator.body import BRAKE_S, RAMP_S, Body
+from drivers.emulator.body import BRAKE_S, RAMP_S
 from drivers.emulator.event_device import EventDevice
-from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlockedWheels,
     Bumper,
@@ -39,12 +37,8 @@ from drivers.emulator.faults import (
     Reboot,
     Runaway,
     StopButton,
-    SuddenObject,
 )
-from drivers.emulator.faulty_line import FaultyLine
-from drivers.emulator.scene import compile_scene
-from drivers.emulator.sonar import Sonar
-from drivers.messages import Flags, Pose, Twist
+from drivers.messages import Flags, Twist
 
 DEADMAN_MS = 500
 """The base ramps to a stop this long after the last DRIVE, unless a fault changes it; reported in IDENT."""
@@ -106,20 +100,12 @@ class DenningDevice(EventDevice):
         sonar_rng, drift_rng, self._boot_rng, *noises = map(np.random.default_rng, seeds)
         *line_rngs, outlier_rng = noises
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
-        schedule = FaultSchedule(faults)
-        scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
-        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        body = Body(robot.body, scene, start, world.odometry, drift_rng)
-        sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._newest = emulated_version(robot)
-        super().__init__(body, schedule, FaultyLine(robot.link.baud, schedule, *line_rngs))
-        self._reporter = EchoReporter(robot.ring, sonar, self._faults, outlier_rng)
+        super().__init__(robot, world, faults, robot.link.baud, sonar_rng, drift_rng, line_rngs)
+        self._reporter = EchoReporter(robot.ring, self._true_sonar, self._faults, outlier_rng)
         self._deadman_ms = DEADMAN_MS
         self._boot_id = self._new_boot_id()
         self._boot(clock_start_us)
-        # Load the compiled kernels now, so that the first firing is not late.
-        clearance(start.x, start.y, scene.circles, scene.segments)
-        sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
 
     @property
     def flags(self) -> Flags:
@@ -282,18 +268,10 @@ class DenningDevice(EventDevice):
 
     # Faults.
 
-    def _update_faults(self) -> None:
-        """Start and end the faults whose time has come."""
-        if self._faults.next_us is None:
-            return
-        for begins, fault in self._faults.due(self._now_us):
-            self._set_active(fault, on=begins)
-            if begins:
-                self._start_fault(fault)
-            elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
-                self._boot_id = self._new_boot_id()
-                self._body.reset_odometry()
-                self._boot(0)
+    def _restart(self) -> None:
+        self._boot_id = self._new_boot_id()
+        self._body.reset_odometry()
+        self._boot(0)
 
     def _start_fault(self, fault: Fault) -> None:
         match fault:

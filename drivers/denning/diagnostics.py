@@ -25,11 +25,6 @@ _MEANINGS = MappingProxyType(
     }
 )
 
-EXCESS_ECHOES = (
-    "the ring sends many more firings than its pattern has, and the excess is dropped; its firmware is faulty, or "
-    "another device sends on the line: restart the robot, and check what else is connected"
-)
-
 
 def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
     """Return the message for a robot that is not the one the robot file describes; None if it is."""

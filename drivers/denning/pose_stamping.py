@@ -2,8 +2,6 @@
 
 An echo arrives when its window has closed. Usually the odometry after its firing has arrived by then; if not, the
 echo waits for it.
-
-Jumps of the odometry are removed here, where every sample passes: see `drivers.odometry_jumps`.
 """
 
 from __future__ import annotations
@@ -17,12 +15,11 @@ from config.robot import BodyConfig
 from drivers.denning import diagnostics
 from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
 from drivers.denning.wire_units import cross_paths_of, odometry_of, ranges_of
-from drivers.dropped_count import LATE_FIRINGS, RANGES_BEYOND, DroppedCount
-from drivers.messages import CrossPaths, Firing, Floats, Odometry, Pose
+from drivers.dropped_count import RANGES_BEYOND, DroppedCount
+from drivers.messages import CrossPaths, Firing, Floats, Odometry
 from drivers.odometry_history import OdometryHistory
-from drivers.odometry_jumps import OdometryJumps
 from drivers.robot_clock import Jump, RobotClock
-from drivers.token_bucket import TokenBucket
+from drivers.stamper import Stamper
 
 _HISTORY_S = 2.5
 """Odometry kept, s: several times the longest window and its way over a busy line."""
@@ -37,17 +34,9 @@ _GAP_MIN_S = 0.01
 """The same limit, at least, s."""
 _FUTURE_MAX_US = 1_000_000
 """How far after the newest odometry an echo may have been fired to wait for more, µs; beyond, its time is corrupt."""
-_FIRINGS_SHARE = 4.0
-"""Firings passed on are at most so many times as frequent as those of the pattern; more are none of it."""
-_FIRINGS_BURST = 64.0
-"""Firings at once, as after a delay on the way."""
-_EXCESS_NOTE_S = 10.0
-"""Time between notes about too many firings, s."""
-_NOTES_MAX = 16
-"""Notes kept if they are not taken."""
 
 
-class PoseStamper:
+class PoseStamper(Stamper):
     """Gives each firing its pose, from the history of the odometry.
 
     Parameters
@@ -59,30 +48,21 @@ class PoseStamper:
 
     Attributes
     ----------
-    late_echoes
-        Firings dropped: without odometry around them, duplicated, or older than one before.
     out_of_window
         Ranges and cross paths dropped because they lie beyond the window of their firing.
-    excess_echoes
-        Firings dropped because the ring sends many more than its pattern has.
     """
 
     def __init__(self, axes: tuple[float, ...], body: BodyConfig) -> None:
-        self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
+        super().__init__(body)
         self.out_of_window = DroppedCount(RANGES_BEYOND, self.note)
-        self.excess_echoes = 0
         self._axes = axes
-        self._jumps = OdometryJumps(body)
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY_MIN)
         self._gap_max_s = _GAP_MIN_S
         self._held: deque[tuple[int, Floats, CrossPaths | None]] = deque()
         self._last_firing_us: int | None = None
         self._window = WINDOW_MAX
-        self._firing_limit = TokenBucket(math.inf, math.inf)
         self._step_period_ms: int | None = None
-        self._excess_noted_s = -math.inf
-        self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
 
     def set_pattern(self, window: int, step_period_ms: int) -> None:
         """Set what the firing pattern allows; more is dropped.
@@ -97,7 +77,7 @@ class PoseStamper:
         self._window = window
         if step_period_ms != self._step_period_ms:
             self._step_period_ms = step_period_ms
-            self._firing_limit = TokenBucket(1e3 * _FIRINGS_SHARE / max(step_period_ms, 1), _FIRINGS_BURST)
+            self._limit_firings(1e-3 * step_period_ms)
 
     @property
     def jumps(self) -> int:
@@ -105,24 +85,9 @@ class PoseStamper:
         return self._jumps.count
 
     @property
-    def origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry; the identity until that jumps."""
-        return self._jumps.origin
-
-    @property
     def clock_error(self) -> float | None:
         """Relative error of the robot's clock, as found by the last odometry; None if nothing was found."""
         return self._clock.rate_error
-
-    def note(self, text: str) -> None:
-        """Add a message for the operator."""
-        self._notes.append(text)
-
-    def notes(self) -> tuple[str, ...]:
-        """Return the messages about the odometry for the operator, and remove them."""
-        notes = tuple(self._notes)
-        self._notes.clear()
-        return notes
 
     def set_period(self, period_s: float) -> None:
         """Size the history for a robot that sends odometry every `period_s`."""
@@ -160,9 +125,7 @@ class PoseStamper:
         reported = odometry_of(odom, t_us)
         if len(self._history) and self._jumps.is_reset(reported):
             return Jump.AHEAD
-        sample, note = self._jumps.remove(reported)
-        if note is not None:
-            self.note(note)
+        sample = self._without_jump(reported)
         self._history.add(sample)
         return sample
 
@@ -203,8 +166,7 @@ class PoseStamper:
             if self._last_firing_us is not None and t_us <= self._last_firing_us:
                 self.late_echoes.add()
                 continue
-            if not self._firing_limit.take(run_s):
-                self._drop_excess(run_s)
+            if self._is_excess(run_s):
                 continue
             place = self._history.at(t_us * 1e-6, self._gap_max_s)
             if place is None:
@@ -225,10 +187,3 @@ class PoseStamper:
             return None
         kept = ~beyond
         return CrossPaths(heard.transmitters[kept], heard.listeners[kept], heard.half_paths_m[kept])
-
-    def _drop_excess(self, run_s: float) -> None:
-        """Count a firing that is dropped because there are too many; note it for the operator now and then."""
-        self.excess_echoes += 1
-        if run_s - self._excess_noted_s >= _EXCESS_NOTE_S:
-            self._excess_noted_s = run_s
-            self.note(diagnostics.EXCESS_ECHOES)

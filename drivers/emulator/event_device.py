@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
+import numpy as np
+
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import Body
 from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import Fault, Reboot, SuddenObject
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.robot_device import GroundTruth
-from drivers.emulator.scene import NOWHERE
-from drivers.messages import Flags
+from drivers.emulator.scene import NOWHERE, compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Flags, Pose
 
 
 class EventDevice(ABC):
@@ -19,18 +26,31 @@ class EventDevice(ABC):
 
     Parameters
     ----------
-    body
-        The base in its scene.
+    robot, world
+        What the robot is, and what surrounds it.
     faults
         What goes wrong, and when.
-    line
-        The robot's end of the line.
+    baud
+        The line's speed.
+    sonar_rng, drift_rng, line_rngs
+        Random numbers of the echoes, of the odometry, and of the line.
     """
 
-    def __init__(self, body: Body, faults: FaultSchedule, line: FaultyLine) -> None:
-        self._body, self._faults, self._line = body, faults, line
+    def __init__(
+        self, robot: RobotConfig, world: WorldConfig, faults: Sequence[Fault], baud: int,
+        sonar_rng: np.random.Generator, drift_rng: np.random.Generator, line_rngs: Sequence[np.random.Generator],
+    ) -> None:  # fmt: skip
+        self._faults = schedule = FaultSchedule(faults)
+        self._scene = scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
+        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        self._true_sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
+        self._line = FaultyLine(baud, schedule, *line_rngs)
         self._now_us = self._moved_us = 0
         self._next_event_us: int | None = None  # None once something may have changed it
+        # Load the compiled kernels now, so that the first firing is not late.
+        clearance(start.x, start.y, scene.circles, scene.segments)
+        self._true_sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
 
     @property
     def truth(self) -> GroundTruth:
@@ -94,9 +114,24 @@ class EventDevice(ABC):
     def _move(self) -> None:
         """Move the body up to the present event."""
 
-    @abstractmethod
     def _update_faults(self) -> None:
-        """Start and end faults."""
+        """Start and end the faults whose time has come."""
+        if self._faults.next_us is None:
+            return
+        for begins, fault in self._faults.due(self._now_us):
+            self._set_active(fault, on=begins)
+            if begins:
+                self._start_fault(fault)
+            elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
+                self._restart()
+
+    @abstractmethod
+    def _start_fault(self, fault: Fault) -> None:
+        """Do what a fault does as it begins."""
+
+    @abstractmethod
+    def _restart(self) -> None:
+        """Start as a robot does that has been off."""
 
     @abstractmethod
     def _handle_events(self) -> None:

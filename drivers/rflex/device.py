@@ -14,9 +14,8 @@ import numpy as np
 from config.robot import SOUND_SPEED_M_S, RobotConfig
 from config.world import WorldConfig
 from drivers.emulator.acoustics import clearance
-from drivers.emulator.body import BRAKE_S, RAMP_S, Body
+from drivers.emulator.body import BRAKE_S, RAMP_S
 from drivers.emulator.event_device import EventDevice
-from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlockedWheels,
     Bumper,
@@ -29,12 +28,8 @@ from drivers.emulator.faults import (
     Reboot,
     Runaway,
     StopButton,
-    SuddenObject,
 )
-from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.faulty_sonar import FaultySonar
-from drivers.emulator.scene import compile_scene
-from drivers.emulator.sonar import Sonar
 from drivers.messages import Flags, Pose, Twist
 from drivers.rflex.codec import (
     DIO,
@@ -115,20 +110,12 @@ class RflexDevice(EventDevice):
         sonar_rng, drift_rng, outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
         self._config, self._rflex = robot, robot.rflex
         self._ids = sonar_ids(robot)
-        schedule = FaultSchedule(faults)
-        self._scene = scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
-        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        body = Body(robot.body, scene, start, world.odometry, drift_rng)
-        sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
-        self._sonar = FaultySonar(sonar, len(robot.ring.mounts), schedule, outlier_rng)
-        super().__init__(body, schedule, FaultyLine(robot.link.baud, schedule, *line_rngs))
+        super().__init__(robot, world, faults, robot.link.baud, sonar_rng, drift_rng, line_rngs)
+        self._sonar = FaultySonar(self._true_sonar, len(robot.ring.mounts), self._faults, outlier_rng)
         self._clock_start_us, self._booted_us = clock_start_us, 0
         self._fail_safe_us = round(1e6 * self._rflex.fail_safe_s)
         self._touched_at: tuple[Pose, bool] | None = None
         self._boot()
-        # Load the compiled kernels now, so that the first firing is not late.
-        clearance(start.x, start.y, scene.circles, scene.segments)
-        sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
 
     @property
     def flags(self) -> Flags:
@@ -317,28 +304,26 @@ class RflexDevice(EventDevice):
 
     # Faults.
 
-    def _update_faults(self) -> None:
-        """Start and end the faults whose time has come."""
-        if self._faults.next_us is None:
-            return
-        for begins, fault in self._faults.due(self._now_us):
-            self._set_active(fault, on=begins)
-            match fault:
-                case Reboot():
-                    self._body.reset_odometry()
-                    self._boot()
-                case StopButton() if begins:
-                    self._brake, self._target = True, STILL
-                case MotorFault() if begins:
-                    self._target = STILL
-                case Deadman() if begins:
-                    self._fail_safe_us = 1000 * fault.deadman_ms
-                case OdometryJump() if begins:
-                    heading = self._body.odometry_pose.theta
-                    self._zero_m -= fault.dx_m * math.cos(heading) + fault.dy_m * math.sin(heading)
-                    self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
-                case _:
-                    pass
+    def _start_fault(self, fault: Fault) -> None:
+        match fault:
+            case Reboot():
+                self._restart()
+            case StopButton():
+                self._brake, self._target = True, STILL
+            case MotorFault():
+                self._target = STILL
+            case Deadman():
+                self._fail_safe_us = 1000 * fault.deadman_ms
+            case OdometryJump():
+                heading = self._body.odometry_pose.theta
+                self._zero_m -= fault.dx_m * math.cos(heading) + fault.dy_m * math.sin(heading)
+                self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
+            case _:
+                pass
+
+    def _restart(self) -> None:
+        self._body.reset_odometry()
+        self._boot()
 
     def _boot(self) -> None:
         """Start as after power-on, except for the body, which stays where it is."""

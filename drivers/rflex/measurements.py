@@ -14,15 +14,13 @@ import numpy as np
 
 from config.robot import RobotConfig
 from drivers import se2
-from drivers.dropped_count import EXCESS_FIRINGS, LATE_FIRINGS, DroppedCount
 from drivers.messages import Firing, Flags, Floats, Odometry, Pose, Twist
 from drivers.odometry_history import OdometryHistory
-from drivers.odometry_jumps import OdometryJumps
 from drivers.rflex import diagnostics
 from drivers.rflex.codec import NO_ECHO, ROTATION, TRANSLATION, AxisReport, SonarReport
 from drivers.rflex.wire_units import SonarPattern
 from drivers.robot_clock import Jump, RobotClock
-from drivers.token_bucket import TokenBucket
+from drivers.stamper import Stamper
 
 REPORT_PERIOD_S: Final = 0.05
 """Period of the reports that the driver asks for, s."""
@@ -41,9 +39,6 @@ _SLACK_M, _SLACK_RAD = 0.2, 0.3
 checksum lets one of some hundred corrupt frames pass."""
 _ZERO_M, _ZERO_RAD = 0.02, 0.03
 """The counts may be so far from zero just after a restart."""
-_FIRINGS_SHARE, _FIRINGS_BURST = 4.0, 64.0
-"""Firings passed on are at most so many times as frequent as those of the pattern, and so many at once."""
-_NOTES_MAX: Final = 16
 
 
 def _difference(now: int, before: int) -> int:
@@ -51,7 +46,7 @@ def _difference(now: int, before: int) -> int:
     return (now - before + 0x80000000) % 0x100000000 - 0x80000000
 
 
-class Measurements:
+class Measurements(Stamper):
     """Gives samples of the odometry their poses, and firings theirs.
 
     Parameters
@@ -60,11 +55,6 @@ class Measurements:
         The robot file.
     ids
         The id of each sensor of the ring.
-
-    Attributes
-    ----------
-    late_echoes, excess_echoes
-        Firings dropped because their pose is not known, or because there are many more than the pattern has.
     """
 
     # Set by a restart; see `_reset` and `break_off`.
@@ -78,39 +68,20 @@ class Measurements:
     _is_new: bool
 
     def __init__(self, config: RobotConfig, ids: tuple[int, ...]) -> None:
-        self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
-        self.excess_echoes = DroppedCount(EXCESS_FIRINGS, self.note)
+        super().__init__(config.body)
         self._config = config
         self._sensors = {one: sensor for sensor, one in enumerate(ids)}
         self._clock = RobotClock()
-        self._jumps = OdometryJumps(config.body)
         self._history = OdometryHistory(_HISTORY)
-        self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
         self._held: deque[tuple[float, Floats]] = deque(maxlen=_HELD_MAX)
         self._step_s, self._window_m = 0.0, math.inf
         self._is_clock_noted = False
-        self._limit = TokenBucket(math.inf, math.inf)
         self._reset()
-
-    @property
-    def origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry; the identity until that jumps."""
-        return self._jumps.origin
-
-    def note(self, text: str) -> None:
-        """Add a message for the operator."""
-        self._notes.append(text)
-
-    def notes(self) -> tuple[str, ...]:
-        """Return the messages for the operator, and remove them."""
-        notes = tuple(self._notes)
-        self._notes.clear()
-        return notes
 
     def set_pattern(self, pattern: SonarPattern) -> None:
         """Set the firing pattern that the robot carries out."""
         self._step_s, self._window_m = 1e-6 * pattern.step_us, pattern.window_m
-        self._limit = TokenBucket(_FIRINGS_SHARE / self._step_s, _FIRINGS_BURST)
+        self._limit_firings(self._step_s)
 
     def break_off(self) -> None:
         """Discard what waits: later reports do not continue the earlier ones."""
@@ -168,9 +139,7 @@ class Measurements:
         moved_m, turned = self._way(last, here)
         self._pose = self._pose.compose(se2.exp(moved_m, 0.0, turned))
         ring_yaw = 0.0 if self._config.body.synchro else self._pose.theta
-        sample, note = self._jumps.remove(Odometry(robot_s, self._pose, ring_yaw, twist, flags, 0))
-        if note is not None:
-            self.note(note)
+        sample = self._without_jump(Odometry(robot_s, self._pose, ring_yaw, twist, flags, 0))
         self._history.add(sample)
         return sample
 
@@ -197,9 +166,7 @@ class Measurements:
             place = self._history.at(fired_s, _GAP_S)
             if place is None or fired_s <= self._fired_s:
                 self.late_echoes.add()
-            elif not self._limit.take(run_s):
-                self.excess_echoes.add()
-            else:
+            elif not self._is_excess(run_s):
                 self._fired_s = fired_s
                 ready.append(Firing(fired_s, *place, ranges))
         return ready

@@ -130,4 +130,4 @@ def test_a_flood_of_ranges_is_bounded_and_reported() -> None:
         passed += len(driven.sip(*range(16), speed=0)[1])
     assert passed <= 64 + 4 / 0.041 + 1
     assert passed + driven.stamper.excess_echoes + driven.stamper.late_echoes.count == 1000
-    assert sum("many more ranges than its sonar can measure" in note for note in driven.stamper.notes()) == 1
+    assert sum("many more firings than its pattern has" in note for note in driven.stamper.notes()) == 1
