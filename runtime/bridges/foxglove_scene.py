@@ -9,23 +9,10 @@ from typing import Final
 import foxglove
 import numpy as np
 import orjson
-from foxglove import channels as ch
-from foxglove import messages as fx
 
 from drivers.messages import Pose
-from runtime.analysis.export.foxglove import (
-    ARC_POINTS,
-    colour,
-    line,
-    placed,
-    quaternion,
-    scene,
-    stamp,
-    write_cross_paths,
-    write_log,
-    write_segments,
-)
-from runtime.analysis.export.shapes import HEIGHT_M, MODEL, TRUTH, even_radius
+from runtime.analysis.export.foxglove_messages import RunChannels, object_label
+from runtime.analysis.export.shapes import even_radius
 from runtime.analysis.timeline import CROSS_PATH, CrossPathRows
 from runtime.bridges.console_client import ConsoleClient, Message
 
@@ -49,14 +36,7 @@ class SceneChannels:
     """
 
     def __init__(self, context: foxglove.Context) -> None:
-        self._frames = ch.FrameTransformsChannel("/tf", context=context)
-        self._pose = ch.PoseInFrameChannel("/pose", context=context)
-        self._ring = ch.LaserScanChannel("/ring", context=context)
-        self._crosses = ch.SceneUpdateChannel("/cross_paths", context=context)
-        self._segments = ch.SceneUpdateChannel("/segments", context=context)
-        self._objects = ch.SceneUpdateChannel("/models", context=context)
-        self._truth = ch.SceneUpdateChannel("/truth", context=context)
-        self._log = ch.LogChannel("/log", context=context)
+        self._run = RunChannels(context)
         self._state = foxglove.Channel("/state", schema={"type": "object"}, message_encoding="json", context=context)
         self._session: Message = {}
         self._states = 0
@@ -74,7 +54,7 @@ class SceneChannels:
         self._write_ranges(state, at)
         if state.get("cross_paths"):  # a run of an earlier version sends none
             rows = cross_path_rows(state["cross_paths"], self._session["ring"])
-            write_cross_paths(self._crosses, rows, self._session["ring"]["half_angle"], at)
+            self._run.write_cross_paths(rows, self._session["ring"]["half_angle"], at)
         self._state.log(orjson.dumps({name: state[name] for name in STATE_FIELDS}), log_time=at)
         if self._states % MAP_EVERY == 0:
             self._write_map(state["objects"], client.segments.values(), at)
@@ -84,24 +64,15 @@ class SceneChannels:
     def take_log(self, entry: Message, at: int) -> None:
         """Write a line of the log."""
         fields = " ".join(f"{name}={value}" for name, value in entry["fields"].items())
-        write_log(self._log, entry["level"], f"{entry['event']} {fields}".strip(), at)
+        self._run.write_log(entry["level"], f"{entry['event']} {fields}".strip(), at)
 
     def _write_frames(self, state: Message, at: int) -> None:
         x, y, theta = state["pose"]
         localized, rows = state["localized"], [("odom", "base", Pose(x, y, theta))]
         if localized is not None and localized["status"] == "tracking":
             rows.insert(0, ("map", "odom", Pose(*localized["frame"]).inverse()))
-        transforms = [
-            fx.FrameTransform(
-                timestamp=stamp(at), parent_frame_id=parent, child_frame_id=child,
-                translation=fx.Vector3(x=pose.x, y=pose.y, z=0.0), rotation=quaternion(pose.theta),
-            )
-            for parent, child, pose in rows
-        ]  # fmt: skip
-        self._frames.log(fx.FrameTransforms(transforms=transforms), log_time=at)
-        self._pose.log(
-            fx.PoseInFrame(timestamp=stamp(at), frame_id="odom", pose=placed(x, y, theta)), log_time=at
-        )  # fmt: skip
+        self._run.write_frames(rows, at)
+        self._run.write_pose(Pose(x, y, theta), at)
 
     def _write_ranges(self, state: Message, at: int) -> None:
         """Write the sensors that fired: one scan for an even ring, otherwise an arc for each sensor."""
@@ -113,47 +84,31 @@ class SceneChannels:
         radius = even_radius(mounts)
         if radius is not None:
             from_centre = [ranges[k] + radius if k in fired else math.nan for k in range(len(mounts))]
-            self._scan(base, 0.0, 2.0 * math.pi * (len(mounts) - 1) / len(mounts), from_centre, at)
+            self._run.write_ring(base, from_centre, at)
             return
         half = ring["half_angle"]
         for sensor in fired:
             turned = Pose(*state["pose"]) if sensor in ring["turning"] else base
-            self._scan(turned.compose(Pose(*mounts[sensor])), -half, half, [ranges[sensor]] * ARC_POINTS, at)
-
-    def _scan(self, eye: Pose, start: float, end: float, ranges: list[float], at: int) -> None:
-        message = fx.LaserScan(
-            timestamp=stamp(at), frame_id="odom", pose=placed(eye.x, eye.y, eye.theta), start_angle=start,
-            end_angle=end, ranges=ranges,
-        )  # fmt: skip
-        self._ring.log(message, log_time=at)
+            self._run.write_arc(turned.compose(Pose(*mounts[sensor])), half, ranges[sensor], at)
 
     def _write_map(self, objects: list[Message], segments: Iterable[list[float]], at: int) -> None:
         ends = [point for row in segments for point in (row[:2], row[2:4])]
-        write_segments(self._segments, ends, at)
+        self._run.write_segments(ends, at)
         models = {model["name"]: model for model in self._session["models"]}
-        outlines = [outline(seen, models.get(seen["model"])) for seen in objects]
-        lines = [line(points, MODEL, closed=closed) for points, closed in outlines]
-        texts = [
-            fx.TextPrimitive(
-                pose=placed(seen["x"], seen["y"], 0.0, HEIGHT_M), billboard=True, font_size=0.15, color=colour(MODEL),
-                text=f"{seen['number']} {seen['model']} {seen['score']:.2f}",
-            )
+        labels = [
+            (seen["x"], seen["y"], object_label(seen["number"], seen["model"], seen["score"]))
             for seen in objects
             if seen["ends"] is None
-        ]  # fmt: skip
-        scene(self._objects, "models", lines, texts, at)
+        ]
+        self._run.write_objects([outline(seen, models.get(seen["model"])) for seen in objects], labels, at)
 
     def _write_truth(self, at: int) -> None:
         """Write the true world of an emulated robot, or the known room, in odometry's frame."""
         truth = self._session["truth"]
         if truth is None:
             return
-        loops = [circle(*drum) for drum in truth["drums"]] + truth["polygons"]
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in truth["walls"]]
-        lines = [line(points, TRUTH, closed=True) for points in loops] + [
-            line(points, TRUTH, closed=False) for points in walls
-        ]
-        scene(self._truth, "truth", lines, [], at)
+        self._run.write_truth([*(circle(*drum) for drum in truth["drums"]), *truth["polygons"]], walls, at)
 
 
 def cross_path_rows(firings: list[Message], ring: Message) -> CrossPathRows:
