@@ -13,11 +13,12 @@ import numpy as np
 
 from behaviors.response import Response
 from config.behaviors import AvoidPastConfig
+from config.bounded import Coordinate
 from perception.percept import Percept
 
 SCHEMA: Final = "avoid_past"
 
-Trail: TypeAlias = tuple[tuple[float, float], ...]
+Trail: TypeAlias = tuple[tuple[Coordinate, Coordinate], ...]
 """Places x, y that the robot has passed, m, oldest first."""
 
 MARK_M: Final = 0.1

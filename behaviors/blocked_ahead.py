@@ -19,6 +19,7 @@ from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
+from config.bounded import Coordinate
 from perception.percept import Floats, Pose, wrap_angle
 
 T = TypeVar("T", float, Floats)
@@ -56,15 +57,15 @@ POINTS_MAX: Final = 200
 class Ahead:
     """An echo ahead on a way, in the frame of that way (m, rad)."""
 
-    x: float
-    y: float
-    axis_rad: float
+    x: Coordinate
+    y: Coordinate
+    axis_rad: Coordinate
     """Where the way began, and its direction."""
-    along_m: float
+    along_m: Coordinate
     """Where the echo lies along the way."""
-    stays_m: float = 0.0
+    stays_m: Coordinate = 0.0
     """Driven while it stayed."""
-    missed_m: float = 0.0
+    missed_m: Coordinate = 0.0
     """Driven since it was heard."""
 
     @property
@@ -88,14 +89,14 @@ class Pocket(NamedTuple):
 class Block:
     """A rectangle that is given room, in a frame that looks at it (m, rad)."""
 
-    x: float
-    y: float
-    axis_rad: float
-    front_m: float
-    back_m: float
+    x: Coordinate
+    y: Coordinate
+    axis_rad: Coordinate
+    front_m: Coordinate
+    back_m: Coordinate
     """Its extent along the axis …"""
-    low_m: float
-    high_m: float
+    low_m: Coordinate
+    high_m: Coordinate
     """… and across, counted to the left."""
 
 

@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from config.bounded import Seconds, Sign, Speed
 from perception.percept import Twist
 
 START_S: Final = 2.0
@@ -30,17 +31,17 @@ OPPOSITE_RAD: Final = math.radians(150.0)
 class Commitment:
     """What the last command committed the robot to; immutable, as keyframes hold it."""
 
-    started_run_s: float | None = None
+    started_run_s: Seconds | None = None
     """When the robot last started, by the run's clock; None before the first start under this request."""
-    turn_rad_s: float = 0.0
+    turn_rad_s: Speed = 0.0
     """Turning rate of the last command, rad/s."""
-    requested: int = 0
+    requested: Sign = 0
     """Sign of the speed that an operator asks for; 0 without one."""
     is_moving: bool = False
     """Whether the last command had a speed."""
-    side: int = 0
+    side: Sign = 0
     """Sign of the last turn that was not faint; 0 before the first one under this request."""
-    turned_run_s: float | None = None
+    turned_run_s: Seconds | None = None
     """When that sign last changed, by the run's clock."""
 
     def kept_angle(self, angle_rad: float, run_s: float | None = None) -> float:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
+
+from pydantic import Field
 
 from behaviors.response import Response
 from behaviors.steady_heading import held, turned_towards
@@ -23,6 +25,7 @@ from behaviors.valley.polar_histogram import (
     room_m,
 )
 from config.behaviors import FollowValleyConfig
+from config.bounded import Coordinate
 from config.robot import PASSAGE_M
 from perception.percept import Percept
 
@@ -39,9 +42,9 @@ STRAIGHT: Final = 0.5
 class Valley:
     """What the schema keeps from one cycle to the next."""
 
-    blocked: str = "0" * SECTORS
+    blocked: Annotated[str, Field(pattern=f"^[01]{{{SECTORS}}}$")] = "0" * SECTORS
     """The sectors of the odometry's frame, from its x axis counter-clockwise: 1 where something stands in the way."""
-    direction_rad: float | None = None
+    direction_rad: Coordinate | None = None
     """The direction that was chosen; None if none is free, or before the first choice."""
 
 

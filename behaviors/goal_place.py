@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from behaviors.move_to_goal import Goal
+from config.bounded import Coordinate
 from perception.percept import Pose
 
 GOAL_SLEW_M_S: Final = 0.2
@@ -17,8 +18,8 @@ GOAL_SLEW_M_S: Final = 0.2
 class GoalPlace:
     """Where a goal lies in odometry's frame, m, as the robot drives to it; and whether it truly lies there."""
 
-    x: float
-    y: float
+    x: Coordinate
+    y: Coordinate
     is_exact: bool = True
 
 

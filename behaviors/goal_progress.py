@@ -13,6 +13,7 @@ from typing import Literal, TypeAlias
 
 from behaviors.way_progress import NEARER_M
 from config.behaviors import MoveToGoalConfig
+from config.bounded import Coordinate, Seconds
 from perception.percept import Pose
 
 Fault: TypeAlias = Literal["stuck", "unreachable"]
@@ -22,14 +23,14 @@ Fault: TypeAlias = Literal["stuck", "unreachable"]
 class Progress:
     """The progress of a drive to a goal; times by the run's clock."""
 
-    x: float
-    y: float
-    moved_run_s: float
+    x: Coordinate
+    y: Coordinate
+    moved_run_s: Seconds
     """Where the robot was when it had last moved, and when, m and s."""
-    nearest_m: float
-    nearer_run_s: float
+    nearest_m: Coordinate
+    nearer_run_s: Seconds
     """The smallest distance to the goal so far, and when it was reached, m and s."""
-    excused_run_s: float | None = None
+    excused_run_s: Seconds | None = None
     """Until when a detour led away from the goal, s; such a robot comes no nearer, and is not given up for it."""
     given_up: str | None = None
     """Why the drive has ended short of the goal; None while it goes on."""

@@ -32,6 +32,7 @@ from behaviors.near_memory import NearEchoes, places, remember
 from behaviors.response import Response
 from behaviors.steady_heading import turned_towards
 from config.behaviors import LeaveCanyonConfig
+from config.bounded import Coordinate, Count
 from config.robot import PASSAGE_M
 from perception.percept import Canyon, Floats, Percept, Pose, wrap_angle
 
@@ -83,26 +84,26 @@ class Detour:
 
     side: Literal[-1, 0, 1] = 0
     """Of the obstacle that is gone round: +1 it stays on the left, −1 on the right; 0 without a detour."""
-    began_m: float = 0.0
+    began_m: Coordinate = 0.0
     """Least distance to the goal until the detour began, …"""
-    began_x: float = 0.0
-    began_y: float = 0.0
+    began_x: Coordinate = 0.0
+    began_y: Coordinate = 0.0
     """… the place where it did, …"""
-    began_driven_m: float = 0.0
+    began_driven_m: Coordinate = 0.0
     """… and how far the robot had driven by then."""
-    driven_m: float = 0.0
+    driven_m: Coordinate = 0.0
     """The way since the goal was set."""
-    rounds: int = 0
+    rounds: Count = 0
     """How often the robot has gone all round."""
-    nearest_m: float = FAR_M
-    nearest_driven_m: float = 0.0
+    nearest_m: Coordinate = FAR_M
+    nearest_driven_m: Coordinate = 0.0
     """The least distance to the goal so far, and how far the robot had driven by then."""
     near: NearEchoes = ()
     """What was heard near the robot on its way."""
-    wall_rad: float = 0.0
+    wall_rad: Coordinate = 0.0
     """Where the obstacle lay in the last cycle."""
-    x: float | None = None
-    y: float | None = None
+    x: Coordinate | None = None
+    y: Coordinate | None = None
     """The robot's place in the last cycle."""
     leaving: Canyon | None = None
     """The narrow canyon that the robot is in and must leave."""
@@ -110,7 +111,7 @@ class Detour:
     """What stays far ahead, …"""
     block: Block | None = None
     """… what it is presumed to be a part of, …"""
-    presume_below_m: float = FAR_M
+    presume_below_m: Coordinate = FAR_M
     """… and the distance to the goal below which something may be presumed."""
 
 

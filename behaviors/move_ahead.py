@@ -12,6 +12,7 @@ from typing import Final
 
 from behaviors.response import Response
 from config.behaviors import MoveAheadConfig
+from config.bounded import Coordinate
 from perception.percept import Percept, Pose
 
 SCHEMA: Final = "move_ahead"
@@ -21,8 +22,8 @@ SCHEMA: Final = "move_ahead"
 class Leg:
     """The current leg: its start (m, odometry's frame), whether it leads outbound, and whether it is finished."""
 
-    origin_x: float
-    origin_y: float
+    origin_x: Coordinate
+    origin_y: Coordinate
     outbound: bool = True
     done: bool = False
     gave_up: bool = False

@@ -12,9 +12,10 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from config.bounded import Coordinate
 from perception.percept import Floats, Pose
 
-NearEchoes: TypeAlias = tuple[tuple[float, float, float], ...]
+NearEchoes: TypeAlias = tuple[tuple[Coordinate, Coordinate, Coordinate], ...]
 """Places x, y, and how far the robot had driven when each was last heard, m."""
 
 NEAR_M: Final = 1.5

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from config.bounded import Coordinate
+
 
 @dataclass(frozen=True, slots=True)
 class Response:
     """A schema's vector in the odometry's frame, its gain included; length 1 requests the base velocity."""
 
     schema: str
-    x: float
-    y: float
+    x: Coordinate
+    y: Coordinate
 
 
 def summed(responses: Iterable[Response]) -> tuple[float, float]:

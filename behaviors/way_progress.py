@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from config.bounded import Coordinate, Seconds
+
 STALLED_S: Final = 20.0
 """After so long without progress the operator reads why, s."""
 ENDED_S: Final = 2.0 * STALLED_S
@@ -26,9 +28,9 @@ class WayProgress:
 
     outbound: bool = True
     """In which direction that was."""
-    best_m: float | None = None
+    best_m: Coordinate | None = None
     """Least distance left so far, m from any origin; None before the first cycle."""
-    run_s: float = 0.0
+    run_s: Seconds = 0.0
     """When it was."""
 
     def observe(self, remaining_m: float, requested_run_s: float, run_s: float, *, outbound: bool) -> WayProgress:

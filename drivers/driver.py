@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import Annotated, Protocol
 
+from config.bounded import CONSISTENT
 from config.errors import WRONG_CALL, UserError
 from config.robot import RingConfig
-from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, RecordedFlags, Twist
 
 
 class DriverError(UserError):
@@ -39,7 +40,7 @@ class LineState(Enum):
 class Received:
     """What a driver received since the last call of `take_received`."""
 
-    firings: tuple[Firing, ...]
+    firings: tuple[Annotated[Firing, CONSISTENT], ...]
     """Oldest first; their times only grow, unless the robot restarted."""
     odometry: Odometry | None
     """The newest sample, None if there was none."""
@@ -47,7 +48,7 @@ class Received:
     """The robot restarted: its clock and odometry began again at zero. Nothing here is from before the restart."""
     notes: tuple[str, ...] = ()
     """Messages for the operator, one line each: what happened, likely cause, next action."""
-    flags: Flags = Flags.NONE
+    flags: RecordedFlags = Flags.NONE
     """Every flag that any sample of the odometry had, not only the newest: a contact may last for one sample."""
 
 

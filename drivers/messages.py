@@ -7,21 +7,29 @@ them. Units are SI and radians; counter-clockwise is positive, x points forward.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntFlag
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetPydanticSchema
+from pydantic import Field, GetPydanticSchema
 from pydantic_core import CoreSchema, core_schema
 
+from config.bounded import COUNT_MAX, RANGE_MAX_M, Coordinate, Number, Seconds, Speed
 
-def _array_schema(entry: CoreSchema, dtype: type[np.generic]) -> GetPydanticSchema:
+
+def _array_schema(
+    entry: CoreSchema, dtype: type[np.generic], check: Callable[[NDArray[Any]], None] | None = None
+) -> GetPydanticSchema:
     """Return how pydantic writes and reads an array of shape (n,): as a list of numbers, exact to the bit."""
 
     def as_array(values: list[Any]) -> NDArray[Any]:
-        return np.array(values, dtype=dtype)
+        array = np.array(values, dtype=dtype)
+        if check is not None:
+            check(array)
+        return array
 
     def schema(_source: object, _handler: object) -> CoreSchema:
         numbers = core_schema.list_schema(entry)
@@ -38,8 +46,18 @@ def _as_list(value: object) -> object:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
+def _check_ranges(ranges_m: NDArray[Any]) -> None:
+    heard = ranges_m[~np.isnan(ranges_m) & (ranges_m != math.inf)]
+    if len(heard) and not (heard.min() >= 0.0 and heard.max() <= RANGE_MAX_M):
+        raise ValueError(f"a range of {heard.min():g} or {heard.max():g} m, expected 0 to {RANGE_MAX_M:g}")
+
+
 Floats: TypeAlias = Annotated[NDArray[np.float64], _array_schema(core_schema.float_schema(), np.float64)]
 """An array of float64; pydantic records one of shape (n,) as a list."""
+Ranges: TypeAlias = Annotated[
+    NDArray[np.float64], _array_schema(core_schema.float_schema(), np.float64, _check_ranges)
+]
+"""Ranges, m; recorded likewise, and refused beyond `RANGE_MAX_M`. NaN is no reading, +inf no echo."""
 Indices: TypeAlias = Annotated[NDArray[np.int64], _array_schema(core_schema.int_schema(ge=0, le=255), np.int64)]
 """An array of indices of sensors; recorded likewise."""
 
@@ -53,9 +71,9 @@ def wrap_angle(angle_rad: float) -> float:
 class Pose:
     """A position and direction in the plane, m and rad: an element of SE(2)."""
 
-    x: float
-    y: float
-    theta: float
+    x: Coordinate
+    y: Coordinate
+    theta: Coordinate
 
     def compose(self, other: Pose) -> Pose:
         """Return the pose `other`, which is given in this pose's frame, in the frame of this pose."""
@@ -72,8 +90,8 @@ class Pose:
 class Twist:
     """A velocity in the body's frame: v forward in m/s, w counter-clockwise in rad/s."""
 
-    v: float
-    w: float
+    v: Speed
+    w: Speed
 
     def at_most(self, speed_m_s: float) -> Twist:
         """Return this velocity, or a slower one on the same curve whose speed is `speed_m_s`."""
@@ -93,6 +111,10 @@ class Flags(IntFlag):
     MOTOR_FAULT = 4
     DEADMAN = 8
     BATTERY_LOW = 16
+
+
+RecordedFlags: TypeAlias = Annotated[Flags, Field(ge=0, le=COUNT_MAX)]
+"""Flags of a later version may be among them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +150,12 @@ class Odometry:
         Number of the last drive command that the base obeyed.
     """
 
-    robot_s: float
+    robot_s: Seconds
     pose: Pose
-    ring_yaw: float
+    ring_yaw: Coordinate
     twist: Twist
-    flags: Flags
-    last_drive_seq: int
+    flags: RecordedFlags
+    last_drive_seq: Number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +173,17 @@ class CrossPaths:
 
     transmitters: Indices
     listeners: Indices
-    half_paths_m: Floats
+    half_paths_m: Ranges
+
+    def contradiction(self, sensors: int) -> str | None:
+        """Return why a ring of so many sensors cannot have heard this; None if it can."""
+        lengths = [len(self.transmitters), len(self.listeners), len(self.half_paths_m)]
+        if not 1 <= lengths[0] <= sensors or len(set(lengths)) > 1:
+            return f"cross paths have arrays of {lengths} entries, expected 1 to {sensors} in each"
+        highest = int(max(self.transmitters.max(), self.listeners.max()))
+        if highest >= sensors or (self.transmitters == self.listeners).any():
+            return f"cross paths name sensor {highest} of {sensors}, or one that hears itself"
+        return "cross paths have a path that is no number" if np.isnan(self.half_paths_m).any() else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,11 +204,15 @@ class Firing:
         is none, as always on a ring that cannot listen.
     """
 
-    robot_s: float
+    robot_s: Seconds
     pose: Pose
-    ring_yaw: float
-    ranges_m: Floats
+    ring_yaw: Coordinate
+    ranges_m: Ranges
     cross_paths: CrossPaths | None = None
+
+    def contradiction(self) -> str | None:
+        """Return why the cross paths are not of this ring; None if they are."""
+        return None if self.cross_paths is None else self.cross_paths.contradiction(len(self.ranges_m))
 
     def over_scale(self, range_scale: float) -> Firing:
         """Return this firing with all distances divided by `range_scale`: reported over true."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from config.bounded import Coordinate, Count
 from drivers.messages import Floats, Pose, Twist, wrap_angle
 from perception.detected_object import DetectedObject
 
@@ -99,11 +100,11 @@ class Canyon:
         That the back and both sides are closed for this robot, 0 to 1.
     """
 
-    number: int
-    mouth: tuple[float, float, float, float]
-    axis_rad: float
-    depth_m: float
-    probability: float
+    number: Count
+    mouth: tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+    axis_rad: Coordinate
+    depth_m: Coordinate
+    probability: Coordinate
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
-from typing import Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
+
+from pydantic import Field
 
 from behaviors.valley.choice import apart, candidates, gaps
 from behaviors.valley.polar_histogram import (
@@ -25,10 +27,13 @@ from behaviors.valley.polar_histogram import (
     room_m,
 )
 from config.behaviors import FollowValleyConfig
+from config.bounded import COORDINATE_MAX, Coordinate, Count, Number
 from config.robot import PASSAGE_M
 from perception.percept import OccupancyWindow, Percept
 
-Place: TypeAlias = tuple[float, float]
+Place: TypeAlias = tuple[Coordinate, Coordinate]
+
+Square: TypeAlias = Annotated[int, Field(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 SQUARES_M: Final = 0.5
 """Places in one square of this share of a step are the same place."""
@@ -54,13 +59,13 @@ FAILED_MAX: Final = 64
 class Node:
     """A projected place: m, in odometry's frame."""
 
-    x: float
-    y: float
-    direction: float
+    x: Coordinate
+    y: Coordinate
+    direction: Coordinate
     """In which it was reached, in sectors."""
-    cost_m: float
+    cost_m: Coordinate
     """Of the way to it."""
-    parent: int
+    parent: Number
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +75,9 @@ class Search:
     goal: Place | None = None
     """None before the first search."""
     nodes: tuple[Node, ...] = ()
-    waiting: tuple[tuple[float, int], ...] = ()
+    waiting: tuple[tuple[Coordinate, Count], ...] = ()
     """A heap of estimated costs of the whole way, m, and numbers of nodes."""
-    passed: tuple[tuple[int, int], ...] = ()
+    passed: tuple[tuple[Square, Square], ...] = ()
     """Squares that are expanded."""
     way: tuple[Place, ...] = ()
     """The way in force, from where its search began; empty without one."""
@@ -84,6 +89,13 @@ class Search:
     """Whether the last search has found a way that turns back from the one in force."""
     failed: tuple[Place, ...] = ()
     """Such places of former ways, which were given up for them: as the grid forgets, they would be tried again."""
+
+    def contradiction(self) -> str | None:
+        """Return which number of a place names none; None if all do."""
+        if any(not -1 <= node.parent < k for k, node in enumerate(self.nodes)):
+            return "a place of the search whose parent does not come before it"
+        is_named = all(number < len(self.nodes) for _, number in self.waiting)
+        return None if is_named else "a place that waits for the search and is not in it"
 
     @property
     def is_done(self) -> bool:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from config.bounded import Count, Seconds
 from drivers.messages import Firing, Odometry
 
 PERIOD_S: Final = 5.0
@@ -51,17 +52,17 @@ class ClockState(Enum):
 class Reading:
     """A reading of the robot's clock, and when it arrived by the run's."""
 
-    robot_s: float
-    run_s: float
+    robot_s: Seconds
+    run_s: Seconds
 
 
 @dataclass(frozen=True, slots=True)
 class Lead:
     """The greatest lead of the present period, and those of the periods before, s."""
 
-    begin_run_s: float
-    newest_s: float
-    before_s: tuple[float, ...] = ()
+    begin_run_s: Seconds
+    newest_s: Seconds
+    before_s: tuple[Seconds, ...] = ()
 
     @property
     def greatest_s(self) -> float:
@@ -89,7 +90,7 @@ class ClockMonitor:
     """As of the newest cycle."""
     newest: Reading | None = None
     """The first reading that showed the newest time of the robot's clock."""
-    repeats: int = 0
+    repeats: Count = 0
     """How many readings have shown it since."""
     lead: Lead | None = None
     """Of odometry."""

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
+
+from pydantic import AfterValidator
 
 from behaviors.goal_place import GOAL_SLEW_M_S, GoalPlace, goal_place
 from behaviors.missions.mission import Mission, MissionEdit, continued, edit_refusal, edited, progress_problem
@@ -28,6 +30,7 @@ __all__ = [
     "DriveRequest",
     "GoalPlace",
     "Legs",
+    "ValidRequest",
     "after_reboot",
     "after_stop",
     "first_request",
@@ -62,6 +65,8 @@ class Legs:
 
 DriveRequest: TypeAlias = Legs | Goal | Teleoperate | Mission
 """What is driven in DRIVE."""
+ValidRequest: TypeAlias = Annotated[DriveRequest, AfterValidator(lambda request: _refuse_invalid(request))]
+"""One that a cycle has accepted: a keyframe that holds another is refused."""
 DriveInput: TypeAlias = DriveRequest | MissionEdit
 """What an operator asks for: something else to drive, or a change of the mission under way."""
 
@@ -128,6 +133,12 @@ def refusal(before: DriveRequest, asked: DriveInput) -> str | None:
     if isinstance(asked, MissionEdit):
         return edit_refusal(before if isinstance(before, Mission) else None, asked)
     return validate(asked)
+
+
+def _refuse_invalid(drive_request: DriveRequest) -> DriveRequest:
+    if (problem := validate(drive_request)) is not None:
+        raise ValueError(problem)
+    return drive_request
 
 
 def validate(drive_request: DriveRequest) -> str | None:

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from behaviors.avoid_past import Trail
 from behaviors.move_ahead import Leg
+from config.bounded import Seconds
 from config.mission import StepConfig
 from config.settings import Settings
 from drivers.messages import Pose
-from runtime.cycle.drive_requests import DriveRequest, GoalPlace, Legs
+from runtime.cycle.drive_requests import DriveRequest, GoalPlace, Legs, ValidRequest
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.velocity_limits import ZoneLimits
@@ -42,9 +43,9 @@ class Moment(NamedTuple):
 class DriveState:
     """What a drive carries over to the next cycle."""
 
-    drive_request: DriveRequest = field(default_factory=Legs)
+    drive_request: ValidRequest = field(default_factory=Legs)
     """What is driven in DRIVE: a goal may have been reached, a velocity may have expired."""
-    requested_run_s: float = 0.0
+    requested_run_s: Seconds = 0.0
     """When the operator requested that, by the run's clock."""
     leg: Leg | None = None
     """How far the current leg has come; None before it begins."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Annotated, Final
 
 from behaviors.arbiter import Decision, Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
@@ -18,6 +18,7 @@ from behaviors.response import Response
 from behaviors.steady_heading import held
 from behaviors.valley.look_ahead import Search, begin, expand
 from behaviors.valley.polar_histogram import cells_near
+from config.bounded import CONSISTENT, Seconds, Speed
 from config.robot import PASSAGE_M
 from config.settings import Settings
 from perception.percept import Percept, Pose, wrap_angle
@@ -43,10 +44,10 @@ class GoalDrive:
 
     progress: Progress
     valley: Valley = field(default_factory=Valley)
-    search: Search = field(default_factory=Search)
-    searched_run_s: float | None = None
+    search: Annotated[Search, CONSISTENT] = field(default_factory=Search)
+    searched_run_s: Seconds | None = None
     """When the look-ahead began, by the run's clock."""
-    turn_rad_s: float = 0.0
+    turn_rad_s: Speed = 0.0
     """The turning rate that was decided on in the last cycle, rad/s."""
     detour: Detour = NO_DETOUR
     """How leave-canyon has come."""

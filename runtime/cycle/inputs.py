@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from config.bounded import Seconds
 from drivers.driver import LineState, Received, RobotDriver
 from perception.edits import Edit
 from runtime.cycle.drive_requests import DriveInput
@@ -40,16 +41,16 @@ def always_valid() -> bool:
 class Inputs:
     """The inputs of the cycle that begins at `run_s` of the run's clock."""
 
-    run_s: float
+    run_s: Seconds
     line: LineState
     line_problem: str | None
     """Why the line is not READY, where the driver knows."""
     received: Received
     """Echoes and odometry that arrived."""
     request: Request | None = None
-    gap_max_s: float = GAP_MAX_S
+    gap_max_s: Seconds = GAP_MAX_S
     """Largest time between two commands that the base's deadman allows."""
-    echo_age_s: float | None = None
+    echo_age_s: Seconds | None = None
     """How long the oldest of the firings has waited for this cycle; None without a firing and in virtual time."""
     overrun: str | None = None
     """Why the cycle can no longer keep its period; None while it can."""
@@ -59,7 +60,7 @@ class Inputs:
     """The new drive request, or a change of the mission in force; None keeps the one in force."""
     edits: tuple[Edit, ...] = ()
     """The operator's edits of the map, in this order."""
-    host_s: float | None = None
+    host_s: Seconds | None = None
     """The same moment by the host's clock; None in virtual time. For the record only: no decision depends on it."""
     preparing: str | None = None
     """How far the preparation of recognition is; None from the cycle on in which recognition begins."""

@@ -12,6 +12,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
+from config.bounded import Seconds
 from drivers.driver import LineState
 from drivers.messages import Flags
 from runtime.cycle.clock_monitor import ClockState
@@ -97,10 +98,10 @@ class ModeState:
     """A mode with its reason, and the progress of arming."""
 
     mode: Mode = Mode.CONNECTING
-    entered_run_s: float = 0.0
+    entered_run_s: Seconds = 0.0
     """When the mode was entered, by the run's clock."""
     reason: str | None = None
-    arming_run_s: float | None = None
+    arming_run_s: Seconds | None = None
     """When the robot began to be armed, by the run's clock; None while it is not being armed."""
 
     def enter(self, mode: Mode, run_s: float, reason: str | None = None) -> ModeState:

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from config.bounded import Coordinate, Seconds, Speed
 from config.robot import BodyConfig
 from drivers.base_model import obeyed
 from drivers.messages import Odometry, Pose, Twist
@@ -32,8 +33,8 @@ from drivers.messages import Odometry, Pose, Twist
 class Amount:
     """A distance and an angle, m and rad, or their rates, m/s and rad/s."""
 
-    along: float
-    turned: float
+    along: Coordinate
+    turned: Coordinate
 
 
 AGE_S: Final = 0.2
@@ -83,7 +84,7 @@ class Movement(Enum):
 class Command:
     """A velocity and when it was commanded, by the run's clock."""
 
-    run_s: float
+    run_s: Seconds
     twist: Twist
 
 
@@ -91,9 +92,9 @@ class Command:
 class Direction:
     """One of the four directions in which the base moves."""
 
-    explained: float
+    explained: Speed
     """Velocity that the commands explain, m/s or rad/s."""
-    excess: float = 0.0
+    excess: Coordinate = 0.0
     """Motion that they do not, m or rad."""
 
 
@@ -111,20 +112,26 @@ class MotionMonitor:
     """Forward, backward, left, right; empty before the first sample."""
     still: Pose | None = None
     """The pose from which the odometry has not moved by `MOVED`, and …"""
-    still_s: float = 0.0
+    still_s: Seconds = 0.0
     """… for how long, by the robot's clock."""
     has_stood: bool = True
     """Whether the base has stood since it was last commanded to move."""
-    asked_s: float = 0.0
+    asked_s: Seconds = 0.0
     """For how long the base has been commanded to drive one way without having moved, …"""
     asked: Amount = NOTHING
     """… how far the model has moved meanwhile, …"""
-    asked_turn_s: float = 0.0
+    asked_turn_s: Seconds = 0.0
     """… and for how long to turn one way, s."""
     modelled: Twist = STANDSTILL
     """Velocity of a base that obeys within the limits of its file, and …"""
-    modelled_run_s: float | None = None
+    modelled_run_s: Seconds | None = None
     """… when it had that, by the run's clock; None before the first cycle."""
+
+    def contradiction(self) -> str | None:
+        """Return why directions and odometry do not belong together; None if they do."""
+        expected = 0 if self.odometry is None else DIRECTIONS
+        found = len(self.directions)
+        return None if found == expected else f"{found} directions of motion, expected {DIRECTIONS} beside odometry"
 
     def observe(self, odometry: Odometry | None, run_s: float, body: BodyConfig) -> MotionMonitor:
         """Return the monitor after the newest odometry.

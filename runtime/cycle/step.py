@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Final, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
 from behaviors.move_ahead import Leg
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
+from config.bounded import CONSISTENT, Count, Seconds
 from config.places import PlacesConfig
 from config.settings import Settings
 from drivers.driver import LineState, RobotDriver
@@ -81,7 +82,7 @@ StopCause: TypeAlias = Literal["budget", "quota", "converged", "nothing"]
 class Refused:
     """A request of the operator that the cycle could not fulfil, and why."""
 
-    edit: int | None
+    edit: Count | None
     """Index of the refused one among the cycle's edits; None for the drive request."""
     why: str
 
@@ -93,16 +94,16 @@ class State(DriveState):
     perception: Perception
     mode: ModeState = field(default_factory=ModeState)
     odometry: Odometry | None = None
-    last_firing_robot_s: float = 0.0
+    last_firing_robot_s: Seconds = 0.0
     """When the ring last fired, by the robot's clock."""
-    run_s: float | None = None
+    run_s: Seconds | None = None
     """When the last cycle began, by the run's clock."""
-    cycle: int = 0
+    cycle: Count = 0
     vectors: tuple[Response, ...] = ()
     """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
     """Why the robot does not move although it may drive; None if it moves."""
-    motion_monitor: MotionMonitor = field(default_factory=MotionMonitor)
+    motion_monitor: Annotated[MotionMonitor, CONSISTENT] = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
     clock_monitor: ClockMonitor = field(default_factory=ClockMonitor)
     """Whether the robot's clock keeps time."""
@@ -124,15 +125,15 @@ class State(DriveState):
 class CycleRecord:
     """The inputs of a cycle, its decisions, and its counts."""
 
-    cycle: int
+    cycle: Count
     inputs: Inputs
     mode: ModeState
     command: Command
-    new_segments: int
-    segments: int
-    clusters: int
-    quanta: int
-    iterations: int
+    new_segments: Count
+    segments: Count
+    clusters: Count
+    quanta: Count
+    iterations: Count
     refinement: StopCause
     refused: tuple[Refused, ...] = ()
     """The operator's drive request and edits that could not be fulfilled."""

@@ -13,12 +13,12 @@ from typing import Any, Final
 import orjson
 from pydantic import ValidationError
 
+from config.bounded import TIME_MAX_S
 from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from config.world import WorldConfig
 from runtime.cycle.step import CycleRecord
 from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode
-from runtime.recording.field_checks import TIME_MAX_S
 from runtime.recording.mcap_file import PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
 from runtime.recording.schema import FORMAT, Cycle, RunInfo

@@ -10,39 +10,30 @@ import math
 from dataclasses import fields
 from itertools import accumulate
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias, get_type_hints
+from typing import Annotated, Any, ClassVar, Final, NotRequired, Self, TypeAlias, get_origin, get_type_hints
 
 import numpy as np
 import zstandard
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema, to_jsonable_python
 
+from config.bounded import COUNT_MAX, Coordinate, Count, Seconds
 from perception.snapshot import Snapshot, fixed_shape
 from runtime.cycle.clock_monitor import ClockMonitor
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import MotionMonitor
 from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.field_checks import (
-    COUNT_MAX,
-    TIME_MAX_S,
-    check_cycle,
-    check_mode,
-    check_object,
-    check_pieces,
-    check_segments,
-    check_state,
-)
+from runtime.cycle.summary import ObjectRow
 
 FORMAT: Final = 2
 """Version of the file format. Increase it with every change after which a recording cannot be read as before."""
 GROWN_MAX: Final = 100_000
 """Greatest length of a keyframe's array, which bounds the memory that a hostile file can take."""
-
-
-Count: TypeAlias = Annotated[int, Field(ge=0, le=COUNT_MAX)]
-Seconds: TypeAlias = Annotated[float, Field(ge=-TIME_MAX_S, le=TIME_MAX_S, allow_inf_nan=False)]
+PIECE_DELAY_MAX_US: Final = 10**15
+COVARIANCE: Final = 3
+"""Numbers of an object's covariance."""
 
 
 class Payload(BaseModel):
@@ -99,11 +90,7 @@ class Cycle(Payload):
     """One cycle. Its time is `record.inputs.run_s`."""
 
     record: CycleRecord
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_cycle(self.record)
-        return self
+    """Drive requests and edits in it may hold any number: the cycle itself validates and refuses them."""
 
 
 class ModeChange(TimedPayload):
@@ -112,25 +99,25 @@ class ModeChange(TimedPayload):
     cycle: Count
     mode: ModeState
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_mode(self.mode)
-        return self
-
 
 class SerialBytes(TimedPayload):
     """Pieces of data received or sent over the serial line; `run_s` is the time of the first piece."""
 
-    after_us: list[int]
+    after_us: list[Annotated[int, Field(ge=-PIECE_DELAY_MAX_US, le=PIECE_DELAY_MAX_US)]]
     """Delay of each piece after the first one, µs."""
-    sizes: list[int]
+    sizes: list[Count]
     """Number of bytes in each piece."""
     data: str
     """All pieces in hexadecimal, in which repetition stays visible to compression, unlike in base64."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        check_pieces(self.after_us, self.sizes, self.data)
+        if len(self.after_us) != len(self.sizes):
+            raise ValueError(f"{len(self.sizes)} pieces of data with {len(self.after_us)} times")
+        if 2 * sum(self.sizes) != len(self.data):
+            found = f"{len(self.data)} hexadecimal digits of data"
+            raise ValueError(f"pieces of {sum(self.sizes)} bytes together, and {found}")
+        bytes.fromhex(self.data)
         return self
 
     def pieces(self) -> list[tuple[float, bytes]]:
@@ -176,31 +163,49 @@ class MapChange(TimedPayload):
     """Whether `added` is the whole map, and all messages before do not count."""
     first: Count
     """Number of the first segment in `added`; the others are numbered consecutively."""
-    added: list[tuple[float, float, float, float, float]]
+    added: list[tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate]]
     """Ends x, y, x, y (m) and normal (rad) of each new segment, rounded to the millimetre."""
     removed: list[Count]
     """Numbers of the segments that are gone."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_segments(self.added)
-        return self
+
+_OBJECT: Final = MappingProxyType(get_type_hints(ObjectRow, include_extras=True))
+_REQUIRED: Final = frozenset(name for name, hint in _OBJECT.items() if get_origin(hint) is not NotRequired)
+
+
+def _checked_object(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with all fields of `ObjectRow`, finite; fields beyond those are numbers, flags or texts."""
+    if missing := sorted(_REQUIRED - row.keys()):
+        raise ValueError(f"an object without {missing[0]}")
+    for name, value in row.items():
+        if name == "model":
+            is_valid = isinstance(value, str)
+        elif name in {"support", "number"}:
+            is_count = type(value) is int and 0 <= value <= COUNT_MAX
+            is_valid = is_count or (value is None and name == "number")
+        elif name == "covariance":
+            is_valid = isinstance(value, list) and len(value) == COVARIANCE and all(map(_is_finite, value))
+        elif name in _OBJECT:
+            is_valid = _is_finite(value)
+        else:
+            is_valid = value is None or isinstance(value, str | bool) or _is_finite(value)
+        if not is_valid:
+            raise ValueError(f"an object whose {name:.40} is {value!r:.40}")
+    return row
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and abs(value) <= COUNT_MAX
 
 
 class ObjectList(TimedPayload):
     """The models recognised near the robot at this moment, as in the run's summary; beside a keyframe all of them."""
 
     cycle: Count
-    objects: list[dict[str, Any]]
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for row in self.objects:
-            check_object(row)
-        return self
+    objects: list[Annotated[dict[str, Any], AfterValidator(_checked_object)]]
 
 
-_HINTS: Final = get_type_hints(State)
+_HINTS: Final = get_type_hints(State, include_extras=True)
 _MADE_ANEW: Final = frozenset({"perception", "percept", "preparing", "step_settings", "undos", "zones"})
 """What a replay makes of the other fields, the settings and perception's own state."""
 _CARRIED: Final = tuple(f.name for f in fields(State) if f.name not in _MADE_ANEW)
@@ -244,11 +249,6 @@ class Keyframe(TimedPayload):
     arrays: list[ArrayInfo]
     data: bytes
     """The arrays' bytes, little-endian, compressed by zstd."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_state(state_fields(self))
-        return self
 
 
 StateFields: TypeAlias = dict[str, Any]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from drivers.messages import Floats, Pose, wrap_angle
+from drivers.messages import CrossPaths, Firing, Flags, Floats, Pose, Ranges, RecordedFlags, wrap_angle
 
 ANGLE = st.floats(-20.0, 20.0)
 PLACE = st.floats(-10.0, 10.0)
@@ -43,3 +43,35 @@ def test_an_array_is_written_as_a_list_and_read_back_to_the_bit() -> None:
     assert back.tobytes() == array.tobytes()
     with pytest.raises(ValueError, match="valid number"):
         adapter.validate_python(["one"])
+
+
+def test_ranges_and_flags_are_bounded() -> None:
+    ranges: TypeAdapter[np.ndarray] = TypeAdapter(Ranges)
+    assert ranges.validate_python([0.0, math.inf, math.nan, 1e3]).shape == (4,)
+    for value in (-1.0, 1.1e3, -math.inf):
+        with pytest.raises(ValueError, match="a range of"):
+            ranges.validate_python([1.0, value])
+    flags: TypeAdapter[Flags] = TypeAdapter(RecordedFlags)
+    assert flags.validate_python(3) == Flags.LATCHED | Flags.BUMPER
+    with pytest.raises(ValueError, match="less than or equal"):
+        flags.validate_python(2**60)
+
+
+@pytest.mark.parametrize(
+    ("heard", "message"),
+    [
+        (([0], [1, 2], [1.0]), "arrays of"),
+        (([], [], []), "arrays of"),
+        (([0] * 4, [1] * 4, [1.0] * 4), "arrays of"),
+        (([0], [3], [1.0]), "name sensor 3 of 3"),
+        (([1], [1], [1.0]), "hears itself"),
+        (([0], [1], [math.nan]), "no number"),
+    ],
+)
+def test_cross_paths_belong_to_the_ring(heard: tuple[list[int], list[int], list[float]], message: str) -> None:
+    def firing(transmitters: list[int], listeners: list[int], half_paths_m: list[float]) -> Firing:
+        paths = CrossPaths(np.array(transmitters, np.int64), np.array(listeners, np.int64), np.array(half_paths_m))
+        return Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.ones(3), paths)
+
+    assert firing([0], [2], [math.inf]).contradiction() is None
+    assert message in (firing(*heard).contradiction() or "")

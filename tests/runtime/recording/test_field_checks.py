@@ -8,21 +8,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import orjson
 import pytest
 import zstandard
 from pydantic import ValidationError
 
 from config.errors import WRONG_CALL
-from drivers.messages import CrossPaths
 from runtime.cli.app import run_command
 from runtime.recording.channels import CHANNELS, CYCLE, KEYFRAME, LOG, MESSAGE_MAX, RawMessage, decode, encode
-from runtime.recording.field_checks import check_cross_paths, check_object, check_pieces, check_segments
 from runtime.recording.mcap_scanner import CONTENT_MAX
 from runtime.recording.reader import RecordingError, cycle_head, open_recording
 from runtime.recording.replayer import Replayer
-from runtime.recording.schema import Cycle, Keyframe
+from runtime.recording.schema import Cycle, Keyframe, MapChange, ObjectList, SerialBytes
 from tests.recorded import entries_of, hall, record, rewrite, scanned
 
 PAPER = "perception.method=paper"
@@ -199,12 +196,15 @@ def test_a_message_that_is_too_large_is_not_parsed() -> None:
 
 
 def test_serial_data_objects_and_segments_belong_together() -> None:
-    check_pieces([0, 5], [1, 1], "00ff")
+    def serial(after_us: list[int], sizes: list[int], data: str) -> SerialBytes:
+        return SerialBytes(run_s=1.0, after_us=after_us, sizes=sizes, data=data)
+
+    serial([0, 5], [1, 1], "00ff")
     for times, sizes, data in (([0], [2], "00"), ([0], [-1], ""), ([10**17], [1], "00"), ([0], [1], "zz")):
-        with pytest.raises(ValueError, match=r"pieces|a piece|fromhex"):
-            check_pieces(times, sizes, data)
+        with pytest.raises(ValidationError):
+            serial(times, sizes, data)
     good = {"model": "drum", "x": 1.0, "y": 2, "theta": 0.0, "sigma": 0.1, "support": 3, "score": 0.5, "number": None}
-    check_object(good)
+    assert ObjectList(run_s=1.0, cycle=1, objects=[good]).objects == [good]
     for name, value in (
         ("x", math.nan),
         ("x", "1"),
@@ -213,29 +213,9 @@ def test_serial_data_objects_and_segments_belong_together() -> None:
         ("covariance", [1.0]),
         ("extra", []),
     ):
-        with pytest.raises(ValueError, match=f"whose {name} is"):
-            check_object({**good, name: value})
-    with pytest.raises(ValueError, match="without score"):
-        check_object({name: value for name, value in good.items() if name != "score"})
-    with pytest.raises(ValueError, match="a segment's"):
-        check_segments([(0.0, 0.0, 0.0, math.inf, 0.0)])
-
-
-@pytest.mark.parametrize(
-    ("heard", "message"),
-    [
-        (([0], [1, 2], [1.0]), "arrays of"),
-        (([], [], []), "arrays of"),
-        (([0] * 4, [1] * 4, [1.0] * 4), "arrays of"),
-        (([0], [3], [1.0]), "names sensor 3 of 3"),
-        (([1], [1], [1.0]), "hears itself"),
-        (([0], [1], [math.nan]), "no number"),
-        (([0], [1], [-1.0]), "a range of -1"),
-    ],
-)
-def test_cross_paths_belong_to_the_ring(heard: tuple[list[int], list[int], list[float]], message: str) -> None:
-    transmitters, listeners, half_paths_m = heard
-    paths = CrossPaths(np.array(transmitters, np.int64), np.array(listeners, np.int64), np.array(half_paths_m))
-    check_cross_paths("heard", CrossPaths(np.array([0]), np.array([2]), np.array([math.inf])), 3)
-    with pytest.raises(ValueError, match=message):
-        check_cross_paths("heard", paths, 3)
+        with pytest.raises(ValidationError, match=f"whose {name} is"):
+            ObjectList(run_s=1.0, cycle=1, objects=[{**good, name: value}])
+    with pytest.raises(ValidationError, match="without score"):
+        ObjectList(run_s=1.0, cycle=1, objects=[{name: value for name, value in good.items() if name != "score"}])
+    with pytest.raises(ValidationError):
+        MapChange(run_s=1.0, cycle=1, whole=True, first=0, added=[(0.0, 0.0, 0.0, math.inf, 0.0)], removed=[])

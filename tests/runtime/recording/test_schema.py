@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Iterator
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
@@ -10,9 +13,17 @@ import pytest
 from behaviors.move_ahead import Leg
 from config.load import load_settings
 from perception.pipeline import Perception
-from runtime.cycle.step import State
+from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import decode, encode
-from runtime.recording.schema import Keyframe, SerialBytes, carried_state, keyframe, perception_snapshot, state_fields
+from runtime.recording.schema import (
+    CarriedState,
+    Keyframe,
+    SerialBytes,
+    carried_state,
+    keyframe,
+    perception_snapshot,
+    state_fields,
+)
 
 RECORD = np.dtype([("x", "<f8", (2,)), ("flag", "?"), ("inner", [("count", "<i4")])])
 
@@ -60,3 +71,34 @@ def test_pieces_of_serial_data_keep_their_times() -> None:
     assert data == (b"\x00\xff", b"", b"\n")
     with pytest.raises(ValueError, match="2 pieces of data with 1 times"):
         SerialBytes(run_s=0.0, after_us=[0], sizes=[1, 1], data="0000").pieces()
+
+
+VALIDATED = ("drive_request", "edits")
+"""Fields of which a cycle itself refuses what it cannot carry out."""
+
+
+def unbounded(hint: Any, path: str) -> Iterator[str]:
+    """Yield each number within a type whose annotation bounds nothing."""
+    if get_origin(hint) is Annotated:
+        kind, *details = get_args(hint)
+        if kind in {int, float} or not any(hasattr(detail, "metadata") for detail in details):
+            hint = None if kind in {int, float} or "ndarray" in str(kind) else kind
+        else:
+            hint = None
+    if hint in {int, float}:
+        yield path
+    elif dataclasses.is_dataclass(hint):
+        for name, inner in get_type_hints(hint, include_extras=True).items():
+            if name not in VALIDATED:
+                yield from unbounded(inner, f"{path}.{name}")
+    else:
+        for inner in get_args(hint):
+            yield from unbounded(inner, path)
+
+
+def test_every_recorded_number_has_a_bound_beside_it() -> None:
+    carried = {name: field for name, field in CarriedState.model_fields.items() if name not in VALIDATED}
+    hints = {name: Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+             for name, field in carried.items()}  # fmt: skip
+    found = [path for name, hint in hints.items() for path in unbounded(hint, name)]
+    assert [*found, *unbounded(CycleRecord, "record")] == []
