@@ -4,32 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from config.load import load_robot
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, LinkCounts, Pose
 from drivers.session import FIRINGS_MAX, Session
+from drivers.stamper import Stamper
 
 
-class Notes:
-    """A stamper that keeps notes only."""
-
-    origin = Pose(1.0, 2.0, 0.0)
-
-    def __init__(self) -> None:
-        self.kept = list[str]()
-
-    def note(self, text: str) -> None:
-        self.kept.append(text)
-
-    def notes(self) -> tuple[str, ...]:
-        notes, self.kept = tuple(self.kept), []
-        return notes
-
-
-class Plain(Session[Notes]):
+class Plain(Session[Stamper]):
     """A session whose line has brought ten frames."""
 
     def __init__(self) -> None:
-        super().__init__(Notes())
+        super().__init__(Stamper(load_robot("p3dx").body))
         self._earlier_counts = LinkCounts(5, 2, 1)
 
     @property
@@ -52,7 +38,7 @@ def test_what_it_is_before_anything_comes() -> None:
     session = Plain()
     assert (session.state, session.problem, session.identity) == (LineState.CLOSED, None, None)
     assert (session.battery_v, session.line_baud) == (None, None)
-    assert session.odometry_origin == Pose(1.0, 2.0, 0.0)
+    assert session.odometry_origin == Pose(0.0, 0.0, 0.0)
     assert session.counts == LinkCounts(15, 3, 2)
     assert session.take_received() == Received((), None, rebooted=False)
 
