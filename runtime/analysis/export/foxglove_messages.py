@@ -1,4 +1,4 @@
-"""A run as Foxglove's messages: topics, frames and drawings, whoever writes them.
+"""A run as Foxglove's messages, for a file and for a live server: topics, frames and drawings.
 
 `echolocate export --to foxglove` writes them to a file, the live bridge to the clients of a server. Frames: `map`
 (while the robot knows its place in one) → `odom` → `base`, which turns with the wheels. Echoes are in `odom`, from
