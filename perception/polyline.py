@@ -21,6 +21,11 @@ class Polyline:
     probability: float
     """Probability that something stands along it, from 0 to 1."""
 
+    @property
+    def length_m(self) -> float:
+        """Length of its pieces together, m."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
     def in_frame(self, to: Pose) -> Polyline:
         """Return it in another frame, in which the present origin lies at `to`."""
         if to == Pose(0.0, 0.0, 0.0):

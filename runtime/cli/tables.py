@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from rich.table import Table
@@ -14,7 +15,7 @@ from runtime.support.length_format import Units, format_length, format_point
 
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
-    from runtime.cycle.summary import ObjectRow, PoseRow, RunSummary, WallRow
+    from runtime.cycle.summary import ObjectRow, PolylineRow, PoseRow, RunSummary, WallRow
     from runtime.simulation.budget_sweep import BudgetRow
     from runtime.simulation.drift_trials import DriftRow
     from runtime.simulation.evaluation import DrumRow, Outcome, Spread
@@ -136,6 +137,13 @@ def walls_table(walls: Sequence[WallRow], units: Units, frame: str = "odometry")
             page_text.percent(wall["probability"]),
         )
     return table
+
+
+def polylines_line(polylines: Sequence[PolylineRow], units: Units) -> str:
+    """Return how many polylines there are, and their length together, in one line."""
+    length_m = sum(math.dist(a, b) for one in polylines for a, b in pairwise(one["points"]))
+    count = "1 polyline" if len(polylines) == 1 else f"{len(polylines)} polylines"
+    return f"{count} of what is not straight, {format_length(length_m, units, 1)} {units} long together"
 
 
 def pose_line(pose: PoseRow, units: Units) -> str:

@@ -83,6 +83,15 @@ class CanyonRow(TypedDict):
     probability: float
 
 
+class PolylineRow(TypedDict):
+    """One polyline: what is not straight, m, in the frame of the objects."""
+
+    number: int
+    points: list[list[float]]
+    """x, y of each, in order."""
+    probability: float
+
+
 class PerceivedRows(TypedDict):
     """What perception reports, in one frame."""
 
@@ -90,6 +99,7 @@ class PerceivedRows(TypedDict):
     walls: list[WallRow]
     corners: list[CornerRow]
     canyons: list[CanyonRow]
+    polylines: list[PolylineRow]
 
 
 class PoseRow(TypedDict):
@@ -198,7 +208,9 @@ def perceived_rows(
     """
     to = Pose(0.0, 0.0, 0.0) if to is None else to
     found = (turned_object(to, seen) for seen in perception.objects()) if objects is None else objects
-    rows: PerceivedRows = {"objects": [object_row(seen) for seen in found], "walls": [], "corners": [], "canyons": []}
+    rows: PerceivedRows = {
+        "objects": [object_row(seen) for seen in found], "walls": [], "corners": [], "canyons": [], "polylines": [],
+    }  # fmt: skip
     for canyon in perception.canyons():
         (x1, y1), (x2, y2) = (
             (at.x, at.y)
@@ -228,6 +240,10 @@ def perceived_rows(
                 "x": seen.x, "y": seen.y, "kind": CORNER_KINDS[seen.model], "sigma": seen.sigma,
                 "probability": seen.score,
             })  # fmt: skip
+    for line in (one.in_frame(to) for one in perception.polylines()):
+        rows["polylines"].append({
+            "number": line.number, "points": line.points.tolist(), "probability": line.probability,
+        })  # fmt: skip
     return rows
 
 
@@ -278,6 +294,7 @@ def run_summary(
         "walls": perceived["walls"],
         "corners": perceived["corners"],
         "canyons": perceived["canyons"],
+        "polylines": perceived["polylines"],
         "cycles": stats.cycles,
         "cycle_us": stats.cycle_us(),
         "late": stats.late,

@@ -120,6 +120,7 @@ def adopt(frame: Keyframe, settings: Settings) -> State:
     restore(state, state_fields(frame), snapshot)
     perception.labelled_objects()
     perception.archived_objects()
+    perception.polylines()
     return state
 
 

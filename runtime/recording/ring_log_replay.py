@@ -67,6 +67,7 @@ class FiringReplayer:
             "walls": perceived["walls"],
             "corners": perceived["corners"],
             "canyons": perceived["canyons"],
+            "polylines": perceived["polylines"],
             "segments": counts.segments_total,
             "clusters": counts.hypotheses,
             "cycles": self._cycle_stats.cycles,

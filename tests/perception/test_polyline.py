@@ -9,10 +9,8 @@ import pytest
 
 from drivers.messages import Pose
 from perception.pipeline import Perception
-from perception.polyline import Polyline
 from tests.perception.halls import settings
-
-BEND = Polyline(3, np.array([[1.0, 0.0], [2.0, 0.0], [2.0, 1.0]]), 0.9)
+from tests.polylines import BEND
 
 
 def test_it_is_turned_and_shifted_as_the_poses_of_its_points() -> None:
@@ -27,6 +25,10 @@ def test_it_is_turned_and_shifted_as_the_poses_of_its_points() -> None:
 def test_in_its_own_frame_it_is_the_same() -> None:
     assert BEND.in_frame(Pose(0.0, 0.0, 0.0)) is BEND
     assert BEND.in_frame(Pose(0.0, 0.0, math.tau)) is not BEND
+
+
+def test_its_length_is_that_of_its_pieces() -> None:
+    assert BEND.length_m == 2.0
 
 
 def test_perception_gives_the_same_tuple_until_it_changes() -> None:

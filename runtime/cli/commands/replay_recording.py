@@ -16,7 +16,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
-from runtime.cli.tables import objects_table, walls_table
+from runtime.cli.tables import objects_table, polylines_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
 from runtime.recording.replay_summary import ReplaySummary
@@ -178,6 +178,8 @@ def replay_again(
     output.print(objects_table(summary["objects"], units))
     if summary["walls"]:
         output.print(walls_table(summary["walls"], units))
+    if summary["polylines"]:
+        output.print(polylines_line(summary["polylines"], units))
     for region in recording.corrupt_regions:
         console.print(str(region))
     for first, last in result.missing:
@@ -201,7 +203,7 @@ def replay_again(
 def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
     """Return the summary of a replay."""
     perception = result.state.perception if result.state is not None else None
-    perceived: PerceivedRows = {"objects": [], "walls": [], "corners": [], "canyons": []}
+    perceived: PerceivedRows = {"objects": [], "walls": [], "corners": [], "canyons": [], "polylines": []}
     if perception is not None:
         perceived = perceived_rows(perception)
     return {
@@ -209,6 +211,7 @@ def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
         "walls": perceived["walls"],
         "corners": perceived["corners"],
         "canyons": perceived["canyons"],
+        "polylines": perceived["polylines"],
         "segments": 0 if perception is None else perception.counts.segments_total,
         "clusters": 0 if perception is None else perception.counts.hypotheses,
         "cycles": result.cycles,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from config.errors import DONE
 from config.load import load_settings, with_known_room
 from runtime.cli.commands.output_files import check_outputs, writing
-from runtime.cli.tables import objects_table, pose_line, walls_table
+from runtime.cli.tables import objects_table, polylines_line, pose_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import write_json
 from runtime.recording.conventions.options import AUTO, RingLogOptions
@@ -81,6 +81,8 @@ def replay_log(
     output.print(objects_table(summary["objects"], units, frame=summary.get("frame", "odometry")))
     if summary["walls"]:
         output.print(walls_table(summary["walls"], units, frame=summary.get("frame", "odometry")))
+    if summary["polylines"]:
+        output.print(polylines_line(summary["polylines"], units))
     if "pose" in summary:
         output.print(pose_line(summary["pose"], units))
     cycle_us = summary["cycle_us"]

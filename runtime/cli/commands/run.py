@@ -113,7 +113,7 @@ def run(
     from runtime.cli.commands.run_recording import open_run_recording
     from runtime.cli.commands.run_settings import SettingsFiles, with_port
     from runtime.cli.start_signals import ending_the_start
-    from runtime.cli.tables import objects_table, timing_line, timing_table, walls_table
+    from runtime.cli.tables import objects_table, polylines_line, timing_line, timing_table, walls_table
     from runtime.cli.terminal.escaping_console import EscapingConsole
     from runtime.support.config_lint import lint_settings
     from runtime.support.file_lock import file_lock
@@ -220,6 +220,8 @@ def run(
     output.print(objects_table(summary["objects"], units))
     if summary["walls"]:
         output.print(walls_table(summary["walls"], units))
+    if summary["polylines"]:
+        output.print(polylines_line(summary["polylines"], units))
     output.print(timing_table(summary))
     output.print(timing_line(summary))
     if recording.summary_row is not None and recording.summary_row["file"] is not None:

@@ -88,7 +88,7 @@ def test_the_timing_table_and_the_causes_of_delays() -> None:
         "collections": [0, 12, 0],
     }  # fmt: skip
     summary: RunSummary = {
-        "objects": [], "walls": [], "corners": [], "canyons": [], "cycles": 240,
+        "objects": [], "walls": [], "corners": [], "canyons": [], "polylines": [], "cycles": 240,
         "process": cost, "cycle_us": spread, "late": 7, "missed": 1, "lag_us": spread,
         "link": {"frames": 0, "bad": 0, "lost": 0}, "sensors": [], "mode": "DRIVE", "stop_reasons": [],
         "hold_reasons": [], "preparing": None, "timing": timing,

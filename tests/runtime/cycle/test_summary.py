@@ -15,9 +15,11 @@ from drivers.messages import Pose
 from perception.localization.localized_pose import LocalizedPose
 from perception.percept import Canyon
 from perception.pipeline import DetectedObject, Perception
+from perception.polyline import Polyline
 from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, perceived_rows, pose_row, write_json
 from runtime.recording.replay_summary import ReplaySummary
 from runtime.simulation.evaluation import DrumRow, Outcome
+from tests.polylines import BEND
 
 SEEN = DetectedObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)
 
@@ -64,6 +66,9 @@ class Perceived:
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         return (DetectedObject("edge", -5.0, 0.0, 0.0, 0.03, 9, 0.9),)
 
+    def polylines(self) -> tuple[Polyline, ...]:
+        return (BEND,)
+
     def canyons(self) -> tuple[Canyon, ...]:
         return (Canyon(3, (1.0, -1.0, 1.0, 1.0), 0.0, 2.5, 0.97),)
 
@@ -84,6 +89,10 @@ def test_walls_and_corners_have_rows_of_their_own_in_the_frame_of_the_result() -
     assert (inside["kind"], edge["kind"]) == ("inside", "edge")
     assert (inside["x"], inside["y"], inside["sigma"]) == pytest.approx((6.0, 1.0, 0.02))
     assert (edge["x"], edge["y"], edge["sigma"]) == pytest.approx((10.0, -5.0, 0.03))
+    (polyline,) = rows["polylines"]
+    assert (polyline["number"], polyline["probability"]) == (BEND.number, BEND.probability)
+    assert np.array(polyline["points"]) == pytest.approx(np.array([(10.0, 1.0), (10.0, 2.0), (9.0, 2.0)]))
+    assert json.loads(json.dumps(rows["polylines"])) == rows["polylines"]
 
 
 def test_objects_given_in_the_frame_of_the_result_are_not_turned() -> None:

@@ -15,6 +15,7 @@ from runtime.cli.app import run_command
 from runtime.cli.commands import replay_recording
 from runtime.cli.commands.replay_recording import Span, errors_line
 from runtime.recording.replayer import GAP_MAX_S
+from tests.polylines import BEND, report_bend
 from tests.recorded import SECONDS, spoil, write_with_gap
 
 
@@ -41,6 +42,18 @@ def test_a_verified_replay_has_no_differences(run: Path, tmp_path: Path, capsys:
     assert (read["cycles"], read["verify"]["differences"], read["verify"]["first"]) == (240, 0, None)
     assert len(read["objects"]) >= 3
     assert "240 cycles from cycle 1 on, 0 differences, " in capsys.readouterr().out
+
+
+def test_polylines_are_in_the_summary(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    summary = tmp_path / "summary.json"
+    report_bend(monkeypatch)
+    assert run_command(["replay", str(run), "--json", str(summary)]) == DONE
+    assert json.loads(summary.read_bytes())["polylines"] == [
+        {"number": 3, "points": BEND.points.tolist(), "probability": 0.9}
+    ]
+    assert "1 polyline of what is not straight, 2.0 m long together\n" in capsys.readouterr().out
 
 
 def test_a_refused_keyframe_is_one_line_and_no_error(

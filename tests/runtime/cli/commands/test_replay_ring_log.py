@@ -11,6 +11,7 @@ import pytest
 from config.errors import DONE, WRONG_CALL
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
 from runtime.cli.app import run_command
+from tests.polylines import BEND, report_bend
 
 
 @pytest.mark.usefixtures("bad_files")
@@ -26,6 +27,19 @@ def test_a_localized_replay_gives_the_pose_in_the_map_frame(capsys: pytest.Captu
     assert header == "t,x,y,theta,sxx,sxy,syy,stt,status"
     assert row.split(",")[-1] == "localizing"
     assert [float(v) for v in row.split(",")[1:4]] == [result["pose"][name] for name in ("x", "y", "theta")]
+
+
+@pytest.mark.usefixtures("bad_files")
+def test_polylines_are_in_the_summary(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["replay", "good.csv", "--model", "drum", "--json", "x.json"]
+    assert run_command(words) == DONE
+    assert json.loads(Path("x.json").read_bytes())["polylines"] == []
+    report_bend(monkeypatch)
+    assert run_command([*words, "--force"]) == DONE
+    assert json.loads(Path("x.json").read_bytes())["polylines"] == [
+        {"number": 3, "points": BEND.points.tolist(), "probability": 0.9}
+    ]
+    assert "1 polyline of what is not straight, 2.0 m long together\n" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("bad_files")
