@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from config.load import load_mission, load_model, load_robot, load_settings, load_world
     from drivers.messages import Firing, Pose
     from perception.detected_object import DetectedObject
+    from perception.polyline import Polyline
     from perception.recogniser import Recogniser
     from runtime.recording.ring_log import read_ring_log, write_ring_log
     from runtime.simulation.closed_loop import SimulationResult, simulate
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "DetectedObject",
     "Firing",
+    "Polyline",
     "Pose",
     "Recogniser",
     "SimulationResult",
@@ -47,6 +49,7 @@ ROOT: Final = os.path.dirname(os.path.realpath(__file__))
 _MODULES: Final = {
     "DetectedObject": "perception.detected_object",
     "Firing": "drivers.messages",
+    "Polyline": "perception.polyline",
     "Pose": "drivers.messages",
     "Recogniser": "perception.recogniser",
     "SimulationResult": "runtime.simulation.closed_loop",

@@ -8,6 +8,7 @@ from config.load import load_world as load_world
 from drivers.messages import Firing as Firing
 from drivers.messages import Pose as Pose
 from perception.detected_object import DetectedObject as DetectedObject
+from perception.polyline import Polyline as Polyline
 from perception.recogniser import Recogniser as Recogniser
 from runtime.recording.ring_log import read_ring_log as read_ring_log
 from runtime.recording.ring_log import write_ring_log as write_ring_log

@@ -14,6 +14,7 @@ from config.settings import PerceptionConfig
 from drivers.messages import Firing, Floats, Pose
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
+from perception.polyline import Polyline
 
 __all__ = ["Recogniser"]
 
@@ -83,6 +84,10 @@ class Recogniser:
     def surroundings(self) -> tuple[DetectedObject, ...]:
         """Return what has a label near the robot: models, walls, corners, edges, posts, unknown objects."""
         return self.perception.labelled_objects()
+
+    def polylines(self) -> tuple[Polyline, ...]:
+        """Return the outlines of what is not straight, in the frame of the poses."""
+        return self.perception.polylines()
 
     def _check(self, poses: Floats, ranges_m: Floats, times_s: Floats, ring_yaws: Floats) -> None:
         """Check what a person may get wrong; compiled code reads it unchecked.

@@ -7,6 +7,7 @@ come, passes where the surface should be.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 
 from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from drivers.messages import Floats
+from perception.polyline import Polyline
+from runtime.analysis.export.world_file import polyline_walls
 from runtime.analysis.timeline import Echoes
 
 NEAR_M: Final = 0.3
@@ -61,11 +64,11 @@ class MapChange:
 
     kind: Literal["new", "gone", "moved", "opened"]
     what: str
-    """`drum`, `wall` or a model's name."""
+    """`drum`, `wall`, `outline` (a polyline) or a model's name."""
     place: tuple[float, float]
     """Its middle."""
     extent_m: float = 0.0
-    """How far it was moved, or how long the wall or the opening is."""
+    """How far it was moved, or how long the wall, the outline or the opening is."""
 
     def __str__(self) -> str:
         x, y = self.place
@@ -127,7 +130,12 @@ def _looks(
 
 
 def compare_with_map(
-    known: WorldConfig, found: WorldConfig, names: Sequence[str], echoes: Echoes, half_angle_rad: float
+    known: WorldConfig,
+    found: WorldConfig,
+    names: Sequence[str],
+    echoes: Echoes,
+    half_angle_rad: float,
+    polylines: Sequence[Polyline] = (),
 ) -> tuple[list[MapChange], WorldConfig]:
     """Return what changed, and the corrected map.
 
@@ -143,6 +151,8 @@ def compare_with_map(
         All readings, in the map frame.
     half_angle_rad : float
         Half the beam's opening.
+    polylines : sequence of Polyline
+        Those that the run found, in the map frame. A new one enters the map as a wall for each of its pieces.
     """
     changes = list[MapChange]()
     drums = _compare_drums(known, found, names, echoes, half_angle_rad, changes)
@@ -172,6 +182,15 @@ def compare_with_map(
         if length >= OPENING_MIN_M and not _is_near(places, sides, known.drum):
             walls.append(wall)
             changes.append(MapChange("new", "wall", (0.5 * (x1 + x2), 0.5 * (y1 + y2)), length))
+    for polyline in polylines:
+        length = polyline.length_m
+        places = np.concatenate([
+            np.linspace(a, b, max(2, round(math.dist(a, b) / CELL_M)))
+            for a, b in itertools.pairwise(polyline.points)
+        ])  # fmt: skip
+        if length >= OPENING_MIN_M and not _is_near(places, sides, known.drum):
+            walls += polyline_walls(polyline)
+            changes.append(MapChange("new", "outline", _middle(polyline.points.tolist()), length))
     corrected = {"drum": tuple(drums), "wall": tuple(walls), "box": tuple(boxes), "polygon": tuple(outlines)}
     return changes, known.model_copy(update=corrected)
 

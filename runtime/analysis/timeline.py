@@ -16,6 +16,7 @@ from config.world import WorldConfig
 from drivers.messages import Floats, LinkCounts, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.mapping.grid.known_cells import KnownCells
+from perception.polyline import Polyline
 
 ECHO: Final = np.dtype(
     [
@@ -103,6 +104,8 @@ class RunSnapshot:
     """Where the robot is in a map; None where that is not known."""
     corners: tuple[DetectedObject, ...] = ()
     """The inside corners and the edges of walls recognised."""
+    polylines: tuple[Polyline, ...] = ()
+    """What is not straight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +153,8 @@ class MapView:
     """Those reported at the end, each as it was last seen nearby."""
     walls: Floats
     """(n, 4): ends x, y, x, y (m) of the walls recognised at the end."""
+    polylines: tuple[Polyline, ...]
+    """Those of the end."""
 
 
 @dataclass(slots=True, eq=False)
@@ -218,6 +223,11 @@ class Timeline:
     def walls(self) -> tuple[DetectedObject, ...]:
         """The walls recognised at the end."""
         return self.snapshots[-1].walls if self.snapshots else ()
+
+    @property
+    def polylines(self) -> tuple[Polyline, ...]:
+        """The polylines of the end."""
+        return self.snapshots[-1].polylines if self.snapshots else ()
 
     @property
     def start_unix_ns(self) -> int:

@@ -167,6 +167,7 @@ class TimelineBuilder:
             np.array([(pose.x, pose.y) for pose, _ in self._placed]).reshape(-1, 2),
             tuple(seen for number, seen in self._near_map.items() if number in numbers),
             wall_ends(walls),
+            tuple(one.in_frame(to) for one in perception.polylines()),
         )
 
     def _add_snapshot(self, t_s: float, perception: Perception) -> None:
@@ -185,7 +186,7 @@ class TimelineBuilder:
             RunSnapshot(
                 t_s, self._pose, self._yaw, self._row_count, rows[:, :4], self._clusters_of(rows),
                 perception.objects(), walls_of(perception), None if window is None else known_cells(window),
-                _place_of(perception), corners_of(perception),
+                _place_of(perception), corners_of(perception), perception.polylines(),
             )
         )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""A run as tables: echoes, cross paths, segments, objects, walls, odometry.
+"""A run as tables: echoes, cross paths, segments, objects, walls, polylines, odometry.
 
 Metres, radians, seconds, in the odometry's frame.
 """
@@ -18,7 +18,7 @@ from runtime.analysis.timeline import Timeline
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 """Columns by name, all of the same length. None means unknown."""
 
-NAMES: Final = ("echoes", "cross_paths", "segments", "objects", "walls", "odometry")
+NAMES: Final = ("echoes", "cross_paths", "segments", "objects", "walls", "polylines", "odometry")
 """Tables, and files without their suffix."""
 FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
 
@@ -27,7 +27,7 @@ def tables(timeline: Timeline) -> dict[str, Table]:
     """Return the tables of a run by name."""
     found = (
         _echoes(timeline), _cross_paths(timeline), _segments(timeline), _objects(timeline), _walls(timeline),
-        _odometry(timeline),
+        _polylines(timeline), _odometry(timeline),
     )  # fmt: skip
     return dict(zip(NAMES, found, strict=True))
 
@@ -111,6 +111,24 @@ def _walls(timeline: Timeline) -> Table:
     }
 
 
+def _polylines(timeline: Timeline) -> Table:
+    """Return one row for each point of each polyline at each snapshot; `point` counts them along the polyline."""
+    seen = [
+        (m.t_s, one, k, x, y)
+        for m in timeline.snapshots
+        for one in m.polylines
+        for k, (x, y) in enumerate(one.points.tolist())
+    ]
+    return {
+        "t_s": [t for t, *_ in seen],
+        "number": [one.number for _, one, *_ in seen],
+        "probability": [one.probability for _, one, *_ in seen],
+        "point": [k for *_, k, _, _ in seen],
+        "x_m": [x for *_, x, _ in seen],
+        "y_m": [y for *_, y in seen],
+    }
+
+
 def _odometry(timeline: Timeline) -> Table:
     path_rows = timeline.odometry
     return {
@@ -162,7 +180,7 @@ def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
 
     whole = pa.int64()
     kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole,
-             "number": whole, "transmitter": whole, "listener": whole}  # fmt: skip
+             "number": whole, "transmitter": whole, "listener": whole, "point": whole}  # fmt: skip
     paths = []
     for name, table in tables(timeline).items():
         schema = pa.schema(

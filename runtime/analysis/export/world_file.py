@@ -20,6 +20,7 @@ from config.places import PLACE_KEYS, PlacesConfig
 from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from drivers.messages import Floats
 from perception.detected_object import DetectedObject
+from perception.polyline import Polyline
 
 HEADER: Final = re.compile(r"""\s*\[\[?\s*["']?(?P<name>[A-Za-z_][\w-]*)["']?\s*[\].]""")
 """The first line of a table; a line of coordinates within a list has no letter."""
@@ -27,10 +28,16 @@ DIGITS: Final = 4
 """Decimals of a length, m."""
 
 
-def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[ModelConfig]) -> WorldConfig:
+def world_of(
+    objects: Sequence[DetectedObject],
+    walls: Floats,
+    models: Sequence[ModelConfig],
+    polylines: Sequence[Polyline] = (),
+) -> WorldConfig:
     """Return the world of what was recognised.
 
-    A model with an arc becomes a drum, a closed polygon a polygon, and each side of an open one a wall.
+    A model with an arc becomes a drum, a closed polygon a polygon, and each side of an open one a wall; so does each
+    piece of a polyline.
 
     Parameters
     ----------
@@ -40,6 +47,8 @@ def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[
         Ends x, y, x, y, m.
     models : sequence of ModelConfig
         The models.
+    polylines : sequence of Polyline
+        In the frame of the walls.
     """
     by_name = {model.name: model for model in models}
     drums, polygons, sides = list[DrumConfig](), list[PolygonConfig](), [tuple(row) for row in walls.tolist()]
@@ -57,16 +66,19 @@ def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[
             polygons.append(PolygonConfig(vertices_m=tuple(corners)))
         else:
             sides += [(*a, *b) for a, b in itertools.pairwise(corners)]
-    return WorldConfig(
-        drum=tuple(drums),
-        polygon=tuple(polygons),
-        wall=tuple(
-            WallConfig(
-                **{name: round(v, DIGITS) for name, v in zip(("x1_m", "y1_m", "x2_m", "y2_m"), side, strict=True)}
-            )
-            for side in sides
-        ),
-    )
+    pieces = (wall for polyline in polylines for wall in polyline_walls(polyline))
+    return WorldConfig(drum=tuple(drums), polygon=tuple(polygons), wall=(*(_wall(*side) for side in sides), *pieces))
+
+
+def polyline_walls(polyline: Polyline) -> list[WallConfig]:
+    """Return each piece of a polyline as a wall, but for those that rounding to `DIGITS` makes a point."""
+    places = polyline.points.round(DIGITS).tolist()
+    return [_wall(*a, *b) for a, b in itertools.pairwise(places) if a != b]
+
+
+def _wall(x1: float, y1: float, x2: float, y2: float) -> WallConfig:
+    x1, y1, x2, y2 = (round(value, DIGITS) for value in (x1, y1, x2, y2))
+    return WallConfig(x1_m=x1, y1_m=y1, x2_m=x2, y2_m=y2)
 
 
 def with_places(world: WorldConfig, places: PlacesConfig) -> WorldConfig:

@@ -22,6 +22,7 @@ from matplotlib.transforms import Affine2D
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 from perception.mapping.grid.known_cells import UNKNOWN, KnownCells
+from perception.polyline import Polyline
 from runtime.analysis.plots.cross_arcs import cross_arcs
 from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, world_outlines
 from runtime.analysis.plots.plot_style import (
@@ -292,6 +293,16 @@ def draw_walls(axes: Axes, walls: Sequence[DetectedObject], frame: Frame) -> lis
             x, y = ends.mean(axis=0)
             _label(axes, str(wall.number), (x, y), 0.0, up=y < axes.viewLim.intervaly.mean())
     return [Line2D([], [], label="recognised wall, its number", **style)] if walls else []
+
+
+def draw_polylines(axes: Axes, polylines: Sequence[Polyline], frame: Frame) -> list[Line2D]:
+    """Draw what is not straight, thinner than walls; parameters as of `draw_walls`."""
+    if not polylines:
+        return []
+    style: Any = {"color": MODEL, "linewidth": 1.1}
+    chains = [frame.points(one.points) for one in polylines]
+    axes.add_collection(LineCollection(chains, zorder=5, gid="polylines", **style))
+    return [Line2D([], [], label="outline of what is not straight", **style)]
 
 
 def draw_objects(

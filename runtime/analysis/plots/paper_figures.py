@@ -23,6 +23,7 @@ from runtime.analysis.plots.layers import (
     draw_evidence_grid,
     draw_objects,
     draw_path,
+    draw_polylines,
     draw_segments,
     draw_walls,
     draw_world,
@@ -108,6 +109,7 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
 
     def models(axes: Axes) -> list[Line2D]:
         handles = draw_segments(axes, last.segments, frame, faint=True) + draw_walls(axes, last.walls, frame)
+        handles += draw_polylines(axes, last.polylines, frame)
         return handles + draw_objects(axes, last.objects, timeline, frame, units)
 
     layers = (

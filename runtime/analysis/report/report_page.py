@@ -16,7 +16,7 @@ from perception.detected_object import DetectedObject
 from runtime import VERSION
 from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.layers import match_to_truth
-from runtime.analysis.plots.paper_figures import paper_figures, pictures
+from runtime.analysis.plots.paper_figures import counted, paper_figures, pictures
 from runtime.analysis.plots.run_history import history_figure
 from runtime.analysis.report.html_parts import note, section, settings_list, table, tile
 from runtime.analysis.report.inline_svg import inlined
@@ -186,7 +186,14 @@ def _walls(timeline: Timeline, units: Units) -> str:
         for x1, y1, x2, y2 in [wall.ends or (0.0, 0.0, 0.0, 0.0)]
     ]
     said = "Each straight piece between openings, in the odometry's frame, with the number that it has on the page:"
-    return note(said) + table(heads, rows) if rows else ""
+    listed = note(said) + table(heads, rows) if rows else ""
+    if timeline.polylines:
+        length_m = sum(one.length_m for one in timeline.polylines)
+        listed += note(
+            f"What is not straight: {counted(len(timeline.polylines), 'polyline')}, "
+            f"{format_length(length_m, units)} {units} together, drawn thinner than walls in the figure."
+        )
+    return listed
 
 
 def _pictures(timeline: Timeline, units: Units) -> str:

@@ -30,6 +30,7 @@ def map_run(
 ) -> int:
     """Write the map of a run as a world file, as an occupancy image with the YAML of ROS's map_server, as GeoJSON.
 
+    What is not straight, a polyline, is a wall for each of its pieces.
     Of a run in a known room (`run --map`) it is that map, corrected by what the run found, and what changed is said.
 
     Parameters
@@ -71,10 +72,14 @@ def map_run(
     files = {"--out": out, "--grid": grid, "--grid (its YAML)": beside, "--geojson": geojson}
     timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
     settings, view, changes = timeline.settings, timeline.map_view, list[MapChange]()
-    objects, walls = (timeline.objects, wall_ends(timeline.walls)) if view is None else (view.objects, view.walls)
-    if len(objects) + len(walls) > ITEMS_MAX:
+    objects, walls, polylines = (
+        (timeline.objects, wall_ends(timeline.walls), timeline.polylines)
+        if view is None
+        else (view.objects, view.walls, view.polylines)
+    )
+    if len(objects) + len(walls) + sum(len(one.points) - 1 for one in polylines) > ITEMS_MAX:
         raise UserError(f"{file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
-    world, echoes = world_of(objects, walls, settings.models), timeline.echoes
+    world, echoes = world_of(objects, walls, settings.models, polylines if view is None else ()), timeline.echoes
     half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)
     head = f"Map of {utf8(Path(file).name)}: what was recognised, in the frame of its odometry (m)."
     if view is not None:
@@ -86,7 +91,7 @@ def map_run(
             )
         echoes = view.echoes
         changes, world = compare_with_map(
-            view.known, world, round_names(objects, settings.models), echoes, half_angle_rad
+            view.known, world, round_names(objects, settings.models), echoes, half_angle_rad, polylines
         )
         head = f"The map of {utf8(Path(file).name)}, corrected by what that run found (m)."
     world = with_places(world, settings.places)

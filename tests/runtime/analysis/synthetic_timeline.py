@@ -22,6 +22,7 @@ from runtime.analysis.timeline import (
     RunSnapshot,
     Timeline,
 )
+from tests.polylines import BEND
 
 SETTINGS = load_settings("hallway")
 ERROR_M = 0.01
@@ -81,6 +82,12 @@ def with_grid(timeline: Timeline) -> Timeline:
     """Return the timeline with an evidence grid of two rows and three columns at its end."""
     cells = np.array([[-1, 10, 90], [50, -1, 100]], np.int8)
     timeline.snapshots[-1] = replace(timeline.snapshots[-1], grid=KnownCells(cells, 1.0, -0.5, 0.1))
+    return timeline
+
+
+def with_polyline(timeline: Timeline) -> Timeline:
+    """Return the timeline with a polyline at its end."""
+    timeline.snapshots[-1] = replace(timeline.snapshots[-1], polylines=(BEND,))
     return timeline
 
 

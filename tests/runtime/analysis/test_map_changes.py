@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from config.world import BoxConfig, DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from runtime.analysis.map_changes import LOOKS_MIN, compare_with_map, looks_at_circle, looks_at_wall
 from runtime.analysis.timeline import ECHO, Echoes
+from tests.polylines import BEND
 
 HALF_ANGLE_RAD = math.radians(15.0)
 WAY = np.arange(0.0, 4.0, 0.02)
@@ -122,3 +124,16 @@ def test_looks_count_only_within_the_beam_and_in_reach() -> None:
     assert far.passes.sum() == 0
     few = looking_up({})[: LOOKS_MIN - 1]
     assert looks_at_wall(few, (0.0, 2.0, 4.0, 2.0), HALF_ANGLE_RAD).runs() == []
+
+
+def test_a_new_polyline_enters_the_map_and_one_along_a_known_wall_does_not() -> None:
+    known = WorldConfig(wall=(WALL,))
+    along = replace(BEND, points=np.array([[0.0, 1.9], [1.0, 2.1], [2.0, 1.9], [3.0, 2.1]]))
+    short = replace(BEND, points=0.2 * BEND.points)
+    changes, corrected = compare_with_map(
+        known, WorldConfig(), (), looking_up({(0.0, 4.0): 2.0}), HALF_ANGLE_RAD, (BEND, along, short)
+    )
+    assert [str(change) for change in changes] == ["new: outline at (1.67, 0.33) m, 2.00 m long"]
+    assert [(w.x1_m, w.y1_m, w.x2_m, w.y2_m) for w in corrected.wall] == [
+        (0.0, 2.0, 4.0, 2.0), (1.0, 0.0, 2.0, 0.0), (2.0, 0.0, 2.0, 1.0),
+    ]  # fmt: skip

@@ -14,6 +14,7 @@ from perception.pipeline import Perception
 from runtime.analysis import timeline_builder
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_builder import TimelineBuilder
+from tests.polylines import BEND, report_bend
 from tests.runtime.analysis.synthetic_timeline import SETTINGS
 
 RADIUS_M = 0.381
@@ -113,3 +114,12 @@ def test_without_a_pose_there_is_no_snapshot(timeline: Timeline) -> None:
     builder.end_cycle(0.0, perception())
     builder.finish(perception())
     assert timeline.last is None
+
+
+def test_a_snapshot_has_the_polylines(timeline: Timeline, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert timeline.polylines == ()
+    report_bend(monkeypatch)
+    builder = TimelineBuilder(timeline)
+    builder.add_odometry(0.0, odometry(0.0))
+    builder.end_cycle(0.0, perception())
+    assert timeline.polylines == timeline.snapshots[0].polylines == (BEND,)

@@ -13,9 +13,14 @@ import pytest
 
 from perception.detected_object import DetectedObject
 from runtime.analysis.export.csv_tables import tables, write_csv, write_parquet
-from tests.runtime.analysis.synthetic_timeline import START_NS, synthetic_timeline, with_cross_paths
+from tests.runtime.analysis.synthetic_timeline import (
+    START_NS,
+    synthetic_timeline,
+    with_cross_paths,
+    with_polyline,
+)
 
-TABLES = {"echoes", "cross_paths", "segments", "objects", "walls", "odometry"}
+TABLES = {"echoes", "cross_paths", "segments", "objects", "walls", "polylines", "odometry"}
 RUN = synthetic_timeline()
 
 
@@ -86,3 +91,16 @@ def test_objects_include_corners_and_edges_of_walls() -> None:
     found = tables(run)["objects"]
     assert (found["model"][-1], found["x_m"][-1], found["t_s"][-1]) == ("inside corner", 3.0, run.snapshots[-1].t_s)
     assert len(found["model"]) == len(tables(synthetic_timeline())["objects"]["model"]) + 1
+
+
+def test_a_polyline_is_a_row_for_each_of_its_points(tmp_path: Path) -> None:
+    run = with_polyline(synthetic_timeline())
+    found = tables(run)["polylines"]
+    assert found == {
+        "t_s": [3.0] * 3, "number": [3] * 3, "probability": [0.9] * 3, "point": [0, 1, 2], "x_m": [1.0, 2.0, 2.0],
+        "y_m": [0.0, 0.0, 1.0],
+    }  # fmt: skip
+    (path,) = (path for path in write_parquet(run, tmp_path) if path.stem == "polylines")
+    assert pq.read_table(path).to_pydict() == found
+    assert pq.read_schema(path).field("point").type == pq.read_schema(path).field("number").type
+    assert tables(RUN)["polylines"]["t_s"] == [], "a run without any has the table with no row"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from config.places import NoGoAreaConfig, PlaceConfig, PlacesConfig
 from config.world import WorldConfig
 from perception.detected_object import DetectedObject
 from runtime.analysis.export.world_file import placed, text_with_places, with_places, world_of, world_text
+from tests.polylines import BEND
 
 BOX = ModelConfig(name="box", closed=True, vertices_m=((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)))
 CORNER = ModelConfig(name="corner", closed=False, vertices_m=((1.0, 0.0), (0.0, 0.0), (0.0, 1.0)))
@@ -41,6 +43,15 @@ def test_each_model_becomes_what_a_world_has_for_it_and_can_be_read_again() -> N
     text = world_text(world, ("a line", "and another"))
     assert text.startswith("# a line\n# and another\n")
     assert WorldConfig.model_validate(tomllib.loads(text)) == world
+
+
+def test_a_polyline_is_a_wall_for_each_of_its_pieces() -> None:
+    doubled = replace(BEND, points=np.insert(BEND.points, 1, BEND.points[1] + 1e-6, axis=0))
+    world = world_of((), np.array([[0.0, 5.0, 4.0, 5.0]]), (DRUM,), (doubled,))
+    assert [(w.x1_m, w.y1_m, w.x2_m, w.y2_m) for w in world.wall] == [
+        (0.0, 5.0, 4.0, 5.0), (1.0, 0.0, 2.0, 0.0), (2.0, 0.0, 2.0, 1.0),
+    ]  # fmt: skip
+    assert WorldConfig.model_validate(tomllib.loads(world_text(world, ()))) == world
 
 
 def test_an_empty_map_is_a_world_without_anything() -> None:

@@ -17,6 +17,7 @@ from runtime.analysis.plots import layers
 from runtime.analysis.plots.geometry import Frame
 from runtime.analysis.plots.paper_figures import Canvas
 from runtime.analysis.timeline import BookmarkEntry
+from tests.polylines import BEND
 from tests.runtime.analysis.synthetic_timeline import ERROR_M, SETTINGS, synthetic_timeline, with_cross_paths
 
 RUN = synthetic_timeline()
@@ -118,3 +119,12 @@ def test_objects_match_the_nearest_drum_within_the_gate() -> None:
     matched = layers.match_to_truth([*LAST.objects[:2], far], RUN)
     assert {j: one.name for j, one in matched.items()} == {0: "drum 1", 1: "drum 2"}
     assert all(math.isclose(one.error_m, ERROR_M, rel_tol=1e-6) for one in matched.values())
+
+
+def test_polylines_are_one_collection_thinner_than_walls(axes: Axes) -> None:
+    assert layers.draw_polylines(axes, (), FRAME) == []
+    (entry,) = layers.draw_polylines(axes, (BEND,), FRAME)
+    (drawn,) = (one for one in axes.collections if one.get_gid() == "polylines")
+    assert drawn.get_paths()[0].vertices == pytest.approx(FRAME.points(BEND.points))
+    (wall,) = layers.draw_walls(axes, LAST.walls, FRAME)
+    assert entry.get_linewidth() < 0.6 * wall.get_linewidth()

@@ -16,7 +16,7 @@ from runtime.analysis.report import report_page
 from runtime.analysis.report.report_page import page
 from runtime.analysis.timeline import ModeEntry
 from tests.runtime.analysis.report.page_reader import PageReader
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_polyline
 
 SIZE_MAX = 3_000_000
 SPREAD = {"p50": 170.0, "p99": 1250.0, "p999": 8004.0, "max": 49_653.0}
@@ -105,6 +105,13 @@ def test_walls_are_numbered_and_counted(shown: str) -> None:
     assert rows == [("0.00, 4.92", "9.84, 4.92", "9.84")], "ends and length, ft"
     assert 'id="models-wall-1"' in shown
     assert "recognised wall, its number" in shown
+
+
+def test_polylines_are_counted_and_drawn(shown: str) -> None:
+    assert "polyline" not in shown
+    with_one = page(with_polyline(synthetic_timeline()), "m")
+    assert "What is not straight: 1 polyline, 2.00 m together, drawn thinner than walls in the figure." in with_one
+    assert 'id="models-polylines"' in with_one
 
 
 def test_a_polygon_of_ones_own_model_is_not_counted_false() -> None:

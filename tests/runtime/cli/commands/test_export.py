@@ -28,7 +28,7 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
 def test_a_recording_as_tables(hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert export_to("csv", hall_run, tmp_path / "new") == DONE
     files = sorted((tmp_path / "new").iterdir())
-    tables = ["cross_paths", "echoes", "objects", "odometry", "segments", "walls"]
+    tables = ["cross_paths", "echoes", "objects", "odometry", "polylines", "segments", "walls"]
     assert [path.stem for path in files] == tables
     assert sorted(capsys.readouterr().out.splitlines()) == [str(path) for path in files]
 

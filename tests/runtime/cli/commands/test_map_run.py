@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from config.errors import DONE, FAILED, WRONG_CALL
 from config.load import load_settings, load_world, with_known_room
 from runtime.cli.app import run_command
+from tests.polylines import BEND, report_bend
 from tests.recorded import record
 
 
@@ -30,6 +33,28 @@ def test_the_map_of_a_recording_is_a_world_that_can_be_loaded(
     found = json.loads(geojson.read_text("utf-8"))
     assert features == f"{geojson}: {len(found['features'])} features"
     assert (len(found["features"]), found["frame"]) == (len(world.drum) + len(world.wall), "odom")
+
+
+def test_a_polyline_is_on_the_map_as_its_pieces_of_wall(
+    hall_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, grid = tmp_path / "map.toml", tmp_path / "map.pgm"
+    command = ["map", str(hall_log), "--out", str(out), "--grid", str(grid)]
+    assert run_command(command) == DONE
+    without = load_world(str(out))
+    report_bend(monkeypatch)
+    assert run_command([*command, "--force"]) == DONE
+    world = load_world(str(out))
+    assert world.drum == without.drum
+    pieces = [[w.x1_m, w.y1_m, w.x2_m, w.y2_m] for w in world.wall if w not in without.wall]
+    assert pieces == [[*a, *b] for a, b in itertools.pairwise(BEND.points.tolist())]
+    columns, rows = map(int, grid.read_bytes().split(b"\n")[1].split())
+    pixels = np.frombuffer(grid.read_bytes()[-rows * columns :], np.uint8).reshape(rows, columns)
+    (origin,) = re.findall(r"origin: \[(.*?), (.*?),", grid.with_suffix(".yaml").read_text("utf-8"))
+    along = np.concatenate([np.linspace(a, b, 30) for a, b in itertools.pairwise(BEND.points)])
+    at = np.round((along - np.array(origin, float)) / 0.05).astype(int)  # it lies on the lines between pixels
+    beside = [pixels[rows - 1 - at[:, 1] + below, at[:, 0] - left] for below in (0, 1) for left in (0, 1)]
+    assert (np.min(beside, axis=0) == 0).all(), "occupied"
 
 
 def test_the_image_is_drawn_by_the_method_that_the_settings_name(hall_log: Path, tmp_path: Path) -> None:
