@@ -105,10 +105,9 @@ def correction_drive(seed: int, odometry: OdometryConfig, seconds: float | None 
     room = ROOMS[(seed + seed // len(ROBOTS)) % len(ROOMS)]
     acoustics = AcousticsConfig(
         model=("cone", "specular")[int(rng.integers(2))],
-        **{
-            name: float(rng.choice(values))
-            for name, values in (("noise_relative", NOISES), ("dropout", DROPOUTS), ("outliers", OUTLIERS))
-        },
+        noise_relative=float(rng.choice(NOISES)),
+        dropout=float(rng.choice(DROPOUTS)),
+        outliers=float(rng.choice(OUTLIERS)),
     )
     duration = float(rng.uniform(*SECONDS))
     world = _world(room, seed, acoustics)

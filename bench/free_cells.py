@@ -20,9 +20,10 @@ from config.robot import RingConfig
 from config.settings import Settings
 from config.units import FOOT_M
 from config.world import AcousticsConfig
-from drivers.emulator.acoustics import SIGHT_SLACK_M, Records, hidden
+from drivers.emulator.acoustics import SIGHT_SLACK_M, hidden
 from drivers.emulator.scene import Scene, compile_scene
 from drivers.emulator.sonar import Sonar
+from drivers.emulator.surfaces import Records
 from drivers.messages import Firing, Floats
 from perception.kernel import kernel
 from perception.localization.room.expected_ranges import Reflection

@@ -131,7 +131,7 @@ def no_look(perception: Perception, minute: int) -> None:
 
 def acoustics_of(model: Reflection, seed: int) -> AcousticsConfig:
     """Return the acoustics of a room: every fourth is without noise."""
-    return AcousticsConfig(model=model, **({} if seed % 4 == 0 else NOISY))
+    return AcousticsConfig.model_validate({"model": model, **({} if seed % 4 == 0 else NOISY)})
 
 
 def try_standing(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,14 +17,22 @@ from config.world import WorldConfig
 
 @dataclass(frozen=True)
 class Shapes:
-    """The surfaces of a world: circles (centre, radius) and sides (both ends)."""
+    """The surfaces of a world: circles (centre, radius) and sides (both ends); how each answers, if not all alike."""
 
     circles: list[tuple[complex, float]]
     sides: list[tuple[complex, complex]]
+    circle_answers: list[str] = field(default_factory=list)
+    side_answers: list[str] = field(default_factory=list)
+
+    def circle_is(self, model: str) -> list[bool]:
+        return [answer == model for answer in self.circle_answers] or [True] * len(self.circles)
+
+    def side_is(self, model: str) -> list[bool]:
+        return [answer == model for answer in self.side_answers] or [True] * len(self.sides)
 
 
-def shapes_of(world: WorldConfig) -> Shapes:
-    """Return the surfaces of a world."""
+def shapes_of(world: WorldConfig, model: str = "") -> Shapes:
+    """Return the surfaces of a world; with the world's model also how each answers."""
     outlines = []
     for box in world.box:
         turn = cmath.exp(1j * math.radians(box.angle_deg))
@@ -35,7 +43,13 @@ def shapes_of(world: WorldConfig) -> Shapes:
     sides = [(complex(wall.x1_m, wall.y1_m), complex(wall.x2_m, wall.y2_m)) for wall in world.wall]
     for outline in outlines:
         sides += [(outline[k - 1], outline[k]) for k in range(len(outline))]
-    return Shapes([(complex(d.x_m, d.y_m), d.radius_m) for d in world.drum], sides)
+    answers = [wall.surface or model for wall in world.wall]
+    answers += [box.surface or model for box in world.box for _ in range(4)]
+    answers += [polygon.surface or model for polygon in world.polygon for _ in polygon.vertices_m]
+    drums = [(complex(d.x_m, d.y_m), d.radius_m) for d in world.drum]
+    if not model:
+        return Shapes(drums, sides)
+    return Shapes(drums, sides, [d.surface or model for d in world.drum], answers)
 
 
 def in_beam(point: complex, sensor: complex, axis: float, half_angle: float, margin: float = 0.0) -> bool:
@@ -88,6 +102,22 @@ def cone(shapes: Shapes, sensor: complex, axis: float, half_angle: float) -> flo
     )
 
 
+def rays(shapes: Shapes, sensor: complex, axis: float, half_angle: float, count: int) -> float:
+    """Return the nearest of the first hits of some rays in the beam whose surface answers to rays."""
+    found = []
+    for turn in np.linspace(-half_angle, half_angle, count).tolist() if count > 1 else [0.0]:
+        direction = cmath.exp(1j * (axis + turn))
+        hits = [(math.inf, False)]
+        for (centre, radius), answers in zip(shapes.circles, shapes.circle_is("rays"), strict=True):
+            hits += [(t, answers) for t in _line_hits_circle(sensor, direction, centre, radius) if t > 0]
+        for (a, b), answers in zip(shapes.sides, shapes.side_is("rays"), strict=True):
+            t = _line_hits_side(sensor, direction, a, b)
+            hits += [(t, answers)] if t is not None and t > 0 else []
+        nearest, answers = min(hits)
+        found.append(nearest if answers else math.inf)
+    return min(found)
+
+
 def surface_samples(shapes: Shapes, spacing: float) -> np.ndarray:
     """Return points on every surface, at most `spacing` apart."""
     pieces = []
@@ -110,14 +140,22 @@ def in_sight(shapes: Shapes, sensor: complex, point: complex, slack: float) -> b
     return not any(0 < t < reach for t in hits)
 
 
-def _opening_towards(vertex: complex, sensor: complex, sides: list[tuple[complex, complex]]) -> float:
-    """Return the angle between the surfaces at `vertex` that face the sensor; 2π with a single surface."""
-    turns = []
-    for a, b in sides:
+def _opening_towards(
+    vertex: complex, sensor: complex, sides: list[tuple[complex, complex]], mirrors: list[bool] | None = None
+) -> float:
+    """Return the angle between the surfaces at `vertex` that face the sensor; 2π with a single surface.
+
+    π, as of a wall that goes on, if one of these surfaces is no mirror.
+    """
+    turns, are_mirrors = [], []
+    for (a, b), is_mirror in zip(sides, mirrors or [True] * len(sides), strict=True):
         share = min(1.0, max(0.0, foot_on_line(vertex, a, b)[1]))
         if abs(a + share * (b - a) - vertex) < 1e-4:
             ends = [end for end in (a, b) if abs(end - vertex) > 1e-4]
             turns += [cmath.phase((end - vertex) / (sensor - vertex)) % (2 * math.pi) for end in ends]
+            are_mirrors += [is_mirror for _ in ends]
+    if not (are_mirrors[turns.index(min(turns))] and are_mirrors[turns.index(max(turns))]):
+        return math.pi
     return min(turns) + (2 * math.pi - max(turns))
 
 
@@ -125,17 +163,22 @@ def specular(
     shapes: Shapes, sensor: complex, axis: float, half_angle: float, edge_reach: float, slack: float
 ) -> float:
     """Return the range of the first mirror echo: of all points that may answer, the nearest one in beam and sight."""
-    candidates = [c + (sensor - c) / abs(sensor - c) * radius for c, radius in shapes.circles]
-    for a, b in shapes.sides:
+    candidates = [
+        c + (sensor - c) / abs(sensor - c) * radius
+        for (c, radius), is_mirror in zip(shapes.circles, shapes.circle_is("specular"), strict=True)
+        if is_mirror
+    ]
+    mirrors = shapes.side_is("specular")
+    for (a, b), is_mirror in zip(shapes.sides, mirrors, strict=True):
         foot, share = foot_on_line(sensor, a, b)
-        candidates += [foot] if 0 <= share <= 1 else []
+        candidates += [foot] if 0 <= share <= 1 and is_mirror else []
     vertices = [end for side in shapes.sides for end in side]
     for i, (a, b) in enumerate(shapes.sides):
         for c, d in shapes.sides[:i]:
             along = _line_hits_side(a, b - a, c, d)
             vertices += [a + along * (b - a)] if along is not None and 0 <= along <= 1 else []
     for vertex in vertices:
-        opening = _opening_towards(vertex, sensor, shapes.sides)
+        opening = _opening_towards(vertex, sensor, shapes.sides, mirrors)
         if abs(opening - math.pi) > 1e-3 and (opening < math.pi or abs(vertex - sensor) <= edge_reach):
             candidates.append(vertex)
     return min(

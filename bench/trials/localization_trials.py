@@ -17,6 +17,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.drumheller.localize import PoseCandidate, localize
+from perception.localization.room.expected_ranges import reflection_of
 from perception.localization.room.room import room_of
 
 RIGHT_M: Final = 0.3 * FOOT_M
@@ -88,7 +89,7 @@ def localize_once(
     ranges = Sonar(ring, scene, acoustics, np.random.default_rng(seed)).fire(truth, truth.theta)
     firing = Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges)
     known = world if map_seed is None else random_room(map_seed)[0]
-    return Trial(truth, localize([firing], room_of(known), ring, acoustics.model))
+    return Trial(truth, localize([firing], room_of(known), ring, reflection_of(acoustics.model)))
 
 
 @dataclass(frozen=True, slots=True)

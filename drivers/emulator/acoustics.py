@@ -1,9 +1,15 @@
 """The first echo of each sensor, computed by exact geometry in compiled kernels, without sampling.
 
-There are two models of the beam. `cone`: the nearest surface point inside the beam's sector. `specular`: at a
-wavelength of 7 mm smooth surfaces are mirrors. A surface then answers only from the point whose normal looks back at
-the sensor, a concave corner reflects sound back to where it came from, a convex edge answers weakly, and a surface
-that a nearer one hides does not answer.
+Each surface answers by one of these models of the beam; the first echo of all counts.
+
+- `cone`: from the nearest of its points inside the beam's sector.
+- `specular`: at a wavelength of 7 mm smooth surfaces are mirrors. A surface then answers only from the point whose
+  normal looks back at the sensor, a concave corner reflects sound back to where it came from, and a convex edge
+  answers weakly.
+- `rays`: where one of a few rays in the beam hits it, as other simulators have it.
+- `silent`: not at all.
+
+A surface that a nearer one hides does not answer.
 
 Surfaces, sensors and echoes are structured arrays: one record each, with named fields.
 """
@@ -11,27 +17,18 @@ Surfaces, sensors and echoes are structured arrays: one record each, with named 
 from __future__ import annotations
 
 import math
-from typing import Any, Final, TypeAlias
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.emulator._jit import kernel
+from drivers.emulator.surfaces import CONE, RAYS, SPECULAR, Records, answers_by, first_hit, models_present
 
-CIRCLE: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("radius", "f8")]))
-"""A round surface: its centre and radius, m."""
-SEGMENT: Final = np.dtype((np.record, [("x1", "f8"), ("y1", "f8"), ("x2", "f8"), ("y2", "f8")]))
-"""A straight surface: its two end points, m."""
-CORNER: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("start", "f8"), ("opening", "f8")]))
-"""An open sector at a point where surfaces meet: the point, m, the direction in which the sector starts, and its
-opening counter-clockwise from there, rad."""
 MOUNT: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("angle", "f8")]))
 """A sensor's place and direction in the ring's frame, m and rad."""
 ECHO: Final = np.dtype((np.record, [("distance", "f8"), ("x", "f8"), ("y", "f8")]))
 """Distance from a sensor to the reflecting point, m, and that point in the world; +inf and NaN if there is none."""
-
-Records: TypeAlias = NDArray[Any]
-"""A structured array of one of the types above, shape (n,)."""
 
 CONVEX_EDGE_REACH_M = 1.0
 """Farthest distance at which a convex edge is detected. An edge scatters only what diffracts round it, some 20 to
@@ -40,6 +37,8 @@ detects it within about a metre."""
 SIGHT_SLACK_M = 3e-4
 """A surface nearer than this to a reflecting point does not hide it: it is the reflecting surface itself, or one that
 joins it. Above `scene.JOIN_M`, so that rounding in a corner's own walls does not hide the corner."""
+BESIDE_RAD = 1e-7
+"""What is looked for right beside a surface's end is looked for at this angle from it, to either side."""
 
 
 @kernel
@@ -50,7 +49,8 @@ def first_echoes(
     mounts: Records,
     fired: NDArray[np.bool_],
     half_angle: float,
-    specular: bool,
+    model: int,
+    rays: int,
     edge_reach: float,
     slack: float,
     circles: Records,
@@ -70,8 +70,10 @@ def first_echoes(
         Which sensors emit, shape (sensors,).
     half_angle
         Half of the beam's opening, rad, below π/2.
-    specular
-        True for mirrors, False for the nearest point in the beam.
+    model
+        How surfaces answer that do not say it themselves: `CONE`, `SPECULAR` or `RAYS`.
+    rays
+        Number of rays in the beam.
     edge_reach, slack
         `CONVEX_EDGE_REACH_M` and `SIGHT_SLACK_M`, m.
     circles, segments, corners
@@ -80,6 +82,7 @@ def first_echoes(
         The echoes: `ECHO`, shape (sensors,), overwritten; none for a sensor that did not fire.
     """
     c, s = math.cos(yaw), math.sin(yaw)
+    present = models_present(model, circles, segments)
     for i in range(mounts.shape[0]):
         out[i].distance = math.inf
         out[i].x = math.nan
@@ -89,10 +92,102 @@ def first_echoes(
         sx = x + c * mounts[i].x - s * mounts[i].y
         sy = y + s * mounts[i].x + c * mounts[i].y
         axis = yaw + mounts[i].angle
-        if specular:
-            _first_mirror(sx, sy, axis, half_angle, edge_reach, slack, circles, segments, corners, out[i])
-        else:
+        if present & (1 << SPECULAR):
+            _first_mirror(sx, sy, axis, half_angle, model, edge_reach, slack, circles, segments, corners, out[i])
+        if present == 1 << CONE:
             _nearest_in_cone(sx, sy, axis, half_angle, circles, segments, out[i])
+        elif present & (1 << CONE):
+            _nearest_in_sight(sx, sy, axis, half_angle, model, slack, circles, segments, corners, out[i])
+        if present & (1 << RAYS):
+            for k in range(rays):
+                share = 0.5 if rays == 1 else k / (rays - 1)
+                _keep_hit(sx, sy, axis + (2.0 * share - 1.0) * half_angle, RAYS, model, circles, segments, out[i])
+
+
+@kernel
+def _nearest_in_sight(
+    sx: float,
+    sy: float,
+    axis: float,
+    half_angle: float,
+    model: int,
+    slack: float,
+    circles: Records,
+    segments: Records,
+    corners: Records,
+    best: np.record,
+) -> None:
+    """Keep the nearest point in the beam of the surfaces that answer from each of their points, and that is in sight.
+
+    That is the nearest point of one, or one on the beam's edge, or one right beside the end of what hides the rest.
+    """
+    ux, uy = math.cos(axis), math.sin(axis)
+    cos_half = math.cos(half_angle)
+    for side in (-1.0, 1.0):
+        _keep_hit(sx, sy, axis + side * half_angle, CONE, model, circles, segments, best)
+    for k in range(circles.shape[0]):
+        cx, cy, radius = circles[k].x - sx, circles[k].y - sy, circles[k].radius
+        centre = math.hypot(cx, cy)
+        if centre <= radius:
+            _keep_nearer(0.0, sx, sy, best)
+            return
+        gap = centre - radius
+        if (
+            gap < best.distance
+            and answers_by(CONE, circles[k].surface, model)
+            and cx * ux + cy * uy >= centre * cos_half
+        ):
+            px, py = sx + cx / centre * gap, sy + cy / centre * gap
+            if not hidden(sx, sy, px, py, slack, circles, segments):
+                _keep_nearer(gap, px, py, best)
+        to_edge, edge = math.asin(radius / centre), math.sqrt(centre * centre - radius * radius)
+        for side in (-1.0, 1.0):
+            _look_beside(
+                sx, sy, math.atan2(cy, cx) + side * to_edge, edge, axis, half_angle, model, circles, segments, best
+            )
+    for k in range(segments.shape[0]):
+        ax, ay = segments[k].x1 - sx, segments[k].y1 - sy
+        dx, dy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1
+        t = -(ax * dx + ay * dy) / (dx * dx + dy * dy)
+        px, py = ax + t * dx, ay + t * dy
+        foot = math.hypot(px, py)
+        if (
+            0.0 <= t <= 1.0
+            and foot < best.distance
+            and answers_by(CONE, segments[k].surface, model)
+            and px * ux + py * uy >= foot * cos_half
+            and not hidden(sx, sy, sx + px, sy + py, slack, circles, segments)
+        ):
+            _keep_nearer(foot, sx + px, sy + py, best)
+        for end in (0.0, 1.0):
+            ex, ey = ax + end * dx, ay + end * dy
+            _look_beside(
+                sx, sy, math.atan2(ey, ex), math.hypot(ex, ey), axis, half_angle, model, circles, segments, best
+            )
+    for k in range(corners.shape[0]):
+        ex, ey = corners[k].x - sx, corners[k].y - sy
+        _look_beside(sx, sy, math.atan2(ey, ex), math.hypot(ex, ey), axis, half_angle, model, circles, segments, best)
+
+
+@kernel
+def _look_beside(
+    sx: float,
+    sy: float,
+    direction: float,
+    reach: float,
+    axis: float,
+    half_angle: float,
+    model: int,
+    circles: Records,
+    segments: Records,
+    best: np.record,
+) -> None:
+    """Keep what a ray hits on either side of the end of a surface, if the end is in the beam and not too far."""
+    off = (direction - axis + math.pi) % (2.0 * math.pi) - math.pi
+    if reach < best.distance and abs(off) <= half_angle:
+        for side in (-1.0, 1.0):
+            if abs(off + side * BESIDE_RAD) <= half_angle:
+                _keep_hit(sx, sy, direction + side * BESIDE_RAD, CONE, model, circles, segments, best)
 
 
 @kernel
@@ -101,6 +196,23 @@ def _keep_nearer(distance: float, px: float, py: float, best: np.record) -> None
         best.distance = distance
         best.x = px
         best.y = py
+
+
+@kernel
+def _keep_hit(
+    sx: float,
+    sy: float,
+    direction: float,
+    wanted: int,
+    model: int,
+    circles: Records,
+    segments: Records,
+    best: np.record,
+) -> None:
+    """Keep the first point that a ray hits if its surface answers by the wanted model."""
+    reach, surface = first_hit(sx, sy, direction, circles, segments)
+    if reach < math.inf and answers_by(wanted, surface, model):
+        _keep_nearer(reach, sx + reach * math.cos(direction), sy + reach * math.sin(direction), best)
 
 
 @kernel
@@ -155,6 +267,7 @@ def _first_mirror(
     sy: float,
     axis: float,
     half_angle: float,
+    model: int,
     edge_reach: float,
     slack: float,
     circles: Records,
@@ -169,7 +282,7 @@ def _first_mirror(
         centre = math.hypot(cx, cy)
         if centre <= radius:
             _keep_nearer(0.0, sx, sy, best)
-        elif cx * ux + cy * uy >= centre * cos_half:
+        elif answers_by(SPECULAR, circles[k].surface, model) and cx * ux + cy * uy >= centre * cos_half:
             gap = centre - radius
             px, py = sx + cx / centre * gap, sy + cy / centre * gap
             if gap < best.distance and not hidden(sx, sy, px, py, slack, circles, segments):
@@ -183,6 +296,7 @@ def _first_mirror(
             foot = math.hypot(px, py)
             if (
                 foot < best.distance
+                and answers_by(SPECULAR, segments[k].surface, model)
                 and px * ux + py * uy >= foot * cos_half
                 and not hidden(sx, sy, sx + px, sy + py, slack, circles, segments)
             ):
@@ -195,6 +309,8 @@ def _first_mirror(
             side < corners[k].opening
             and (corners[k].opening < math.pi or reach <= edge_reach)
             and reach < best.distance
+            and answers_by(SPECULAR, corners[k].surface, model)
+            and answers_by(SPECULAR, corners[k].beside, model)
             and px * ux + py * uy >= reach * cos_half
             and not hidden(sx, sy, corners[k].x, corners[k].y, slack, circles, segments)
         ):

@@ -136,7 +136,8 @@ class Body:
         circle
             Centre and radius in world coordinates, m; `scene.NOWHERE` takes the drum away.
         """
-        self._scene.circles[-1 - number] = circle
+        place = self._scene.circles[-1 - number]
+        place.x, place.y, place.radius = circle
         self._last_clearance, self._clear_m = None, -math.inf
 
     def jump_odometry(self, dx_m: float, dy_m: float, dheading_rad: float) -> None:

@@ -6,7 +6,7 @@ either sensor silences it.
 - `specular`: a circle or wall answers where it is a mirror between the two sensors. In a concave corner the sound
   bounces off both walls: unfolded, that is a straight line, and where the corner is too wide for it the corner itself
   scatters. A convex edge scatters weakly.
-- `cone`: each surface answers from the point in both beams with the shortest way.
+- `cone`, and `rays` as well: each surface answers from the point in both beams with the shortest way.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.emulator._jit import kernel
-from drivers.emulator.acoustics import Records, hidden
+from drivers.emulator.acoustics import hidden
+from drivers.emulator.surfaces import CONE, RAYS, SPECULAR, Records, answers_by
 
 
 @kernel
@@ -29,7 +30,7 @@ def first_cross_paths(
     heard: NDArray[np.bool_],
     half_angle: float,
     lobe: float,
-    specular: bool,
+    model: int,
     edge_reach: float,
     slack: float,
     circles: Records,
@@ -49,8 +50,8 @@ def first_cross_paths(
         Whose pulse is heard by whom: [transmitter, listener], shape (sensors, sensors).
     half_angle, lobe
         How far off its axis a sensor emits, and how far it hears another one's pulse, rad; `half_angle` is below π/2.
-    specular
-        True for mirrors, False for the nearest point in both beams.
+    model
+        How surfaces answer that do not say it themselves.
     edge_reach, slack
         `acoustics.CONVEX_EDGE_REACH_M`, of half a path, and `acoustics.SIGHT_SLACK_M`, m.
     circles, segments, corners
@@ -65,12 +66,10 @@ def first_cross_paths(
         for j in range(mounts.shape[0]):
             if heard[j, i]:
                 transmitter = _placed(x, y, yaw, c, s, mounts[j], half_angle)
-                if specular:
-                    shortest = _over_mirrors(
-                        transmitter, listener, 2.0 * edge_reach, slack, circles, segments, corners, shortest
-                    )
-                else:
-                    shortest = _in_both_beams(transmitter, listener, slack, circles, segments, shortest)
+                shortest = _over_mirrors(
+                    transmitter, listener, model, 2.0 * edge_reach, slack, circles, segments, corners, shortest
+                )
+                shortest = _in_both_beams(transmitter, listener, model, slack, circles, segments, shortest)
         out[i] = 0.5 * shortest
 
 
@@ -93,6 +92,7 @@ def _is_in_beam(sensor: tuple[float, float, float, float], px: float, py: float,
 def _over_mirrors(
     transmitter: tuple[float, float, float, float],
     listener: tuple[float, float, float, float],
+    model: int,
     edge_path: float,
     slack: float,
     circles: Records,
@@ -103,7 +103,7 @@ def _over_mirrors(
     tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
     for k in range(circles.shape[0]):
         least = _least_over_circle(tx, ty, lx, ly, circles[k])
-        if least >= shortest:
+        if least >= shortest or not answers_by(SPECULAR, circles[k].surface, model):
             continue
         if least <= 0.0:  # a sensor inside the circle always reports the shortest range
             return 0.0
@@ -111,10 +111,14 @@ def _over_mirrors(
         if path < shortest and _answers(transmitter, px, py, listener, px, py, slack, circles, segments):
             shortest = path
     for k in range(segments.shape[0]):
+        if not answers_by(SPECULAR, segments[k].surface, model):
+            continue
         px, py, path = _mirror_on_side(tx, ty, lx, ly, segments[k])
         if path < shortest and _answers(transmitter, px, py, listener, px, py, slack, circles, segments):
             shortest = path
     for k in range(corners.shape[0]):
+        if not (answers_by(SPECULAR, corners[k].surface, model) and answers_by(SPECULAR, corners[k].beside, model)):
+            continue
         vx, vy, start, opening = corners[k].x, corners[k].y, corners[k].start, corners[k].opening
         from_t, from_l = math.hypot(tx - vx, ty - vy), math.hypot(lx - vx, ly - vy)
         t_angle = (math.atan2(ty - vy, tx - vx) - start) % (2.0 * math.pi)
@@ -291,9 +295,16 @@ _ROUNDING = 1e-9
 
 
 @kernel
+def _answers_everywhere(surface: int, model: int) -> bool:
+    """Return whether a surface answers from each of its points; to the sound of others, `rays` do as `cone` does."""
+    return answers_by(CONE, surface, model) or answers_by(RAYS, surface, model)
+
+
+@kernel
 def _in_both_beams(
     transmitter: tuple[float, float, float, float],
     listener: tuple[float, float, float, float],
+    model: int,
     slack: float,
     circles: Records,
     segments: Records,
@@ -302,7 +313,7 @@ def _in_both_beams(
     tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
     for k in range(circles.shape[0]):
         least = _least_over_circle(tx, ty, lx, ly, circles[k])
-        if least >= shortest:
+        if least >= shortest or not _answers_everywhere(circles[k].surface, model):
             continue
         if least <= 0.0:
             return 0.0
@@ -333,7 +344,7 @@ def _in_both_beams(
             shortest = path
     for k in range(segments.shape[0]):
         t_along, t_off, l_along, l_off, length = _beside(tx, ty, lx, ly, segments[k])
-        if t_off * l_off <= 0.0:
+        if t_off * l_off <= 0.0 or not _answers_everywhere(segments[k].surface, model):
             continue
         x1, y1 = segments[k].x1, segments[k].y1
         dx, dy = segments[k].x2 - x1, segments[k].y2 - y1

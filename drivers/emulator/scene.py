@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from config.world import WorldConfig
-from drivers.emulator.acoustics import CIRCLE, CORNER, SEGMENT, Records
+from config.world import Surface, WorldConfig
+from drivers.emulator.surfaces import AS_WORLD, CIRCLE, CORNER, SEGMENT, SURFACES, Records
 
 JOIN_M = 1e-4
 """Surfaces whose end points are nearer than this meet: people type rounded numbers into world files."""
@@ -29,12 +29,13 @@ NOWHERE = (_FAR_M, _FAR_M, 0.0)
 """Such an object."""
 
 _Point = tuple[float, float]
-_Side = tuple[_Point, _Point]
+_Side = tuple[_Point, _Point, int]
+"""Both ends of a straight surface, and how it answers: a model of `surfaces`, or `AS_WORLD`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What reflects sound and stops the body, in world coordinates; types of records as in `acoustics`.
+    """What reflects sound and stops the body, in world coordinates; types of records as in `surfaces`.
 
     Attributes
     ----------
@@ -56,15 +57,51 @@ def compile_scene(world: WorldConfig, later: int = 0) -> Scene:
 
     The last `later` of the circles are far away: a drum that appears later takes the place of one.
     """
-    sides = [((x1, y1), (x2, y2)) for x1, y1, x2, y2 in world.sides_m()]
-    sides = [(a, b) for a, b in sides if math.dist(a, b) > JOIN_M]
+    sides = [side for side in _sides(world) if math.dist(side[0], side[1]) > JOIN_M]
+    drums = [(drum.x_m, drum.y_m, drum.radius_m, _answers(drum.surface)) for drum in world.drum]
     return Scene(
-        circles=np.array(
-            [(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum] + later * [NOWHERE], dtype=CIRCLE
-        ),
-        segments=np.array([(*a, *b) for a, b in sides], dtype=SEGMENT),
-        corners=np.array(_sectors(sides), dtype=CORNER),
+        circles=np.array(drums + later * [(*NOWHERE, AS_WORLD)], dtype=CIRCLE),
+        segments=np.array([(*a, *b, surface) for a, b, surface in sides], dtype=SEGMENT),
+        corners=np.array(_sectors(sides) + _bends(world), dtype=CORNER),
     )
+
+
+def _answers(surface: Surface | None) -> int:
+    return AS_WORLD if surface is None else SURFACES[surface]
+
+
+def _sides(world: WorldConfig) -> list[_Side]:
+    """Return the straight surfaces of walls, boxes and polygons."""
+    sides = [
+        ((x1, y1), (x2, y2), _answers(wall.surface)) for wall in world.wall for x1, y1, x2, y2 in wall.pieces_m()
+    ]
+    for box in world.box:
+        sides += _outline(box.corners_m(), _answers(box.surface))
+    for polygon in world.polygon:
+        sides += _outline(list(polygon.vertices_m), _answers(polygon.surface))
+    return sides
+
+
+def _outline(vertices: list[_Point], surface: int) -> list[_Side]:
+    return [(a, b, surface) for a, b in zip(vertices, vertices[1:] + vertices[:1], strict=True)]
+
+
+def _bends(world: WorldConfig) -> list[tuple[float, ...]]:
+    """Return the sectors in which the joints of bent walls answer: between the normals of the pieces that meet there.
+
+    A smooth bend answers wherever its normal looks back; of its straight pieces, those seen from their outer side do
+    not between two of their normals.
+    """
+    rows: list[tuple[float, ...]] = []
+    for wall in world.wall:
+        pieces = wall.pieces_m()
+        directions = [math.atan2(y2 - y1, x2 - x1) for x1, y1, x2, y2 in pieces]
+        for (_, _, x, y), before, after in zip(pieces, directions, directions[1:], strict=False):
+            turn = (after - before + math.pi) % (2.0 * math.pi) - math.pi
+            # Turning left, the outer side is on the right.
+            start = before - 0.5 * math.pi if turn > 0.0 else after + 0.5 * math.pi
+            rows.append((x, y, start, abs(turn), _answers(wall.surface), _answers(wall.surface)))
+    return rows
 
 
 def _sectors(sides: list[_Side]) -> list[tuple[float, ...]]:
@@ -73,11 +110,11 @@ def _sectors(sides: list[_Side]) -> list[tuple[float, ...]]:
     boxes = _Boxes(sides)
     for x, y in _meeting_points(sides, boxes):
         directions = _directions_from((x, y), [sides[i] for i in boxes.near((x, y), (x, y))])
-        for i, start in enumerate(directions):
-            end = directions[(i + 1) % len(directions)]
+        for i, (start, surface) in enumerate(directions):
+            end, beside = directions[(i + 1) % len(directions)]
             opening = (end - start) % (2.0 * math.pi) or 2.0 * math.pi
             if abs(opening - math.pi) > _FLAT_RAD:
-                rows.append((x, y, start, opening))
+                rows.append((x, y, start, opening, surface, beside))
     return rows
 
 
@@ -85,7 +122,7 @@ class _Boxes:
     """The rectangles round all sides, so that a building's hundreds are not compared each with each."""
 
     def __init__(self, sides: list[_Side]) -> None:
-        ends = np.array(sides, dtype=np.float64).reshape(-1, 2, 2)
+        ends = np.array([side[:2] for side in sides], dtype=np.float64).reshape(-1, 2, 2)
         self._low, self._high = ends.min(axis=1) - JOIN_M, ends.max(axis=1) + JOIN_M
 
     def near(self, a: _Point, b: _Point) -> list[int]:
@@ -100,12 +137,12 @@ def _meeting_points(sides: list[_Side], boxes: _Boxes) -> list[_Point]:
     crossings = [
         p
         for i, side in enumerate(sides)
-        for k in boxes.near(*side)
+        for k in boxes.near(side[0], side[1])
         if k < i and (p := _crossing(side, sides[k])) is not None
     ]
     found: list[_Point] = []
     squares: dict[tuple[int, int], list[_Point]] = {}
-    for point in [end for side in sides for end in side] + crossings:
+    for point in [end for side in sides for end in side[:2]] + crossings:
         column, row = math.floor(point[0] / JOIN_M), math.floor(point[1] / JOIN_M)
         around = (squares.get((i, k), ()) for i in range(column - 1, column + 2) for k in range(row - 1, row + 2))
         if all(math.dist(point, other) > JOIN_M for others in around for other in others):
@@ -115,8 +152,8 @@ def _meeting_points(sides: list[_Side], boxes: _Boxes) -> list[_Point]:
 
 
 def _crossing(first: _Side, second: _Side) -> _Point | None:
-    (ax, ay), (bx, by) = first
-    (cx, cy), (dx, dy) = second
+    (ax, ay), (bx, by), _ = first
+    (cx, cy), (dx, dy), _ = second
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
     across = ux * vy - uy * vx
     if abs(across) < _PARALLEL * math.hypot(ux, uy) * math.hypot(vx, vy):
@@ -126,17 +163,17 @@ def _crossing(first: _Side, second: _Side) -> _Point | None:
     return (ax + t * ux, ay + t * uy) if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0 else None
 
 
-def _directions_from(point: _Point, sides: list[_Side]) -> list[float]:
-    """Return the directions in which surface leaves `point`, ascending, each once."""
-    directions: list[float] = []
-    for a, b in sides:
+def _directions_from(point: _Point, sides: list[_Side]) -> list[tuple[float, int]]:
+    """Return the directions in which surface leaves `point`, ascending, each once, and how it answers."""
+    directions: list[tuple[float, int]] = []
+    for a, b, surface in sides:
         if _distance_to_side(point, a, b) > JOIN_M:
             continue
         for end in (a, b):
             if math.dist(point, end) > JOIN_M:
                 direction = math.atan2(end[1] - point[1], end[0] - point[0]) % (2.0 * math.pi)
-                if all(_angle_between(direction, other) > _FLAT_RAD for other in directions):
-                    directions.append(direction)
+                if all(_angle_between(direction, other) > _FLAT_RAD for other, _ in directions):
+                    directions.append((direction, surface))
     return sorted(directions)
 
 

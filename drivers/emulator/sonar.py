@@ -14,16 +14,10 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from config.world import AcousticsConfig
-from drivers.emulator.acoustics import (
-    CONVEX_EDGE_REACH_M,
-    ECHO,
-    MOUNT,
-    SIGHT_SLACK_M,
-    Records,
-    first_echoes,
-)
+from drivers.emulator.acoustics import CONVEX_EDGE_REACH_M, ECHO, MOUNT, SIGHT_SLACK_M, first_echoes
 from drivers.emulator.cross_paths import first_cross_paths
 from drivers.emulator.scene import Scene
+from drivers.emulator.surfaces import CONE, SILENT, SURFACES, Records
 from drivers.messages import Floats, Pose
 
 LISTENING_LOBE = 2.0
@@ -31,6 +25,8 @@ LISTENING_LOBE = 2.0
 emission and reception together reach the detection limit. For a foreign pulse only reception is off axis, which costs
 half the decibels, so the limit lies farther out: about √2 times for an ordinary echo, about twice for a strong one.
 Strong echoes are those that cause crosstalk."""
+LATE_M = (0.3, 2.0)
+"""A late echo's way leads over another surface: so much farther than the first one in the beam, m."""
 
 
 class Sonar:
@@ -75,9 +71,9 @@ class Sonar:
         Parameters
         ----------
         pose
-            The body's true pose, whose origin is the ring's centre.
+            The body's true pose, whose origin is the ring's centre; the acoustics' jitter is added to it.
         ring_yaw
-            The true direction of the ring, rad.
+            The true direction of the ring, rad; so here.
         sensors
             Numbers of the sensors that fire; all if not given.
         window_m
@@ -94,7 +90,10 @@ class Sonar:
         window = self._ring.window_m if window_m is None else window_m
         fired = np.zeros(len(self._mounts), dtype=np.bool_)
         fired[slice(None) if sensors is None else list(sensors)] = True
+        pose, ring_yaw = self._jittered(pose, ring_yaw)
         distances = self.true_echoes(pose, ring_yaw, fired)["distance"].copy()
+        if self._acoustics.late > 0.0:
+            self._add_late(distances, pose, ring_yaw, fired)
         active = fired.copy()
         for i in listeners:
             active[i] = True
@@ -113,6 +112,33 @@ class Sonar:
         ranges[~active] = math.nan
         return ranges
 
+    @property
+    def echoes(self) -> Records:
+        """What the sensors heard first in the last firing, without errors: `acoustics.ECHO`, shape (sensors,)."""
+        return self._echoes
+
+    def _jittered(self, pose: Pose, ring_yaw: float) -> tuple[Pose, float]:
+        """Return where the body and the ring truly are at a firing that odometry has at this pose."""
+        acoustics = self._acoustics
+        if not (acoustics.jitter_m or acoustics.jitter_rad):
+            return pose, ring_yaw
+        sigmas = acoustics.jitter_m, acoustics.jitter_m, acoustics.jitter_rad
+        dx, dy, turn = (self._rng.standard_normal(3) * sigmas).tolist()
+        return Pose(pose.x + dx, pose.y + dy, pose.theta + turn), ring_yaw + turn
+
+    def _add_late(self, distances: Floats, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_]) -> None:
+        """Give some of the sensors that hear nothing a late echo, beyond the first surface in their beam."""
+        chance, share = self._rng.random((2, len(fired)))
+        is_late = fired & np.isinf(distances) & (chance < self._acoustics.late)
+        if is_late.any():
+            circles, segments = self._scene.circles.copy(), self._scene.segments.copy()
+            for surfaces in (circles, segments):
+                surfaces["surface"][surfaces["surface"] != SILENT] = CONE
+            nearest = np.empty(len(fired), dtype=ECHO)
+            self._find(pose, ring_yaw, is_late, circles, segments, nearest)
+            farther = LATE_M[0] + share * (LATE_M[1] - LATE_M[0])
+            distances[is_late] = (nearest["distance"] + farther)[is_late]
+
     def true_echoes(self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_]) -> Records:
         """Return the first echo of each sensor, without errors of the electronics.
 
@@ -130,6 +156,13 @@ class Sonar:
         Records
             `acoustics.ECHO`, shape (sensors,); the next call overwrites it.
         """
+        self._find(pose, ring_yaw, fired, self._scene.circles, self._scene.segments, self._echoes)
+        return self._echoes
+
+    def _find(
+        self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_], circles: Records, segments: Records, out: Records
+    ) -> None:
+        """Find the first echoes from some surfaces."""
         self._turn_mounts(pose.theta - ring_yaw)
         first_echoes(
             pose.x,
@@ -138,15 +171,15 @@ class Sonar:
             self._mounts,
             fired,
             self._half_angle,
-            self._acoustics.model == "specular",
+            SURFACES[self._acoustics.model],
+            self._acoustics.rays,
             CONVEX_EDGE_REACH_M,
             SIGHT_SLACK_M,
-            self._scene.circles,
-            self._scene.segments,
+            circles,
+            segments,
             self._scene.corners,
-            self._echoes,
+            out,
         )
-        return self._echoes
 
     def _turn_mounts(self, turn: float) -> None:
         """Turn the sensors of the part that follows the wheels by an angle in the ring's frame, rad."""
@@ -182,7 +215,7 @@ class Sonar:
             heard,
             self._half_angle,
             LISTENING_LOBE * self._half_angle,
-            self._acoustics.model == "specular",
+            SURFACES[self._acoustics.model],
             CONVEX_EDGE_REACH_M,
             SIGHT_SLACK_M,
             self._scene.circles,

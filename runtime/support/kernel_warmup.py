@@ -189,7 +189,7 @@ def _emulator(settings: Settings) -> None:
     from config.world import DrumConfig, WallConfig, WorldConfig
     from drivers.registry import make_device
 
-    for model in ("cone", "specular"):
+    for model in ("cone", "specular", "rays"):
         acoustics = WorldConfig().acoustics.model_copy(update={"model": model, "crosstalk": 0.5})
         world = WorldConfig(
             drum=(DrumConfig(x_m=2.0, y_m=0.0, radius_m=0.3),),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from config.world import ITEMS_MAX, WorldConfig
+from config.world import ITEMS_MAX, WallConfig, WorldConfig
 from tests.config.toml_text import WORLD
 
 
@@ -37,6 +38,26 @@ def test_the_sides_of_walls_boxes_and_polygons_are_listed() -> None:
     assert turned.corners_m()[0] == pytest.approx((2.0, 0.0))
 
 
+def test_a_bent_wall_is_an_arc_with_its_middle_to_the_left() -> None:
+    for bend in (0.03, -0.02, 0.3):
+        wall = WallConfig(x1_m=1.0, y1_m=1.0, x2_m=1.0, y2_m=4.0, bend_m=bend)
+        pieces = np.array(wall.pieces_m())
+        assert pieces[0, :2].tolist() == [1.0, 1.0]
+        assert pieces[-1, 2:].tolist() == [1.0, 4.0]
+        np.testing.assert_array_equal(pieces[1:, :2], pieces[:-1, 2:])
+        radius = (1.5**2 + bend**2) / (2.0 * bend)
+        middle = 1.0 - bend + radius
+        np.testing.assert_allclose(np.hypot(pieces[:, 0] - middle, pieces[:, 1] - 2.5), abs(radius), atol=1e-9)
+        assert pieces[len(pieces) // 2, 0] == pytest.approx(1.0 - bend)
+    straight = WallConfig(x1_m=1.0, y1_m=1.0, x2_m=1.0, y2_m=4.0)
+    assert straight.pieces_m() == [(1.0, 1.0, 1.0, 4.0)]
+
+
+def test_a_wall_that_bends_too_far_is_refused_with_the_most_it_may() -> None:
+    with pytest.raises(ValidationError, match=r"bend_m: a wall of 3 m bends by 0\.3 m at most"):
+        WallConfig(x1_m=1.0, y1_m=1.0, x2_m=1.0, y2_m=4.0, bend_m=0.31)
+
+
 @pytest.mark.parametrize(
     "table",
     [
@@ -46,7 +67,9 @@ def test_the_sides_of_walls_boxes_and_polygons_are_listed() -> None:
         {"polygon": [{"vertices_m": [[0.0, 0.0], [1.0, 0.0]]}]},
         {"polygon": [{"vertices_m": [[float(k), 0.0] for k in range(ITEMS_MAX + 1)]}]},
         {"wall": [{"x1_m": 0.0, "y1_m": 0.0, "x2_m": 1.0, "y2_m": 0.0}] * (ITEMS_MAX + 1)},
+        {"wall": [{"x1_m": 0.0, "y1_m": 0.0, "x2_m": 1.0, "y2_m": 0.0, "surface": "velvet"}]},
         {"acoustics": {"model": "laser"}},
+        {"acoustics": {"model": "rays", "rays": 0}},
         {"acoustics": {"dropout": 1.1}},
         {"start": {"heading_deg": 361.0}},
     ],

@@ -23,6 +23,11 @@ SIGHT_SLACK_M: Final = 1e-3
 """A wall nearer than this to a reflecting point does not hide it, m."""
 
 
+def reflection_of(model: str) -> Reflection:
+    """Return the model of reflection that comes nearest to a world's: rays in the beam are as good as all of it."""
+    return "specular" if model == "specular" else "cone"
+
+
 class Beams(NamedTuple):
     """Sensors in the map frame: place (m) and direction (rad), each an array of the same shape."""
 

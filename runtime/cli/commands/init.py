@@ -85,7 +85,7 @@ def world(
     depth: float | None = None,
     drums: int | None = None,
     drum_radius: float | None = None,
-    surfaces: Literal["cone", "specular"] | None = None,
+    surfaces: Literal["cone", "specular", "rays"] | None = None,
     yes: Yes = False,
     force: Force = False,
 ) -> int:
@@ -104,7 +104,7 @@ def world(
     drum_radius
         Radius of a drum, m.
     surfaces
-        How they reflect: cone (each point answers) or specular (as mirrors).
+        How they reflect: cone (each point answers), specular (as mirrors) or rays (where a few rays hit).
     """
     given = locals()  # the options by their names, as the questions have them
     from runtime.cli.commands.init_files import write_world

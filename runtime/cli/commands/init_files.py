@@ -157,7 +157,7 @@ def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:
     depth = ask.number("depth", "Size of the room along y, m", 6.0, 1.0, 1000.0)
     drums = ask.count("drums", "Number of drums", 4, 0, 12)
     radius = ask.number("drum_radius", "Radius of a drum, m", 0.3048, 0.02, 0.1 * min(width, depth)) if drums else 0.0
-    surfaces = ask.choice("surfaces", "How surfaces reflect", ("cone", "specular"))
+    surfaces = ask.choice("surfaces", "How surfaces reflect", ("cone", "specular", "rays"))
     x, y = 0.5 * width, 0.5 * depth
     corners = [(-x, -y), (x, -y), (x, y), (-x, y)]
     walls = "".join(
@@ -178,7 +178,7 @@ y_m = 0.0
 heading_deg = 0.0
 
 [acoustics]
-model = "{surfaces}"  # cone: each point of a surface answers; specular: surfaces are mirrors
+model = "{surfaces}"  # cone: each point of a surface answers; specular: surfaces are mirrors; rays: where rays hit
 noise_m = 0.005
 """
     return _write(file, text, force=force)

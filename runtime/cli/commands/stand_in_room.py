@@ -39,6 +39,7 @@ def locate_stand(
         A file cannot be read or written, the map has no surface, or no place in it fits what was heard.
     """
     from perception.localization.drumheller.localize import localize
+    from perception.localization.room.expected_ranges import reflection_of
     from perception.localization.room.room import room_of
     from perception.stand import last_round
 
@@ -50,7 +51,7 @@ def locate_stand(
         raise UserError(text, WRONG_CALL) from None
     settings, stand = read_stand(file, at_s, robot, json_file, force=force, options=options)
     heard = last_round(stand)
-    candidates = localize(heard, room, settings.ring, world.acoustics.model)
+    candidates = localize(heard, room, settings.ring, reflection_of(world.acoustics.model))
     poses = [(robot_pose(one.pose, heard[-1]), one.probability) for one in candidates]
     if json_file is not None:
         rows = [{"x": at.x, "y": at.y, "heading": at.theta, "probability": share} for at, share in poses]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,11 +14,11 @@ from drivers.emulator.acoustics import (
     ECHO,
     MOUNT,
     SIGHT_SLACK_M,
-    Records,
     clearance,
     first_echoes,
 )
 from drivers.emulator.scene import compile_scene
+from drivers.emulator.surfaces import SURFACES, Records
 from tests import naive_acoustics as naive
 from tests.drivers.emulator.one_sensor import drum, hear, wall, world_of
 
@@ -25,6 +26,8 @@ from tests.drivers.emulator.one_sensor import drum, hear, wall, world_of
 
 WORLDS = (60, pytest.param(1000, marks=pytest.mark.soak))
 """Random worlds."""
+
+RAYS = 3
 
 Case = tuple[WorldConfig, naive.Shapes, list[tuple[complex, float]], float]
 
@@ -58,7 +61,7 @@ def random_world(rng: np.random.Generator) -> WorldConfig:
     )
 
 
-def echoes(world: WorldConfig, sensors: list[tuple[complex, float]], half_angle: float, *, specular: bool) -> Records:
+def echoes(world: WorldConfig, sensors: list[tuple[complex, float]], half_angle: float, model: str) -> Records:
     scene = compile_scene(world)
     mounts = np.array([(s.real, s.imag, axis) for s, axis in sensors], dtype=MOUNT)
     out = np.empty(len(sensors), dtype=ECHO)
@@ -69,7 +72,8 @@ def echoes(world: WorldConfig, sensors: list[tuple[complex, float]], half_angle:
         mounts,
         np.ones(len(sensors), dtype=np.bool_),
         half_angle,
-        specular,
+        SURFACES[model],
+        RAYS,
         CONVEX_EDGE_REACH_M,
         SIGHT_SLACK_M,
         scene.circles,
@@ -100,7 +104,7 @@ def random_cases(
 def test_cone_is_exactly_the_nearest_point_in_the_beam(worlds: int) -> None:
     heard = 0
     for world, shapes, sensors, half in random_cases(1, worlds):
-        out = echoes(world, sensors, half, specular=False)
+        out = echoes(world, sensors, half, "cone")
         expected = [naive.cone(shapes, s, axis, half) for s, axis in sensors]
         np.testing.assert_allclose(out["distance"], expected, rtol=0, atol=1e-8)
         heard += int(np.isfinite(out["distance"]).sum())
@@ -110,7 +114,7 @@ def test_cone_is_exactly_the_nearest_point_in_the_beam(worlds: int) -> None:
 def test_cone_agrees_with_densely_sampled_surfaces() -> None:
     spacing = 0.002
     for world, shapes, sensors, half in random_cases(2, 25):
-        out = echoes(world, sensors, half, specular=False)
+        out = echoes(world, sensors, half, "cone")
         points = naive.surface_samples(shapes, spacing)
         for (sensor, axis), found in zip(sensors, out["distance"], strict=True):
             inside = np.abs(np.angle((points - sensor) * np.exp(-1j * axis))) <= half
@@ -126,19 +130,17 @@ def test_cone_agrees_with_densely_sampled_surfaces() -> None:
 def test_specular_is_exactly_the_first_visible_mirror(worlds: int) -> None:
     heard = 0
     for world, shapes, sensors, half in random_cases(3, worlds):
-        out = echoes(world, sensors, half, specular=True)
+        out = echoes(world, sensors, half, "specular")
         expected = [naive.specular(shapes, s, axis, half, CONVEX_EDGE_REACH_M, SIGHT_SLACK_M) for s, axis in sensors]
         np.testing.assert_allclose(out["distance"], expected, rtol=0, atol=1e-8)
         heard += int(np.isfinite(out["distance"]).sum())
     assert heard > 1.5 * worlds
 
 
-@pytest.mark.parametrize("specular", [False, True])
-def test_reflecting_point_lies_at_the_reported_distance(specular: bool) -> None:
+@pytest.mark.parametrize("model", ["cone", "specular", "rays"])
+def test_reflecting_point_lies_at_the_reported_distance(model: str) -> None:
     for world, _, sensors, half in random_cases(4, 25):
-        for (sensor, _axis), (distance, x, y) in zip(
-            sensors, echoes(world, sensors, half, specular=specular), strict=True
-        ):
+        for (sensor, _axis), (distance, x, y) in zip(sensors, echoes(world, sensors, half, model), strict=True):
             if math.isfinite(distance):
                 assert abs(complex(x, y) - sensor) == pytest.approx(distance, abs=1e-9)
             else:
@@ -154,6 +156,75 @@ def test_clearance_agrees_with_densely_sampled_surfaces() -> None:
             expected = np.abs(points - sensor).min() if len(points) else math.inf
             found = clearance(sensor.real, sensor.imag, scene.circles, scene.segments)
             assert found == pytest.approx(expected, abs=0.002) or found == expected
+
+
+def with_surfaces(world: WorldConfig, choose: Callable[[], str | None]) -> WorldConfig:
+    """Return a world whose objects have these surfaces of their own."""
+    return world.model_copy(
+        update={
+            kind: tuple(item.model_copy(update={"surface": choose()}) for item in getattr(world, kind))
+            for kind in ("drum", "wall", "box", "polygon")
+        }
+    )
+
+
+def one_of(rng: np.random.Generator, *names: str | None) -> Callable[[], str | None]:
+    return lambda: names[int(rng.integers(len(names)))]
+
+
+@pytest.mark.parametrize("model", ["specular", "rays"])
+@pytest.mark.parametrize("worlds", WORLDS)
+@pytest.mark.boundscheck
+def test_mixed_surfaces_answer_each_by_its_own_model(model: str, worlds: int) -> None:
+    heard, rng = 0, np.random.default_rng(6)
+    for world, _, sensors, half in random_cases(7, worlds):
+        mixed = with_surfaces(world, one_of(rng, "specular", "rays", "silent", None))
+        shapes = naive.shapes_of(mixed, model)
+        out = echoes(mixed, sensors, half, model)
+        expected = [
+            min(
+                naive.specular(shapes, s, axis, half, CONVEX_EDGE_REACH_M, SIGHT_SLACK_M),
+                naive.rays(shapes, s, axis, half, RAYS),
+            )
+            for s, axis in sensors
+        ]
+        np.testing.assert_allclose(out["distance"], expected, rtol=0, atol=1e-8)
+        heard += int(np.isfinite(out["distance"]).sum())
+    assert heard > 1.5 * worlds
+
+
+def test_a_cone_behind_cloth_is_heard_where_it_is_in_sight() -> None:
+    """No ray of many finds a nearer point in sight, and the found one is in the beam and in sight."""
+    found, rng = 0, np.random.default_rng(8)
+    for world, _, sensors, half in random_cases(9, 15):
+        bare = world.model_copy(update={"drum": ()})
+        apart = [d for d in world.drum if clearance_of(bare, d.x_m, d.y_m) > d.radius_m][:1]  # no surfaces that cross
+        mixed = with_surfaces(bare.model_copy(update={"drum": tuple(apart)}), one_of(rng, "silent", None))
+        shapes = naive.shapes_of(mixed, "cone")
+        dense = naive.shapes_of(mixed, "rays")
+        for (sensor, axis), echo in zip(sensors, echoes(mixed, sensors, half, "cone"), strict=True):
+            distance = float(echo["distance"])
+            assert distance <= naive.rays(dense, sensor, axis, half, 201) + 1e-5
+            if math.isfinite(distance):
+                at = complex(echo["x"], echo["y"])
+                assert naive.in_beam(at, sensor, axis, half, 1e-6)
+                assert naive.in_sight(shapes, sensor, at, 1e-3)
+                found += 1
+    assert found > 20
+
+
+def clearance_of(world: WorldConfig, x: float, y: float) -> float:
+    scene = compile_scene(world)
+    return clearance(x, y, scene.circles, scene.segments)
+
+
+def test_a_world_of_one_surface_answers_alike_whether_the_world_or_each_object_says_it() -> None:
+    for world, _, sensors, half in random_cases(10, 30):
+        for model, other in (("cone", "specular"), ("specular", "cone"), ("rays", "cone")):
+            each = with_surfaces(world, one_of(np.random.default_rng(0), model))
+            mine, worlds = echoes(each, sensors, half, other), echoes(world, sensors, half, model)
+            for name in ("distance", "x", "y"):
+                np.testing.assert_array_equal(mine[name], worlds[name])
 
 
 # Cases one can check by looking.
@@ -229,3 +300,54 @@ def test_inside_a_drum_the_range_is_the_shortest(model: str) -> None:
 def test_no_surfaces_no_echo() -> None:
     for model in ("cone", "specular"):
         assert hear(world_of(model)) == math.inf
+
+
+def test_one_ray_hears_only_what_is_on_the_axis_and_three_what_is_at_the_edges() -> None:
+    for rays, off_deg, is_heard in (
+        (1, 0.0, True),
+        (1, 6.0, False),
+        (3, 12.0, True),
+        (3, 6.0, False),
+        (10, 4.0, True),
+    ):
+        turn = math.radians(off_deg)
+        post = drum(2 * math.cos(turn), 2 * math.sin(turn), 0.05)
+        world = world_of("rays", drum=(post,))
+        world = world.model_copy(update={"acoustics": world.acoustics.model_copy(update={"rays": rays})})
+        assert math.isfinite(hear(world)) == is_heard, (rays, off_deg)
+
+
+def test_a_slanted_wall_answers_a_ray_where_it_hits() -> None:
+    slanted = wall(1.0, -1.0, 5.0, 3.0)  # at 45°, through (2, 0)
+    world = world_of("rays", wall=(slanted,))
+    axis = world.acoustics.model_copy(update={"rays": 1})
+    assert hear(world.model_copy(update={"acoustics": axis})) == pytest.approx(2.0)
+    edge = math.radians(12.0)
+    assert hear(world) == pytest.approx(1.0 / (math.cos(edge) + math.sin(edge)) * 2.0, abs=0.5)
+    mirror = slanted.model_copy(update={"surface": "specular"})
+    assert hear(world.model_copy(update={"wall": (mirror,)})) == math.inf
+
+
+def test_cloth_is_silent_and_hides_the_wall_behind_it() -> None:
+    cloth = wall(2.0, -1.0, 2.0, 1.0).model_copy(update={"surface": "silent"})
+    back = wall(3.0, -5.0, 3.0, 5.0)
+    for model in ("cone", "specular", "rays"):
+        assert hear(world_of(model, wall=(cloth, back))) == math.inf
+        half = cloth.model_copy(update={"y1_m": 0.0})
+        heard = hear(world_of(model, wall=(half, back)))
+        assert heard == (
+            math.inf
+            if model == "specular"
+            else pytest.approx(3.0 if model == "cone" else 3.0 / math.cos(math.radians(12.0)))
+        )
+
+
+def test_a_bent_mirror_answers_along_its_arc_on_both_sides() -> None:
+    """Seen from a place, the nearest point of the whole arc is where its normal looks back."""
+    for bend in (0.03, -0.03):
+        bent = WallConfig(x1_m=2.0, y1_m=-1.5, x2_m=2.0, y2_m=1.5, bend_m=bend)
+        radius = (1.5**2 + bend**2) / (2.0 * abs(bend))
+        middle = 2.0 - bend + math.copysign(radius, bend)
+        for y in np.linspace(-0.9, 0.9, 181).tolist():
+            expected = abs(math.hypot(middle, y) - radius)
+            assert hear(world_of("specular", wall=(bent,)), y=y) == pytest.approx(expected, abs=2e-4)

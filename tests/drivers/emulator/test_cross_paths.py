@@ -12,6 +12,7 @@ from config.world import BoxConfig, WorldConfig
 from drivers.emulator.acoustics import CONVEX_EDGE_REACH_M, MOUNT, SIGHT_SLACK_M
 from drivers.emulator.cross_paths import first_cross_paths, mirror_on_circle
 from drivers.emulator.scene import compile_scene
+from drivers.emulator.surfaces import CONE, SPECULAR
 from drivers.messages import Floats
 from tests import naive_acoustics as naive
 from tests.drivers.emulator.one_sensor import drum, wall
@@ -33,8 +34,8 @@ def half_paths(
     out = np.empty(len(sensors))
     first_cross_paths(
         0.0, 0.0, 0.0, mounts, ~np.eye(len(sensors), dtype=np.bool_) if heard is None else heard, half_angle,
-        LOBE * half_angle, specular, CONVEX_EDGE_REACH_M, SIGHT_SLACK_M, scene.circles, scene.segments,
-        scene.corners, out,
+        LOBE * half_angle, SPECULAR if specular else CONE, CONVEX_EDGE_REACH_M, SIGHT_SLACK_M, scene.circles,
+        scene.segments, scene.corners, out,
     )  # fmt: skip
     return out
 

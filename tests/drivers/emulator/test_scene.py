@@ -10,6 +10,7 @@ import pytest
 
 from config.world import BoxConfig, PolygonConfig, WorldConfig
 from drivers.emulator.scene import JOIN_M, compile_scene
+from drivers.emulator.surfaces import AS_WORLD
 from tests.drivers.emulator.one_sensor import drum, wall, world_of
 
 
@@ -58,8 +59,8 @@ def test_ends_that_nearly_meet_are_one_corner_and_tiny_surfaces_are_left_out() -
 def test_drums_are_circles_and_polygons_are_closed() -> None:
     triangle = PolygonConfig(vertices_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
     scene = compile_scene(WorldConfig(drum=(drum(1, 2, 0.5),), polygon=(triangle,)))
-    assert scene.circles.tolist() == [(1.0, 2.0, 0.5)]
-    assert scene.segments[-1].tolist() == (0.0, 1.0, 0.0, 0.0)
+    assert scene.circles.tolist() == [(1.0, 2.0, 0.5, AS_WORLD)]
+    assert scene.segments[-1].tolist() == (0.0, 1.0, 0.0, 0.0, AS_WORLD)
 
 
 def test_of_many_sides_every_end_and_every_crossing_is_found_once() -> None:
@@ -76,7 +77,7 @@ def test_of_many_sides_every_end_and_every_crossing_is_found_once() -> None:
                 places.add((ax + t * (bx - ax), ay + t * (by - ay)))
     expected = {(round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in places}
     opening: dict[tuple[float, float], float] = {}
-    for x, y, _, angle in scene.corners.tolist():
+    for x, y, _, angle, *_ in scene.corners.tolist():
         at = (round(x, 6) + 0.0, round(y, 6) + 0.0)
         opening[at] = opening.get(at, 0.0) + angle
     straight = expected - opening.keys()

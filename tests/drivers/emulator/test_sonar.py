@@ -115,6 +115,40 @@ def test_a_sensor_that_did_not_fire_reports_nan() -> None:
     assert np.isnan(sonar.fire(Pose(0, 0, 0), 0.0, [2])).tolist() == [True, True, False, True]
 
 
+def test_the_ring_jitters_about_the_place_that_odometry_has() -> None:
+    got = fire_many(wall_at(4.0, jitter_m=0.03), 2000)[:, 0]
+    assert got.mean() == pytest.approx(4.0, abs=0.003)
+    assert got.std() == pytest.approx(0.03, rel=0.1)
+    world = WorldConfig(drum=(drum(0, 4, 0.5),), acoustics=AcousticsConfig(model="specular", jitter_rad=0.01))
+    sonar = Sonar(ring(), compile_scene(world), world.acoustics, np.random.default_rng(1))
+    edge = math.radians(90.0 - 12.0)  # the drum's nearest point is on the beam's edge
+    heard = [math.isfinite(sonar.fire(Pose(0, 0, edge + 0.01), edge + 0.01)[0]) for _ in range(2000)]
+    assert np.mean(heard) == pytest.approx(0.841, abs=0.03)  # of a normal distribution, below one σ
+
+
+def test_the_true_echoes_of_a_firing_are_of_where_it_truly_fired() -> None:
+    world = wall_at(4.0, jitter_m=0.05)
+    sonar = Sonar(ring(), compile_scene(world), world.acoustics, np.random.default_rng(1))
+    for _ in range(10):
+        assert sonar.fire(Pose(0, 0, 0), 0.0)[0] == pytest.approx(sonar.echoes["distance"][0], abs=1e-12)
+
+
+def test_late_echoes_come_in_place_of_silence_and_from_beyond_the_first_surface() -> None:
+    slanted = wall(
+        1.0, -3.0, 5.0, 1.0
+    )  # a mirror that sends sound elsewhere; its nearest point in the beam is on an edge
+    nearest = 4.0 / (math.sqrt(2.0) * math.cos(math.radians(45.0 - 12.0)))
+    world = WorldConfig(wall=(slanted,), acoustics=AcousticsConfig(model="specular", late=0.3))
+    got = fire_many(world, 100, sensors=20)
+    late = got[np.isfinite(got)]
+    assert late.size / got.size == pytest.approx(0.3, abs=0.03)
+    assert late.min() == pytest.approx(nearest + 0.3, abs=0.02)
+    assert late.max() == pytest.approx(nearest + 2.0, abs=0.02)
+    cloth = slanted.model_copy(update={"surface": "silent"})
+    for silent in (world.model_copy(update={"wall": (cloth,)}), world.model_copy(update={"wall": ()})):
+        assert np.isinf(fire_many(silent, 20)).all()
+
+
 # Crosstalk.
 
 
