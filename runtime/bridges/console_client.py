@@ -64,6 +64,8 @@ class ConsoleClient:
         The outline segments of the map by number: x1, y1, x2, y2 (m), direction of the normal (rad), time (s).
     archived : list of dict
         The objects left behind, as in a state's `objects`.
+    polylines : list of dict
+        The outlines of what is not straight, as in a state's `polylines`.
     has_control : bool
         Whether this client may move the robot.
     asked_by : int or None
@@ -76,6 +78,7 @@ class ConsoleClient:
         self.session: Message = {}
         self.segments: dict[int, list[float]] = {}
         self.archived: list[Message] = []
+        self.polylines: list[Message] = []
         self.has_control = False
         self.asked_by: int | None = None
         self.dropped = 0
@@ -183,6 +186,7 @@ class ConsoleClient:
         for number, *row in changes["added"]:
             self.segments[number] = row
         self.archived = state.get("archived", self.archived)
+        self.polylines = state.get("polylines", self.polylines)
 
     def _answer(self, message: Message) -> None:
         waiting = self._answers.get(message["id"])

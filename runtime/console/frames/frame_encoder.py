@@ -23,6 +23,8 @@ from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
 from perception.percept import Canyon
 from perception.pipeline import Perception
+from perception.polyline import Polyline
+from runtime.console.frames.changing_rows import ChangingRows
 from runtime.console.frames.cross_path_rows import CrossPathRows
 from runtime.console.frames.mission_rows import MissionRows
 from runtime.console.frames.segment_delta import SegmentDelta
@@ -78,7 +80,7 @@ class EncodedFrame(NamedTuple):
     head: bytes
     """Everything but the map and what differs between clients, without the closing brace."""
     changes: bytes
-    """The map's fields: segments added or removed since the previous frame, objects left behind if they changed."""
+    """The map's fields: segments that came or went since the last one; objects left behind, polylines if changed."""
     whole: Callable[[], bytes]
     """Returns the map's fields whole; valid while this is the newest frame of its source."""
 
@@ -125,9 +127,8 @@ class FrameEncoder:
         self._segment_counts: tuple[int, int] | None = None
         self._is_stale = True
         self._number = 0
-        self._archived: tuple[DetectedObject, ...] = ()
-        self._archived_rows: dict[DetectedObject, bytes] = {}
-        self._archived_json = b"[]"
+        self._archived = ChangingRows(_object)
+        self._polylines = ChangingRows(_polyline)
 
     def adopt(self, settings: Settings) -> None:
         """Use other settings from the next frame on."""
@@ -207,8 +208,10 @@ class FrameEncoder:
             head["flags"] = [flag.name for flag in odometry.flags]
         self._fired.clear()
         changes = b'"segments":%b' % segments
-        if self._encode_archived(state.perception.archived_objects()):
-            changes += b',"archived":%b' % self._archived_json
+        if self._archived.update(state.perception.archived_objects()):
+            changes += b',"archived":%b' % self._archived.json
+        if self._polylines.update(state.perception.polylines()):
+            changes += b',"polylines":%b' % self._polylines.json
         return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], changes, self._whole)
 
     def ranges(self) -> list[float | None]:
@@ -237,17 +240,10 @@ class FrameEncoder:
                 return self._mission.row(drive_request)
         return {"kind": "legs"}
 
-    def _encode_archived(self, objects: tuple[DetectedObject, ...]) -> bool:
-        """Encode the objects left behind; return whether any came or went since the last frame."""
-        if objects is self._archived:
-            return False
-        before, self._archived = self._archived_rows, objects
-        self._archived_rows = {seen: before.get(seen) or orjson.dumps(_object(seen)) for seen in objects}
-        self._archived_json = b"[%b]" % b",".join(self._archived_rows.values())
-        return self._archived_rows.keys() != before.keys()
-
     def _whole(self) -> bytes:
-        return b'"segments":%b,"archived":%b' % (self._segments.whole(), self._archived_json)
+        return b'"segments":%b,"archived":%b,"polylines":%b' % (
+            self._segments.whole(), self._archived.json, self._polylines.json,
+        )  # fmt: skip
 
     def _encode_segments(self, state: State, *, may_wait: bool) -> bytes:
         """Return the changes of the map's segments; list them only if they may have changed and may not wait."""
@@ -298,6 +294,12 @@ def _object(detected: DetectedObject) -> dict[str, Any]:
         "placed": detected.placed,
         "ends": None if ends is None else [round(value, 3) for value in ends],
     }
+
+
+def _polyline(polyline: Polyline) -> dict[str, Any]:
+    """Return a polyline in odometry's frame, m."""
+    points = np.round(polyline.points, 3).tolist()
+    return {"number": polyline.number, "points": points, "probability": round(polyline.probability, 3)}
 
 
 def _localized(perception: Perception) -> dict[str, Any] | None:

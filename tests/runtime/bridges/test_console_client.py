@@ -119,6 +119,17 @@ async def test_states_that_are_not_taken_are_dropped_and_lines_of_the_log_are_no
     assert client.dropped == 8
 
 
+async def test_polylines_are_kept_until_a_state_has_others() -> None:
+    client = ConsoleClient(None)  # type: ignore[arg-type]
+    segments: Message = {"whole": False, "removed": [], "added": []}
+    changes: list[Message] = [{}, {"polylines": [{"number": 3}]}, {}, {"polylines": []}]
+    known = []
+    for change in changes:
+        client._take({"type": "state", "controller": True, "segments": segments, **change})
+        known.append([one["number"] for one in client.polylines])
+    assert known == [[], [3], [3], []]
+
+
 async def test_it_connects_again_and_reports_each_problem_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(console_client, "RETRY_FIRST_S", 0.001)
     lines: list[str] = []

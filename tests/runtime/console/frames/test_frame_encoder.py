@@ -24,6 +24,7 @@ from perception.pipeline import Perception
 from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, FrameContext, FrameEncoder, _canyon, _object
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.step import Inputs, State
+from tests.polylines import report_bend
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
 Segments = dict[int, list[float]]
@@ -130,6 +131,22 @@ async def test_a_later_client_gets_all_segments() -> None:
         assert frame["segments"]["whole"]
         apply(segments, frame["segments"])
         assert_same_segments(segments, case)
+
+
+async def test_polylines_come_when_they_change_and_whole_to_a_later_client(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with open_console() as case:
+        page = await case.page()
+        case.cycles()
+        assert (await page.next("state"))["polylines"] == []
+        report_bend(monkeypatch)
+        bend = {"number": 3, "points": [[1.0, 0.0], [2.0, 0.0], [2.0, 1.0]], "probability": 0.9}
+        case.cycles()
+        assert (await page.next("state"))["polylines"] == [bend]
+        case.cycles()
+        assert "polylines" not in await page.next("state")
+        later = await case.page()
+        case.cycles()
+        assert (await later.next("state"))["polylines"] == [bend]
 
 
 async def test_new_segments_come_with_every_second_frame() -> None:
