@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Final
 
 import foxglove
@@ -47,7 +46,7 @@ class SceneChannels:
         self._write_truth(at)
 
     def take(self, state: Message, client: ConsoleClient, at: int) -> None:
-        """Write a state; the map of segments is that of the client."""
+        """Write a state; segments and polylines are those of the client."""
         if not self._session or state["playback"] is not None:
             return
         self._write_frames(state, at)
@@ -57,7 +56,7 @@ class SceneChannels:
             self._run.write_cross_paths(rows, self._session["ring"]["half_angle"], at)
         self._state.log(orjson.dumps({name: state[name] for name in STATE_FIELDS}), log_time=at)
         if self._states % MAP_EVERY == 0:
-            self._write_map(state["objects"], client.segments.values(), at)
+            self._write_map(state["objects"], client, at)
             self._write_truth(at)  # for clients that have connected since
         self._states += 1
 
@@ -91,8 +90,8 @@ class SceneChannels:
             turned = Pose(*state["pose"]) if sensor in ring["turning"] else base
             self._run.write_arc(turned.compose(Pose(*mounts[sensor])), half, ranges[sensor], at)
 
-    def _write_map(self, objects: list[Message], segments: Iterable[list[float]], at: int) -> None:
-        ends = [point for row in segments for point in (row[:2], row[2:4])]
+    def _write_map(self, objects: list[Message], client: ConsoleClient, at: int) -> None:
+        ends = [point for row in client.segments.values() for point in (row[:2], row[2:4])]
         self._run.write_segments(ends, at)
         models = {model["name"]: model for model in self._session["models"]}
         labels = [
@@ -100,7 +99,8 @@ class SceneChannels:
             for seen in objects
             if seen["ends"] is None
         ]
-        self._run.write_objects([outline(seen, models.get(seen["model"])) for seen in objects], labels, at)
+        outlines = [outline(seen, models.get(seen["model"])) for seen in objects]
+        self._run.write_objects(outlines, [one["points"] for one in client.polylines], labels, at)
 
     def _write_truth(self, at: int) -> None:
         """Write the true world of an emulated robot, or the known room, in odometry's frame."""

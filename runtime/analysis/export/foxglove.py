@@ -18,7 +18,7 @@ from foxglove import messages as fx
 
 from drivers.messages import Pose
 from perception.mapping.grid.known_cells import KnownCells
-from runtime.analysis.export.foxglove_messages import RunChannels, line, object_label, placed, scene, stamp
+from runtime.analysis.export.foxglove_messages import Outline, RunChannels, line, object_label, placed, scene, stamp
 from runtime.analysis.export.shapes import CLUSTER, FiringScan, even_radius, firing_scans, truth_outlines, whole_ring
 from runtime.analysis.plots.cross_arcs import newest_cross_paths
 from runtime.analysis.plots.geometry import outline
@@ -136,11 +136,14 @@ class _RunExporter:
                 boxes.append(line(stroke, CLUSTER, closed=False))
         scene(self._clusters, "clusters", boxes, [], at)
         outlines = [outline(seen, self._models.get(seen.model), whole=self._whole) for seen in snapshot.objects]
+        drawn: list[Outline] = [(points.tolist(), closed) for points, closed in outlines]
+        drawn += [((wall.ends[:2], wall.ends[2:]), False) for wall in snapshot.walls if wall.ends is not None]
+        polylines = [one.points.tolist() for one in snapshot.polylines]
         labels = [
             (seen.x, seen.y, object_label(number, seen.model, seen.score))
             for number, seen in enumerate(snapshot.objects, 1)
         ]
-        self._run.write_objects([(points.tolist(), closed) for points, closed in outlines], labels, at)
+        self._run.write_objects(drawn, polylines, labels, at)
         if snapshot.grid is not None and snapshot.grid.percent.size:
             self._grid.log(_grid(snapshot.grid, at), log_time=at)
 

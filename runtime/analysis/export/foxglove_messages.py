@@ -23,6 +23,7 @@ from runtime.analysis.timeline import CrossPathRows
 
 ARC_POINTS: Final = 9
 LINE_PX: Final = 2.0
+POLYLINE_PX: Final = 1.0
 FONT_M: Final = 0.15
 
 Places = Iterable[Iterable[float]]
@@ -95,9 +96,12 @@ class RunChannels:
         )  # fmt: skip
         scene(self._segments, "segments", [many] if ends else [], [], at)
 
-    def write_objects(self, outlines: Iterable[Outline], labels: Iterable[Label], at: int) -> None:
-        """Replace the recognised objects: their outlines, and what is written beside them."""
+    def write_objects(
+        self, outlines: Iterable[Outline], polylines: Iterable[Places], labels: Iterable[Label], at: int
+    ) -> None:
+        """Replace what was recognised: outlines of objects, polylines, and what is written beside the objects."""
         lines = [line(points, MODEL, closed=closed) for points, closed in outlines]
+        lines += [line(points, MODEL, closed=False, thickness_px=POLYLINE_PX) for points in polylines]
         texts = [
             fx.TextPrimitive(
                 pose=placed(x, y, 0.0, HEIGHT_M), billboard=True, font_size=FONT_M, color=_colour(MODEL), text=text
@@ -146,11 +150,13 @@ def scene(
     channel.log(fx.SceneUpdate(entities=[entity]), log_time=at)
 
 
-def line(points: Places, rgb: Colour, *, closed: bool) -> fx.LinePrimitive:
+def line(points: Places, rgb: Colour, *, closed: bool, thickness_px: float = LINE_PX) -> fx.LinePrimitive:
     """Return a line through points (m), or the loop that they close."""
     kind = fx.LinePrimitiveLineType.LineLoop if closed else fx.LinePrimitiveLineType.LineStrip
     places = [fx.Point3(x=x, y=y) for x, y in points]
-    return fx.LinePrimitive(type=kind, thickness=LINE_PX, scale_invariant=True, points=places, color=_colour(rgb))
+    return fx.LinePrimitive(
+        type=kind, thickness=thickness_px, scale_invariant=True, points=places, color=_colour(rgb)
+    )
 
 
 def stamp(at: int) -> fx.Timestamp:

@@ -22,6 +22,7 @@ Seen = Mapping[str, Any]
 """An object or a model, as a state and a session of the console have it."""
 
 LINE_M: Final = 0.03
+POLYLINE_M: Final = 0.015
 ODOMETRY_VARIANCE: Final = (1e-2, 1e-2, 3e-2)
 """Nominal variance of x, y (m²) and theta (rad²): a run does not say how good its wheels are."""
 UNKNOWN_VARIANCE: Final = 1e6
@@ -151,8 +152,10 @@ class Messages:
             "pose", "geometry_msgs/PoseWithCovarianceStamped", {"header": header(self.map, at), "pose": placed}
         )
 
-    def objects(self, objects: Iterable[Seen], models: Iterable[Seen], at: int) -> tuple[list[Fields], list[Output]]:
-        """Return the markers of objects, and a pose with covariance for each but walls."""
+    def objects(
+        self, objects: Iterable[Seen], models: Iterable[Seen], polylines: Iterable[Seen], at: int
+    ) -> tuple[list[Fields], list[Output]]:
+        """Return the markers of objects and polylines, and a pose with covariance for each object but walls."""
         head, known = header(self.odom, at), {model["name"]: model for model in models}
         markers: list[Fields] = []
         poses: list[Output] = []
@@ -172,6 +175,10 @@ class Messages:
             poses.append(
                 Output("object_poses", "geometry_msgs/PoseWithCovarianceStamped", {"header": head, "pose": placed})
             )
+        markers += [
+            line_marker(one["points"], MODEL, header=head, ns="polyline", id=one["number"], scale={"x": POLYLINE_M})
+            for one in polylines
+        ]
         return markers, poses
 
     def grid(

@@ -179,7 +179,8 @@ class _RunExporter:
             here = (place.pose.x, place.pose.y, place.pose.theta)
             self._write(self._say.place(here, known if all(map(math.isfinite, known)) else None, at), at)
         seen = [as_seen(one) for one in (*snapshot.objects, *snapshot.walls)]
-        markers, poses = self._say.objects(seen, self._models, at)
+        polylines = [{"number": one.number, "points": one.points.tolist()} for one in snapshot.polylines]
+        markers, poses = self._say.objects(seen, self._models, polylines, at)
         self._write_markers("objects", [self._delete_all(at), *markers], at)
         for pose in poses:
             self._write(pose, at)

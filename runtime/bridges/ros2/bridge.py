@@ -78,7 +78,7 @@ class _Bridge:
                     case "state":
                         host_s = time.monotonic()
                         node.look_around(host_s)
-                        frames, outputs = topics.take(message, node.now_s(), host_s)
+                        frames, outputs = topics.take(message, node.now_s(), host_s, client.polylines)
                         if topics.note is not None:
                             node.warn(topics.note)
                         node.publish(outputs, frames)

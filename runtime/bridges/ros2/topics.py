@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from array import array
 from base64 import b64decode
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from drivers.messages import Pose, Twist
@@ -78,7 +78,9 @@ class Topics:
         ring = self._session["ring"]
         return self._say.static(ring["mounts"], ring["turning"], stamp_ns)
 
-    def take(self, state: Message, ros_s: float, host_s: float) -> tuple[list[Frame], list[Output]]:
+    def take(
+        self, state: Message, ros_s: float, host_s: float, polylines: Sequence[Message] = ()
+    ) -> tuple[list[Frame], list[Output]]:
         """Return the new frames and messages of a state; none before the first session.
 
         Parameters
@@ -87,6 +89,8 @@ class Topics:
             Of the run.
         ros_s, host_s : float
             ROS time and this machine's monotonic clock when it arrived, s.
+        polylines : sequence of dict
+            Those that the run has now; a state has them only when they changed.
         """
         if not self._session or (state["playback"] is not None):
             return [], []
@@ -113,7 +117,7 @@ class Topics:
             self._mode = state["mode"]
             outputs.append(mode(state["mode"]))
         if self._is_due("markers", ros_s, MARKERS_S):
-            outputs += self._objects(state["objects"], at)
+            outputs += self._objects(state["objects"], polylines, at)
         if self._is_due("diagnostics", ros_s, DIAGNOSTICS_S):
             outputs.append(self._diagnostics(state, round(1e9 * ros_s)))
         return frames, outputs
@@ -145,9 +149,9 @@ class Topics:
             limits, at = (ring["range_min"], ring["range_max"]), self._clock.nanoseconds(fired_s)
             yield self._say.range(sensor, heard_m, limits, ring["half_angle"], at)
 
-    def _objects(self, objects: list[Message], at: int) -> list[Output]:
+    def _objects(self, objects: list[Message], polylines: Sequence[Message], at: int) -> list[Output]:
         """Return the markers, those to delete among them, and a pose with covariance for each object but walls."""
-        markers, poses = self._say.objects(objects, self._session["models"], at)
+        markers, poses = self._say.objects(objects, self._session["models"], polylines, at)
         now = {(marker["ns"], marker["id"]) for marker in markers}
         gone = [
             {"header": header(self._say.odom, at), "ns": ns, "id": number, "action": DELETE}

@@ -24,6 +24,7 @@ AT = 1_700_000_000_000_000_000
 def written(path: Path, robot: str, *states: dict[str, Any]) -> dict[str, list[Any]]:
     """Return the messages that a run's states become, by topic."""
     context, client = foxglove.Context(), ConsoleClient(None)  # type: ignore[arg-type]
+    client.polylines = [{"number": 3, "points": [[1.0, 0.0], [2.0, 1.0]], "probability": 0.9}]
     client.segments = {1: [0.0, 1.0, 2.0, 3.0, 0.0, 0.0]}
     settings = load_settings("hallway", [f"robot={robot}"])
     with foxglove.open_mcap(path, context=context):
@@ -57,9 +58,10 @@ def test_a_state_is_on_the_topics_of_the_export(tmp_path: Path) -> None:
     assert scan.ranges[0] == pytest.approx(2.381)
     assert scan.ranges[6] == math.inf
     assert math.isnan(scan.ranges[1])
-    drum, wall = found["/models"][0].entities[0].lines
+    drum, wall, polyline = found["/models"][0].entities[0].lines
     assert len(drum.points) == 36
     assert [(p.x, p.y) for p in wall.points] == [(0.0, 1.0), (2.0, 1.0)]
+    assert [(p.x, p.y) for p in polyline.points] == [(1.0, 0.0), (2.0, 1.0)]
     assert [text.text for text in found["/models"][0].entities[0].texts] == ["7 drum 0.99"]
     assert found["/log"][0].message == "mode mode=DRIVE"
     assert set(found["/state"][0]) == set(STATE_FIELDS)

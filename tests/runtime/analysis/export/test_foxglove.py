@@ -19,7 +19,12 @@ from drivers.messages import Firing, Pose
 from runtime.analysis.export.foxglove import write_foxglove
 from runtime.analysis.timeline import MapPlace, Timeline
 from runtime.analysis.timeline_builder import TimelineBuilder
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid
+from tests.runtime.analysis.synthetic_timeline import (
+    synthetic_timeline,
+    with_cross_paths,
+    with_grid,
+    with_polyline,
+)
 
 UNEVEN = """
 [ring]
@@ -48,7 +53,7 @@ def messages(path: Path) -> Iterator[tuple[str, str, int, Any]]:
 
 
 def test_a_run_for_foxglove(tmp_path: Path) -> None:
-    run = synthetic_timeline()
+    run = with_polyline(synthetic_timeline())
     (path,) = write_foxglove(run, tmp_path / "fox.mcap")
     seen: Counter[tuple[str, str]] = Counter()
     newest: dict[str, Any] = {}
@@ -72,7 +77,7 @@ def test_a_run_for_foxglove(tmp_path: Path) -> None:
     assert times == sorted(times)
     assert (times[0], times[-1]) == (run.start_unix_ns, run.unix_ns(run.seconds))
     assert len(newest["/truth"].entities[0].lines) == 6
-    assert len(newest["/models"].entities[0].lines) == 3
+    assert [len(line.points) for line in newest["/models"].entities[0].lines[3:]] == [2, 3], "a wall, a polyline"
     assert len(newest["/segments"].entities[0].lines[0].points) == 2 * 3
     assert len(newest["/clusters"].entities[0].lines) == 3 * 3
     base = first["/tf"].transforms[0]

@@ -21,7 +21,13 @@ from runtime.analysis.export.rosbag import as_seen, write_bag
 from runtime.analysis.timeline import MapPlace
 from runtime.bridges.ros2.topics import Topics
 from runtime.console.frames.session_info import session_info
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid
+from tests.polylines import BEND
+from tests.runtime.analysis.synthetic_timeline import (
+    synthetic_timeline,
+    with_cross_paths,
+    with_grid,
+    with_polyline,
+)
 
 
 def test_a_run_as_a_ros_2_bag(tmp_path: Path) -> None:
@@ -95,7 +101,7 @@ def contains(whole: Any, part: Any) -> bool:
 @pytest.mark.parametrize("localized", [False, True])
 def test_a_bag_holds_what_the_live_bridge_publishes(tmp_path: Path, localized: bool) -> None:
     """The last moment of a run, as a state of the console before the bridge, and in the bag."""
-    run = synthetic_timeline()
+    run = with_polyline(synthetic_timeline())
     place = MapPlace(Pose(1.0, 2.0, 0.3), np.diag([1e-3, 2e-3, 3e-3]), Pose(0.2, -0.1, 0.05))
     if localized:
         run.snapshots[-1] = replace(run.snapshots[-1], place=place)
@@ -118,7 +124,8 @@ def test_a_bag_holds_what_the_live_bridge_publishes(tmp_path: Path, localized: b
         } if localized else None,
         "cycle_us": 1.0, "late_us": 1.0, "missed": 0, "late": 0, "quanta": 0,
     }  # fmt: skip
-    frames, outputs = live.take(state, at_s, at_s)
+    polyline = {"number": 3, "points": BEND.points.tolist(), "probability": 0.9}
+    frames, outputs = live.take(state, at_s, at_s, [polyline])
     names = {frame.child for frame in frames} | {f"sonar_{k:02d}" for k in range(24)}
     found = {t.child_frame_id: t for topic in ("/tf", "/tf_static") for m in bag[topic] for t in m.transforms}
     assert set(found) == names

@@ -122,6 +122,17 @@ def test_objects_are_markers_that_keep_their_numbers_and_are_deleted() -> None:
     }  # fmt: skip
 
 
+def test_polylines_are_lines_thinner_than_walls() -> None:
+    made, bend = topics(), {"number": 3, "points": [[1.0, 0.0], [2.0, 0.0], [2.0, 1.0]], "probability": 0.9}
+    (markers,) = of(made.take(state(objects=[WALL]), 100.0, 100.0, [bend])[1], "objects")
+    wall, drawn = markers["markers"]
+    assert (drawn["ns"], drawn["id"], drawn["type"]) == ("polyline", 3, STRIP)
+    assert drawn["points"] == [{"x": 1.0, "y": 0.0}, {"x": 2.0, "y": 0.0}, {"x": 2.0, "y": 1.0}]
+    assert drawn["scale"]["x"] < wall["scale"]["x"]
+    (markers,) = of(made.take(state(10.2), 100.2, 100.2)[1], "objects")
+    assert ("polyline", 3) in {(m["ns"], m["id"]) for m in markers["markers"] if m["action"] == DELETE}
+
+
 def test_a_model_with_corners_is_its_outline() -> None:
     made = Topics(Frames())
     made.begin(session_info(load_settings("hallway", ["models=box"]), name=None, emulated=True, units="m"))
