@@ -75,6 +75,7 @@ class FakeServer:
     changed: list[tuple[str, Any]] = field(default_factory=list)
     areas: list[list[float]] = field(default_factory=list)
     canyons: list[dict[str, Any]] = field(default_factory=list)
+    polylines: list[dict[str, Any]] = field(default_factory=list)
     cross_paths: list[dict[str, Any]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
@@ -164,7 +165,7 @@ class FakeServer:
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
         frame = self.hall.frame(self.cycle) | stopped | self.robot() | {
             "type": "state", "flags": self.flags, "areas": self.areas, "canyons": self.canyons, "segments": segments,
-            "cross_paths": self.cross_paths,
+            "cross_paths": self.cross_paths, "polylines": self.polylines,
             "drive_request": self.drive_request, "dropped": 0,
             "controller": self.controller == client.number, "playback": self.playback,
         }  # fmt: skip

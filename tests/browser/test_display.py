@@ -39,6 +39,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     server.drive_request = {"kind": "goal", "x": 3.0, "y": 0.3}
     server.areas = [[1, 2.0, 0.0, 0.5]]
     server.canyons = [{"number": 1, "mouth": [2.0, 1.0, 2.0, -1.0], "axis": 0.0, "depth": 3.0, "probability": 0.95}]
+    server.polylines = [{"number": 1, "points": [[1.0, 0.2], [1.5, 0.5], [1.4, 0.9]], "probability": 0.9}]
     server.cross_paths = [{"robot_s": 8.5, "pose": [2.5, 0.0, 0.0, 0.0], "paths": [[6, 7, 0.6], [6, 5, 0.6]]}]
     server.cycle = 150
     opened = await opener.open(server.url, SMALL)
@@ -52,7 +53,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     await fall_silent(server, opened)
     boxes = opened.page.locator("#layers input")
     names = await opened.page.locator("#layers label").all_inner_texts()
-    assert len(names) == 23
+    assert len(names) == 24
     assert [name for name in names if "arc" in name or "beam" in name] == [
         "arcs of recent echoes",
         "beams firing now",

@@ -144,6 +144,22 @@ export function drawModels(f) {
   ctx.stroke(unsure);
 }
 
+export function drawOutlines(f) {
+  const { ctx, run, theme, px } = f;
+  const sure = new Path2D(),
+    unsure = new Path2D();
+  for (const { points, probability } of run.polylines) {
+    const path = probability >= SURE ? sure : unsure;
+    points.forEach(([x, y], i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
+  }
+  f.inWorld();
+  ctx.strokeStyle = theme.model;
+  ctx.lineWidth = 1.5 * px;
+  ctx.stroke(sure);
+  ctx.setLineDash([6 * px, 4 * px]);
+  ctx.stroke(unsure);
+}
+
 export function drawEllipses(f) {
   const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;

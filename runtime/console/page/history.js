@@ -21,6 +21,7 @@ const LEFT_OUT = new Set([
   "sensors",
   "segments",
   "archived",
+  "polylines",
   "steps",
   "way",
   "number",

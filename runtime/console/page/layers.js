@@ -9,7 +9,15 @@ import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
 import { drawMapFrame, drawRobot, drawVectors, drawGoal, drawValley, trailDrawer } from "./draw_motion.js";
 import { drawMission } from "./draw_mission.js";
 import { drawPlaces } from "./draw_places.js";
-import { drawAreas, drawClusters, drawEllipses, drawEvidence, drawLabels, drawModels } from "./draw_objects.js";
+import {
+  drawAreas,
+  drawClusters,
+  drawEllipses,
+  drawEvidence,
+  drawLabels,
+  drawModels,
+  drawOutlines,
+} from "./draw_objects.js";
 import { AGE_LEGEND, segmentsDrawer } from "./draw_segments.js";
 import { prefer, preferred } from "./preferences.js";
 
@@ -54,6 +62,15 @@ const TABLE = [
     drawModels,
     true,
     "M20 3a7 7 0 1 1-.1 0Z",
+    "model",
+  ],
+  [
+    "outlines",
+    "front",
+    "outlines of what is not straight (dashed: uncertain)",
+    drawOutlines,
+    true,
+    "M4 14c6-9 10 4 16-4s8-8 16-3",
     "model",
   ],
   [

@@ -63,6 +63,7 @@ export class RunState extends Emitter {
   fresh = false; // whether a state has arrived since the session began
   received_ms = null;
   archived = []; // objects left behind; a frame lists them when they have changed
+  polylines = []; // outlines of what is not straight, likewise
   segments = new Map();
   segmentsVersion = 0;
   trail = [];
@@ -135,6 +136,7 @@ export class RunState extends Emitter {
     const switched =
       !this.fresh || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
     this.archived = frame.archived ?? this.archived;
+    this.polylines = frame.polylines ?? this.polylines;
     state.objects = [...state.objects, ...this.archived].sort(
       (a, b) => (a.number ?? Infinity) - (b.number ?? Infinity),
     ); // frames list them by score, which changes
