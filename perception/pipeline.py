@@ -228,7 +228,7 @@ class Perception:
 
     def polylines(self) -> tuple[Polyline, ...]:
         """Return what is not straight; without correction the same tuple until it changes."""
-        return self.map_frame.polylines_in_odometry(())
+        return self.map_frame.polylines_in_odometry(self.vacant.polylines_outside(()))
 
     def vacant_areas(self) -> tuple[VacantArea, ...]:
         """Return the areas in which nothing stands, in odometry's frame."""

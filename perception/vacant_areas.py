@@ -13,6 +13,7 @@ import numpy as np
 
 from perception.bounds import COUNT, PLACE, bounds, up_to
 from perception.detected_object import DetectedObject
+from perception.polyline import Polyline
 
 AREAS_MAX: Final = 64
 """Greatest number of areas."""
@@ -66,6 +67,8 @@ class VacantAreas:
         self.last = 0
         self._archived: tuple[DetectedObject, ...] = ()
         self._archived_seen: tuple[DetectedObject, ...] = ()
+        self._polylines: tuple[Polyline, ...] = ()
+        self._polylines_seen: tuple[Polyline, ...] = ()
 
     def mark(self, x: float, y: float, radius: float, detected: int = NO_OBJECT) -> str | None:
         """Add an area; return None, or why there is no room for it.
@@ -131,6 +134,15 @@ class VacantAreas:
             self._archived, self._archived_seen = archived, self.outside(archived)
         return self._archived_seen
 
+    def polylines_outside(self, polylines: tuple[Polyline, ...]) -> tuple[Polyline, ...]:
+        """Return the polylines of which no area contains all points; the same tuple until they change."""
+        if self.count == 0:
+            return polylines
+        if polylines is not self._polylines:
+            self._polylines = polylines
+            self._polylines_seen = tuple(one for one in polylines if not self._contain_all(one))
+        return self._polylines_seen
+
     def clear(self) -> None:
         """Remove all areas; their numbers are not given again."""
         self._keep(np.zeros(0, np.int64))
@@ -138,10 +150,14 @@ class VacantAreas:
     def drop_caches(self) -> None:
         """Discard what was derived from the areas."""
         self._archived = self._archived_seen = ()
+        self._polylines = self._polylines_seen = ()
 
     def _contain(self, x: float, y: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         rows = self.rows[: self.count]
         return np.hypot(rows["x"] - x, rows["y"] - y) <= rows["radius"]
+
+    def _contain_all(self, polyline: Polyline) -> bool:
+        return bool(np.all([self._contain(x, y) for x, y in polyline.points.tolist()], axis=0).any())
 
     def _keep(self, kept: np.ndarray[tuple[int], np.dtype[np.int64]]) -> None:
         self.rows[: len(kept)] = self.rows[kept]

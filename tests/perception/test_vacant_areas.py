@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from perception.edits import LiftArea, MarkVacant, MoveObject, PlaceModel, Rejec
 from perception.pipeline import Perception
 from perception.vacant_areas import AREAS_MAX, RADIUS_MIN_M, VacantAreas, invalid_area, radius_of
 from tests.perception.edited import DRUM, again, at, hear, number_of, there
+from tests.polylines import BEND
 
 
 def drum(number: int | None, x: float, y: float) -> DetectedObject:
@@ -107,3 +109,17 @@ def test_an_area_is_marked_by_hand_and_left_by_what_is_moved_into_it(seen: Perce
 
 def there_model(seen: Perception) -> str:
     return seen._models[0].name
+
+
+def test_a_polyline_is_hidden_where_an_area_contains_all_of_it() -> None:
+    areas, polylines = VacantAreas(), (BEND, replace(BEND, number=4, points=BEND.points + 5.0))
+    assert areas.polylines_outside(polylines) is polylines
+    areas.mark(1.0, 0.0, 1.2)
+    areas.mark(2.0, 1.0, 0.5)
+    shown = areas.polylines_outside(polylines)
+    assert shown == polylines, "each area contains a part of it only"
+    assert areas.polylines_outside(polylines) is shown, "the same tuple until it changes"
+    areas.mark(1.5, 0.5, 0.8)
+    assert areas.polylines_outside(polylines) == polylines[1:]
+    areas.lift(3)
+    assert areas.polylines_outside(polylines) == polylines
