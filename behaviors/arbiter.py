@@ -2,7 +2,8 @@
 
 Most schemas request a direction (`arbitrate`). Teleoperation requests a velocity (`limit_velocity`), which echoes can
 only reduce. With incomplete or invalid inputs the decision is to stop. Neither moves the robot towards a direction in
-which the ring has not looked (`behaviors.field_of_view`), and neither chatters (`behaviors.commitment`).
+which the ring has not looked (`behaviors.surroundings.field_of_view`), and neither chatters
+(`behaviors.memory.commitment`).
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
-from behaviors.clearance import stoppable_speed_m_s
-from behaviors.commitment import Commitment
-from behaviors.field_of_view import UnseenWay, angle_to_look, seen_speed_m_s, unseen_way
+from behaviors.memory.commitment import Commitment
 from behaviors.response import Response, summed
+from behaviors.surroundings.clearance import stoppable_speed_m_s
+from behaviors.surroundings.field_of_view import UnseenWay, angle_to_look, seen_speed_m_s, unseen_way
 from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
 from perception.percept import Percept, Twist, wrap_angle

@@ -7,7 +7,7 @@ the goal's direction is free. What closes the way is
 
 - echoes ahead;
 - the mouth of a known canyon (`perception.percept.Canyon`): a virtual wall for a goal that does not lie behind it;
-- what may be a canyon's back, far ahead (`behaviors.blocked_ahead`).
+- what may be a canyon's back, far ahead (`behaviors.surroundings.blocked_ahead`).
 
 A robot inside a known canyon leaves it, however free its goal's direction is there. One so narrow that both sides
 are within the room that is kept is left by its middle line: what is heard at the ends of its walls is placed on the
@@ -26,11 +26,20 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from behaviors.blocked_ahead import Ahead, Block, between, blocked_ahead, outline, pocket_ahead, presume, widen
-from behaviors.clearance import free_paths_m
-from behaviors.near_memory import NearEchoes, places, remember
+from behaviors.memory.near_memory import NearEchoes, places, remember
 from behaviors.response import Response
 from behaviors.steady_heading import turned_towards
+from behaviors.surroundings.blocked_ahead import (
+    Ahead,
+    Block,
+    between,
+    blocked_ahead,
+    outline,
+    pocket_ahead,
+    presume,
+    widen,
+)
+from behaviors.surroundings.clearance import free_paths_m
 from config.behaviors import LeaveCanyonConfig
 from config.bounded import Coordinate, Count
 from config.robot import PASSAGE_M

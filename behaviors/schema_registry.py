@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 from behaviors.approach_object import approach_object
 from behaviors.avoid_past import avoid_past
 from behaviors.follow_wall import follow_wall
-from behaviors.goal_place import GoalPlace, goal_place
+from behaviors.memory.goal_place import GoalPlace, goal_place
 from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal, move_to_goal

@@ -11,9 +11,9 @@ import math
 from dataclasses import replace
 from typing import Final
 
-from behaviors.clearance import free_path_m
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene
+from behaviors.surroundings.clearance import free_path_m
 from config.mission_step import WanderUse
 
 SCHEMA: Final = "wander"

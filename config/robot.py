@@ -7,9 +7,9 @@ from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from config.arcos import ArcosConfig
-from config.rflex import RflexConfig
-from config.ros2 import Ros2Config
+from config.families.arcos import ArcosConfig
+from config.families.rflex import RflexConfig
+from config.families.ros2 import Ros2Config
 from config.strict import Strict, TomlList
 
 SOUND_SPEED_M_S = 343.0

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from behaviors.approach_object import matching
-from behaviors.goal_progress import Fault
+from behaviors.memory.goal_progress import Fault
+from behaviors.memory.way_progress import GROUND_M, NEARER_M
 from behaviors.missions.mission import VISITED_MAX, Mission, Progress, goes_to, held
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene, Visited
 from behaviors.schema_registry import SCHEMAS
-from behaviors.way_progress import GROUND_M, NEARER_M
 from config.mission_step import HELPERS, Condition, SchemaUse, SeenCondition, UnseenCondition
 from perception.percept import Pose
 

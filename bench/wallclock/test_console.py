@@ -18,7 +18,7 @@ from config.settings import LogConfig
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run_settings import with_port
+from runtime.cli.commands.run.run_settings import with_port
 from runtime.console.console import Console
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode

@@ -17,7 +17,7 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run_settings import with_port
+from runtime.cli.commands.run.run_settings import with_port
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.logs import open_log

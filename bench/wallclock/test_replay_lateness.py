@@ -14,7 +14,7 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run_settings import with_port
+from runtime.cli.commands.run.run_settings import with_port
 from runtime.console.files.jobs import Jobs
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.cycle.modes import Mode

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from runtime.recording.ring_log import read_ring_log, write_ring_log
-from tests.runtime.cli.commands.test_experiment import experiment
+from tests.runtime.cli.commands.experiments.test_experiment import experiment
 from tests.runtime.recording.test_ring_log import firing
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.arcos import ArcosConfig
+from config.families.arcos import ArcosConfig
 from drivers.arcos.frames import Sip
 from drivers.messages import Flags, Odometry, Pose, Twist
 

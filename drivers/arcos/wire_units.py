@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from config.arcos import DISCS_MAX
+from config.families.arcos import DISCS_MAX
 from config.robot import BodyConfig, RobotConfig
 from drivers.arcos.commands import Command, CommandNumber
 from drivers.arcos.frames import ConfigPacket, Sip, SipFlags

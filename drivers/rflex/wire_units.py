@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from config.rflex import BANKS_MAX
+from config.families.rflex import BANKS_MAX
 from config.robot import RingConfig, RobotConfig
 from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError, firing_pattern

@@ -37,7 +37,7 @@ times in 100, and by chance three times in 100 something at its distance, as the
 SURE_NAT: Final = 2.0 * HIT_NAT
 """Two echoes are as sure as it gets, so that a wall that has left is soon forgotten."""
 KEPT_M: Final = 2.5
-"""A look counts while the robot is within this of where it looked, m; as `behaviors.near_memory`."""
+"""A look counts while the robot is within this of where it looked, m; as `behaviors.memory.near_memory`."""
 AGAIN_SHARE: Final = 0.5
 """Once a direction ahead is unknown, those count as unknown, too, that were looked in farther away than this share of
 `KEPT_M`: so the robot looks round in one place."""

@@ -76,7 +76,12 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType({
     },
 })  # fmt: skip
 """Groups of commands, and the first line of each command's docstring, so that a list of them imports none."""
-FUNCTIONS: Final = MappingProxyType({"init": "init:app", "map": "map_run:map_run"})
+FUNCTIONS: Final = MappingProxyType({
+    "calibrate": "robots.calibrate:calibrate", "experiment": "experiments.experiment:experiment",
+    "firmware": "robots.firmware:firmware", "init": "init:app", "map": "map_run:map_run",
+    "probe": "robots.probe:probe", "replay": "replay.replay:replay", "ring-test": "robots.ring_test:ring_test",
+    "ros2-robot": "robots.ros2_robot:ros2_robot", "run": "run.run:run",
+})  # fmt: skip
 """Where in `runtime.cli.commands` a command is, unless it is the function and the module of its own name."""
 
 

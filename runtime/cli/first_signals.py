@@ -6,7 +6,7 @@ import os
 import signal
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a start. A run handles them itself: see `runtime.cli.commands.run_process.signals`."""
+"""Signals that end a start. A run handles them itself: see `runtime.cli.commands.run.run_process.signals`."""
 EXIT_CODE_BASE = 128
 """Exit code of a program that a signal ended, less the signal's number, as shells count."""
 

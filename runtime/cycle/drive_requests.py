@@ -13,7 +13,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import AfterValidator
 
-from behaviors.goal_place import GOAL_SLEW_M_S, GoalPlace, goal_place
+from behaviors.memory.goal_place import GOAL_SLEW_M_S, GoalPlace, goal_place
 from behaviors.missions.mission import Mission, MissionEdit, continued, edit_refusal, edited, progress_problem
 from behaviors.missions.mission import after_stop as mission_after_stop
 from behaviors.move_to_goal import Goal

@@ -9,9 +9,9 @@ from typing import Final
 from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.field_of_view import unseen_way
 from behaviors.follow_valley import SCHEMA as VALLEY
 from behaviors.leave_canyon import SCHEMA as CANYON
+from behaviors.memory.way_progress import ENDED_S
 from behaviors.missions.drive_mission import drive_mission, given_up
 from behaviors.missions.mission import Mission
 from behaviors.move_ahead import SCHEMA as AHEAD
@@ -20,9 +20,9 @@ from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response, summed
 from behaviors.schema_call import ODOM_FRAME, Scene
+from behaviors.surroundings.field_of_view import unseen_way
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, blocked_by, is_expired, teleoperation
 from behaviors.turn import is_aligned
-from behaviors.way_progress import ENDED_S
 from config.mission import StepConfig
 from config.settings import Settings
 from drivers.messages import Pose, Twist

@@ -21,18 +21,18 @@ from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
 from perception.edits import Edit, Evidence
-from runtime.cycle.alerts import Alerts
 from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINK_RECEIVE
 from runtime.cycle.connection import Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
-from runtime.cycle.line_log import LineLog
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
-from runtime.cycle.mode_log import ModeLog
+from runtime.cycle.logs.alerts import Alerts
+from runtime.cycle.logs.line_log import LineLog
+from runtime.cycle.logs.mode_log import ModeLog
+from runtime.cycle.logs.object_log import ObjectLog
 from runtime.cycle.modes import Mode, ModeState
-from runtime.cycle.object_log import ObjectLog
 from runtime.cycle.preparation import Preparation, RunningPreparation, fresh_state
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary

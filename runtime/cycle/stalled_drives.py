@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from behaviors.commitment import Commitment
+from behaviors.memory.commitment import Commitment
+from behaviors.memory.way_progress import ENDED_S, STALLED_S, WayProgress
 from behaviors.missions.mission import Mission
 from behaviors.move_ahead import Leg, along_m, given_up
 from behaviors.move_to_goal import Goal
-from behaviors.way_progress import ENDED_S, STALLED_S, WayProgress
 from config.behaviors import MoveAheadConfig
 from perception.percept import Pose
 from runtime.cycle.drive_requests import DriveRequest, Legs

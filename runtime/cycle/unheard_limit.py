@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Final
 
-from behaviors.clearance import stoppable_speed_m_s
+from behaviors.surroundings.clearance import stoppable_speed_m_s
 from config.settings import Settings
 from drivers.messages import Twist
 from perception.percept import Floats, Percept

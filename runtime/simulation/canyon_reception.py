@@ -23,7 +23,7 @@ BACK: Final = 1
 """The back among the walls of a canyon."""
 IN_TIME_M: Final = 1.0
 """A back is heard in time if it is heard so far before the mouth: an echo counts once it has stayed for .4 m of the
-way (`behaviors.blocked_ahead.STAYS_FOR_M`), and at .3 m/s and .3 rad/s a turn by 90° takes .6 m."""
+way (`behaviors.surroundings.blocked_ahead.STAYS_FOR_M`), and at .3 m/s and .3 rad/s a turn by 90° takes .6 m."""
 
 
 def back_heard_m(settings: Settings, place: CanyonWorld) -> float | None:

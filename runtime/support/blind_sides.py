@@ -1,6 +1,7 @@
 """The directions in which a ring never looks, and what they forbid: the texts of `check`, `init` and `run`.
 
-The rule is that of each cycle (`behaviors.field_of_view`): the robot drives only towards where the ring has looked.
+The rule is that of each cycle (`behaviors.surroundings.field_of_view`): the robot drives only towards where the ring
+has looked.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from behaviors.field_of_view import path_half_angle_rad, seen_speed_m_s
+from behaviors.surroundings.field_of_view import path_half_angle_rad, seen_speed_m_s
 from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from perception.percept import Pose

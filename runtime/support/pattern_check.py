@@ -1,7 +1,7 @@
 """Whether a robot with its firing pattern sees where it drives.
 
-A pattern is judged by the same rule as each cycle (`behaviors.field_of_view`), with the oldest looks that it ever
-leaves: those of sensors that are just about to report again.
+A pattern is judged by the same rule as each cycle (`behaviors.surroundings.field_of_view`), with the oldest looks
+that it ever leaves: those of sensors that are just about to report again.
 """
 
 from __future__ import annotations
@@ -11,7 +11,13 @@ from typing import Final
 
 import numpy as np
 
-from behaviors.field_of_view import listed, oldest_look_s, path_half_angle_rad, seen_speed_m_s, unseen_way
+from behaviors.surroundings.field_of_view import (
+    listed,
+    oldest_look_s,
+    path_half_angle_rad,
+    seen_speed_m_s,
+    unseen_way,
+)
 from config.settings import Settings
 from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensors, time_of_flight_s
 from drivers.registry import make_driver

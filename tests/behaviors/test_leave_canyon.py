@@ -12,9 +12,9 @@ import pytest
 from behaviors.arbiter import Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.blocked_ahead import Block
 from behaviors.leave_canyon import NO_DETOUR, SCHEMA, Detour, is_closed, leave_canyon
 from behaviors.move_to_goal import Goal, move_to_goal
+from behaviors.surroundings.blocked_ahead import Block
 from config.behaviors import BehaviorsConfig, LeaveCanyonConfig
 from perception.percept import Canyon, Floats, OccupancyWindow, Percept, Pose
 from tests.behaviors.hall import BODY, STEP_S, World, clamp, echoes

@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import pytest
 
-from behaviors.goal_place import GOAL_SLEW_M_S
+from behaviors.memory.goal_place import GOAL_SLEW_M_S
 from behaviors.schema_registry import SCHEMAS
 from config.mission_step import SchemaUse
 from perception.percept import Pose

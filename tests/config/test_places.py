@@ -9,7 +9,7 @@ from config.load import ConfigError, load_settings, load_world, parse_text, with
 from config.mission import MissionConfig
 from config.places import PlacesConfig
 from runtime.cli.commands.check import check
-from runtime.cli.commands.run_settings import SettingsFiles
+from runtime.cli.commands.run.run_settings import SettingsFiles
 
 MAP = """
 [[wall]]

@@ -16,7 +16,7 @@ from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.cli.commands.run_settings import with_port
+from runtime.cli.commands.run.run_settings import with_port
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess

@@ -42,7 +42,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "drivers/firing_pattern.py": ("tests/drivers/test_firing_pattern.py",),
     "behaviors/arbiter.py": (
         "tests/behaviors/test_arbiter.py",
-        "tests/behaviors/test_field_of_view.py",
+        "tests/behaviors/surroundings/test_field_of_view.py",
         "tests/behaviors/test_teleoperation.py",
     ),
     "runtime/cycle/modes.py": ("tests/runtime/cycle/test_modes.py",),

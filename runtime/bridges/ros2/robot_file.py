@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from config.ros2 import SENSORS_MAX
+from config.families.ros2 import SENSORS_MAX
 from drivers.ros_tf import Frame
 
 DEPTH_MAX: Final = 32

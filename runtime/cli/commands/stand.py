@@ -9,9 +9,9 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from config.errors import DONE, FAILED, UserError
-from runtime.cli.commands.calibrate import read_firings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.commands.robots.calibrate import read_firings
 from runtime.cli.options import Force, JsonFile, RobotFile, UnitsOption
 from runtime.cli.source_options import File, LogOptions
 from runtime.recording.conventions.options import AUTO, RingLogOptions

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from config.arcos import ArcosConfig
+from config.families.arcos import ArcosConfig
 from config.load import load_robot
 from drivers.arcos.odometer import Odometer
 from drivers.messages import Flags, Odometry

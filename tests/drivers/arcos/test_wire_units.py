@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from config.arcos import ArcosConfig
+from config.families.arcos import ArcosConfig
 from config.load import load_robot
 from config.robot import FiringConfig, RobotConfig
 from drivers.arcos.commands import Command, CommandNumber

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from behaviors.commitment import FAINT_RAD_S
+from behaviors.memory.commitment import FAINT_RAD_S
 from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate

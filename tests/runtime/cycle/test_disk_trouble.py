@@ -23,7 +23,7 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Drive, Frame, Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.cli.commands.run_recording import RunRecording, open_run_recording
+from runtime.cli.commands.run.run_recording import RunRecording, open_run_recording
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import pytest
 
+from behaviors.memory.way_progress import GROUND_M, NEARER_M
 from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
-from behaviors.way_progress import GROUND_M, NEARER_M
 from config.load import load_settings
 from drivers.messages import Pose
 from runtime.cycle.inputs import Request

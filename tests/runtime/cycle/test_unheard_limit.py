@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from behaviors.clearance import stoppable_speed_m_s
+from behaviors.surroundings.clearance import stoppable_speed_m_s
 from config.load import load_settings
 from drivers.messages import Twist
 from perception.percept import Percept, Pose

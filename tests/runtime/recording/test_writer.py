@@ -15,7 +15,7 @@ from config.load import load_settings
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
 from runtime.cli.app import run_command
-from runtime.cli.commands.run_recording import RunRecording, open_run_recording
+from runtime.cli.commands.run.run_recording import RunRecording, open_run_recording
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, decode
 from runtime.recording.reader import open_recording

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from behaviors.field_of_view import path_half_angle_rad, seen_speed_m_s
+from behaviors.surroundings.field_of_view import path_half_angle_rad, seen_speed_m_s
 from config.errors import UserError
 from config.load import load_settings
 from config.robot import SensorConfig

@@ -11,7 +11,7 @@ import orjson
 import pytest
 
 from behaviors.follow_valley import Valley
-from behaviors.goal_progress import Progress
+from behaviors.memory.goal_progress import Progress
 from behaviors.valley.look_ahead import Search
 from config.load import load_settings
 from drivers.driver import LineState, Received

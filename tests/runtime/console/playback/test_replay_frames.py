@@ -11,7 +11,7 @@ import pytest
 
 from config.load import load_settings
 from perception.edits import DeleteSegments
-from runtime.cli.commands.serve_console import REPLAY_PROGRAM
+from runtime.cli.commands.run.serve_console import REPLAY_PROGRAM
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_frames import make_replay_frames

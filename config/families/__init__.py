@@ -1,0 +1,1 @@
+"""The keys that only one family of robots has."""

@@ -1,0 +1,1 @@
+"""`echolocate experiment`: the paper's experiments and others, in virtual time."""

@@ -1,0 +1,1 @@
+"""`echolocate replay`: of a recording, and of a ring log."""

@@ -1,0 +1,106 @@
+"""`echolocate replay`: a recording cycle by cycle, or perception over a ring log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from config.errors import WRONG_CALL, UserError
+from runtime.cli.options import Flag, Force, JsonFile, ModelFiles, RobotFile, Sets, UnitsOption
+from runtime.cli.source_options import LogOptions
+from runtime.recording.conventions.options import AUTO
+
+
+def replay(
+    log: str,
+    /,
+    *,
+    verify: Annotated[bool, Flag] = False,
+    other: Annotated[str | None, Parameter(name="--with")] = None,
+    since: Annotated[float, Parameter(name="--from", show_default=False)] = 0.0,
+    until: Annotated[float | None, Parameter(name="--to")] = None,
+    speed: float | None = None,
+    localize: Annotated[bool, Flag] = False,
+    trajectory: str | None = None,
+    map_file: Annotated[str | None, Parameter(name="--map")] = None,
+    robot: RobotFile = None,
+    model: ModelFiles = (),
+    json: JsonFile = None,
+    force: Force = False,
+    units: UnitsOption = "m",
+    options: LogOptions = AUTO,
+    sets: Sets = (),
+) -> int:
+    """Replay a recording cycle by cycle, or run perception over a ring log.
+
+    Parameters
+    ----------
+    log
+        Recording (MCAP), or ring log (CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…).
+    verify
+        Fail unless every cycle is reproduced bit by bit.
+    other
+        Compare with the run under the settings of this run file. So does --set.
+    since
+        Start this many seconds after the first recorded cycle.
+    until
+        End this many seconds after the first recorded cycle.
+    speed
+        Show the run this many times as fast as it was; by default it is replayed as fast as possible.
+    localize
+        Correct the drift of a ring log's odometry by what is recognised; objects are then in the map frame, which is
+        the odometry's at the first row.
+    map_file
+        With --localize, the known room: a world file, or the name of a shipped one. The start is then unknown, and
+        the map frame is the file's.
+    trajectory
+        With --localize, a file for the robot's poses in the map frame (CSV), one row a firing.
+    robot
+        Robot file for a ring log; a recording contains its robot.
+    model
+        Object models to recognise in a ring log; a recording contains its models.
+    json
+        File for a summary (JSON); None for no file.
+    force
+        Overwrite files that exist already.
+    units
+        Units of the printed tables.
+    options
+        The conventions of a ring log.
+    sets
+        Single settings, each `path=value`, that differ from the recorded or default ones.
+
+    Raises
+    ------
+    UserError
+        An option that applies to recordings only is given with a ring log.
+    """
+    from runtime.recording.reader import is_recording
+
+    if trajectory is not None and not localize:
+        raise UserError("--trajectory gives poses in the map frame: give --localize too", WRONG_CALL)
+    if map_file is not None and not localize:
+        raise UserError("--map names the room in which the robot is: give --localize too", WRONG_CALL)
+    if localize and is_recording(Path(log)):
+        raise UserError(f"{log}: is a recording; --localize applies to ring logs only", WRONG_CALL)
+    if is_recording(Path(log)):
+        options.refuse_for(log)
+        from runtime.cli.commands.replay.replay_recording import Span, replay_recording
+
+        return replay_recording(
+            log, sets, span=Span(since, until, speed), verify=verify, other=other, robot=robot, models=model,
+            json_file=json, force=force, units=units,
+        )  # fmt: skip
+    if verify or other is not None or since or until is not None or speed is not None:
+        raise UserError(
+            f"{log}: is a ring log; --verify, --with, --from, --to and --speed apply to recordings (MCAP) only",
+            WRONG_CALL,
+        )
+    from runtime.cli.commands.replay.replay_ring_log import replay_log
+
+    return replay_log(
+        log, sets, robot=robot, models=model, json_file=json, force=force, units=units, localize=localize,
+        trajectory=trajectory, map_file=map_file, options=options,
+    )  # fmt: skip

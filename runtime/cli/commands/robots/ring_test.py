@@ -1,0 +1,46 @@
+"""`echolocate ring-test`: each sensor by itself, and the motors."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+from config.errors import WRONG_CALL, UserError
+from runtime.cli.options import Count, Flag, RobotFile
+
+
+def ring_test(
+    port: str | None = None,
+    /,
+    *,
+    robot: RobotFile = None,
+    rounds: Count = 20,
+    move: Annotated[bool, Flag] = False,
+) -> int:
+    """Fire each sensor of a robot by itself and report what it hears; with `--move`, try its motors.
+
+    Parameters
+    ----------
+    port
+        Serial port of the robot; by default that of the robot file, or the only one of this computer.
+    rounds
+        How often each sensor fires.
+    move
+        Turn the wheels as well, for a second in each direction: put the robot on a block first.
+
+    Raises
+    ------
+    UserError
+        There is no robot, or it does not answer.
+    """
+    import asyncio
+
+    from config.load import load_settings
+    from runtime.cli.commands.robots.ring_trial import RingTest, one_at_a_time, only_port
+
+    if rounds < 1:
+        raise UserError("--rounds: must be at least 1", WRONG_CALL)
+    config = load_settings(None, (), robot=robot)
+    link = config.link.model_copy(update={"port": port or config.link.port or only_port()})
+    test = RingTest(one_at_a_time(config.model_copy(update={"link": link})), sys.stdout.write)
+    return asyncio.run(test.run(rounds, move=move))

@@ -1,0 +1,194 @@
+"""The robot's process in `echolocate run`, with live view, console, signals and keys."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from config.settings import Settings
+from runtime.cli.commands.foxglove import foxglove_beside
+from runtime.cli.commands.run.run_recording import RunRecording
+from runtime.cli.first_signals import is_remembered
+from runtime.cli.start_signals import handled_by_loop
+from runtime.support.kernel_loader import KernelPreparation
+from runtime.support.length_format import Units
+from runtime.support.logs import LogStatus
+from runtime.support.restart import Restart
+from runtime.support.sd_notify import SdNotifier
+from runtime.support.user_folders import state_folder
+from runtime.timing.run_clock import RunClock
+
+if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
+    from drivers.driver import RobotDriver
+    from runtime.cycle.line_messages import LineMessages
+    from runtime.cycle.process import OnCycle, RobotProcess
+    from runtime.cycle.reloader import Reloader
+    from runtime.cycle.step import CycleRecord, State
+    from runtime.cycle.summary import RunSummary
+    from runtime.timing.cycle_stats import CycleStats
+    from runtime.timing.time_control import TimeControl
+
+
+def import_rest() -> None:
+    """Import what a run uses beside its cycles; that takes a third of a second."""
+    import runtime.cli.commands.run.serve_console
+    import runtime.cycle.process  # noqa: F401 - for the modules alone
+
+
+async def run_process(
+    settings: Settings,
+    log: FilteringBoundLogger,
+    console: Console,
+    *,
+    clock: RunClock,
+    control: TimeControl,
+    live: bool,
+    units: Units,
+    recording: RunRecording,
+    log_status: LogStatus,
+    arm: bool,
+    seconds: float | None,
+    foxglove: bool,
+    restart: Restart,
+    emulated: bool,
+    preparation: KernelPreparation | None,
+    line_messages: LineMessages,
+    reload: Callable[[], Settings],
+) -> RunSummary:
+    """Run the robot's process with live view, console, signals and keys; return the summary of the run.
+
+    Parameters
+    ----------
+    settings, log, clock
+        As of `runtime.cycle.process.RobotProcess`.
+    console : rich.console.Console
+        The terminal.
+    control : TimeControl
+        Of the run.
+    live : bool
+        Whether the live view is shown.
+    units : {"m", "ft"}
+        Units of view and console.
+    recording : RunRecording
+        Of the run.
+    log_status : LogStatus
+        Of the run's log.
+    arm, seconds
+        As of `runtime.cycle.process.RobotProcess.run`.
+    foxglove : bool
+        Whether the run is served to Foxglove.
+    restart : Restart
+        Is asked to start the run again.
+    emulated : bool
+        Whether the robot is emulated.
+    preparation : KernelPreparation, optional
+        Prepares recognition beside the run; None if it is ready.
+    line_messages : LineMessages
+        About the line.
+    reload : callable
+        Reads the settings again.
+    """
+    from runtime.cli.terminal.keys import keys
+    from runtime.cli.terminal.time_keys import TimeKeys
+    from runtime.cli.terminal.view import View, after_each_cycle
+    from runtime.cycle.callbacks import VIEW
+    from runtime.cycle.process import RobotProcess
+    from runtime.cycle.reloader import Reloader
+    from runtime.support.kernel_loader import KernelLoader
+
+    async with contextlib.AsyncExitStack() as stack:
+        view = View(settings, console, units) if live else None
+        listeners: list[OnCycle] = []
+
+        def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
+            for listener in listeners:
+                listener(record, state, stats, driver)
+
+        observers = recording.observers(on_cycle, log)
+        process = RobotProcess(
+            settings, log, observers, clock, stack.enter_context(SdNotifier.from_environment()), preparation,
+            line_messages,
+        )  # fmt: skip
+        if view is not None:
+            listeners.append(after_each_cycle(process.timing_monitor.timed(VIEW, view.on_cycle)))
+        if preparation is not None:
+            stack.push_async_callback(preparation.close)
+        kernel_loader = KernelLoader(log, preparation=preparation)
+        reloader = Reloader(process.live_settings, reload, log, kernel_loader)
+        if settings.log.webhook is not None:
+            from runtime.support.webhook import Webhook
+
+            hook = Webhook(settings.log.webhook, settings.log.webhook_period_s, settings.robot.name or "the robot")
+            stack.enter_context(hook.sending())
+            log_status.listeners.append(hook.on_log)
+            stack.callback(log_status.listeners.remove, hook.on_log)
+        if settings.console.enabled:
+            from runtime.cli.commands.run.local_runs import shown_local_runs
+            from runtime.cli.commands.run.network_presence import on_the_network
+            from runtime.cli.commands.run.serve_console import serve_console
+            from runtime.support.console_address import announced
+
+            page = await stack.enter_async_context(
+                serve_console(
+                    process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units,
+                    reload=reload, restart=restart,
+                )
+            )  # fmt: skip
+            log_status.listeners.append(page.hub.on_log)
+            stack.callback(log_status.listeners.remove, page.hub.on_log)
+            listeners.append(page.on_cycle)
+            stack.enter_context(announced(page.url, folder := state_folder()))
+            await stack.enter_async_context(shown_local_runs(page.url, folder, page.show_local_runs))
+            presence = await stack.enter_async_context(on_the_network(page, process, settings.console, log))
+            if presence is not None:
+                listeners.append(presence.on_cycle)
+            if foxglove:
+                await stack.enter_async_context(foxglove_beside(page.url, log))
+            if view is not None:
+                for line in page.hints():
+                    console.print(line, markup=False, highlight=False, soft_wrap=True)
+                view.console_url = page.url
+        stack.enter_context(signals(process, reloader))
+        if view is not None:
+            view.is_paused = lambda: control.is_paused
+            clock.on_change(view.draw_again)
+            stack.enter_context(view.shown())
+            stack.enter_context(keys(process.request, process.stop, TimeKeys(control, log).press))
+            process.health.watch("view", view.probe)
+        for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():
+            process.health.watch(name, probe)
+        summary = await process.run(arm=arm, seconds=seconds)
+        summary["process"]["compilations"] -= kernel_loader.loaded  # they delayed no cycle
+        return summary
+
+
+@contextlib.contextmanager
+def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
+    """Handle signals during a run: INT and TERM end it, USR1 arms the robot, USR2 halts it, HUP reloads the settings.
+
+    A USR2 that came during the start halts the robot before its first cycle, so that it is not armed by itself.
+    If the reloaded configuration is wrong, the errors go to the log and the settings in force remain.
+    """
+    from runtime.cycle.inputs import Request
+
+    handlers: dict[signal.Signals, Callable[[], None]] = {
+        signal.SIGINT: process.stop,
+        signal.SIGTERM: process.stop,
+        signal.SIGUSR1: lambda: process.request(Request.ARM),
+        signal.SIGUSR2: lambda: process.request(Request.HALT),
+        signal.SIGHUP: reloader.request,
+    }
+    halting = signal.getsignal(signal.SIGUSR2)
+    with handled_by_loop(handlers):
+        if is_remembered(halting):
+            process.request(Request.HALT)
+        try:
+            yield
+        finally:
+            reloader.cancel()

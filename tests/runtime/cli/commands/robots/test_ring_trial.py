@@ -1,0 +1,186 @@
+"""`echolocate ring-test`: what is found out about sensors and motors, and the whole command on the real firmware."""
+
+from __future__ import annotations
+
+import math
+import os
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from config.errors import DONE, FAILED, UserError
+from config.files import list_shipped
+from config.load import load_robot, load_settings
+from config.robot import FiringConfig, RingConfig
+from drivers.emulator.faults import Fault, StuckSensor
+from drivers.messages import Flags, Odometry, Pose, Twist
+from drivers.registry import make_device
+from runtime.cli.app import run_command
+from runtime.cli.commands.robots import ring_trial
+from runtime.cli.commands.robots.ring_trial import RingTest, judge_motion, judge_sensor, one_at_a_time, only_port
+from tests.drivers.firmware.board import install, start
+from tests.runtime.virtual_time import MemoryLink, VirtualLoop
+
+INF = math.inf
+RING = RingConfig(
+    count=12,
+    radius_m=0.09,
+    beam_half_angle_deg=15.0,
+    resolution_m=0.003,
+    range_min_m=0.02,
+    range_max_m=4.0,
+    firing=FiringConfig(preset="quadrants"),
+)
+TIMEOUT_S = 120.0
+
+
+@pytest.mark.parametrize(
+    ("ranges", "is_good", "said"),
+    [
+        ([], False, "NO ANSWER"),
+        ([1.0] * 15, False, "15 times of 20"),
+        ([INF] * 20, True, "hears nothing"),
+        ([1.0, 1.003] * 10, True, "1.002 m, 20 echoes of 20, within 3 mm"),
+        ([1.0] * 19 + [3.0], True, "within 0 mm"),
+        ([1.0] * 20, False, "STUCK at 1.0000 m"),
+        ([0.1] * 20, True, "always the same: see that it changes"),
+        ([0.0017] * 20, False, "TOO SHORT, 0.0017 m, in 20 of 20 firings"),
+        ([0.0017] * 3 + [1.0, 1.003] * 8 + [1.0], True, "1.000 m"),
+        ([0.0] * 20, False, "ZERO in 20 of 20"),
+        ([0.0] * 10 + [1.0, 1.003] * 5, False, "ZERO in 10 of 20"),
+        ([4.0] * 20, False, "AT ITS MAXIMUM, 4.000 m, in 20 of 20"),
+        ([1.0, 1.5] * 8 + [INF] * 4, True, "16 echoes of 20, unsteady by 0.50 m"),
+    ],
+)
+def test_what_is_found_out_about_a_sensor(ranges: list[float], is_good: bool, said: str) -> None:
+    finding = judge_sensor(ranges, 20, RING, unsteadiness=0.01)
+    assert finding.is_good is is_good
+    assert said in finding.text
+
+
+def odometry(x: float, y: float, theta: float) -> Odometry:
+    return Odometry(0.0, Pose(x, y, theta), theta, Twist(0.0, 0.0), Flags.NONE, 0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "after", "flags", "is_good"),
+    [
+        (Twist(0.1, 0.0), (0.0, 0.09, math.pi / 2), Flags.NONE, True),
+        (Twist(0.1, 0.0), (0.09, 0.0, math.pi / 2), Flags.NONE, False),
+        (Twist(-0.1, 0.0), (0.0, 0.1, math.pi / 2), Flags.NONE, False),
+        (Twist(0.0, 0.6), (0.0, 0.0, math.pi / 2 + 0.5), Flags.NONE, True),
+        (Twist(0.0, 0.6), (0.0, 0.0, math.pi / 2 - 0.5), Flags.NONE, False),
+        (Twist(0.1, 0.0), (0.0, 0.09, math.pi / 2), Flags.MOTOR_FAULT | Flags.LATCHED, False),
+        (Twist(0.1, 0.0), (0.0, 0.0, math.pi / 2), Flags.LATCHED, False),
+    ],
+)
+def test_what_is_found_out_about_a_motion(
+    asked: Twist, after: tuple[float, float, float], flags: Flags, is_good: bool
+) -> None:
+    finding = judge_motion(asked, odometry(0.0, 0.0, math.pi / 2), odometry(*after), flags, 1.0)
+    assert finding.is_good is is_good
+
+
+def test_without_a_port_there_must_be_exactly_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Port:
+        def __init__(self, device: str) -> None:
+            self.device = device
+
+    for names, said in (((), "found none"), (("/dev/b", "/dev/a"), "found /dev/a, /dev/b")):
+        monkeypatch.setattr(ring_trial, "comports", lambda names=names: [Port(name) for name in names])
+        with pytest.raises(UserError, match=said):
+            only_port()
+    monkeypatch.setattr(ring_trial, "comports", lambda: [Port("/dev/ttyACM0")])
+    assert only_port() == "/dev/ttyACM0"
+
+
+def reports_of(
+    robot: str, monkeypatch: pytest.MonkeyPatch, *faults: Fault, move: bool = False
+) -> tuple[int, list[str]]:
+    """Test a shipped robot in virtual time, given what fails; return the exit code and the lines."""
+    loop, said = VirtualLoop(), list[str]()
+    config = load_settings("room", ("link.port=memory",), robot=robot)
+    assert config.world is not None
+    device = make_device(config, config.world, 3, faults=faults)
+    monkeypatch.setattr(ring_trial, "Link", lambda *args: MemoryLink(device, loop, *args))
+    try:
+        test = RingTest(one_at_a_time(config), said.append, loop.time)
+        code = loop.run_until_complete(test.run(10, move=move))
+    finally:
+        loop.close()
+    return code, [line for line in said if not line.startswith("note: ")]
+
+
+ROBOTS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver != "ros2")
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is_found(
+    robot: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = load_robot(robot)
+    count = len(config.ring.mounts)
+    code, lines = reports_of(robot, monkeypatch)
+    assert code == DONE, lines
+    assert sum(line.startswith("sensor ") for line in lines) == count
+    for sensor, range_m, said in (
+        (min(count, 24) - 1, 0.1 * config.ring.range_min_m, ("TOO SHORT",)),
+        (0, 0.0, ("ZERO", "TOO SHORT", "NO ANSWER")),  # a driver drops a 0 that its protocol does not have
+        (min(count, 24) // 2, config.ring.range_max_m, ("AT ITS MAXIMUM", "hears nothing", "NO ANSWER")),
+    ):
+        fault = StuckSensor(kind="stuck_sensor", at_s=0.0, duration_s=1e3, sensor=sensor, range_m=range_m)
+        code, lines = reports_of(robot, monkeypatch, fault)
+        (found,) = (line for line in lines if line.startswith(f"sensor {sensor:2}"))
+        assert any(each in found for each in said), found
+        assert code == FAILED or "hears nothing" in found
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_motors_of_every_shipped_robot_are_good(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    code, lines = reports_of(robot, monkeypatch, move=True)
+    assert code == DONE, lines
+
+
+@pytest.fixture
+def plugged(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Yield the arguments that name a robot with the real firmware on a pty.
+
+    On a busy machine the firmware's start takes longer than a board's, and so do its firings.
+    """
+    monkeypatch.setattr("runtime.cycle.connection.CONNECT_MAX_S", TIMEOUT_S)
+    monkeypatch.setattr(ring_trial, "SLACK_S", TIMEOUT_S)
+    install(tmp_path, "pico", request.param)
+    assert run_command(["firmware", "--board", "pico", "--out", str(tmp_path / "files")]) == DONE
+    board, port = os.openpty()
+    tty.setraw(port)
+    process = start(tmp_path, "realtime.py", stdin=board, stdout=board)
+    yield [os.ttyname(port), "--robot", str(tmp_path / "files" / "robot.toml")]
+    process.kill()
+    process.wait()
+    os.close(board)
+    os.close(port)
+
+
+@pytest.mark.parametrize("plugged", ["FAKE_DEAD = (3,)"], indirect=True)
+def test_a_dead_sensor_of_the_real_firmware_is_found(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert run_command(["ring-test", *plugged, "--rounds", "2"]) == FAILED
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("robot 'ring' on ")
+    assert "NO ANSWER" in lines[4]
+    assert not any("NO ANSWER" in line for line in (*lines[1:4], *lines[5:13]))
+    assert len(lines) == 13, "and no wheel has turned"
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("plugged", [""], indirect=True)
+def test_the_motors_of_the_real_firmware(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert run_command(["ring-test", *plugged, "--rounds", "2", "--move"]) == DONE
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[13].startswith("WARNING: the wheels turn in")
+    assert [line.split(":")[0] for line in lines[14:18]] == [
+        "motors forward", "motors backward", "motors left (counter-clockwise from above)", "motors right",
+    ]  # fmt: skip

@@ -1,0 +1,84 @@
+"""The signals of a run: requests while it lasts, and a halt from before it."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from runtime.cli.commands.run.run_process import signals
+from runtime.cli.first_signals import ENDING, Remembered
+from runtime.cycle.inputs import Request
+from tests.hil.machine import TIMEOUT_S
+
+
+class StubProcess:
+    """Notes what it is asked for."""
+
+    def __init__(self) -> None:
+        self.asked: asyncio.Queue[object] = asyncio.Queue()
+
+    def request(self, request: Request) -> None:
+        self.asked.put_nowait(request)
+
+    def stop(self) -> None:
+        self.asked.put_nowait("stop")
+
+
+class StubReloader:
+    """Notes its requests in the process's queue."""
+
+    def __init__(self, asked: asyncio.Queue[object]) -> None:
+        self.asked = asked
+        self.is_cancelled = False
+
+    def request(self) -> None:
+        self.asked.put_nowait("reload")
+
+    def cancel(self) -> None:
+        self.is_cancelled = True
+
+
+@pytest.fixture
+def _handlers_restored() -> Iterator[None]:
+    handlers = {number: signal.getsignal(number) for number in (*ENDING, signal.SIGUSR1, signal.SIGUSR2)}
+    yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_handlers_restored")
+async def test_signals_are_requests_while_the_run_lasts() -> None:
+    process = StubProcess()
+    reloader = StubReloader(process.asked)
+    expected = {
+        signal.SIGINT: "stop",
+        signal.SIGTERM: "stop",
+        signal.SIGUSR1: Request.ARM,
+        signal.SIGUSR2: Request.HALT,
+        signal.SIGHUP: "reload",
+    }
+    with signals(process, reloader):  # type: ignore[arg-type]
+        for number, asked in expected.items():
+            signal.raise_signal(number)
+            assert await asyncio.wait_for(process.asked.get(), TIMEOUT_S) == asked
+    assert reloader.is_cancelled
+    for number in ENDING:
+        with pytest.raises(SystemExit) as ended:  # a second one ends an end that takes long
+            signal.raise_signal(number)
+        assert ended.value.code == 128 + number
+    assert {signal.getsignal(number) for number in expected.keys() - {*ENDING}} == {signal.SIG_DFL}
+
+
+@pytest.mark.promise("P19")
+@pytest.mark.usefixtures("_handlers_restored")
+async def test_a_halt_from_before_the_run_stops_it_from_arming_the_robot() -> None:
+    process = StubProcess()
+    for number in (signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(number, Remembered())
+        signal.raise_signal(number)
+    with signals(process, StubReloader(process.asked)):  # type: ignore[arg-type]
+        assert process.asked.get_nowait() is Request.HALT
+    assert process.asked.empty(), "no robot is armed later than it was asked for"

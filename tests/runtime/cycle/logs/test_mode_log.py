@@ -1,0 +1,35 @@
+"""The log of modes: bounded for a robot that loses and regains its line in every cycle."""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import structlog
+
+from runtime.cycle.logs.mode_log import LINES_BURST, LINES_PER_S, STOP_REASONS_MAX, ModeLog
+from runtime.cycle.modes import Mode, ModeState
+from runtime.support.sd_notify import SdNotifier
+
+
+@pytest.mark.promise("P22")
+def test_a_robot_that_changes_the_mode_in_every_cycle_fills_neither_log_nor_memory() -> None:
+    lines: list[dict[str, Any]] = []
+
+    def keep(_logger: object, _name: str, event: Any) -> Any:
+        lines.append(dict(event))
+        raise structlog.DropEvent
+
+    log = ModeLog(structlog.wrap_logger(None, processors=[keep]), SdNotifier())
+    seconds = 600
+    for k in range(20 * seconds):
+        mode = ModeState(Mode.SAFE_STOP if k % 2 else Mode.READY, 0.05 * k, f"reason {k}")
+        state: Any = SimpleNamespace(mode=mode, cycle=k)
+        log.entered(state, 0.05 * k)
+    assert len(lines) <= LINES_BURST + LINES_PER_S * seconds
+    assert len(lines) + sum(line.get("suppressed_before", 0) for line in lines) >= 20 * (seconds - 1)
+    assert len(log.stop_reasons) == STOP_REASONS_MAX
+    assert log.stop_reasons[-1] == f"reason {20 * seconds - 1}"
+    assert re.fullmatch(r"reason \d+", lines[-1]["reason"])
