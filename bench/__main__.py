@@ -25,7 +25,9 @@ from bench.map_commands import (
     false_walls,
     free_cells,
     grid,
+    imperfect_rooms,
     map_size,
+    range_statistics,
     standing,
     walls,
 )
@@ -273,6 +275,8 @@ for command in (
     false_walls,
     false_canyons,
     free_cells,
+    imperfect_rooms,
+    range_statistics,
     standing,
     grid,
 ):

@@ -9,7 +9,9 @@ from rich.console import Console
 
 from bench.in_rooms import BY_BAYES, try_in_rooms
 from bench.table import report, rows_table, wide
+from bench.trials.imperfect_rooms import MODELS
 from config.load import load_settings
+from config.units import FOOT_M
 from runtime.support.kernel_cache import EMULATOR, GRIDS, use_kernel_cache
 from runtime.support.kernel_warmup import prepare_kernels
 
@@ -244,4 +246,82 @@ def false_drums(
     return try_in_rooms(
         lambda settings, tell: measure(settings, seeds, max(0.01, minutes), furniture, tell),
         lambda rows: rows_table(title, rows), json, BY_BAYES,
+    )  # fmt: skip
+
+
+def imperfect_rooms(
+    *,
+    json: str = "imperfect_rooms.json",
+    rooms: int = 10,
+    first: int = 0,
+    drums: int = 3,
+    step: float = 0.2,
+    models: tuple[str, ...] = tuple(MODELS),
+    hall_seeds: int = 0,
+) -> int:
+    """Measure what is found in furnished, imperfect rooms by rays, cones, mirrors, a mixture of them and pose jitter.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms.
+    first
+        Seed of the first room.
+    drums
+        Drums in each room; 0: what is reported as one is false.
+    step
+        Distance between two firings of one sensor, ft.
+    models
+        By which acoustics the rooms are heard.
+    hall_seeds
+        In place of rooms, drive down the paper's hall of six drums with this many seeds, by rays and cone, with the
+        Denning and a Pioneer.
+    """
+    use_kernel_cache()
+    from bench.imperfect_rooms import measure, measure_halls
+
+    if hall_seeds > 0:
+        return try_in_rooms(
+            lambda _, tell: measure_halls(range(first, first + hall_seeds), tell),
+            lambda rows: rows_table("the paper's hall, by rays in the beam", rows), json, BY_BAYES,
+        )  # fmt: skip
+    seeds = range(first, first + max(1, rooms))
+    return try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, models, step * FOOT_M, drums, tell),
+        lambda rows: rows_table(f"furnished, imperfect rooms, {step:g} ft", rows), json, BY_BAYES,
+    )  # fmt: skip
+
+
+def range_statistics(
+    *,
+    json: str = "range_statistics.json",
+    rooms: int = 20,
+    first: int = 0,
+    models: tuple[str, ...] = ("cone", "mirrors", "mixture"),
+    real: Path | None = None,
+) -> int:
+    """Compare the ranges of generated rooms with those of real drives: silence, late echoes, jumps, repeats, spread.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms.
+    first
+        Seed of the first room.
+    models
+        By which acoustics the rooms are heard.
+    real
+        Folder of the real drives; without it what is known of them.
+    """
+    use_kernel_cache()
+    from bench.range_statistics import measure
+
+    seeds = range(first, first + max(1, rooms))
+    return try_in_rooms(
+        lambda _, tell: measure(seeds, models, real, tell),
+        lambda rows: rows_table("ranges of real drives and of generated rooms", rows), json, parts=(EMULATOR,),
     )  # fmt: skip

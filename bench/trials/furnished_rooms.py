@@ -83,6 +83,21 @@ def furnished_room(seed: int, acoustics: AcousticsConfig = ACOUSTICS) -> Furnish
     rng = np.random.default_rng(np.random.SeedSequence([seed, 14]))
     width_m, depth_m, turn_rad = (float(rng.uniform(*span)) for span in (WIDTH_M, DEPTH_M, (-math.pi, math.pi)))
     room = FurnishedRoom(WorldConfig(), width_m, depth_m, turn_rad)
+    world = WorldConfig(wall=tuple(walls_with_openings(rng, room)), acoustics=acoustics)
+    world = world.model_copy(update={"drum": _drums(rng, room, compile_scene(world))})
+    return FurnishedRoom(world, width_m, depth_m, turn_rad)
+
+
+def walls_with_openings(rng: np.random.Generator, room: FurnishedRoom) -> list[WallConfig]:
+    """Return the walls of a skewed rectangle, counter-clockwise; half of them have a doorway.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Of the skew and the doorways.
+    room : FurnishedRoom
+        The rectangle.
+    """
     corners = [
         np.array(room.place(a, b)) + rng.uniform(-SKEW_M, SKEW_M, 2)
         for a, b in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
@@ -90,9 +105,7 @@ def furnished_room(seed: int, acoustics: AcousticsConfig = ACOUSTICS) -> Furnish
     walls: list[WallConfig] = []
     for begin, end in zip(corners, [*corners[1:], corners[0]], strict=True):
         walls += _wall_with_opening(rng, begin, end)
-    world = WorldConfig(wall=tuple(walls), acoustics=acoustics)
-    world = world.model_copy(update={"drum": _drums(rng, room, compile_scene(world))})
-    return FurnishedRoom(world, width_m, depth_m, turn_rad)
+    return walls
 
 
 def _wall_with_opening(rng: np.random.Generator, begin: Floats, end: Floats) -> list[WallConfig]:

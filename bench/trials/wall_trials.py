@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -189,6 +189,8 @@ class Heard:
         The true corners and edges.
     echoes : tuple of int
         The echoes that came from each of them.
+    points : (n, 2) float
+        Where all echoes truly came from, m.
     """
 
     firings: tuple[Firing, ...]
@@ -196,9 +198,12 @@ class Heard:
     answered: tuple[Floats, ...]
     corners: tuple[Corner, ...]
     echoes: tuple[int, ...]
+    points: Floats = field(default_factory=lambda: np.empty((0, 2)))
 
 
-def listen(ring: RingConfig, room: FurnishedRoom, seed: int, step_m: float) -> Heard:
+def listen(
+    ring: RingConfig, room: FurnishedRoom, seed: int, step_m: float, poses: Floats | None = None
+) -> Heard:  # fmt: skip
     """Drive through a room and return what is heard.
 
     An echo that drops out, or in whose place a wrong range is reported, is not heard.
@@ -213,31 +218,33 @@ def listen(ring: RingConfig, room: FurnishedRoom, seed: int, step_m: float) -> H
         Of the drive and of the noise.
     step_m : float
         Distance between two firings of one sensor.
+    poses : (n, 3) float, optional
+        Where the ring fires, m and rad; by default along a drive of the seed.
     """
     acoustics, scene, pattern = room.world.acoustics, compile_scene(room.world), firing_pattern(ring)
     sonar = Sonar(ring, scene, acoustics, np.random.default_rng([seed, 9]))
     sets = [sensors(mask) for mask in pattern.masks]
-    masks = [np.isin(np.arange(len(ring.mounts)), fired) for fired in sets]
     length_m = DENSE_DRIVE_M if step_m < DENSE_STEP_M else DRIVE_M
     relative, least_m = acoustics.noise_relative, HEARD_SIGMAS * acoustics.noise_m + ring.resolution_m
     firings, points = [], []
-    for k, (x, y, yaw) in enumerate(drive(room, seed, step_m / len(sets), length_m).tolist()):
+    poses = drive(room, seed, step_m / len(sets), length_m) if poses is None else poses
+    for k, (x, y, yaw) in enumerate(poses.tolist()):
         pose = Pose(x, y, yaw)
-        true = sonar.true_echoes(pose, yaw, masks[k % len(sets)]).copy()
-        ranges = sonar.fire(pose, yaw, sets[k % len(sets)])
+        ranges, true = sonar.fire(pose, yaw, sets[k % len(sets)]), sonar.echoes
         is_heard = np.isfinite(ranges) & np.isclose(ranges, true["distance"], HEARD_SIGMAS * relative, least_m)
         points.append(np.column_stack([true["x"], true["y"]])[is_heard])
         firings.append(Firing(k * ring.firing.step_period_s, pose, yaw, ranges))
     walls = tuple(Segment(np.array([w.x1_m, w.y1_m]), np.array([w.x2_m, w.y2_m])) for w in room.world.wall)
     corners, heard = tuple(true_corners(walls)), np.concatenate(points)
     echoes = tuple(int((np.hypot(*(heard - (it.x, it.y)).T) < ON_WALL_M).sum()) for it in corners)
-    return Heard(tuple(firings), walls, tuple(_answered(wall, heard) for wall in walls), corners, echoes)
+    answered = tuple(_answered(a, heard, b.bend_m) for a, b in zip(walls, room.world.wall, strict=True))
+    return Heard(tuple(firings), walls, answered, corners, echoes, heard)
 
 
-def _answered(wall: Segment, points: Floats) -> Floats:
-    """Return where a wall answers with echoes from these points, shape (n, 2)."""
+def _answered(wall: Segment, points: Floats, bend_m: float) -> Floats:
+    """Return where a wall answers with echoes from these points, shape (n, 2), if it bends by this much."""
     off, along = wall.off_and_along(points)
-    is_on = (np.abs(off) < ON_WALL_M) & (along > -ON_WALL_M) & (along < wall.length_m + ON_WALL_M)
+    is_on = (np.abs(off) < abs(bend_m) + ON_WALL_M) & (along > -ON_WALL_M) & (along < wall.length_m + ON_WALL_M)
     return np.sort(along[is_on].clip(0.0, wall.length_m))
 
 
