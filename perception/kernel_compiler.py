@@ -14,19 +14,24 @@ from typing import Any, Final
 
 import numpy as np
 from llvmlite.binding import Linkage
-from numba.core import compiler, event, sigutils, typed_passes, types, typing, untyped_passes
-from numba.core.caching import FunctionCache
+from numba.core import compiler, config, event, sigutils, typed_passes, types, typing, untyped_passes
+from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.np.numpy_support import from_struct_dtype, map_layout
 
+from perception.kernel_digest import KernelDigests, tools_digest
+
 Untyped = Any
 """What numba gives no types to."""
 
 Args = tuple[Untyped, ...]
 """Numba's types of the arguments of a call."""
+
+NAME_DIGITS: Final = 32
+"""Hexadecimal digits of a kernel's digest in the name of its file."""
 
 _unliteral: Final[Callable[[object], object]] = types.unliteral
 
@@ -137,26 +142,64 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no types
         return key, compiled.signature
 
 
+@functools.cache
+def _digests() -> KernelDigests:
+    return KernelDigests(tools_digest(globals()))
+
+
 class _KernelCache:
-    """The files of a kernel that allocates nothing; numba's own looks for them before anybody has called it."""
+    """The files of a kernel, one for each type of its arguments, named by the digest of what it is made of.
 
-    def __init__(self, function: Callable[..., object]) -> None:
-        self._function = function
+    Parameters
+    ----------
+    kernel : KernelDispatcher
+        The kernel.
+    allocates : bool
+        Whether it allocates. Then numba first loads everything that compiling needs, its allocator among it, which
+        takes a fifth of a second.
+    """
 
-    @functools.cached_property
-    def _files(self) -> FunctionCache:
-        return FunctionCache(self._function)
+    def __init__(self, kernel: KernelDispatcher, *, allocates: bool) -> None:
+        self._kernel = kernel
+        self._allocates = allocates
 
     def load_overload(self, sig: Untyped, target_context: Untyped) -> Untyped:
-        """Return the compiled code for a signature, None if it is not there.
-
-        Numba's own first loads everything that compiling needs, which takes a fifth of a second.
-        """
-        return self._files._load_overload(sig, target_context)
+        """Return the compiled code for a signature, None if it is not there."""
+        if self._allocates:
+            target_context.refresh()
+        try:
+            data = _files()._load_data(self._name(sig, target_context))
+        except FileNotFoundError:
+            return None
+        return compiler.CompileResult._rebuild(target_context, *data)
 
     def save_overload(self, sig: Untyped, compiled: Untyped) -> None:
         """Keep the compiled code for a signature."""
-        self._files.save_overload(sig, compiled)
+        if not compiled.library.has_dynamic_globals:
+            _Folder().ensure_cache_path()
+            _files()._save_data(self._name(sig, compiled.target_context), compiled._reduce())
+
+    def _name(self, sig: Untyped, target_context: Untyped) -> str:
+        args, _ = sigutils.normalize_signature(sig)
+        processor = target_context.codegen().magic_tuple()
+        digest = _digests().of(self._kernel, f"{processor} {args}")
+        return f"{self._kernel.__module__}.{self._kernel.__name__}-{digest[:NAME_DIGITS]}.nbc"
+
+
+class _Folder(UserProvidedCacheLocator):  # type: ignore[misc]  # numba has no types
+    """Numba's cache folder, without its folders by the places of sources."""
+
+    def __init__(self) -> None:
+        pass
+
+    def get_cache_path(self) -> str:
+        return str(config.CACHE_DIR)
+
+
+@functools.cache
+def _files() -> IndexDataCacheFile:
+    """Return what reads and writes files in numba's cache folder, each of them whole; the index of it is not used."""
+    return IndexDataCacheFile(config.CACHE_DIR, "", "")
 
 
 @functools.cache
@@ -172,10 +215,7 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no typ
         super().__init__(function, targetoptions={"nopython": True, **options})
         self._compiler = _Compiler(function, self.targetdescr, self.targetoptions, self.locals, _Pipeline)
         self._inner: dict[Args, tuple[object, Untyped]] = {}
-        if options.get("_nrt", True):
-            self.enable_caching()  # numba's own also sets up its allocator
-        else:
-            self._cache = _KernelCache(function)
+        self._cache = _KernelCache(self, allocates=bool(options.get("_nrt", True)))
 
     def typeof_pyval(self, val: object) -> Untyped:
         """Return the type of an argument."""

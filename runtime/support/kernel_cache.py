@@ -1,8 +1,9 @@
 """The cache of compiled kernels: its folder, and which parts of it a run needs.
 
 Numba's own cache lies beside the sources, does not notice a change in another file, and fails where it cannot write.
-So each version of the sources gets a folder of its own in the user's cache, named by a digest of their content, and
-one process compiles everything before the next starts.
+So kernels are in the user's cache, each named by a digest of all that it depends on (`perception.kernel_digest`): all
+copies and versions of the sources share what they have in common. Within, each version of the sources has a folder
+whose files say which parts of it are compiled, so that nothing is imported to know it.
 """
 
 from __future__ import annotations
@@ -65,17 +66,18 @@ PARTS: Final = (EMULATOR, RING, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM
 """What is compiled separately: what keeps the ring's echoes and finds false ones, without which no robot drives; a
 method by its name, what the Bayesian method needs beyond it for polygons, the emulator, the correction of drift,
 finding the robot in a known room, the choice of a valley, and each kind of evidence grid. A file with the name of a
-part in the cache folder says that it is compiled."""
+part in the folder of `use_kernel_cache` says that it is compiled."""
 
 COMPILED_SUFFIX: Final = ".compiled"
-"""Ending of empty files in the cache folder, one for each kernel that was compiled, from which progress is shown."""
+"""Ending of empty files in the folder of `use_kernel_cache`, one for each kernel that was compiled; progress is
+shown from them."""
 
 PRIVATE: Final = 0o700
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 
 
 def kernels_key() -> str:
-    """Return a digest of everything that compiled kernels depend on: the sources, Python, numba and numpy."""
+    """Return a digest of everything that compiled kernels may depend on: the sources, Python, numba and numpy."""
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")  # not part of numba's own key
     digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{checked}".encode())
     for package in PACKAGES:
@@ -87,7 +89,7 @@ def kernels_key() -> str:
 
 
 def cache_folder() -> Path:
-    """Return a folder for the kernels of these sources that only this user can write; it is created if needed.
+    """Return the folder of all kernels, which only this user can write; it is created if needed.
 
     Numba unpickles what it finds there, so a user who can write into it can run code as this one. It is in the user's
     cache; where that cannot be written or others can write into it, it is a new folder for this process and its
@@ -98,14 +100,12 @@ def cache_folder() -> Path:
     UserError
         Neither can be created.
     """
-    # Numba keeps the kernels of each place of the sources apart, so the marks of compiled parts must be, too.
-    place = hashlib.sha256(os.fsencode(Path(__file__))).hexdigest()[:8]
     own = users_own(user_cache_path)
     if own is not None:
-        folder = own / "kernels" / f"{kernels_key()}-{place}"
+        folder = own / "kernels"
         with contextlib.suppress(OSError):
             folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
-            if all(_is_ours(place) for place in (folder, *folder.parents[:2])):
+            if all(_is_ours(place) for place in (folder, folder.parent)):
                 with tempfile.TemporaryFile(dir=folder):
                     return folder
     try:
@@ -126,8 +126,20 @@ def _is_ours(folder: Path) -> bool:
 
 
 def use_kernel_cache() -> Path:
-    """Set numba's cache folder, unless the environment names one, and return it; call this before importing numba."""
-    return Path(os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder())))
+    """Set numba's cache folder, unless the environment names one; call this before importing numba.
+
+    Returns
+    -------
+    Path
+        The folder in it that says which parts of these sources are compiled.
+    """
+    kernels = os.environ.get("NUMBA_CACHE_DIR")
+    if kernels is None:
+        kernels = os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
+    folder = Path(kernels) / kernels_key()
+    with contextlib.suppress(OSError):  # what writes into it says what is wrong
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def is_interpreted() -> bool:
@@ -146,7 +158,7 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:
-    """Return those parts that are not yet compiled in the cache folder."""
+    """Return those parts that are not yet compiled, as the files in the folder of `use_kernel_cache` say."""
     return [part for part in parts if not (folder / part).exists()]
 
 

@@ -255,7 +255,7 @@ RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
 
 @contextlib.contextmanager
 def marking_compiled_kernels(folder: Path) -> Iterator[None]:
-    """Leave a file in the cache folder for each kernel that is compiled meanwhile."""
+    """Leave a file in this folder for each kernel that is compiled meanwhile."""
     from numba.core import event
 
     class Marker(event.Listener):  # type: ignore[misc]  # numba has no types
@@ -363,7 +363,7 @@ def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> Non
     settings : Settings
         Ring, models and constants of the run.
     folder : Path
-        The cache folder.
+        From `use_kernel_cache`.
     parts : sequence of str
         Of `PARTS`.
     """

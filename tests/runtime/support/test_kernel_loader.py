@@ -33,7 +33,6 @@ class Kernels:
     """Stub of compiling and loading kernels, which take too long for tests."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-        self.folder = folder
         self.preparation = KernelPreparation(())
         self.preparation.is_over.set()
         self.fails = False
@@ -43,6 +42,7 @@ class Kernels:
         self.log = LogCapture()
         monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+        self.folder = kernels.use_kernel_cache()
         monkeypatch.setattr(kernel_loader, "warm_up", self._load)
         monkeypatch.setattr(kernel_loader, "compiled_signatures", lambda: 7 * len(self.loaded))
         log = structlog.wrap_logger(None, processors=[self.log])
@@ -138,10 +138,10 @@ class Compiler:
         self.returncode: int | None = None
         self.words: Sequence[str] = ()
         self.killed: list[Compiler] = []
-        self._folder = folder
         self._parts = parts
         monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+        self._folder = kernels.use_kernel_cache()
         monkeypatch.setattr(kernel_loader, "start_child", self._start)
         monkeypatch.setattr(kernel_loader, "kill_child", self._kill)
         monkeypatch.setattr(kernel_loader, "warm_up", lambda _settings, parts: self.loaded.append(tuple(parts)))
@@ -170,7 +170,7 @@ def test_a_preparation_is_needed_wherever_there_is_a_compiler(
     Compiler(monkeypatch, tmp_path, ())
     assert isinstance(kernel_loader.begin_preparation(ROUND), KernelPreparation)
     for part in needed_parts(ROUND):
-        (tmp_path / part).touch()
+        (kernels.use_kernel_cache() / part).touch()
     assert isinstance(kernel_loader.begin_preparation(ROUND), KernelPreparation)
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     assert kernel_loader.begin_preparation(BOXES) is None
@@ -193,7 +193,7 @@ async def test_a_preparation_compiles_in_another_process_and_loads_the_rest(
 async def test_where_all_is_compiled_no_process_is_started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     compiler = Compiler(monkeypatch, tmp_path, ())
     for part in (EMULATOR, BAYES):
-        (tmp_path / part).touch()
+        (kernels.use_kernel_cache() / part).touch()
     preparation = KernelPreparation((EMULATOR, BAYES))
     await preparation(ROUND)
     await preparation.close()
@@ -210,7 +210,7 @@ async def test_what_the_first_cycle_needs_is_compiled_in_a_thread_of_this_proces
         lambda *call: happened.append((*call, threading.current_thread() is threading.main_thread())),
     )  # fmt: skip
     await KernelPreparation((EMULATOR, RING, BAYES)).ring(ROUND)
-    assert happened == [(ROUND, tmp_path, [RING], False)]
+    assert happened == [(ROUND, kernels.use_kernel_cache(), [RING], False)]
 
 
 async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -239,7 +239,7 @@ def test_another_process_compiles_all_that_belongs_to_polygons(tmp_path: Path) -
         return done.stdout
 
     run("-m", "runtime.support.kernel_warmup", POLYGONS, "whole")
-    assert kernels.uncompiled_parts(tmp_path, [POLYGONS]) == []
+    assert kernels.uncompiled_parts(tmp_path / kernels.kernels_key(), [POLYGONS]) == []
     assert run("-c", LOADS) == "[]\n"
 
 
