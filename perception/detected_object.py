@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import numpy as np
+
+from drivers.messages import Pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,3 +68,18 @@ class MapCounts(NamedTuple):
     """Objects that the robot has left behind."""
     waiting: int = 0
     """Of these, objects near the robot for which the arrays have no room."""
+
+
+def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
+    """Return an object in another frame, in which the present origin lies at `to`."""
+    if to == Pose(0.0, 0.0, 0.0):
+        return seen
+    place = to.compose(Pose(seen.x, seen.y, seen.theta))
+    if seen.covariance is None:
+        return replace(seen, x=place.x, y=place.y, theta=place.theta)
+    xx, xy, yy = seen.covariance
+    c, s = math.cos(to.theta), math.sin(to.theta)
+    turn = np.array([[c, -s], [s, c]])
+    turned = turn @ np.array([[xx, xy], [xy, yy]]) @ turn.T
+    covariance = (float(turned[0, 0]), float(turned[0, 1]), float(turned[1, 1]))
+    return replace(seen, x=place.x, y=place.y, theta=place.theta, covariance=covariance)

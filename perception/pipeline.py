@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from config.model import ModelConfig
 from config.robot import PASSAGE_M, RingConfig
@@ -33,24 +33,26 @@ from perception.edits import (
 )
 from perception.kernel import Floats
 from perception.localization.equal_edit import edit_equally
-from perception.localization.known_room.known_room import KnownRoom, place_robot
 from perception.localization.localized_pose import LocalizedPose
 from perception.localization.odometry_frame import OdometryFrame
 from perception.mapping.canyons import ENDS_M, CanyonMap
-from perception.mapping.grid.evidence_grid import EvidenceGrid
 from perception.method import Method
 from perception.no_method import NOT_READY, NoMethod
 from perception.obstacle_echoes.fresh_echoes import FreshEchoes
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
 from perception.polyline import Polyline
-from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room
+from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room, place_robot
 from perception.ring_faults.monitor import RingMonitor
 from perception.sensor_faults.monitor import SensorMonitor
 from perception.sensor_faults.report import SensorReport
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.snapshot import Snapshot, put_back, snapshot_of
 from perception.vacant_areas import VacantArea, VacantAreas
+
+if TYPE_CHECKING:
+    from perception.localization.known_room.known_room import KnownRoom
+    from perception.mapping.grid.evidence_grid import EvidenceGrid
 
 __all__ = ["DetectedObject", "Perception"]
 

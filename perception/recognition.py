@@ -12,6 +12,8 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from config.world import WorldConfig
+from drivers.messages import Pose
+from perception.edits import PlaceRobot, invalid_pose
 from perception.localization.odometry_frame import OdometryFrame
 from perception.no_method import NoMethod
 
@@ -59,3 +61,13 @@ def find_in_room(room: WorldConfig | None, ring: RingConfig) -> KnownRoom | None
     from perception.localization.room.room import room_of
 
     return KnownRoom(room_of(room), ring)
+
+
+def place_robot(known_room: KnownRoom | None, edit: PlaceRobot) -> str | None:
+    """Take an operator's place of the robot as right; return None, or why not, as text for the operator."""
+    if known_room is None:
+        return "there is no known room: start with --map, or load a map"
+    refused = invalid_pose(edit.x, edit.y, edit.theta)
+    if refused is None:
+        known_room.assume(Pose(edit.x, edit.y, edit.theta))
+    return refused

@@ -12,13 +12,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final, TypeAlias
 
-import numpy as np
-
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.reports.object_report import worst_sigma
-from perception.detected_object import DetectedObject
+from perception.detected_object import DetectedObject, turned_object
 from perception.edits import (
     Evidence,
     MarkVacant,
@@ -217,18 +215,3 @@ def _placed(seen: DetectedObject, place: LandmarkPlace | None) -> DetectedObject
         return seen
     sigma = worst_sigma(*place.covariance)
     return replace(seen, x=place.x, y=place.y, sigma=sigma, covariance=place.covariance)
-
-
-def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
-    """Return an object in another frame, in which the present origin lies at `to`."""
-    if to == Pose(0.0, 0.0, 0.0):
-        return seen
-    place = to.compose(Pose(seen.x, seen.y, seen.theta))
-    if seen.covariance is None:
-        return replace(seen, x=place.x, y=place.y, theta=place.theta)
-    xx, xy, yy = seen.covariance
-    c, s = math.cos(to.theta), math.sin(to.theta)
-    turn = np.array([[c, -s], [s, c]])
-    turned = turn @ np.array([[xx, xy], [xy, yy]]) @ turn.T
-    covariance = (float(turned[0, 0]), float(turned[0, 1]), float(turned[1, 1]))
-    return replace(seen, x=place.x, y=place.y, theta=place.theta, covariance=covariance)

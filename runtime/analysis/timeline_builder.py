@@ -14,8 +14,7 @@ import numpy as np
 
 from config.world import WorldConfig
 from drivers.messages import Firing, Floats, Odometry, Pose
-from perception.detected_object import DetectedObject
-from perception.localization.map_frame import turned_object
+from perception.detected_object import DetectedObject, turned_object
 from perception.mapping.grid.known_cells import known_cells
 from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception

@@ -13,9 +13,9 @@ import orjson
 from config.errors import FAILED, UserError
 from drivers.driver import RobotDriver
 from drivers.messages import Pose
+from perception.detected_object import DetectedObject, turned_object
 from perception.localization.localized_pose import LocalizedPose, Status
-from perception.localization.map_frame import turned_object
-from perception.pipeline import DetectedObject, Perception
+from perception.pipeline import Perception
 from runtime.cycle.step import State
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow

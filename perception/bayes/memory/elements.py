@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
+from perception.bayes.memory.parameters import POST_RADIUS_M
 from perception.bayes.memory.settings_record import CIRCLES_MAX
 from perception.bounds import RANGE, Bound, Count, Finite, Place
 from perception.records import Record
@@ -104,3 +105,8 @@ class MappedSegment(Record):
     normal_y: Place
     number: Count
     time_s: Place
+
+
+def round_label(radius: float) -> str:
+    """Return the label of a round object of this radius (m) that is not a model."""
+    return "edge" if radius == 0.0 else "post" if radius < POST_RADIUS_M else "barrel"

@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import (
     CIRCLE_INFLATION,
     PLACED_SIGMA_M,
-    POST_RADIUS_M,
     ROOM_CORNER_M,
     UNKNOWN_HITS_MIN,
     WALL_ECHOES_MIN,
@@ -166,11 +166,6 @@ def corner_object(corner: Row) -> DetectedObject:
         "edge" if is_edge == 1 else "inside corner", x, y, 0.0, worst_sigma(xx, xy, yy), int(echoes), probability,
         probability, (xx, xy, yy),
     )  # fmt: skip
-
-
-def round_label(radius: float) -> str:
-    """Return the label of a round object of this radius (m) that is not a model."""
-    return "edge" if radius == 0.0 else "post" if radius < POST_RADIUS_M else "barrel"
 
 
 def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:

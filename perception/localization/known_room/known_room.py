@@ -18,7 +18,6 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, bounds, index_of, up_to
-from perception.edits import PlaceRobot, invalid_pose
 from perception.localization.known_room.background import Background
 from perception.localization.known_room.keyframes import Keyframes
 from perception.localization.known_room.mixed_reflection import LearnedShares
@@ -348,13 +347,3 @@ class KnownRoom:
         self._window_begin = max(min(self._tracked.peak_at + 1, latest), latest + 1 - WINDOW_MAX)
         self._pause_m, self._searched_at_m = SEARCH_M[0], self._keyframes.driven_m
         self._stage = DUE
-
-
-def place_robot(known_room: KnownRoom | None, edit: PlaceRobot) -> str | None:
-    """Take an operator's place of the robot as right; return None, or why not, as text for the operator."""
-    if known_room is None:
-        return "there is no known room: start with --map, or load a map"
-    refused = invalid_pose(edit.x, edit.y, edit.theta)
-    if refused is None:
-        known_room.assume(Pose(edit.x, edit.y, edit.theta))
-    return refused

@@ -35,7 +35,7 @@ def main() -> None:
             elif isinstance(message, Snapshot) and picture is not None:
                 live.update(picture.draw(message), refresh=True)
             elif isinstance(message, str):
-                live.console.print(message)
+                live.console.print(message, markup=False, highlight=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

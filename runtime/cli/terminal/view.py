@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from config.settings import Settings
     from drivers.driver import RobotDriver
+    from runtime.cycle.modes import Mode
     from runtime.cycle.process import OnCycle
     from runtime.cycle.step import CycleRecord, State
     from runtime.support.length_format import Units
@@ -78,6 +79,8 @@ class View:
         self.is_paused: Callable[[], bool] = lambda: False
         """Whether time is paused now."""
         self._lines: deque[str] = deque()
+        self._mode: Mode | None = None
+        """The mode that was drawn last; a new one is drawn at once."""
         self._slot: Snapshot | None = None
         self._stats: CycleStats | None = None
         self._wake = threading.Event()
@@ -104,7 +107,8 @@ class View:
         for firing in record.inputs.received.firings:
             fired = ~np.isnan(firing.ranges_m)
             self._ranges[fired] = firing.ranges_m[fired]
-        if record.cycle % EVERY_CYCLES:
+        is_new, self._mode = record.mode.mode is not self._mode, record.mode.mode
+        if record.cycle % EVERY_CYCLES and not is_new:
             return
         pose = None if state.odometry is None else state.odometry.pose
         if pose is not None:

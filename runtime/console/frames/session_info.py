@@ -12,8 +12,8 @@ from config.mission_step import LABELS
 from config.settings import Settings
 from config.world import StartConfig, WorldConfig
 from drivers.messages import Pose
+from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import RIVAL_RADII_M
-from perception.bayes.reports.object_report import round_label
 from runtime import VERSION
 from runtime.console.commands.parameters import parameters
 from runtime.support.length_format import Units

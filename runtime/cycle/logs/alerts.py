@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from drivers.driver import Received
 from drivers.token_bucket import LineLimit
-from perception.localization.known_room.known_room import KnownRoom
 from perception.localization.localized_pose import Status
 from perception.pipeline import Perception
 from perception.sensor_faults.report import SensorReport
 from runtime.cycle.step import State
+
+if TYPE_CHECKING:
+    from perception.localization.known_room.known_room import KnownRoom
 
 LINES_PER_S: Final = 1.0
 LINES_BURST: Final = 60.0

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.driver import LineState
 from drivers.emulator.faults import Fault, Garbage, OdometryJump, Outliers, StuckSensor
-from perception.localization.map_frame import turned_object
+from perception.detected_object import turned_object
 from runtime.cycle.logs.alerts import Alerts
 from runtime.cycle.modes import Mode
 from tests.runtime.emulated_run import FT, Run, hallway

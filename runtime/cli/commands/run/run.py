@@ -12,16 +12,19 @@ from cyclopts import Parameter
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.cli.options import ConfigFile, Count, Flag, Force, JsonFile, RobotFile, Sets, UnitsOption
+from runtime.timing.memory_policy import no_collection
 
 if TYPE_CHECKING:
     import asyncio
 
     from runtime.cli.commands.run.run_recording import RunRecording
+    from runtime.cli.terminal.view import View
     from runtime.cycle.summary import RunSummary
     from runtime.simulation.emulator_process import EmulatorHandle
     from runtime.timing.time_control import TimeControl
 
 
+@no_collection()
 def run(
     config: ConfigFile = None,
     /,
@@ -109,16 +112,11 @@ def run(
     from runtime.cli.commands.foxglove import check_foxglove
     from runtime.cli.commands.output_files import check_outputs, refuse_existing
     from runtime.cli.commands.run.offer import ask_for_robot, plugged_in
-    from runtime.cli.commands.run.run_process import import_rest, run_process
-    from runtime.cli.commands.run.run_recording import open_run_recording
-    from runtime.cli.commands.run.run_settings import SettingsFiles, with_port
+    from runtime.cli.commands.run.run_settings import SettingsFiles, refuse_impossible, with_port
     from runtime.cli.start_signals import ending_the_start
-    from runtime.cli.tables import objects_table, polylines_line, timing_line, timing_table, walls_table
     from runtime.cli.terminal.escaping_console import EscapingConsole
-    from runtime.support.config_lint import lint_settings
     from runtime.support.file_lock import file_lock
     from runtime.support.kernel_cache import EMULATOR, is_compiled
-    from runtime.support.kernel_loader import begin_preparation
     from runtime.support.logs import LogStatus, log_path, open_log
     from runtime.support.restart import Restart, restart_refusal
     from runtime.timing.run_clock import RunClock, ScaledClock
@@ -129,7 +127,7 @@ def run(
         check_foxglove(no_console=no_console)
     emulator = EmulatorOptions(world, seed, trace, faults, force=force)
     files = SettingsFiles(config, sets, robot, world, map_file, mission, goal, no_console=no_console)
-    settings = files.read()
+    settings = files.read_unchecked()
     console = EscapingConsole(stderr=True)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     if live:
@@ -141,7 +139,7 @@ def run(
         if found is not None:
             port, arm, was_chosen = found.port, False, True
             files = replace(files, robot=found.robot or robot)
-            settings = files.read()
+            settings = files.read_unchecked()
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = with_port(settings, port)
@@ -151,7 +149,6 @@ def run(
         {**own_files, "--trace": trace}, (faults, port), force=force,
         appended={"log.file": log_path(settings.log)},
     )  # fmt: skip
-    preparation = begin_preparation(settings)
     log_status = LogStatus()
     with contextlib.ExitStack() as stack:
         for option, path in own_files.items():
@@ -162,7 +159,6 @@ def run(
 
         async def whole_run() -> tuple[RunSummary, RunRecording]:
             from runtime.simulation.emulator_process import start_emulator
-            from runtime.timing.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
                 running.enter_context(ending_the_start())  # until `signals` takes over
@@ -173,6 +169,21 @@ def run(
                     emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
                     running.push_async_callback(_end_task, emulator_start)
                     await asyncio.sleep(0.0)
+                view: View | None = None
+                if live:
+                    from runtime.cli.terminal.view import View
+
+                    view = View(settings, console, units)
+                    running.enter_context(view.shown())
+                from runtime.cli.commands.run.run_process import import_rest, run_process
+                from runtime.cli.commands.run.run_recording import open_run_recording
+                from runtime.cycle.line_messages import ProgramLine, messages_on
+                from runtime.support.config_lint import lint_settings
+                from runtime.support.kernel_loader import begin_preparation
+                from runtime.timing.time_control import NoTimeControl
+
+                refuse_impossible(settings)
+                preparation = begin_preparation(settings)
                 recording = stack.enter_context(
                     open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)
                 )
@@ -185,8 +196,6 @@ def run(
                 if port is None and plugged:
                     runs = f"`echolocate probe` names the robot, `echolocate run --port {plugged[0]}` runs it"
                     log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
-                from runtime.cycle.line_messages import ProgramLine, messages_on
-
                 run_settings = settings
                 control: TimeControl = NoTimeControl()
                 line_messages = messages_on(port)
@@ -199,7 +208,7 @@ def run(
                     run_settings, control = with_port(settings, emulated.port), emulated.control
                     line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
                 summary = await run_process(
-                    run_settings, log, console, clock=clock, control=control, live=live, units=units,
+                    run_settings, log, clock=clock, control=control, view=view, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
                     foxglove=foxglove, restart=restart, emulated=port is None, preparation=preparation,
                     line_messages=line_messages,
@@ -216,6 +225,8 @@ def run(
         from runtime.cycle.summary import write_json
 
         write_json(json, summary)
+    from runtime.cli.tables import objects_table, polylines_line, timing_line, timing_table, walls_table
+
     output = EscapingConsole()
     output.print(objects_table(summary["objects"], units))
     if summary["walls"]:

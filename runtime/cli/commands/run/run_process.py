@@ -7,8 +7,6 @@ import signal
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from config.settings import Settings
 from runtime.cli.commands.foxglove import foxglove_beside
 from runtime.cli.commands.run.run_recording import RunRecording
@@ -26,6 +24,7 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
+    from runtime.cli.terminal.view import View
     from runtime.cycle.line_messages import LineMessages
     from runtime.cycle.process import OnCycle, RobotProcess
     from runtime.cycle.reloader import Reloader
@@ -44,11 +43,10 @@ def import_rest() -> None:
 async def run_process(
     settings: Settings,
     log: FilteringBoundLogger,
-    console: Console,
     *,
     clock: RunClock,
     control: TimeControl,
-    live: bool,
+    view: View | None,
     units: Units,
     recording: RunRecording,
     log_status: LogStatus,
@@ -67,14 +65,12 @@ async def run_process(
     ----------
     settings, log, clock
         As of `runtime.cycle.process.RobotProcess`.
-    console : rich.console.Console
-        The terminal.
     control : TimeControl
         Of the run.
-    live : bool
-        Whether the live view is shown.
+    view : View, optional
+        The live view, which is shown; None without one.
     units : {"m", "ft"}
-        Units of view and console.
+        Units of the operator console.
     recording : RunRecording
         Of the run.
     log_status : LogStatus
@@ -96,14 +92,13 @@ async def run_process(
     """
     from runtime.cli.terminal.keys import keys
     from runtime.cli.terminal.time_keys import TimeKeys
-    from runtime.cli.terminal.view import View, after_each_cycle
+    from runtime.cli.terminal.view import after_each_cycle
     from runtime.cycle.callbacks import VIEW
     from runtime.cycle.process import RobotProcess
     from runtime.cycle.reloader import Reloader
     from runtime.support.kernel_loader import KernelLoader
 
     async with contextlib.AsyncExitStack() as stack:
-        view = View(settings, console, units) if live else None
         listeners: list[OnCycle] = []
 
         def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
@@ -152,13 +147,12 @@ async def run_process(
                 await stack.enter_async_context(foxglove_beside(page.url, log))
             if view is not None:
                 for line in page.hints():
-                    console.print(line, markup=False, highlight=False, soft_wrap=True)
+                    view.print(line)
                 view.console_url = page.url
         stack.enter_context(signals(process, reloader))
         if view is not None:
             view.is_paused = lambda: control.is_paused
             clock.on_change(view.draw_again)
-            stack.enter_context(view.shown())
             stack.enter_context(keys(process.request, process.stop, TimeKeys(control, log).press))
             process.health.watch("view", view.probe)
         for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():

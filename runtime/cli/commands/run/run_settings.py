@@ -11,8 +11,6 @@ from config.load import ConfigError, list_shipped, load_settings, with_goal, wit
 from config.mission_step import Frame
 from config.places import check_places, no_such_place
 from config.settings import GoalConfig, Settings
-from runtime.support.blind_sides import refuse_blind_ways
-from runtime.support.pattern_check import refuse_undrivable
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +38,20 @@ class SettingsFiles:
         UserError
             No robot can carry them out.
         """
+        settings = self.read_unchecked()
+        refuse_impossible(settings)
+        return settings
+
+    def read_unchecked(self) -> Settings:
+        """Return the settings as `read` does, without asking whether a robot can carry them out.
+
+        Raises
+        ------
+        ConfigError
+            The settings are wrong.
+        UserError
+            An option is wrong, or a place has no name.
+        """
         is_shipped = self.config is None and self.mission is None and self.world in list_shipped("runs")
         config = self.world if is_shipped else self.config
         settings = load_settings(config, self.sets, robot=self.robot, world=self.world, mission=self.mission)
@@ -51,8 +63,6 @@ class SettingsFiles:
             frame: Frame = "odom" if self.map_file is None else "map"
             settings = with_goal(settings, parse_goal(self.goal, frame, settings))
         check_places(settings.mission, settings.places)
-        refuse_undrivable(settings)
-        refuse_blind_ways(settings)
         return without_console(settings) if self.no_console else settings
 
     def read_again(self, port: str | None, emulator_port: str | None) -> Settings:
@@ -78,6 +88,21 @@ class SettingsFiles:
             raise ConfigError(str(error)) from error
         port = port or settings.link.port or emulator_port
         return settings if port is None else with_port(settings, port)
+
+
+def refuse_impossible(settings: Settings) -> None:
+    """Refuse settings that no robot can carry out; this imports the most of perception.
+
+    Raises
+    ------
+    UserError
+        What is impossible, and why.
+    """
+    from runtime.support.blind_sides import refuse_blind_ways
+    from runtime.support.pattern_check import refuse_undrivable
+
+    refuse_undrivable(settings)
+    refuse_blind_ways(settings)
 
 
 def parse_goal(text: str, frame: Frame, settings: Settings) -> GoalConfig:

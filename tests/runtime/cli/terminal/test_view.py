@@ -140,7 +140,7 @@ def test_ctrl_c_leaves_the_end_of_the_picture_to_the_run(terminal: Terminal) -> 
     assert picture.returncode == 0
 
 
-def test_pictures_are_taken_every_few_cycles_only() -> None:
+def test_pictures_are_taken_every_few_cycles_and_of_each_new_mode_at_once() -> None:
     assert SETTINGS.world is not None
     records: list[CycleRecord] = []
     run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
@@ -150,7 +150,11 @@ def test_pictures_are_taken_every_few_cycles_only() -> None:
         shown.on_cycle(record, run.state, stats, driver)
         taken += shown._slot is not None
         shown._slot = None
-    assert taken == len(records) // EVERY_CYCLES
+    modes = [None, *(record.mode.mode for record in records)]
+    new = {k for k in range(len(records)) if modes[k + 1] is not modes[k]}
+    due = {k for k in range(len(records)) if records[k].cycle % EVERY_CYCLES == 0}
+    assert len(new) >= 2
+    assert taken == len(new | due)
 
 
 def test_a_pause_is_shown_at_once(terminal: Terminal) -> None:
