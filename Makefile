@@ -68,7 +68,7 @@ coverage: $(VENV)/test.stamp
 
 # Whole drives with array bounds checked, which compiled code does not do by default.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
 
 # Measures every promise and writes docs/promises.md. (The option needs its "=": pytest would take the page for a test.)
 promises: $(VENV)/test.stamp $(VENV)/browser.stamp
@@ -78,7 +78,7 @@ promises: $(VENV)/test.stamp $(VENV)/browser.stamp
 # time that checks memory growth, late compilation and full garbage collections.
 soak: $(VENV)/soak.stamp $(VENV)/browser.stamp ros2
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and soak"
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and soak"
 	$(BIN)/python -m pytest -m "soak and not ros2" --promises=docs/promises-soak.md
 	@$(BIN)/python -m bench.growth $(SOAK)
 	@$(BIN)/python -m bench.budget $(SOAK)
