@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.options import ConfigFile, Count, Flag, Force, RobotFile, Sets, WorldFile
+from runtime.timing.memory_policy import no_collection
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,13 +81,14 @@ def emulate(
     UserError
         There is no world, an option is wrong, or a file cannot be written.
     """
-    import asyncio
+    with no_collection():
+        import asyncio
 
-    from config.load import load_settings
+        from config.load import load_settings
 
-    settings = load_settings(config, sets, world=world, robot=robot)
-    from drivers.emulator.faults import load_faults
-    from drivers.emulator.server import serve
+        settings = load_settings(config, sets, world=world, robot=robot)
+        from drivers.emulator.faults import load_faults
+        from drivers.emulator.server import serve
 
     if settings.world is None:
         raise UserError("no world: name one with --world", WRONG_CALL)

@@ -296,7 +296,8 @@ class MalformedMessage(UserError):  # noqa: N818 - names the message, which the 
 class _Envelope(BaseModel):
     """What every message has, and how strictly it is read."""
 
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+    # Only the union of all is built.
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     id: Number
     challenge: Number | None = None

@@ -168,7 +168,10 @@ def run(
                     starting = start_emulator(arguments, clock, compiled=is_compiled(EMULATOR))
                     emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
                     running.push_async_callback(_end_task, emulator_start)
-                    await asyncio.sleep(0.0)
+                if settings.console.enabled:  # meanwhile: it reads certificates, for which it needs no interpreter
+                    http = asyncio.create_task(asyncio.to_thread(_import_http), name="import of HTTP")
+                    running.push_async_callback(asyncio.wait, [http])
+                await asyncio.sleep(0.0)
                 view: View | None = None
                 if live:
                     from runtime.cli.terminal.view import View
@@ -247,6 +250,10 @@ def run(
         raise UserError(summary["stop_reasons"][-1], FAILED)
     recording.raise_if_incomplete()
     return DONE
+
+
+def _import_http() -> None:
+    import aiohttp.web  # noqa: F401 - for the modules alone
 
 
 async def _end_task(task: asyncio.Task[EmulatorHandle]) -> None:
