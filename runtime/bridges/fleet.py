@@ -10,7 +10,7 @@ import asyncio
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias, TypedDict
 from urllib.parse import urlsplit
 
 from config.errors import UserError
@@ -28,6 +28,21 @@ NEAR_M: Final = 1.0
 RUNS_MAX: Final = 64
 
 Halt: TypeAlias = Literal["none", "sent", "confirmed", "unconfirmed"]
+
+
+class FleetRow(TypedDict):
+    """A run as the fleet page shows it."""
+
+    address: str
+    url: str
+    name: str
+    is_local: bool
+    problem: str
+    mode: str
+    reason: str
+    battery: str
+    place: str
+    halt: Halt
 
 
 @dataclass(slots=True)
@@ -106,7 +121,7 @@ class Fleet:
             self._send_halt(run)
         return len(asked)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[FleetRow]:
         """Return what is known of each run, without tokens."""
         now_s = self._clock()
         for run in self.runs:
@@ -177,7 +192,7 @@ def _judge_halt(run: FleetRun, now_s: float) -> None:
         run.halt = "unconfirmed"
 
 
-def _row(run: FleetRun, now_s: float) -> dict[str, Any]:
+def _row(run: FleetRun, now_s: float) -> FleetRow:
     state, session = run.state, {} if run.client is None else run.client.session
     age_s = now_s - run.state_s
     silent = f"nothing has come for {age_s:.0f} s" if state and age_s > SILENT_S else ""

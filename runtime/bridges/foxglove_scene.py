@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 import foxglove
 import numpy as np
@@ -37,10 +38,10 @@ class SceneChannels:
     def __init__(self, context: foxglove.Context) -> None:
         self._run = RunChannels(context)
         self._state = foxglove.Channel("/state", schema={"type": "object"}, message_encoding="json", context=context)
-        self._session: Message = {}
+        self._session: Mapping[str, Any] = {}
         self._states = 0
 
-    def begin(self, session: Message, at: int) -> None:
+    def begin(self, session: Mapping[str, Any], at: int) -> None:
         """Take in a session at a time, ns since 1970."""
         self._session = session
         self._write_truth(at)

@@ -297,7 +297,7 @@ class Console:
         )  # fmt: skip
         places = places_message(self._run.live_settings.current)
         return {
-            **info, "recording": self._commands.recording is not None, "robots": self._others(), "places": places,
+            **info, "robots": self._others(), "places": places,
         }  # fmt: skip
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:

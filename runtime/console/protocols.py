@@ -5,7 +5,7 @@ Recording, replay and files are optional: commands that need a part which this r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
 
@@ -13,6 +13,14 @@ from config.settings import Settings
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
+from runtime.console.sent_messages import (
+    JobMessage,
+    ListedRecording,
+    OpenedRecording,
+    SettingsCheck,
+    SettingsRow,
+    SettingsText,
+)
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
@@ -74,7 +82,7 @@ class Viewer(Protocol):
     def show(self, frame: Frame) -> None:
         """Send a frame, in place of one that has not been sent yet."""
 
-    def send(self, message: dict[str, Any]) -> None:
+    def send(self, message: Mapping[str, Any]) -> None:
         """Queue a message."""
 
 
@@ -98,10 +106,10 @@ class RecordingControl(Protocol):
 class ReplayControl(Protocol):
     """Shows recordings, to each client its own; a CommandError of any call is the client's answer."""
 
-    async def recordings(self) -> list[dict[str, Any]]:
+    async def recordings(self) -> list[ListedRecording]:
         """Return the recordings that can be opened."""
 
-    async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
+    async def open(self, viewer: Viewer, file: str) -> OpenedRecording:
         """Show a recording to a client from now on; return its description."""
 
     async def seek(self, viewer: Viewer, s: float) -> None:
@@ -129,10 +137,10 @@ class ReplayControl(Protocol):
 class JobControl(Protocol):
     """Makes reports and maps of recordings, one at a time; a CommandError of any call is the client's answer."""
 
-    tell: Callable[[dict[str, Any]], None]
+    tell: Callable[[JobMessage], None]
     """Sends every client how far a job is."""
 
-    def listed(self) -> list[dict[str, Any]]:
+    def listed(self) -> list[JobMessage]:
         """Return the jobs of which progress or files can be had, the newest first."""
 
     def cancel(self, number: int, /) -> None:
@@ -145,16 +153,16 @@ class JobControl(Protocol):
 class SettingsFileControl(Protocol):
     """The files of this run's settings; a CommandError of any call is the client's answer."""
 
-    def listed(self) -> Sequence[Mapping[str, Any]]:
+    def listed(self) -> list[SettingsRow]:
         """Return the files."""
 
-    async def read(self, number: int, /) -> Mapping[str, Any]:
+    async def read(self, number: int, /) -> SettingsText:
         """Return text and digest of a file, by its number in the list."""
 
-    async def check(self, number: int, text: str, /) -> Mapping[str, Any]:
+    async def check(self, number: int, text: str, /) -> SettingsCheck:
         """Return problems and warnings of a text in place of a file, and its difference from the file."""
 
-    async def save(self, number: int, text: str, digest: str, /) -> Mapping[str, Any]:
+    async def save(self, number: int, text: str, digest: str, /) -> SettingsText:
         """Write a text in place of a file, if that still has the digest; return it as `read` would."""
 
     async def keep_places(self, settings: Settings) -> None:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from array import array
 from base64 import b64decode
-from collections.abc import Iterator, Sequence
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 from drivers.messages import Pose, Twist
 from drivers.ros_tf import Frame
@@ -50,7 +50,7 @@ class Topics:
         self._say = Messages(frames, None if max_range_for_silence else math.inf)
         self._scan = RingScan(self._say.base) if with_scan else None
         self._clock = StampClock()
-        self._session: Message = {}
+        self._session: Mapping[str, Any] = {}
         self._published_s: list[float] = []
         self._odometry_s = math.nan
         self._markers: set[tuple[str, int]] = set()
@@ -61,7 +61,7 @@ class Topics:
         self.place: str | None = None
         """What is known of the robot's place in a map: `tracking`, `localizing` or `lost`; None without a map."""
 
-    def begin(self, session: Message) -> None:
+    def begin(self, session: Mapping[str, Any]) -> None:
         """Take in a session: another robot, or other models."""
         self._session = session
         self._forget()

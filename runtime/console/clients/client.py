@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Protocol
 
 import orjson
@@ -135,7 +135,7 @@ class Client:
         self._frame = frame
         self._wake.set()
 
-    def send(self, message: dict[str, Any]) -> None:
+    def send(self, message: Mapping[str, Any]) -> None:
         """Queue a message."""
         self.send_encoded(orjson.dumps(message, option=orjson.OPT_SERIALIZE_DATACLASS))
 

@@ -13,6 +13,7 @@ from runtime.console.clients.challenges import Challenges
 from runtime.console.clients.client import Client, Frame, Transport
 from runtime.console.clients.control import Control, Holder
 from runtime.console.http.client_limits import Limits
+from runtime.console.sent_messages import ClientRow, LogMessage, Role, RoleMessage
 
 if TYPE_CHECKING:
     from asyncio import AbstractEventLoop
@@ -156,7 +157,7 @@ class ClientHub:
             return
         known = ("level", "event", "timestamp")
         fields = {name: str(value)[:TEXT_MAX] for name, value in event.items() if name not in known}
-        line = {
+        line: LogMessage = {
             "type": "log",
             "timestamp": str(event.get("timestamp", "")),
             "level": str(event.get("level", "info")),
@@ -174,14 +175,15 @@ class ClientHub:
 
     def _begin_session(self, client: Client, session: Mapping[str, Any]) -> None:
         client.forget_frames()
-        client.send({**session, "role": role_of(client), "client": client.number, "has_token": client.has_token})
+        own: ClientRow = {"role": role_of(client), "client": client.number, "has_token": client.has_token}
+        client.send({**session, **own})
 
     def _send_role(self, holder: Holder, requester: Holder | None) -> None:
         client = self.clients.get(holder.number)
         if client is None:
             return
         client.has_control = self.control.is_held_by(client)
-        role = {
+        role: RoleMessage = {
             "type": "role",
             "role": role_of(client),
             "asked_by": None if requester is None else requester.name,
@@ -190,6 +192,6 @@ class ClientHub:
         client.send_newest("role", orjson.dumps(role))
 
 
-def role_of(client: Client) -> str:
+def role_of(client: Client) -> Role:
     """Return a client's role in the wire's words: "control" or "watch"."""
     return "control" if client.has_control else "watch"

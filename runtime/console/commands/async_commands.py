@@ -7,7 +7,7 @@ file that is being opened.
 from __future__ import annotations
 
 from collections.abc import Awaitable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from config.errors import UserError
 from runtime.console.commands.command import Call
@@ -25,6 +25,7 @@ from runtime.console.commands.messages import (
     StepRecording,
 )
 from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl
+from runtime.console.sent_messages import ListedRecording, OpenedRecording
 from runtime.cycle.modes import Mode
 from runtime.timing.time_control import TimeControl
 
@@ -85,12 +86,12 @@ async def undo_bookmark(call: Call, _: NoArguments) -> str:
         raise CommandError(str(error)) from error
 
 
-async def list_recordings(call: Call, _: NoArguments) -> list[dict[str, Any]]:
+async def list_recordings(call: Call, _: NoArguments) -> list[ListedRecording]:
     """Return the recordings that can be opened."""
     return await _replay(call).recordings()
 
 
-async def open_recording(call: Call, recording: OpenRecording) -> dict[str, Any]:
+async def open_recording(call: Call, recording: OpenRecording) -> OpenedRecording:
     """Show the client a recording in place of the live run; return its description."""
     return await _replay(call).open(call.client, recording.file)
 

@@ -22,8 +22,14 @@ Arguments = TypeVar("Arguments")
 
 PLACES_UNDO_MAX: Final = 50
 """Changes of the places that can be undone."""
-ANSWERED_LATER: Final = object()
-"""A handler returns this if the answer is sent by others once the outcome is known."""
+Data = TypeVar("Data", covariant=True)
+
+
+class AnsweredLater(Generic[Data]):
+    """A handler returns this if the answer, with data of this type, is sent by others once the outcome is known."""
+
+
+ANSWERED_LATER: Final[AnsweredLater[Any]] = AnsweredLater()
 
 
 class Permission(Enum):

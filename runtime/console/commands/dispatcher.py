@@ -14,6 +14,7 @@ from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import MalformedMessage, Message
 from runtime.console.commands.registry import COMMANDS, READER
 from runtime.console.http.client_limits import ConsoleLog
+from runtime.console.sent_messages import AnswerMessage
 
 NO_TOKEN: Final = "this page may only watch: open the start URL with its token to do more"  # noqa: S105 - a text
 NOT_IN_CONTROL: Final = "another client has control: ask for it first"
@@ -140,13 +141,12 @@ def _answer(client: Client, number: int, data: object) -> None:
 
 
 def _send_answer(client: Client, number: int | None, data: object, error: CommandError | None) -> None:
-    client.send(
-        {
-            "type": "answer",
-            "id": number,
-            "ok": error is None,
-            "error": None if error is None else str(error),
-            "field": None if error is None else error.field,
-            "data": data,
-        }
-    )
+    answer: AnswerMessage = {
+        "type": "answer",
+        "id": number,
+        "ok": error is None,
+        "error": None if error is None else str(error),
+        "field": None if error is None else error.field,
+        "data": data,
+    }
+    client.send(answer)

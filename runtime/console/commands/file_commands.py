@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import (
@@ -15,6 +13,7 @@ from runtime.console.commands.messages import (
     RenameRecording,
 )
 from runtime.console.protocols import NOT_AVAILABLE, FileControl
+from runtime.console.sent_messages import JobMessage
 
 
 async def rename_recording(call: Call, given: RenameRecording) -> str:
@@ -42,7 +41,7 @@ async def make_files(call: Call, given: MakeFiles) -> int:
     return await _files(call).make(given.kind, given.file)
 
 
-def list_jobs(call: Call, _: NoArguments) -> list[dict[str, Any]]:
+def list_jobs(call: Call, _: NoArguments) -> list[JobMessage]:
     """Return what is being made, and what was made of which files can be had."""
     return _files(call).jobs.listed()
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import orjson
 
@@ -19,8 +19,8 @@ from config.load import ConfigError, list_shipped, load_mission, parse_text, wit
 from config.mission import MissionConfig
 from config.reload import Difference
 from config.route import mission_text, route_config, waypoints_of
-from perception.edits import Edit
-from runtime.console.commands.command import ANSWERED_LATER, Call, CommandContext, PendingEdit
+from perception.edits import Arc, Edit
+from runtime.console.commands.command import ANSWERED_LATER, AnsweredLater, Call, CommandContext, PendingEdit
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import (
     GetEvidence,
@@ -35,6 +35,7 @@ from runtime.console.commands.messages import (
     StartMission,
 )
 from runtime.console.frames.grid_message import grid_message
+from runtime.console.sent_messages import ChangedValue, CrossReadingRow, EvidenceAnswer, MissionAnswer, ReadingRow
 from runtime.cycle.drive_requests import NO_MAP, DriveInput, Legs, needs_map, refusal
 from runtime.cycle.inputs import Request
 from runtime.cycle.velocity_limits import way_refused
@@ -114,7 +115,7 @@ def run_mission(call: Call, given: RunMission) -> None:
     _request_drive(call, Mission(mission))
 
 
-def read_mission(_: Call, given: ReadMission) -> dict[str, Any]:
+def read_mission(_: Call, given: ReadMission) -> MissionAnswer:
     """Return what a mission file holds; its waypoints and their frame where it is a route, otherwise None for both.
 
     Raises
@@ -217,7 +218,7 @@ def grant_control(call: Call, to: GrantControl) -> None:
     _refuse_if(call.context.hub.control.grant(to.client))
 
 
-def edit(call: Call, edit: Edit) -> object:
+def edit(call: Call, edit: Edit) -> AnsweredLater[None]:
     """Queue an edit of the map for the next cycle; the answer follows that cycle.
 
     Raises
@@ -229,7 +230,7 @@ def edit(call: Call, edit: Edit) -> object:
     return ANSWERED_LATER
 
 
-def undo_edit(call: Call, _: NoArguments) -> object:
+def undo_edit(call: Call, _: NoArguments) -> AnsweredLater[str]:
     """Take back the newest edit of the map that is not taken back yet; the answer names its kind.
 
     Raises
@@ -255,7 +256,7 @@ def _queue(call: Call, *pending: PendingEdit) -> None:
     call.context.pending_edits.extend(pending)
 
 
-def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:
+def get_evidence(call: Call, about: GetEvidence) -> EvidenceAnswer:
     """Return what supports and opposes an object, as the page shows it.
 
     Raises
@@ -271,10 +272,15 @@ def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:
         "model": found.model,
         "for": found.supporting,
         "against": -found.opposing,
-        "readings": [[a.x, a.y, a.range_m, a.direction, a.nats, *(a.listener or ())] for a in found.arcs],
-        "lines": [[line.number, line.x1, line.y1, line.x2, line.y2, line.supports] for line in found.lines],
+        "readings": [_reading(arc) for arc in found.arcs],
+        "lines": [(line.number, line.x1, line.y1, line.x2, line.y2, line.supports) for line in found.lines],
         "rivals": found.rivals,
     }
+
+
+def _reading(arc: Arc) -> ReadingRow | CrossReadingRow:
+    row = (arc.x, arc.y, arc.range_m, arc.direction, arc.nats)
+    return row if arc.listener is None else (*row, *arc.listener)
 
 
 def show_grid(call: Call, _: NoArguments) -> None:
@@ -300,12 +306,12 @@ def _live_grid(context: CommandContext) -> bytes:
     return context.grid[1]
 
 
-def set_parameter(call: Call, change: SetParameter) -> list[dict[str, Any]]:
+def set_parameter(call: Call, change: SetParameter) -> list[ChangedValue]:
     """Change one live setting; return the values that changed."""
     return _changed_values(call.context.tuning.set(change.path, change.value))
 
 
-def undo_parameter(call: Call, _: NoArguments) -> dict[str, Any] | list[dict[str, Any]]:
+def undo_parameter(call: Call, _: NoArguments) -> ChangedValue | list[ChangedValue]:
     """Undo the last change of settings; return the values that changed."""
     rows = _changed_values(call.context.tuning.undo())
     return rows[0] if len(rows) == 1 else rows
@@ -321,7 +327,7 @@ def _refuse_if(reason: str | None) -> None:
         raise CommandError(reason)
 
 
-def _changed_values(changed: Sequence[Difference]) -> list[dict[str, Any]]:
+def _changed_values(changed: Sequence[Difference]) -> list[ChangedValue]:
     """Return the changes of plain values, as the page shows them."""
     plain = (bool, int, float, str, type(None))
     return [{"path": d.path, "value": d.after} for d in changed if isinstance(d.after, plain)]

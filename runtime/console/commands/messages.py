@@ -320,7 +320,7 @@ class MessageReader:
 
     def __init__(self, types: Mapping[str, type]) -> None:
         self._types = dict(types)
-        models = tuple(_wire_model(name, of) for name, of in types.items())
+        models = tuple(wire_model(name, of) for name, of in types.items())
         union = Union[models]  # type: ignore[valid-type]  # noqa: UP007 - made of a tuple
         self._adapter: TypeAdapter[Any] = TypeAdapter(Annotated[union, Field(discriminator="type")])
 
@@ -354,7 +354,7 @@ def _has_bounds(hint: Any) -> bool:  # noqa: ANN401 - any type hint
     return get_origin(hint) is Annotated
 
 
-def _wire_model(name: str, of: type) -> type[BaseModel]:
+def wire_model(name: str, of: type) -> type[BaseModel]:
     """Return the model of a command's messages."""
     hints = get_type_hints(of, include_extras=True)
     defaults = _arguments(of)

@@ -18,6 +18,7 @@ from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.handlers import set_goal
 from runtime.console.commands.messages import MESSAGE_MAX_BYTES, NoArguments, SetGoal
+from runtime.console.sent_messages import PlacesMessage
 
 NO_UNDO = "there is no change of the places to undo"
 HEAD = "The map with its places, saved from the operator console (m)."
@@ -94,7 +95,7 @@ def go_to_place(call: Call, to: GoToPlace) -> None:
     set_goal(call, SetGoal(place.x_m, place.y_m, place.heading_rad, settings.places_frame))
 
 
-def read_places(_: Call, given: ReadPlaces) -> dict[str, Any]:
+def read_places(_: Call, given: ReadPlaces) -> Annotated[dict[str, Any], PlacesConfig]:
     """Return the places of a map file, in the form that `set_places` takes.
 
     Raises
@@ -122,6 +123,14 @@ def save_map(call: Call, asked: SaveMap) -> str:
     return world_text(world, (HEAD,) if settings.places_frame == "map" else (HEAD, OF_ODOMETRY))
 
 
-def places_message(settings: Settings) -> dict[str, Any]:
+def places_message(settings: Settings) -> PlacesMessage:
     """Return the message that shows the places to clients."""
-    return {"type": "places", "frame": settings.places_frame, **settings.places.model_dump(mode="json")}
+    rows = settings.places.model_dump(mode="json")
+    return {
+        "type": "places",
+        "frame": settings.places_frame,
+        "place": rows["place"],
+        "no_go_line": rows["no_go_line"],
+        "no_go_area": rows["no_go_area"],
+        "speed_area": rows["speed_area"],
+    }

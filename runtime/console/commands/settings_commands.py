@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from pydantic import Field
 
@@ -12,6 +11,7 @@ from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import NoArguments, Number
 from runtime.console.protocols import NOT_AVAILABLE, SettingsFileControl
+from runtime.console.sent_messages import SettingsCheck, SettingsRow, SettingsText
 from runtime.cycle.modes import Mode
 
 STOP_FIRST: Final = "the robot drives: halt or disarm it before the run is started again"
@@ -43,22 +43,22 @@ class SaveSettings:
     digest: Annotated[str, Field(min_length=64, max_length=64)]
 
 
-def list_settings(call: Call, _: NoArguments) -> Sequence[Mapping[str, Any]]:
+def list_settings(call: Call, _: NoArguments) -> list[SettingsRow]:
     """Return the settings files of the run."""
     return _files(call).listed()
 
 
-async def read_settings(call: Call, given: ReadSettings) -> Mapping[str, Any]:
+async def read_settings(call: Call, given: ReadSettings) -> SettingsText:
     """Return the text of a file."""
     return await _files(call).read(given.file)
 
 
-async def check_settings(call: Call, given: CheckSettings) -> Mapping[str, Any]:
+async def check_settings(call: Call, given: CheckSettings) -> SettingsCheck:
     """Return what a changed text would mean."""
     return await _files(call).check(given.file, given.toml)
 
 
-async def save_settings(call: Call, given: SaveSettings) -> Mapping[str, Any]:
+async def save_settings(call: Call, given: SaveSettings) -> SettingsText:
     """Write a changed text in place of a file."""
     return await _files(call).save(given.file, given.toml, given.digest)
 

@@ -13,9 +13,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from runtime.console.commands.command_error import CommandError
+from runtime.console.sent_messages import JobMessage
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from runtime.support.length_format import Units
 from runtime.support.progress import MARK, PROGRESS_LINES
@@ -50,10 +51,10 @@ class Job:
     is_over: bool = False
     task: asyncio.Task[None] | None = None
 
-    def message(self, type_: str = "job") -> dict[str, Any]:
+    def message(self) -> JobMessage:
         """Return what pages get of it."""
         return {
-            "type": type_, "job": self.number, "kind": self.kind, "file": self.file, "share": round(self.share, 3),
+            "type": "job", "job": self.number, "kind": self.kind, "file": self.file, "share": round(self.share, 3),
             "what": self.what, "made": self.made, "error": self.error, "over": self.is_over,
         }  # fmt: skip
 
@@ -76,10 +77,10 @@ class Jobs:
         self._number = 0
         self._folder: Path | None = None
         self._resources = contextlib.ExitStack()
-        self.tell: Callable[[dict[str, Any]], None] = lambda _: None
+        self.tell: Callable[[JobMessage], None] = lambda _: None
         """Sends a message to every page."""
 
-    def listed(self) -> list[dict[str, Any]]:
+    def listed(self) -> list[JobMessage]:
         """Return the jobs of which files or progress can be had, the newest first."""
         return [job.message() for job in reversed(self._jobs.values())]
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, TypedDict
+from typing import Final
 
 from config.errors import UserError
 from config.files import ConfigError, DocumentRead, in_place_of, read_file
@@ -20,6 +20,7 @@ from config.toml_lines import located
 from config.world import WorldConfig
 from runtime.analysis.export.world_file import text_with_places, with_places
 from runtime.console.commands.command_error import CommandError
+from runtime.console.sent_messages import ProblemRow, SettingsCheck, SettingsRow, SettingsText
 from runtime.support.config_lint import lint_settings
 from runtime.support.whole_file import whole_file
 
@@ -28,40 +29,6 @@ KINDS: Final = MappingProxyType(
 )
 """Kinds of files as the page names them."""
 NO_PLACES: Final = PlacesConfig()
-
-
-class SettingsRow(TypedDict):
-    """A file in the list."""
-
-    kind: str
-    name: str
-    shipped: bool
-    """Whether it comes with the program, and so is not changed."""
-
-
-class SettingsText(TypedDict):
-    """The text of a file."""
-
-    text: str
-    digest: str
-    """Of the text; a change is saved only over the text that it was made from."""
-
-
-class ProblemRow(TypedDict):
-    """A problem of a text."""
-
-    line: int | None
-    text: str
-
-
-class SettingsCheck(TypedDict):
-    """What a changed text would mean."""
-
-    problems: list[ProblemRow]
-    """A text that has any is not saved."""
-    warnings: list[str]
-    difference: str
-    """From the file to the text, as `diff -u` writes it; empty where they are equal."""
 
 
 class SettingsFiles:

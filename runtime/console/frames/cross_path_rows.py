@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from drivers.messages import Firing
+from runtime.console.frames.state_message import CrossPathRow
 
 PATHS_MAX: Final = 64
 """Most cross paths in a frame, the newest. Between two frames a ring with 16 listeners fires twice."""
@@ -33,21 +34,22 @@ class CrossPathRows:
         """Forget what is kept."""
         self._firings.clear()
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[CrossPathRow]:
         """Return the firings kept, oldest first, with the paths that were heard, and keep them no longer.
 
         Each has `robot_s`, the ring's `pose` (x, y, heading, ring's yaw; m and rad), and `paths`: transmitter,
         listener, half the path in m.
         """
-        left, found = PATHS_MAX, []
+        left = PATHS_MAX
+        found: list[CrossPathRow] = []
         while self._firings:
             firing = self._firings.pop()
             paths = _heard(firing)[:left]
             left -= len(paths)
             if paths:
                 at = firing.pose
-                pose = [round(value, PLACES) for value in (at.x, at.y, at.theta, firing.ring_yaw)]
-                found.append({"robot_s": round(firing.robot_s, 3), "pose": pose, "paths": paths})
+                x, y, heading, yaw = (round(value, PLACES) for value in (at.x, at.y, at.theta, firing.ring_yaw))
+                found.append({"robot_s": round(firing.robot_s, 3), "pose": (x, y, heading, yaw), "paths": paths})
         return found[::-1]
 
 

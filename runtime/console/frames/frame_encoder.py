@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import orjson
@@ -28,6 +28,21 @@ from runtime.console.frames.changing_rows import ChangingRows
 from runtime.console.frames.cross_path_rows import CrossPathRows
 from runtime.console.frames.mission_rows import MissionRows
 from runtime.console.frames.segment_delta import SegmentDelta
+from runtime.console.frames.state_message import (
+    CanyonRow,
+    GoalRow,
+    LegsRow,
+    LocalizedRow,
+    MissionRow,
+    ObjectRow,
+    PlaybackRow,
+    PolylineRow,
+    RobotStatus,
+    StateHead,
+    TeleoperateRow,
+    Triple,
+    ValleyRow,
+)
 from runtime.cycle.drive_requests import DriveRequest, GoalPlace
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.step import CycleRecord, State
@@ -66,7 +81,7 @@ class FrameContext:
     recording: RecordingStatus | None = None
     is_paused: bool = False
     speed: float = 1.0
-    playback: Mapping[str, Any] | None = None
+    playback: PlaybackRow | None = None
     """Position in the recording that is replayed; None for the run itself."""
 
 
@@ -166,15 +181,15 @@ class FrameEncoder:
         odometry = state.odometry
         robot_s = 0.0 if odometry is None else odometry.robot_s
         link, phases_s, late_s = context.link, context.phases_s, context.late_s
-        head: dict[str, Any] = {
+        head: StateHead = {
             "type": "state",
             **robot_status(state, context),
             "cycle": state.cycle,
             "robot_s": robot_s,
             "host_s": round(context.host_s, 4),
-            "pose": [0.0, 0.0, 0.0],
+            "pose": (0.0, 0.0, 0.0),
             "ring_yaw": 0.0,
-            "twist": [0.0, 0.0],
+            "twist": (0.0, 0.0),
             "flags": [],
             "firing": sorted(self._fired),
             "ranges": self.ranges(),
@@ -182,9 +197,9 @@ class FrameEncoder:
             "cross_paths": self._cross_paths.rows(),
             "clusters": self._cluster_boxes,
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
-            "areas": [[a.number, round(a.x, 3), round(a.y, 3), a.radius] for a in state.perception.vacant_areas()],
+            "areas": [(a.number, round(a.x, 3), round(a.y, 3), a.radius) for a in state.perception.vacant_areas()],
             "canyons": [_canyon(canyon) for canyon in state.perception.canyons()],
-            "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
+            "vectors": [(r.schema, round(r.x, 4), round(r.y, 4)) for r in state.vectors],
             "drive_request": self._drive_request(state.drive_request, state.goal_place),
             "valley": None if state.goal_drive is None else _valley(state.goal_drive),
             "phases": {name: round(1e6 * s, 1) for name, s in (phases_s or {}).items()},
@@ -197,15 +212,15 @@ class FrameEncoder:
             "link": None if link is None else {"frames": link.frames, "bad": link.bad, "lost": link.lost},
             "waiting": state.perception.counts.waiting,
             "localized": _localized(state.perception),
-            "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensor_reports()],
+            "sensors": [(r.sensor, r.fault, r.reason) for r in state.perception.sensor_reports()],
             "playback": context.playback,
         }
         if odometry is not None:
             twist = odometry.twist
             head["pose"] = _rounded(odometry.pose)
             head["ring_yaw"] = round(odometry.ring_yaw, 5)
-            head["twist"] = [round(twist.v, 4), round(twist.w, 4)]
-            head["flags"] = [flag.name for flag in odometry.flags]
+            head["twist"] = (round(twist.v, 4), round(twist.w, 4))
+            head["flags"] = [str(flag.name) for flag in odometry.flags]
         self._fired.clear()
         changes = b'"segments":%b' % segments
         if self._archived.update(state.perception.archived_objects()):
@@ -226,11 +241,13 @@ class FrameEncoder:
                 self._fired.add(sensor)
         self._cross_paths.take(firing)
 
-    def _drive_request(self, drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:
+    def _drive_request(
+        self, drive_request: DriveRequest, place: GoalPlace | None
+    ) -> GoalRow | TeleoperateRow | LegsRow | MissionRow:
         """Return what is driven, as the page shows it."""
         match drive_request:
             case Goal(x=x, y=y, frame=frame, heading=heading):
-                at = None if place is None else [round(place.x, 4), round(place.y, 4)]
+                at = None if place is None else (round(place.x, 4), round(place.y, 4))
                 is_done = drive_request.reached and (heading is None or drive_request.aligned)
                 return {"kind": "goal", "x": x, "y": y, "heading": heading, "frame": frame, "at": at,
                         "reached": is_done}  # fmt: skip
@@ -258,15 +275,16 @@ class FrameEncoder:
         return self._segments.update(now.numbers, rows, now.numbers[now.pinned == 1])
 
 
-def robot_status(state: State, context: FrameContext) -> dict[str, Any]:
+def robot_status(state: State, context: FrameContext) -> RobotStatus:
     """Return what a page always shows of the robot itself, also while it shows a recording."""
+    recording = context.recording
     return {
         "mode": state.mode.mode.value,
         "reason": state.mode.reason,
         "hold_reason": state.hold_reason or state.preparing,
         "arming": state.mode.arming_run_s is not None,
         "clients": context.clients,
-        "recording": None if context.recording is None else context.recording._asdict(),
+        "recording": recording and {"file": recording.file, "bytes": recording.bytes, "dropped": recording.dropped},
         "paused": context.is_paused,
         "speed": context.speed,
     }
@@ -277,8 +295,9 @@ def _json_numbers(values: Iterable[float], places: int) -> list[float | None]:
     return [None if math.isnan(value) else round(value, places) for value in values]
 
 
-def _object(detected: DetectedObject) -> dict[str, Any]:
+def _object(detected: DetectedObject) -> ObjectRow:
     ends = detected.ends
+    x1, y1, x2, y2 = ends or (0.0, 0.0, 0.0, 0.0)
     return {
         "number": detected.number,
         "model": detected.model,
@@ -292,51 +311,52 @@ def _object(detected: DetectedObject) -> dict[str, Any]:
         "score": round(detected.score, 4),
         "confirmed": detected.confirmed,
         "placed": detected.placed,
-        "ends": None if ends is None else [round(value, 3) for value in ends],
+        "ends": None if ends is None else (round(x1, 3), round(y1, 3), round(x2, 3), round(y2, 3)),
     }
 
 
-def _polyline(polyline: Polyline) -> dict[str, Any]:
+def _polyline(polyline: Polyline) -> PolylineRow:
     """Return a polyline in odometry's frame, m."""
     points = np.round(polyline.points, 3).tolist()
     return {"number": polyline.number, "points": points, "probability": round(polyline.probability, 3)}
 
 
-def _localized(perception: Perception) -> dict[str, Any] | None:
+def _localized(perception: Perception) -> LocalizedRow | None:
     """Return the robot in the map frame and that frame in odometry's; None where they are the same."""
     here = perception.localized()
     if here is None:
         return None
-    covariance = [float(here.covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2))]
+    xx, xy, yy, turn = (float(here.covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2)))
     return {
         "pose": _rounded(here.pose),
-        "covariance": covariance if math.isfinite(sum(covariance)) else None,
+        "covariance": (xx, xy, yy, turn) if math.isfinite(xx + xy + yy + turn) else None,
         "status": here.status,
         "probability": round(here.probability, 3),
         "frame": _rounded(perception.odometry_from_map()),
     }
 
 
-def _rounded(pose: Pose) -> list[float]:
-    return [round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)]
+def _rounded(pose: Pose) -> Triple:
+    return round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)
 
 
-def _canyon(canyon: Canyon) -> dict[str, Any]:
+def _canyon(canyon: Canyon) -> CanyonRow:
     """Return a box canyon in odometry's frame, m and rad."""
+    x1, y1, x2, y2 = canyon.mouth
     return {
         "number": canyon.number,
-        "mouth": [round(end, 3) for end in canyon.mouth],
+        "mouth": (round(x1, 3), round(y1, 3), round(x2, 3), round(y2, 3)),
         "axis": round(canyon.axis_rad, 4),
         "depth": round(canyon.depth_m, 3),
         "probability": round(canyon.probability, 3),
     }
 
 
-def _valley(drive: GoalDrive) -> dict[str, Any]:
+def _valley(drive: GoalDrive) -> ValleyRow:
     """Return the blocked sectors, the direction chosen (rad) and the way of the look-ahead (m)."""
     direction = drive.valley.direction_rad
     return {
         "blocked": drive.valley.blocked,
         "direction": None if direction is None else round(direction, 3),
-        "way": [[round(x, 2), round(y, 2)] for x, y in drive.search.way],
+        "way": [(round(x, 2), round(y, 2)) for x, y in drive.search.way],
     }

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from typing import Any, Final
+from typing import Final
 
 from perception.mapping.grid.known_cells import known_cells
+from runtime.console.sent_messages import GridMessage
 from runtime.cycle.step import State
 
 SIDE_MAX: Final = 256
 """Greatest number of rows and of columns: 64 KiB of cells."""
 
 
-def grid_message(state: State) -> dict[str, Any]:
+def grid_message(state: State) -> GridMessage:
     """Return the message after a cycle; without cells where the settings keep no grid, or it knows nothing.
 
     Parameters

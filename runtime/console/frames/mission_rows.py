@@ -8,7 +8,8 @@ import orjson
 
 from behaviors.missions.mission import Mission
 from config.mission import MissionConfig, StepConfig
-from config.mission_step import MoveToGoalUse, StayOnPathUse
+from config.mission_step import Frame, MoveToGoalUse, StayOnPathUse
+from runtime.console.frames.state_message import MissionRow, StepRow
 
 
 class MissionRows:
@@ -18,7 +19,7 @@ class MissionRows:
         self._plan: MissionConfig | None = None
         self._steps = orjson.Fragment(b"[]")
 
-    def row(self, mission: Mission) -> dict[str, Any]:
+    def row(self, mission: Mission) -> MissionRow:
         """Return the mission in the form that frames have, m and s."""
         if mission.plan is not self._plan:
             self._plan = mission.plan
@@ -37,13 +38,14 @@ class MissionRows:
         }
 
 
-def _step(step: StepConfig) -> dict[str, Any]:
+def _step(step: StepConfig) -> StepRow:
     """Return a step: its schemas, where its conditions lead, and its places x, y and heading (m, degrees).
 
     A place of the map is given by its name.
     """
     places: list[tuple[float, float, float | None]] = []
-    frame, place = "odom", None
+    frame: Frame = "odom"
+    place = None
     for use in step.schemas:
         if isinstance(use, MoveToGoalUse):
             places += [] if use.point is None else [(*use.point, use.heading_deg)]
@@ -55,7 +57,7 @@ def _step(step: StepConfig) -> dict[str, Any]:
         "name": step.name,
         "schemas": [use.name for use in step.schemas],
         "until": [
-            [" ".join((c.when, *_details(c.model_dump(exclude={"when", "go"}, exclude_defaults=True)))), c.go]
+            (" ".join((c.when, *_details(c.model_dump(exclude={"when", "go"}, exclude_defaults=True)))), c.go)
             for c in step.conditions
         ],
         "places": places,

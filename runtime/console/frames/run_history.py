@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Final
 
 from drivers.messages import Odometry
+from runtime.console.sent_messages import HistoryRow, SampleRow
 
 SAMPLE_S: Final = 1.0
 """Time between the samples, s of the robot's clock."""
@@ -22,7 +23,7 @@ class RunHistory:
     """Samples and trail of the run so far."""
 
     def __init__(self) -> None:
-        self._samples: deque[dict[str, Any]] = deque(maxlen=SAMPLES_MAX)
+        self._samples: deque[SampleRow] = deque(maxlen=SAMPLES_MAX)
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=TRAIL_MAX)
 
     def clear(self) -> None:
@@ -56,15 +57,15 @@ class RunHistory:
         self._samples.append(
             {
                 "robot_s": t,
-                "pose": [round(x, 4), round(y, 4), round(odometry.pose.theta, 5)],
+                "pose": (round(x, 4), round(y, 4), round(odometry.pose.theta, 5)),
                 "ring_yaw": round(odometry.ring_yaw, 5),
-                "twist": [round(odometry.twist.v, 4), round(odometry.twist.w, 4)],
+                "twist": (round(odometry.twist.v, 4), round(odometry.twist.w, 4)),
                 "ranges": ranges(),
                 "phases": {name: round(1e6 * s, 1) for name, s in phases.items()},
                 "cycle_us": round(1e6 * sum(phases.values()), 1),
             }
         )
 
-    def listed(self) -> dict[str, Any]:
+    def listed(self) -> HistoryRow:
         """Return samples and trail, oldest first, as a page is sent them."""
         return {"samples": list(self._samples), "trail": list(self._trail)}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any
 
 from config.load import list_shipped, load_mission
 from config.mission import MissionConfig
@@ -16,10 +15,11 @@ from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import RIVAL_RADII_M
 from runtime import VERSION
 from runtime.console.commands.parameters import parameters
+from runtime.console.sent_messages import SessionInfo, SurfacesRow
 from runtime.support.length_format import Units
 
 
-def session_info(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> dict[str, Any]:
+def session_info(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> SessionInfo:
     """Return the session message that all clients are sent; the hub adds the client's role.
 
     Parameters
@@ -41,7 +41,7 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
         "emulated": emulated,
         "units": units,
         "ring": {
-            "mounts": [[mount.x_m, mount.y_m, mount.angle_rad] for mount in ring.mounts],
+            "mounts": [(mount.x_m, mount.y_m, mount.angle_rad) for mount in ring.mounts],
             "turning": ring.turning,
             "half_angle": math.radians(ring.beam_half_angle_deg),
             "range_min": ring.range_min_m,
@@ -76,7 +76,7 @@ def shipped_missions() -> tuple[MissionConfig, ...]:
     return tuple(load_mission(name) for name in list_shipped("missions"))
 
 
-def surfaces(world: WorldConfig, start: StartConfig) -> dict[str, Any]:
+def surfaces(world: WorldConfig, start: StartConfig) -> SurfacesRow:
     """Return the drums, walls and polygons of a world, m, in the frame of an odometry that begins at this start."""
     odom_from_world = _pose(start).inverse()
 
@@ -87,8 +87,8 @@ def surfaces(world: WorldConfig, start: StartConfig) -> dict[str, Any]:
     polygons = [[in_odom(*vertex) for vertex in polygon.vertices_m] for polygon in world.polygon]
     polygons += [[in_odom(*corner) for corner in box.corners_m()] for box in world.box]
     return {
-        "drums": [[*in_odom(drum.x_m, drum.y_m), drum.radius_m] for drum in world.drum],
-        "walls": [[*in_odom(wall.x1_m, wall.y1_m), *in_odom(wall.x2_m, wall.y2_m)] for wall in world.wall],
+        "drums": [(*in_odom(drum.x_m, drum.y_m), drum.radius_m) for drum in world.drum],
+        "walls": [(*in_odom(wall.x1_m, wall.y1_m), *in_odom(wall.x2_m, wall.y2_m)) for wall in world.wall],
         "polygons": polygons,
     }
 

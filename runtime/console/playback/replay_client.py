@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import orjson
 
@@ -20,6 +20,7 @@ from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_worker import ANSWER, HEADER, PROGRESS, SPEED_MAX, SPEED_MIN, problem
 from runtime.console.protocols import Viewer
+from runtime.console.sent_messages import ListedRecording, OpenedRecording, RecordingDescription
 from runtime.recording.folder_files import describe_recordings
 from runtime.recording.storage import find_recording
 from runtime.support.child_process import kill_child, start_child
@@ -53,14 +54,14 @@ class ReplayProcess:
         self,
         process: asyncio.subprocess.Process,
         on_frame: Callable[[EncodedFrame], None],
-        on_answer: Callable[[dict[str, Any]], None],
+        on_answer: Callable[[Mapping[str, Any]], None],
     ) -> None:
         self._process = process
         self._on_frame = on_frame
         self._on_answer = on_answer
         self._reader: asyncio.Task[None] | None = None
 
-    async def begin(self) -> dict[str, Any]:
+    async def begin(self) -> RecordingDescription:
         """Wait until the recording is open and return its description.
 
         Raises
@@ -88,7 +89,7 @@ class ReplayProcess:
             await self.close()
             raise ReplayError(str(description["error"]))
         self._reader = asyncio.create_task(self._read_all(), name="replay reader")
-        return description
+        return cast("RecordingDescription", description)
 
     async def _description(self) -> dict[str, Any]:
         _, _, (body, _, _) = await self._read()
@@ -162,17 +163,28 @@ class ReplayClient:
         """Processes that run, from before their start until after their end."""
         self._closing: set[asyncio.Task[None]] = set()
 
-    async def recordings(self) -> list[dict[str, Any]]:
+    async def recordings(self) -> list[ListedRecording]:
         """Return the recordings that can be opened, newest first; `live` marks the one in progress."""
         found = await asyncio.to_thread(describe_recordings, self._folder)
         current = self._current()
-        rows = [{**one._asdict(), "live": str(self._folder / one.file) == current} for one in found]
+        rows: list[ListedRecording] = [
+            {
+                "file": one.file,
+                "bytes": one.bytes,
+                "modified_s": one.modified_s,
+                "duration_s": one.duration_s,
+                "state": one.state,
+                "pinned": one.pinned,
+                "live": str(self._folder / one.file) == current,
+            }
+            for one in found
+        ]
         if current is not None and not any(row["live"] for row in rows):
             rows.insert(0, {"file": current, "bytes": None, "modified_s": None, "duration_s": None, "state": "live",
                             "pinned": False, "live": True})  # fmt: skip
         return rows
 
-    async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
+    async def open(self, viewer: Viewer, file: str) -> OpenedRecording:
         """Show a client a recording of the folder, or the one in progress; return its description.
 
         Parameters

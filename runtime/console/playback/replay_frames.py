@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 from config.settings import Settings
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
 from runtime.console.frames.grid_message import grid_message
 from runtime.console.frames.session_info import session_info
+from runtime.console.frames.state_message import PlaybackRow
 from runtime.console.playback.replay_cursor import ReplayedCycle
 from runtime.console.playback.replay_worker import FrameParts, PlaybackPosition, run_worker
+from runtime.console.sent_messages import GridMessage, SessionInfo
 from runtime.cycle.step import CycleRecord
 
 
@@ -30,12 +31,12 @@ class ReplayFrames:
         self._emulated = emulated
         self._encoder = FrameEncoder(settings)
 
-    def session(self) -> dict[str, Any]:
+    def session(self) -> SessionInfo:
         """Return the session information of the recorded run; the page keeps its own choice of units."""
         settings = self._settings
         info = session_info(settings, name=settings.robot.name, emulated=self._emulated, units="m")
         del info["units"]
-        return info | {"recording": True}
+        return info
 
     def take(self, record: CycleRecord) -> None:
         """Take in a cycle, whether or not it is shown."""
@@ -43,13 +44,12 @@ class ReplayFrames:
 
     def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
-        context = FrameContext(
-            host_s=position.s, late_s=None, missed=None, late=None, link=None, playback=position._asdict()
-        )
+        playback: PlaybackRow = {"s": position.s, "is_playing": position.is_playing, "speed": position.speed}
+        context = FrameContext(host_s=position.s, late_s=None, missed=None, late=None, link=None, playback=playback)
         frame = self._encoder.frame(replayed.state, replayed.record, context)
         return FrameParts(frame.head, frame.changes, frame.whole())
 
-    def grid(self, replayed: ReplayedCycle) -> dict[str, Any]:
+    def grid(self, replayed: ReplayedCycle) -> GridMessage:
         """Return the evidence grid after a cycle, as a message."""
         return grid_message(replayed.state)
 

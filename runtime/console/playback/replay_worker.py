@@ -12,7 +12,7 @@ import select
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -20,6 +20,13 @@ import orjson
 
 from config.settings import Settings
 from runtime.console.playback.replay_cursor import ReplayCursor, ReplayedCycle
+from runtime.console.sent_messages import (
+    GridMessage,
+    OpeningMessage,
+    RecordingDescription,
+    ReplayProblemMessage,
+    SessionInfo,
+)
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
 from runtime.recording.replayer import GAP_MAX_S
@@ -34,8 +41,6 @@ READ_BYTES: Final = 4096
 HEADER: Final = struct.Struct("!cIIIII")
 """Before each message to the client: its kind, source and number of a frame, and the lengths of three parts."""
 ANSWER, FRAME = b"a", b"f"
-PROBLEM: Final = "replay_problem"
-"""Type of the answers that say what is wrong with the recording; the page shows them."""
 PROGRESS: Final = "opening"
 """Type of the answers that say how much of the recording has been read, before its description."""
 PROGRESS_PERIOD_S: Final = 0.25
@@ -61,7 +66,7 @@ class FrameParts(NamedTuple):
 class FrameMaker(Protocol):
     """Makes the frames of replayed cycles."""
 
-    def session(self) -> dict[str, Any]:
+    def session(self) -> SessionInfo:
         """Return the session information of the recorded run."""
 
     def take(self, record: CycleRecord) -> None:
@@ -70,7 +75,7 @@ class FrameMaker(Protocol):
     def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
 
-    def grid(self, replayed: ReplayedCycle) -> dict[str, Any]:
+    def grid(self, replayed: ReplayedCycle) -> GridMessage:
         """Return the evidence grid after a cycle, as a message."""
 
 
@@ -103,7 +108,7 @@ class ReplayWorker:
         cursor: ReplayCursor,
         make_frames: Callable[[dict[str, Any]], FrameMaker],
         show: Callable[[int, int, FrameParts], None],
-        answer: Callable[[dict[str, Any]], None],
+        answer: Callable[[Mapping[str, Any]], None],
         clock: Callable[[], float],
     ) -> None:
         self._cursor = cursor
@@ -238,19 +243,20 @@ class ReplayWorker:
             self._show(self._source, self._number, self._frames.frame(replayed, position))
 
 
-def problem(text: object) -> dict[str, Any]:
+def problem(text: object) -> ReplayProblemMessage:
     """Return the answer that says what is wrong."""
-    return {"type": PROBLEM, "error": str(text)}
+    return {"type": "replay_problem", "error": str(text)}
 
 
-def describe(cursor: ReplayCursor, more: dict[str, Any]) -> dict[str, Any]:
+def describe(cursor: ReplayCursor, about: SessionInfo, started: str) -> RecordingDescription:
     """Return what the page shows of a recording before it is played."""
     return {
         "duration_s": round(cursor.duration_s, 3),
         "cycles": cursor.cycles,
-        "bookmarks": [[round(s, 3), text] for s, text in cursor.bookmarks],
-        "modes": [[round(s, 3), mode.mode.value, mode.reason] for s, mode in cursor.modes],
-        **more,
+        "bookmarks": [(round(s, 3), text) for s, text in cursor.bookmarks],
+        "modes": [(round(s, 3), mode.mode.value, mode.reason) for s, mode in cursor.modes],
+        "about": about,
+        "started": started,
     }
 
 
@@ -273,7 +279,7 @@ def run_worker(file: str, make: MakeFrameMaker) -> int:
                 return make(parse_settings(settings), emulated=emulated)
 
             session = make_frames(recording.info.settings).session()
-            _write_answer(describe(cursor, {"about": session, "started": recording.info.started}))
+            _write_answer(describe(cursor, session, recording.info.started))
             worker = ReplayWorker(cursor, make_frames, _write_frame, _write_answer, time.monotonic)
             worker.execute({"do": "seek", "s": 0.0})
             _serve(worker)
@@ -292,7 +298,8 @@ def _progress_writer(size: int, clock: Callable[[], float]) -> Callable[[int], N
         nonlocal next_s
         if clock() >= next_s:
             next_s = clock() + PROGRESS_PERIOD_S
-            _write_answer({"type": PROGRESS, "share": round(min(1.0, offset / max(1, size)), 3)})
+            opening: OpeningMessage = {"type": "opening", "share": round(min(1.0, offset / max(1, size)), 3)}
+            _write_answer(opening)
 
     return on_chunk
 
@@ -316,7 +323,7 @@ def _serve(worker: ReplayWorker) -> None:
         worker.advance()
 
 
-def _write_answer(answer: dict[str, Any]) -> None:
+def _write_answer(answer: Mapping[str, Any]) -> None:
     body = orjson.dumps(answer)
     _write(HEADER.pack(ANSWER, 0, 0, len(body), 0, 0) + body)
 

@@ -36,7 +36,7 @@ async def shows(case: ConsoleCase, fleet: Fleet, key: str, wanted: str) -> None:
 
     def is_so() -> bool:
         case.cycles()
-        return bool(fleet.rows()[0][key] == wanted)
+        return bool(dict(fleet.rows()[0])[key] == wanted)
 
     await case.settled(is_so, f"{key} {wanted}: {fleet.rows()}")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import orjson
@@ -12,6 +12,7 @@ import orjson
 from config.settings import Settings
 from runtime.console.playback.replay_cursor import ReplayedCycle
 from runtime.console.playback.replay_worker import FrameParts, PlaybackPosition, run_worker
+from runtime.console.sent_messages import GridMessage, SessionInfo
 from runtime.cycle.step import CycleRecord
 from runtime.recording.channels import encode
 from runtime.recording.schema import Cycle
@@ -36,9 +37,9 @@ class StubFrames:
         self._emulated = emulated
         self._fired = np.zeros(len(settings.ring.mounts), dtype=bool)
 
-    def session(self) -> dict[str, Any]:
+    def session(self) -> SessionInfo:
         """Return the session information of the recorded run."""
-        return {"sensors": len(self._settings.ring.mounts), "emulated": self._emulated}
+        return cast("SessionInfo", {"sensors": len(self._settings.ring.mounts), "emulated": self._emulated})
 
     def take(self, record: CycleRecord) -> None:
         """Take in a cycle."""
@@ -55,9 +56,9 @@ class StubFrames:
         }  # fmt: skip
         return FrameParts(orjson.dumps(head)[:-1], b'"segments":{"whole":false}', b'"segments":{"whole":true}')
 
-    def grid(self, replayed: ReplayedCycle) -> dict[str, Any]:
+    def grid(self, replayed: ReplayedCycle) -> GridMessage:
         """Return the grid after a cycle: here only which cycle that is."""
-        return {"type": "grid", "cycle": replayed.record.cycle}
+        return cast("GridMessage", {"type": "grid", "cycle": replayed.record.cycle})
 
 
 def make_stub_frames(settings: Settings, *, emulated: bool) -> StubFrames:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.protocols import Viewer
+from runtime.console.sent_messages import ListedRecording, OpenedRecording
 from tests.runtime.console.console_case import open_console
 from tests.runtime.console.sample_messages import ASYNC_COMMANDS
 
@@ -59,14 +60,14 @@ class StubControl:
         await self._show("undo_bookmark")
         return "here"
 
-    async def recordings(self) -> list[dict[str, Any]]:
+    async def recordings(self) -> list[ListedRecording]:
         await self._show("recordings")
-        return [{"file": "run.mcap"}]
+        return [cast("ListedRecording", {"file": "run.mcap"})]
 
-    async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
+    async def open(self, viewer: Viewer, file: str) -> OpenedRecording:
         await self._show(f"open {file}")
         viewer.switch(live=False)
-        return {"seconds": 3.0}
+        return cast("OpenedRecording", {"seconds": 3.0})
 
     async def seek(self, _viewer: Viewer, s: float) -> None:
         await self._show(f"seek {s}")

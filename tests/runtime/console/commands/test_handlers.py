@@ -12,6 +12,7 @@ from perception.edits import ConfirmObject, RejectObject
 from runtime.console.clients.control import REQUEST_TIMEOUT_S
 from runtime.console.commands import handlers
 from runtime.console.frames.grid_message import grid_message
+from runtime.console.sent_messages import GridMessage
 from runtime.cycle.inputs import Request
 from runtime.cycle.step import State
 from tests.runtime.console.console_case import open_console
@@ -138,7 +139,7 @@ async def test_a_closed_page_leaves_a_goal_in_force() -> None:
 async def test_the_evidence_grid_is_sent_to_the_client_that_asks(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[State] = []
 
-    def counted(state: State) -> dict[str, Any]:
+    def counted(state: State) -> GridMessage:
         made.append(state)
         return grid_message(state)
 

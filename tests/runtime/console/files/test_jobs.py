@@ -6,20 +6,20 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from runtime.console.commands.command_error import CommandError
 from runtime.console.files.jobs import KEPT, Jobs
+from runtime.console.sent_messages import JobMessage
 from tests.hil.machine import TIMEOUT_S
 
 PROGRAM = "tests.runtime.console.files.stub_job"
 
 
 @asynccontextmanager
-async def jobs_of() -> AsyncIterator[tuple[Jobs, list[dict[str, Any]]]]:
-    jobs, sent = Jobs(program=PROGRAM), list[dict[str, Any]]()
+async def jobs_of() -> AsyncIterator[tuple[Jobs, list[JobMessage]]]:
+    jobs, sent = Jobs(program=PROGRAM), list[JobMessage]()
     jobs.tell = sent.append
     try:
         yield jobs, sent
@@ -27,7 +27,7 @@ async def jobs_of() -> AsyncIterator[tuple[Jobs, list[dict[str, Any]]]]:
         await jobs.close()
 
 
-async def over(sent: list[dict[str, Any]], number: int) -> dict[str, Any]:
+async def over(sent: list[JobMessage], number: int) -> JobMessage:
     async with asyncio.timeout(TIMEOUT_S):
         while not any(one["over"] for one in sent if one["job"] == number):
             await asyncio.sleep(0.005)

@@ -29,7 +29,7 @@ def test_a_frame_has_what_was_heard_since_the_last_one_oldest_first() -> None:
     rows.take(firing(0.2))
     rows.take(firing(0.3, (1, 2, math.inf)))
     rows.take(firing(0.4, (2, 1, 2.0)))
-    pose = [1.0, -2.0, 0.1235, 0.5]
+    pose = (1.0, -2.0, 0.1235, 0.5)
     assert rows.rows() == [
         {"robot_s": 0.1, "pose": pose, "paths": [(0, 1, 1.2346)]},
         {"robot_s": 0.4, "pose": pose, "paths": [(2, 1, 2.0)]},

@@ -198,7 +198,7 @@ def test_cross_paths_are_shown_once_and_not_after_a_restart() -> None:
 def test_a_canyon_is_sent_with_its_mouth_axis_depth_and_probability() -> None:
     canyon = Canyon(3, (0.0, 1.0, 0.12346, -1.0), 0.123456, 2.98765, 0.98765)
     assert _canyon(canyon) == {
-        "number": 3, "mouth": [0.0, 1.0, 0.123, -1.0], "axis": 0.1235, "depth": 2.988, "probability": 0.988,
+        "number": 3, "mouth": (0.0, 1.0, 0.123, -1.0), "axis": 0.1235, "depth": 2.988, "probability": 0.988,
     }  # fmt: skip
 
 

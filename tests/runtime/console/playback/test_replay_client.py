@@ -6,7 +6,7 @@ import asyncio
 import os
 import random
 import shutil
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import pytest
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError
-from runtime.console.playback.replay_worker import ANSWER, HEADER, PROBLEM
+from runtime.console.playback.replay_worker import ANSWER, HEADER
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from tests.hil.machine import TIMEOUT_S
@@ -49,7 +49,7 @@ class Page:
         self.is_gone = False
         self.live: list[bool] = []
         self.frames: list[EncodedFrame] = []
-        self.messages: list[dict[str, Any]] = []
+        self.messages: list[Mapping[str, Any]] = []
 
     def switch(self, *, live: bool) -> None:
         self.live.append(live)
@@ -58,7 +58,7 @@ class Page:
         assert isinstance(frame, EncodedFrame)
         self.frames.append(frame)
 
-    def send(self, message: dict[str, Any]) -> None:
+    def send(self, message: Mapping[str, Any]) -> None:
         self.messages.append(message)
 
     @property
@@ -85,7 +85,8 @@ async def test_a_recording_is_opened_moved_and_closed(folder: Path) -> None:
     page = Page()
     async with replay_client(folder) as client:
         about = await client.open(page, "hall.mcap")
-        assert about["about"] == {"sensors": 24, "emulated": True}
+        recorded: Mapping[str, Any] = about["about"]
+        assert recorded == {"sensors": 24, "emulated": True}
         assert (about["file"], about["cycles"], about["duration_s"]) == ("hall.mcap", 100, 4.95)
         assert about["modes"][-1][1] == "DRIVE"
         assert page.live == [False]
@@ -115,7 +116,7 @@ async def test_a_recording_with_refused_keyframes_is_played_and_they_are_named(f
         await client.open(page, "spoiled.mcap")
         await client.seek(page, 4.5)
         await until(lambda: bool(page.frames) and page.last["cycle"] == 91)
-        (problem,) = (message for message in page.messages if message["type"] == PROBLEM)
+        (problem,) = (message for message in page.messages if message["type"] == "replay_problem")
         assert "canyon_map.firings is -7" in problem["error"]
 
 
@@ -155,7 +156,7 @@ async def test_workers_are_limited_their_death_is_reported_and_none_outlives_the
         replay._process.kill()
         await until(lambda: replay.is_over)
         await until(lambda: bool(page.messages))
-        assert page.messages[-1]["type"] == PROBLEM
+        assert page.messages[-1]["type"] == "replay_problem"
         assert "has ended: open the recording again" in page.messages[-1]["error"]
         with pytest.raises(ReplayError, match="has ended"):
             await client.seek(page, 1.0)

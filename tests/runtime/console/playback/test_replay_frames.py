@@ -75,7 +75,8 @@ async def test_a_client_is_shown_a_recording(folder: Path, monkeypatch: pytest.M
     try:
         about = (await client.open(page, "hall.mcap"))["about"]
         assert (len(about["ring"]["mounts"]), about["emulated"], "units" in about) == (24, True, False)
-        assert len(about["truth"]["drums"]) > 0
+        assert about["truth"] is not None
+        assert about["truth"]["drums"]
         await client.seek(page, 4.0)
         await until(lambda: bool(page.frames) and page.last["playback"]["s"] == pytest.approx(4.0))
         assert page.last["segments"]["whole"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import orjson
 import pytest
 
 from runtime.console.playback.replay_cursor import ReplayCursor
-from runtime.console.playback.replay_worker import FRAME_PERIOD_S, PROBLEM, FrameParts, ReplayWorker
+from runtime.console.playback.replay_worker import FRAME_PERIOD_S, FrameParts, ReplayWorker
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
 from runtime.recording.replayer import GAP_MAX_S
 from tests.recorded import SECONDS, spoil, write_with_gap
@@ -29,7 +29,7 @@ class WorkerCase:
     def __init__(self, cursor: ReplayCursor) -> None:
         self.host_s = 50.0
         self.frames: list[tuple[float, int, int, dict[str, Any]]] = []
-        self.answers: list[dict[str, Any]] = []
+        self.answers: list[Mapping[str, Any]] = []
         self.worked = 0
         self.worker = ReplayWorker(
             cursor,
@@ -204,7 +204,7 @@ def test_a_refused_keyframe_is_reported_and_the_seek_is_completed(run: Path, tmp
         case.run_for(1.0)
         assert case.last["cycle"] == frames[3] + 31
         (answer,) = case.answers
-    assert answer["type"] == PROBLEM
+    assert answer["type"] == "replay_problem"
     assert "firings is -7, expected 0 to 9.0072e+15, and 2 more; the replay goes on" in answer["error"]
 
 
@@ -217,7 +217,7 @@ def test_a_place_without_a_state_and_a_cycle_that_fails_are_reported_and_the_wor
         case.do(do="seek", s=0.05 * frames[-1])
         case.run_for(1.0)
         assert case.frames == []
-        assert {answer["type"] for answer in case.answers} == {PROBLEM}
+        assert {answer["type"] for answer in case.answers} == {"replay_problem"}
         assert case.answers[-1]["error"].startswith("this moment cannot be replayed")
         assert len(case.answers) <= len(frames) + 1
         case.do(do="seek", s=1.0)
@@ -226,7 +226,7 @@ def test_a_place_without_a_state_and_a_cycle_that_fails_are_reported_and_the_wor
         monkeypatch.setattr(case.worker._cursor, "next_cycle", failing)
         case.do(do="play", speed=1.0)
         case.run_for(1.0)
-        assert case.answers[-1] == {"type": PROBLEM, "error": "cycle 7 cannot be replayed"}
+        assert case.answers[-1] == {"type": "replay_problem", "error": "cycle 7 cannot be replayed"}
         assert case.worker.wait_s == math.inf, "it is paused"
 
 
