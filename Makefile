@@ -12,7 +12,7 @@ COMMA  := ,
 PYTEST := $(BIN)/python -m pytest -q
 PROCESSORS = $(shell nproc)
 LINES  := $(VENV)/lines
-BIOME  := $(VENV)/npm/node_modules/.bin/biome
+NPM_BIN := $(VENV)/npm/node_modules/.bin
 KERNELS = tests/perception tests/behaviors/valley tests/drivers/emulator
 BOUNDSCHECKED = $(KERNELS) tests/runtime/recording
 
@@ -42,7 +42,8 @@ lint: $(VENV)/test.stamp $(VENV)/npm.stamp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell
-	@if [ -x $(BIOME) ]; then $(BIOME) ci --colors=off --config-path=.ci/page runtime/console/page; \
+	@if [ -x $(NPM_BIN)/tsc ]; then $(NPM_BIN)/biome ci --colors=off --config-path=.ci/page runtime/console/page \
+		&& $(NPM_BIN)/tsc --project .ci/page; \
 		else echo "without npm's packages the console's page is not checked"; fi
 
 kernels: $(VENV)/test.stamp

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from config.reference import markdown
-from tests import command_page
+from tests import command_page, page_types
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
@@ -144,3 +144,8 @@ def test_the_notebook_runs_outside_the_clone(monkeypatch: pytest.MonkeyPatch, tm
         exec(first, names)
         exec(last, names)
     assert printed.getvalue().startswith("left out")
+
+
+def test_the_types_of_the_page_are_those_of_the_models() -> None:
+    """Renew them with `python -m tests.page_types`."""
+    assert page_types.FILE.read_text("utf-8") == page_types.page_types()

@@ -15,6 +15,7 @@ from typing import Any, Final
 from aiohttp import WSMsgType, web
 
 from tests.browser.synthetic_run import Hall, greeting
+from tests.page_types import shape_error
 
 PAGE: Final = Path(__file__).parents[2] / "runtime" / "console" / "page"
 POLICY: Final = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
@@ -134,6 +135,7 @@ class FakeServer:
 
     async def send(self, message: dict[str, Any]) -> None:
         """Send a message to every page."""
+        assert shape_error(message) is None
         for client in list(self.clients):
             with contextlib.suppress(ConnectionError):
                 await client.socket.send_str(json.dumps(message))
@@ -184,6 +186,7 @@ class FakeServer:
     async def _send_state(self, client: Client, frame: dict[str, Any]) -> None:
         if self.silent:
             return
+        assert shape_error(frame) is None
         client.last = frame
         with contextlib.suppress(ConnectionError):
             await client.socket.send_str(json.dumps(frame))
@@ -218,7 +221,7 @@ class FakeServer:
         self._counted += 1
         client = Client(socket, self._counted)
         role = "control" if self.controller == client.number else "watch"
-        await socket.send_str(json.dumps((self.session or greeting()) | {"role": role}))
+        await socket.send_str(json.dumps((self.session or greeting()) | {"role": role, "client": client.number}))
         self.clients.append(client)
         self._changed.set()
         await self._send_state(client, self.frame(client))
@@ -296,6 +299,8 @@ class FakeServer:
                 return {"path": self.changed.pop()[0], "value": 1.0} if self.changed else None
             case "save_toml":
                 return TOML
+            case "list_jobs" if kind not in self.data:
+                return []
             case "list_recordings" if kind not in self.data:
                 return [
                     {

@@ -17,6 +17,9 @@ START: Final = (-6 * FOOT, 0.0)
 DRUMS: Final = tuple((x * FOOT - START[0], y * FOOT) for y in (4, -4) for x in (1, 4, 7))
 """In the odometry's frame."""
 RADIUS: Final = FOOT
+NO_PLACES: Final[dict[str, Any]] = {
+    "type": "places", "frame": "odom", "place": [], "no_go_line": [], "no_go_area": [], "speed_area": []
+}  # fmt: skip
 PHASES: Final = ("gather", "perceive", "decide", "command", "refine", "observers")
 
 
@@ -24,7 +27,7 @@ def parameter(path: str, kind: str, value: object, low: float | None = None, hig
               choices: list[str] | None = None, help_: str = "") -> dict[str, Any]:  # fmt: skip
     """Return a parameter as the session message lists it."""
     return {"path": path, "label": path.split(".")[-1].replace("_", " "), "value": value, "low": low, "high": high,
-            "kind": kind, "choices": choices, "help": help_}  # fmt: skip
+            "kind": kind, "choices": choices, "optional": False, "help": help_}  # fmt: skip
 
 
 PARAMETERS: Final = (
@@ -51,10 +54,10 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
     drum = [[round(RADIUS * math.cos(a), 6), round(RADIUS * math.sin(a), 6)] for a in turn]
     half = RADIUS
     return {
-        "type": "session", "version": "1.0.0", "role": role, "name": "denning", "emulated": True, "recording": True,
-        "units": "ft",
+        "type": "session", "version": "1.0.0", "role": role, "name": "denning", "emulated": True,
+        "units": "ft", "client": 1, "has_token": True, "robots": [], "places": NO_PLACES,
         "ring": {"mounts": [[0.381 * math.cos(a), 0.381 * math.sin(a), a] for a in angles],
-                 "half_angle": math.radians(12.0), "range_min": 0.1524, "range_max": 7.7724},
+                 "turning": [], "half_angle": math.radians(12.0), "range_min": 0.1524, "range_max": 7.7724},
         "body": {"radius": 0.381, "speed_max": 0.5, "turn_max": 1.0},
         "models": [{"name": "drum", "vertices": drum, "closed": True, "arc_radius_m": RADIUS},
                    {"name": "box", "vertices": [[half, -half], [half, half], [-half, half], [-half, -half]],
@@ -139,13 +142,15 @@ class Hall:
             out.append({
                 "number": i + 1, "model": "drum" if i < 6 or i % 5 else "wall", "x": x + 0.01, "y": y - 0.01,
                 "theta": 0.0, "sigma": spread, "covariance": [spread**2, 0.4 * spread**2, 0.6 * spread**2],
-                "probability": min(0.999, probability), "support": 40 + i, "score": 0.9,
+                "probability": min(0.999, probability), "support": 40 + i, "score": 0.9, "confirmed": False,
+                "placed": False, "ends": None,
             })  # fmt: skip
         for i, (x1, y1, x2, y2) in enumerate(self.walls):
             out.append({
                 "number": 101 + i, "model": "wall", "x": (x1 + x2) / 2, "y": (y1 + y2) / 2,
                 "theta": math.atan2(y2 - y1, x2 - x1), "sigma": 0.01, "covariance": [0.1, 0.0, 0.0001],
-                "probability": 0.98, "support": 60, "score": 0.98, "ends": [x1, y1, x2, y2],
+                "probability": 0.98, "support": 60, "score": 0.98, "confirmed": False, "placed": False,
+                "ends": [x1, y1, x2, y2],
             })  # fmt: skip
         return out
 
@@ -171,5 +176,5 @@ class Hall:
                           "probability": 0.9, "frame": [0.05, -0.02, 0.03]},
             "missed": missed, "late": cycle // 90, "quanta": 3, "refinement": "budget",
             "link": {"frames": 24 * cycle, "bad": 1 if cycle > 60 else 0, "lost": 0},
-            "sensors": [[17, "weak", "hears less than its neighbours"]],
+            "sensors": [[17, "failing", "hears less than its neighbours"]], "waiting": 0, "valley": None,
         }  # fmt: skip

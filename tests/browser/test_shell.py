@@ -20,6 +20,7 @@ COUNT_TONES = """() => {
     class Tone extends Gain { frequency = {}; start() { window.tones++; } stop() {} }
     window.AudioContext = class {
         currentTime = 0;
+        async resume() {}
         createOscillator() { return new Tone(); }
         createGain() { return new Gain(); }
     };
@@ -40,7 +41,7 @@ async def again(server: FakeServer, opened: Opened) -> None:
 
 
 async def warn(server: FakeServer, level: str = "warning") -> None:
-    await server.send({"type": "log", "timestamp": 1.5, "level": level, "event": "a sensor hears less", "fields": {}})
+    await server.send({"type": "log", "timestamp": "", "level": level, "event": "a sensor hears less", "fields": {}})
 
 
 async def test_layout_tool_tab_and_units_survive_a_reload(server: FakeServer, opener: Opener) -> None:

@@ -1,24 +1,29 @@
+// @ts-check
 // Warnings that should reach a person who looks elsewhere: counted on the Log tab and in the window's title until the
-// log
-// is looked at, and heard if one wants.
+// log is looked at, and heard if one wants.
 
 import { byId, setAttribute, setText } from "./dom.js";
 import { Emitter } from "./emitter.js";
 import { prefer, preferred } from "./preferences.js";
+import { counted } from "./units.js";
 
 const QUIET_MS = 3000; // many warnings at once are one sound
 const TONE_S = 0.12;
 const TONES_HZ = { warning: [660], error: [660, 440, 660] };
 const STOPS = new Set(["SAFE_STOP", "FAULT"]);
 
+/** @extends {Emitter<{ changed: [number] }>} */
 export class Alerts extends Emitter {
   unseen = 0;
   #sound = byId("log-sound");
+  /** @type {AudioContext | null} */
   #audio = null;
   #heard_ms = -Infinity;
+  /** @type {string | null} */
   #mode = null;
 
   // `seen` says whether the log is being looked at.
+  /** @param {Pick<Parts, "run" | "connection"> & { seen: () => boolean }} parts */
   constructor({ run, connection, seen }) {
     super();
     this.seen = seen;
@@ -30,7 +35,7 @@ export class Alerts extends Emitter {
     });
     // After a reload a browser plays nothing before the page was touched.
     for (const touch of ["pointerdown", "keydown"])
-      addEventListener(touch, () => this.#audio?.resume?.(), { capture: true });
+      addEventListener(touch, () => this.#audio?.resume(), { capture: true });
     run.on("log", ({ level }) => (level === "warning" || level === "error") && this.#take(level));
     run.on("mode", ({ mode }) => {
       if (this.#mode !== null && mode !== this.#mode && STOPS.has(mode)) this.#play("error");
@@ -40,6 +45,7 @@ export class Alerts extends Emitter {
     document.addEventListener("visibilitychange", () => this.look());
   }
 
+  /** @param {"warning" | "error"} level */
   #take(level) {
     this.#play(level);
     this.unseen++;
@@ -56,7 +62,7 @@ export class Alerts extends Emitter {
 
   #show() {
     const badge = byId("log-badge"),
-      words = `${this.unseen} new warning${this.unseen === 1 ? "" : "s"}`;
+      words = counted(this.unseen, "new warning");
     badge.hidden = this.unseen === 0;
     setText(badge, this.unseen > 99 ? "99+" : String(this.unseen));
     if (this.unseen > 0) setAttribute(byId("tab-log"), "title", words);
@@ -64,20 +70,22 @@ export class Alerts extends Emitter {
     this.emit("changed", this.unseen);
   }
 
+  /** @param {"warning" | "error"} kind */
   #play(kind) {
     const now = performance.now();
     if (!this.#sound.checked || now - this.#heard_ms < QUIET_MS || !globalThis.AudioContext) return;
     this.#heard_ms = now;
     this.#audio ??= new AudioContext();
-    this.#audio.resume?.();
+    const audio = this.#audio;
+    void audio.resume();
     TONES_HZ[kind].forEach((hz, i) => {
-      const from = this.#audio.currentTime + 1.3 * TONE_S * i;
-      const tone = this.#audio.createOscillator(),
-        loud = this.#audio.createGain();
+      const from = audio.currentTime + 1.3 * TONE_S * i;
+      const tone = audio.createOscillator(),
+        loud = audio.createGain();
       tone.frequency.value = hz;
       loud.gain.setValueAtTime(0.2, from);
       loud.gain.exponentialRampToValueAtTime(0.001, from + TONE_S);
-      tone.connect(loud).connect(this.#audio.destination);
+      tone.connect(loud).connect(audio.destination);
       tone.start(from);
       tone.stop(from + TONE_S);
     });

@@ -1,3 +1,4 @@
+// @ts-check
 // A second panel beside the first, on screens that are wide enough for two. Which one, and its width, are kept.
 
 import { byId, el, setText } from "./dom.js";
@@ -9,11 +10,13 @@ const ALONE = new Set(["cycle"]); // below the map already
 
 export class Beside {
   #wide = matchMedia(WIDE);
-  #main = document.querySelector("main");
+  #main = /** @type {HTMLElement} */ (document.querySelector("main"));
   #wanted = preferred(KEPT, "");
 
+  /** @param {Pick<Parts, "tabs"> & { shown: (name: string) => void }} parts */
   constructor({ tabs, shown }) {
-    Object.assign(this, { tabs, shown });
+    this.tabs = tabs;
+    this.shown = shown;
     const chooser = byId("beside-panel");
     chooser.append(
       ...tabs.names.filter((name) => !ALONE.has(name)).map((name) => el("option", { value: name }, tabs.label(name))),
@@ -25,6 +28,7 @@ export class Beside {
     this.#place();
   }
 
+  /** @param {string} name */
   set(name) {
     this.#wanted = name;
     prefer(KEPT, name);
@@ -44,7 +48,7 @@ export class Beside {
     else this.#main.dataset.beside = name;
     byId("beside").hidden = name === "";
     setText(byId("beside-name"), name === "" ? "" : tabs.label(name));
-    tabs.show(tabs.shown === name ? tabs.names.find((one) => one !== name) : tabs.shown);
+    tabs.show(tabs.shown === name ? (tabs.names.find((one) => one !== name) ?? "") : tabs.shown);
     if (name !== "") this.shown(name);
   }
 }

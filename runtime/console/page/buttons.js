@@ -1,21 +1,29 @@
+// @ts-check
 // Buttons of one's own over the map: missions, places and whatever else offers actions, each with a key if one wants.
-// They
-// are kept in this browser.
+// They are kept in this browser.
 
-import { byId, el, setText, writesText } from "./dom.js";
+import { button, byId, el, setText, writesText } from "./dom.js";
 import { prefer, preferred } from "./preferences.js";
 
 const KEPT = "buttons";
 // Keys that the page uses itself, see keyboard.js; letters of the drive keys among them.
 const TAKEN = new Set([..."+-=−fulpkwasd[]?12345678 "]);
 
-export class Buttons {
-  #offers = new Map(); // kind → () => [{id, name, act}]
-  #shown = "";
-  #kept = preferred(KEPT, []).filter((one) => typeof one?.action === "string");
+/**
+ * @typedef {{ action: string; key: string }} Kept
+ * @typedef {{ id: string; name: string; act: () => Promise<unknown> }} Offer
+ */
 
+export class Buttons {
+  /** @type {Map<string, () => Offer[]>} */
+  #offers = new Map(); // by kind
+  #shown = "";
+  #kept = preferred(KEPT, /** @type {Kept[]} */ ([])).filter((one) => typeof one?.action === "string");
+
+  /** @param {Pick<Parts, "run" | "notifications">} parts */
   constructor({ run, notifications }) {
-    Object.assign(this, { run, notifications });
+    this.run = run;
+    this.notifications = notifications;
     byId("button-form").addEventListener("submit", (event) => this.#add(event));
     run.on("session", () => this.refresh());
     run.on("state", () => this.refresh());
@@ -23,6 +31,7 @@ export class Buttons {
   }
 
   // Offers actions of a kind, as "mission" or "place": `list` returns what there is now, {id, name, act} each.
+  /** @param {string} kind @param {() => Offer[]} list */
   offer(kind, list) {
     this.#offers.set(kind, list);
     this.refresh();
@@ -49,19 +58,10 @@ export class Buttons {
       ...kept.map(({ action, key }) => {
         const found = actions.find((one) => one.key === action);
         const name = found?.name ?? action.slice(action.indexOf(":") + 1);
-        const button = el(
-          "button",
-          {
-            type: "button",
-            "data-action": action,
-            title: found ? `${found.kind} ${name}` : "not there now",
-            onclick: () => this.#act(action),
-          },
-          el("span", {}, name),
-        );
-        if (key) button.append(el("kbd", {}, key.toUpperCase()));
-        button.disabled = !enabled || found === undefined;
-        return button;
+        const content = [el("span", {}, name), key ? el("kbd", {}, key.toUpperCase()) : null];
+        const title = found ? `${found.kind} ${name}` : "not there now";
+        const disabled = !enabled || found === undefined;
+        return button(content, () => this.#act(action), { "data-action": action, title, disabled });
       }),
     );
     chooser.replaceChildren(...actions.map(({ key, kind, name }) => el("option", { value: key }, `${kind} ${name}`)));
@@ -72,26 +72,22 @@ export class Buttons {
           "li",
           { class: "line" },
           el("span", {}, `${action.replace(":", " ")}${key ? `, key ${key.toUpperCase()}` : ""}`),
-          el(
-            "button",
-            {
-              type: "button",
-              "aria-label": `Remove the button ${action.replace(":", " ")}`,
-              onclick: () => this.#keep(this.#kept.filter((one) => one.action !== action)),
-            },
-            "Remove",
-          ),
+          button("Remove", () => this.#keep(this.#kept.filter((one) => one.action !== action)), {
+            "aria-label": `Remove the button ${action.replace(":", " ")}`,
+          }),
         ),
       ),
     );
   }
 
+  /** @param {Kept[]} buttons */
   #keep(buttons) {
     this.#kept = buttons;
     prefer(KEPT, buttons);
     this.refresh();
   }
 
+  /** @param {SubmitEvent} event */
   #add(event) {
     event.preventDefault();
     const action = byId("button-action").value,
@@ -113,6 +109,7 @@ export class Buttons {
     this.#keep([...others, { action, key }]);
   }
 
+  /** @param {string} action */
   async #act(action) {
     const found = this.#actions.find(({ key }) => key === action);
     if (found === undefined || !this.run.state.controller || this.run.watchesRecording) return;
@@ -124,6 +121,7 @@ export class Buttons {
     }
   }
 
+  /** @param {KeyboardEvent} event */
   #key(event) {
     if (
       event.defaultPrevented ||

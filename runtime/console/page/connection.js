@@ -1,3 +1,4 @@
+// @ts-check
 // The websocket: reconnects, matches answers to requests, and detects congestion.
 
 import { Emitter } from "./emitter.js";
@@ -12,6 +13,7 @@ const HALT_CONFIRM_MS = 800;
 const HALT_ANSWER_MS = 3000;
 const MESSAGE_MAX = 65_536;
 // Refused while a recording is shown: its object numbers and poses are not those of the live run.
+/** @type {Set<keyof Commands>} */
 const LIVE_ONLY = new Set([
   "arm",
   "legs",
@@ -36,6 +38,7 @@ const LIVE_ONLY = new Set([
   "load_map",
 ]);
 // Carried out by a cycle, so that in a paused run they wait for the next one, however long that takes.
+/** @type {Set<keyof Commands>} */
 const EDITS = new Set([
   "delete_segments",
   "pin_segments",
@@ -52,6 +55,7 @@ const EDITS = new Set([
 const CONGESTED_BYTES = 4096;
 
 export class RequestError extends Error {
+  /** @param {string} message @param {{ field?: string | null; answered?: boolean }} more */
   constructor(message, { field = null, answered = true } = {}) {
     super(message);
     this.field = field;
@@ -59,21 +63,41 @@ export class RequestError extends Error {
   }
 }
 
+// What is wrong, of an error of any kind.
+/** @param {unknown} error */
+export const messageOf = (error) => (error instanceof Error ? error.message : String(error));
+
+/**
+ * @typedef {object} ConnectionEvents
+ * @property {[]} open
+ * @property {[{ opened: boolean; reason: string; code: number }]} closed
+ * @property {[number]} waiting
+ * @property {[boolean]} halt
+ * @property {[RequestError]} refused
+ */
+
+/** @extends {Emitter<ConnectionEvents & { [K in keyof Messages]: [Messages[K]] }>} */
 export class Connection extends Emitter {
   #address;
+  /** @type {WebSocket | null} */
   #socket = null;
   #next = 1;
+  /** @type {Map<number, Pending>} */
   #pending = new Map();
   #retry_ms = RETRY_FIRST_MS;
-  #timer = null;
+  /** @type {number | undefined} */
+  #timer = undefined;
   #received_ms = 0;
+  /** @type {number | undefined} */
   #challenge = undefined; // the newest of the server; a command that can begin a motion is refused without a fresh one
   #halting = false;
-  #unconfirmed = null;
+  /** @type {number | undefined} */
+  #unconfirmed = undefined;
   #probing = false;
   showsRecording = () => false;
   isPaused = () => false;
 
+  /** @param {string} address */
   constructor(address) {
     super();
     this.#address = address;
@@ -85,7 +109,7 @@ export class Connection extends Emitter {
   }
 
   get congested() {
-    return this.open && this.#socket.bufferedAmount > CONGESTED_BYTES;
+    return this.open && (this.#socket?.bufferedAmount ?? 0) > CONGESTED_BYTES;
   }
 
   connect() {
@@ -105,6 +129,7 @@ export class Connection extends Emitter {
   }
 
   // The end of a connection; of one that hangs, whose own end may take a minute, before it has ended.
+  /** @param {WebSocket} socket @param {boolean} opened @param {{ reason?: string; code?: number }} event */
   #lose(socket, opened = true, { reason = "", code = 0 } = {}) {
     if (this.#socket !== socket) return;
     this.#socket = null;
@@ -122,6 +147,7 @@ export class Connection extends Emitter {
   }
 
   // Sends a message and resolves to its answer's data; rejects with a RequestError that says why not.
+  /** @template {keyof Commands} K @param {Ask<K>} message @returns {Promise<Answers[K]>} */
   request(message, timeout_ms = ANSWER_MAX_MS) {
     return new Promise((resolve, refuse) => {
       const id = this.#transmit(message, refuse);
@@ -133,7 +159,7 @@ export class Connection extends Emitter {
             this.#pending.delete(id);
             refuse(new RequestError(`no answer to "${message.type}" in ${timeout_ms / 1000} s`, { answered: false }));
           }, timeout_ms);
-      this.#pending.set(id, { resolve, refuse, timer, waits });
+      this.#pending.set(id, { resolve: (data) => resolve(/** @type {Answers[K]} */ (data)), refuse, timer, waits });
       if (waits) this.#countWaiting();
     });
   }
@@ -143,13 +169,13 @@ export class Connection extends Emitter {
   }
 
   // Sends a message without waiting for its answer; returns whether it was sent.
+  /** @template {keyof Commands} K @param {Ask<K>} message */
   send(message) {
     return this.#transmit(message, () => {}) !== null;
   }
 
   // A HALT is sent until it is answered: again as the first message of the next connection, and over a new one where
-  // this
-  // one hangs. "halt" is emitted with false when it is not confirmed in time, with true when it is.
+  // this one hangs. "halt" is emitted with false when it is not confirmed in time, with true when it is.
   async halt() {
     const socket = this.open ? this.#socket : null;
     if (!this.#halting)
@@ -159,7 +185,7 @@ export class Connection extends Emitter {
       await this.request({ type: "halt" }, HALT_ANSWER_MS);
       this.#halted();
     } catch (error) {
-      if (error.answered) this.#halted();
+      if (error instanceof RequestError && error.answered) this.#halted();
       else if (socket !== null) this.#lose(socket);
       throw error;
     }
@@ -187,8 +213,9 @@ export class Connection extends Emitter {
     }
   }
 
+  /** @param {{ type: keyof Commands; v?: number; w?: number }} message @param {(why: RequestError) => void} refuse */
   #transmit(message, refuse) {
-    if (!this.open) {
+    if (this.#socket === null || !this.open) {
       refuse(new RequestError("there is no connection to the robot's process", { answered: false }));
       return null;
     }
@@ -206,8 +233,10 @@ export class Connection extends Emitter {
     return id;
   }
 
+  /** @param {string} text */
   #onMessage(text) {
     this.#received_ms = performance.now();
+    /** @type {Messages[keyof Messages]} */
     let message;
     try {
       message = JSON.parse(text);
@@ -216,12 +245,13 @@ export class Connection extends Emitter {
     }
     if (message.type === "answer") this.#resolve(message);
     else if (message.type === "challenge") this.#challenge = message.number;
-    else this.emit(message.type, message);
+    else this.emit(message.type, ...[/** @type {never} */ (message)]);
   }
 
+  /** @param {AnswerMessage} answer */
   #resolve({ id, ok, error, field, data }) {
-    const pending = this.#pending.get(id);
-    if (pending === undefined) {
+    const pending = id === null ? undefined : this.#pending.get(id);
+    if (id === null || pending === undefined) {
       if (!ok) this.emit("refused", new RequestError(error ?? "refused", { field }));
       return;
     }
@@ -233,15 +263,14 @@ export class Connection extends Emitter {
   }
 
   // After a laptop's sleep a socket can look open and be dead. Silence alone proves nothing, because playback may be
-  // paused:
-  // so send a harmless request, and close the socket if that is not answered either.
+  // paused: so send a harmless request, and close the socket if that is not answered either.
   #checkSilence() {
     if (!this.open || performance.now() - this.#received_ms < SILENCE_MAX_MS || this.#probing) return;
     this.#probing = true;
     const socket = this.#socket;
     this.request({ type: "save_toml" })
       .catch((error) => {
-        if (!error.answered) this.#lose(socket);
+        if (socket !== null && error instanceof RequestError && !error.answered) this.#lose(socket);
       })
       .finally(() => {
         this.#probing = false;

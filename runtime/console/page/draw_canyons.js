@@ -1,3 +1,4 @@
+// @ts-check
 // Box canyons: the mouth as a bar across the way in, the closed outline behind it, the axis, depth and probability.
 
 import { textWithHalo } from "./scene.js";
@@ -6,10 +7,12 @@ import { percent } from "./units.js";
 const SURE = 0.9; // from here on leave-canyon stays outside
 const AXIS_MAX_PX = 60;
 
+/** @param {Drawing} f */
 export function drawCanyons(f) {
   for (const canyon of f.run.state.canyons) drawCanyon(f, canyon);
 }
 
+/** @param {Drawing} f @param {CanyonRow} canyon */
 function drawCanyon(f, { mouth: [x1, y1, x2, y2], axis, depth, probability }) {
   const { ctx, px, theme } = f;
   const dx = Math.cos(axis),

@@ -1,6 +1,8 @@
+// @ts-check
 // Cross paths: an arc of each path's ellipse, the newer the bolder, and a mark where a recognised object reflected it.
 
 import { addArc, ellipseArc, reflectorOf } from "./cross_paths.js";
+import { addLine } from "./scene.js";
 
 const AGES = [
   [0.15, 0.8, 1.6],
@@ -12,6 +14,7 @@ const MARK_PX = 4.5;
 const MARK_EVERY_PX = 12; // one mark for all that lie as near together
 
 // Each mark in a frame of its own: x towards the sensors, in units of MARK_PX.
+/** @type {Record<string, Pair[]>} */
 const MARKS = {
   wall: [
     [0, -1.6],
@@ -37,6 +40,7 @@ const MARKS = {
   ],
 };
 
+/** @param {Drawing} f */
 export function drawCrossPaths(f) {
   const { ctx, run, px, theme } = f;
   const explained = AGES.map(() => new Path2D()),
@@ -44,8 +48,8 @@ export function drawCrossPaths(f) {
   const marks = new Path2D(),
     marked = new Set();
   for (const path of run.crossPaths) {
-    path.arc ??= ellipseArc(path, run.session.ring.half_angle) ?? [];
-    if (path.arc.length === 0) continue;
+    if (path.arc === undefined) path.arc = ellipseArc(path, run.session?.ring.half_angle ?? 0);
+    if (path.arc === null) continue;
     if (path.reflector === undefined) path.reflector = reflectorOf(path, run);
     const age = run.state.robot_s - path.t;
     const group = AGES.findIndex(([until]) => age < until);
@@ -53,7 +57,7 @@ export function drawCrossPaths(f) {
     if (path.reflector === null) continue;
     const { kind, x, y } = path.reflector;
     const place = [kind, ...[x, y].map((metres) => Math.round(metres / (MARK_EVERY_PX * px)))].join(" ");
-    if (!marked.has(place)) addMark(marks, path, MARK_PX * px);
+    if (!marked.has(place)) addMark(marks, path, path.reflector, MARK_PX * px);
     marked.add(place);
   }
   f.inWorld();
@@ -75,7 +79,8 @@ export function drawCrossPaths(f) {
   ctx.stroke(marks);
 }
 
-function addMark(marks, { transmitter: t, listener: l, reflector: { kind, x, y } }, size) {
+/** @param {Path2D} marks @param {CrossPath} path @param {Reflector} reflector @param {number} size */
+function addMark(marks, { transmitter: t, listener: l }, { kind, x, y }, size) {
   if (kind === "round") {
     marks.moveTo(x + size, y);
     marks.arc(x, y, size, 0, 2 * Math.PI);
@@ -84,9 +89,8 @@ function addMark(marks, { transmitter: t, listener: l, reflector: { kind, x, y }
   const angle = Math.atan2((t.y + l.y) / 2 - y, (t.x + l.x) / 2 - x);
   const c = size * Math.cos(angle),
     s = size * Math.sin(angle);
-  MARKS[kind].forEach(([forward, left], i) => {
-    const at = [x + c * forward - s * left, y + s * forward + c * left];
-    if (i === 0) marks.moveTo(...at);
-    else marks.lineTo(...at);
-  });
+  addLine(
+    marks,
+    MARKS[kind].map(([forward, left]) => [x + c * forward - s * left, y + s * forward + c * left]),
+  );
 }

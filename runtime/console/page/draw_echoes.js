@@ -1,3 +1,4 @@
+// @ts-check
 // Raw data: the beams that fire now, and the arcs on which recent echoes lie.
 
 import { textWithHalo } from "./scene.js";
@@ -8,13 +9,14 @@ const AGES = [
   [Infinity, 0.2, 1],
 ]; // up to s, opacity, px
 
+/** @param {Drawing} f */
 export function drawArcs(f) {
   const { ctx, run, px } = f;
   const half = run.session?.ring?.half_angle ?? 0;
   const paths = AGES.map(() => new Path2D());
   for (const echo of run.echoes) {
     const age = run.state.robot_s - echo.t;
-    const path = paths[AGES.findIndex(([until]) => age < until)] ?? paths.at(-1);
+    const path = paths[AGES.findIndex(([until]) => age < until)];
     const from = echo.angle - half;
     path.moveTo(echo.x + echo.range * Math.cos(from), echo.y + echo.range * Math.sin(from));
     path.arc(echo.x, echo.y, echo.range, from, echo.angle + half);
@@ -28,12 +30,14 @@ export function drawArcs(f) {
   });
 }
 
+/** @param {Drawing} f */
 export function drawBeams(f) {
   const { ctx, run, px, theme } = f;
   const ring = run.session?.ring;
   if (!ring) return;
   const heard = new Path2D(),
     unheard = new Path2D();
+  /** @type {Array<[number, SensorPose]>} */
   const places = [];
   for (const index of run.state.firing) {
     const at = run.sensor(index);

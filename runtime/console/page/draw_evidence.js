@@ -1,24 +1,31 @@
+// @ts-check
 // The evidence grid: what the cells around the robot have answered. It is asked for once a second while its layer is
 // on, and painted once for each answer, a pixel a cell.
+
+import { RequestError } from "./connection.js";
+import { context } from "./theme.js";
 
 const PERIOD_MS = 1000;
 const UNKNOWN = -1;
 
+/** @param {Drawing} f */
 export function drawEvidenceGrid(f) {
   const { grid } = f.run;
   if (grid === null || grid.columns === 0) return;
-  if (grid.picture === undefined || grid.theme !== f.theme.occupied + f.theme.free) paint(grid, f.theme);
+  const { x = 0, y = 0, cell = 0, columns, rows } = grid;
+  const picture = grid.theme === f.theme.occupied + f.theme.free ? grid.picture : null;
   f.inWorld();
   f.ctx.imageSmoothingEnabled = false;
-  f.ctx.drawImage(grid.picture, grid.x, grid.y, grid.columns * grid.cell, grid.rows * grid.cell);
+  f.ctx.drawImage(picture ?? paint(grid, f.theme), x, y, columns * cell, rows * cell);
 }
 
 // The rows begin at the smallest y, and so does the map, whose y axis points up.
+/** @param {Grid} grid @param {Theme} theme */
 function paint(grid, theme) {
   const cells = Uint8Array.from(atob(grid.cells), (letter) => letter.charCodeAt(0));
   const picture = document.createElement("canvas");
   [picture.width, picture.height] = [grid.columns, grid.rows];
-  const ctx = picture.getContext("2d");
+  const ctx = context(picture);
   cells.forEach((byte, i) => {
     const percent = (byte << 24) >> 24;
     if (percent === UNKNOWN) return;
@@ -28,9 +35,11 @@ function paint(grid, theme) {
   });
   grid.picture = picture;
   grid.theme = theme.occupied + theme.free;
+  return picture;
 }
 
 // Asks for the grid while its layer is on; the answer comes as a message of its own.
+/** @param {Pick<Parts, "run" | "connection" | "notifications"> & { layer: Layer; changed: () => void }} parts */
 export function watchGrid({ layer, run, connection, notifications, changed }) {
   let waiting = false,
     warned = false,
@@ -51,7 +60,7 @@ export function watchGrid({ layer, run, connection, notifications, changed }) {
     try {
       await connection.request({ type: "show_grid" });
     } catch (error) {
-      refused = error.answered; // a page that may only watch
+      refused = error instanceof RequestError && error.answered; // a page that may only watch
       if (refused) notifications.showError(error);
     }
     waiting = false;

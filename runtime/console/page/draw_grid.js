@@ -1,16 +1,19 @@
+// @ts-check
 // The reference layers: grid, scale bar, and the true outlines that the emulator reports.
 
-import { textWithHalo } from "./scene.js";
+import { addLine, textWithHalo } from "./scene.js";
 
 const STEPS = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
 const GRID_PX = 44;
 const SCALE_PX = 90; // at least, and less where the map is small
 
+/** @param {Drawing} f @param {number} pixels */
 function stepOf(f, pixels) {
   const unit = f.units.metres * f.view.scale;
-  return (STEPS.find((step) => step * unit >= pixels) ?? STEPS.at(-1)) * f.units.metres;
+  return (STEPS.find((step) => step * unit >= pixels) ?? STEPS[STEPS.length - 1]) * f.units.metres;
 }
 
+/** @param {Drawing} f */
 export function drawGrid(f) {
   const { ctx, view, theme } = f;
   const step = stepOf(f, GRID_PX);
@@ -18,6 +21,7 @@ export function drawGrid(f) {
   const [right, bottom] = view.toWorld(view.width, view.height);
   f.onScreen();
   ctx.font = theme.font(11);
+  /** @param {number} from @param {number} to @param {(at: number, path: Path2D) => void} path */
   const lines = (from, to, path) => {
     const plain = new Path2D(),
       axis = new Path2D();
@@ -29,6 +33,7 @@ export function drawGrid(f) {
     ctx.strokeStyle = theme.axis;
     ctx.stroke(axis);
   };
+  /** @type {Array<[string, number, number, CanvasTextAlign]>} */
   const labels = [];
   const digits = step / f.units.metres < 0.1 ? 2 : step / f.units.metres < 1 ? 1 : 0;
   lines(left, right, (x, path) => {
@@ -50,6 +55,7 @@ export function drawGrid(f) {
   }
 }
 
+/** @param {Drawing} f */
 export function drawScale(f) {
   const { ctx, view, theme } = f;
   const step = stepOf(f, Math.min(SCALE_PX, view.width / 7));
@@ -71,6 +77,7 @@ export function drawScale(f) {
   textWithHalo(f, f.units.length(step, digits), x + width / 2, y - 7, theme.ink);
 }
 
+/** @param {Drawing} f */
 export function drawTruth(f) {
   const { ctx, theme, px } = f;
   const truth = f.run.session?.truth;
@@ -83,7 +90,7 @@ export function drawTruth(f) {
     closed.arc(x, y, r, 0, 2 * Math.PI);
   }
   for (const polygon of truth.polygons ?? []) {
-    polygon.forEach(([x, y], i) => (i === 0 ? closed.moveTo(x, y) : closed.lineTo(x, y)));
+    addLine(closed, polygon);
     closed.closePath();
   }
   for (const [x1, y1, x2, y2] of truth.walls ?? []) {

@@ -1,11 +1,13 @@
+// @ts-check
 // The places of a mission in the plan: numbered waypoints with final headings, paths, and what is left of the way.
 
 import { inPlane } from "./map_frame.js";
-import { textWithHalo } from "./scene.js";
+import { addLine, textWithHalo } from "./scene.js";
 
 const DOT_PX = 9;
 const HEADING_PX = 20;
 
+/** @param {Drawing} f */
 export function drawMission(f) {
   const { ctx, run, theme, view } = f;
   const mission = run.state.drive_request;
@@ -17,14 +19,15 @@ export function drawMission(f) {
         return at && { at: view.toScreen(at[0], at[1]), heading: at[2], step, isPath: places.length > 1 };
       }),
     )
-    .filter(Boolean);
+    .filter((place) => place !== null);
   if (places.length === 0) return;
   f.onScreen();
   ctx.strokeStyle = theme.drive;
   ctx.lineWidth = 2;
   ctx.setLineDash([6, 5]);
   ctx.beginPath();
-  places.forEach(({ at }, i) => (i === 0 ? ctx.moveTo(...at) : ctx.lineTo(...at)));
+  const line = places.map(({ at }) => at);
+  addLine(ctx, line);
   ctx.stroke();
   ctx.setLineDash([]);
   ctx.font = theme.font(11, 700);

@@ -1,7 +1,8 @@
+// @ts-check
 // The robot and what moves it: body and heading, the trail, each schema's vector with its name, their sum, the goal.
 
 import { ellipseOf } from "./draw_objects.js";
-import { textWithHalo, overlap } from "./scene.js";
+import { addHeading, addLine, pairOf, textWithHalo, overlap } from "./scene.js";
 import { magnitude } from "./units.js";
 
 const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
@@ -14,15 +15,16 @@ const DASHES = [
   [4, 6],
 ];
 
+/** @returns {(f: Drawing) => void} */
 export function trailDrawer() {
   let version = -1;
-  let path = null;
+  let path = new Path2D();
   return (f) => {
     const { ctx, run, px, theme } = f;
     if (run.trailVersion !== version) {
       version = run.trailVersion;
       path = new Path2D();
-      run.trail.forEach(({ x, y }, i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
+      addLine(path, run.trail.map(pairOf));
     }
     f.inWorld();
     ctx.strokeStyle = theme.robot;
@@ -33,6 +35,7 @@ export function trailDrawer() {
   };
 }
 
+/** @param {Drawing} f */
 export function drawRobot(f) {
   const { ctx, run, px, theme } = f;
   if (!run.fresh) return;
@@ -48,13 +51,7 @@ export function drawRobot(f) {
   ctx.strokeStyle = theme.robot;
   ctx.lineWidth = 2.5 * px;
   ctx.stroke();
-  const tip = (angle, reach) => [x + reach * Math.cos(theta + angle), y + reach * Math.sin(theta + angle)];
-  ctx.beginPath();
-  ctx.moveTo(...tip(0, 0.78 * r));
-  ctx.lineTo(...tip(2.5, 0.5 * r));
-  ctx.lineTo(...tip(Math.PI, 0.18 * r));
-  ctx.lineTo(...tip(-2.5, 0.5 * r));
-  ctx.closePath();
+  addHeading(ctx, x, y, theta, r);
   ctx.fillStyle = theme.robot;
   ctx.fill();
   const yaw = run.state.ring_yaw; // the ring does not turn with the wheels: its own mark, on the rim
@@ -66,17 +63,16 @@ export function drawRobot(f) {
 }
 
 // The surfaces of the known room, where the robot's place has them; dashed while it does not track.
-function drawKnownRoom({ ctx, run, px, theme }, { drums, walls, polygons }) {
-  const [x, y, turn] = run.state.localized.frame,
+/** @param {Drawing} f @param {SurfacesRow} room @param {LocalizedRow} localized */
+function drawKnownRoom({ ctx, px, theme }, { drums, walls, polygons }, { frame, status }) {
+  const [x, y, turn] = frame,
     lines = new Path2D();
   for (const [x1, y1, x2, y2] of walls) {
     lines.moveTo(x1, y1);
     lines.lineTo(x2, y2);
   }
   for (const polygon of polygons) {
-    polygon.forEach(([cornerX, cornerY], i) =>
-      i === 0 ? lines.moveTo(cornerX, cornerY) : lines.lineTo(cornerX, cornerY),
-    );
+    addLine(lines, polygon);
     lines.closePath();
   }
   for (const [cx, cy, r] of drums) {
@@ -88,13 +84,14 @@ function drawKnownRoom({ ctx, run, px, theme }, { drums, walls, polygons }) {
   ctx.rotate(turn);
   ctx.strokeStyle = theme.drive;
   ctx.lineWidth = 1.2 * px;
-  ctx.setLineDash(run.state.localized.status === "tracking" ? [] : [4 * px, 5 * px]);
+  ctx.setLineDash(status === "tracking" ? [] : [4 * px, 5 * px]);
   ctx.stroke(lines);
   ctx.restore();
 }
 
 // The axes of the map frame, which lies askew in odometry's where odometry has drifted, and the ellipse of the robot's
 // place.
+/** @param {Drawing} f */
 export function drawMapFrame(f) {
   const { ctx, run, px, theme } = f;
   if (!run.fresh || run.state.localized === null) return;
@@ -104,7 +101,7 @@ export function drawMapFrame(f) {
   } = run.state.localized;
   const length = AXIS_PX * px;
   f.inWorld();
-  if (run.session?.known_room) drawKnownRoom(f, run.session.known_room);
+  if (run.session?.known_room) drawKnownRoom(f, run.session.known_room, run.state.localized);
   ctx.strokeStyle = theme.drive;
   ctx.lineWidth = 2 * px;
   ctx.beginPath();
@@ -126,6 +123,10 @@ export function drawMapFrame(f) {
   textWithHalo(f, "map", at[0] + 5, at[1] - 5, theme.drive);
 }
 
+/**
+ * @param {CanvasRenderingContext2D} ctx @param {number} x @param {number} y @param {number} dx @param {number} dy
+ * @param {number} head
+ */
 function arrow(ctx, x, y, dx, dy, head) {
   const length = Math.hypot(dx, dy),
     ux = dx / length,
@@ -143,6 +144,7 @@ function arrow(ctx, x, y, dx, dy, head) {
   ctx.fill();
 }
 
+/** @param {Drawing} f */
 export function drawVectors(f) {
   const { ctx, run, theme, view } = f;
   if (!run.fresh) return;
@@ -168,6 +170,7 @@ export function drawVectors(f) {
     const width = ctx.measureText(text).width;
     const tx = Math.max(4, Math.min(view.width - width - 4, dx >= 0 ? x + dx + 7 : x + dx - 7 - width));
     let ty = y + dy + (sum ? 0 : dy > 0 ? 8 : -8);
+    /** @returns {Quad} */
     const box = () => [tx - 2, ty - 7, tx + width + 2, ty + 7];
     while (f.labels.some((taken) => overlap(taken, box()))) ty += 13;
     f.labels.push(box());
@@ -176,6 +179,7 @@ export function drawVectors(f) {
 }
 
 // The way that the look-ahead has found, and on a ring round the robot the directions in which something stands.
+/** @param {Drawing} f */
 export function drawValley(f) {
   const { ctx, run, px, theme } = f,
     valley = run.state.valley;
@@ -198,18 +202,19 @@ export function drawValley(f) {
   ctx.strokeStyle = theme.drive;
   ctx.lineWidth = 2 * px;
   ctx.beginPath();
-  valley.way.forEach(([wx, wy], i) => (i === 0 ? ctx.moveTo(wx, wy) : ctx.lineTo(wx, wy)));
+  addLine(ctx, valley.way);
   ctx.stroke();
   ctx.globalAlpha = 1;
 }
 
+/** @param {Drawing} f */
 export function drawGoal(f) {
   const { ctx, run, theme, view } = f;
   const drive_request = run.state.drive_request;
   if (drive_request?.kind !== "goal") return;
   const at = drive_request.frame === "map" ? drive_request.at : [drive_request.x, drive_request.y];
   if (!at) return; // a goal in the map, and the robot's place there is not known
-  const [x, y] = view.toScreen(...at);
+  const [x, y] = view.toScreen(at[0], at[1]);
   const [rx, ry] = view.toScreen(run.state.pose[0], run.state.pose[1]);
   f.onScreen();
   ctx.strokeStyle = ctx.fillStyle = theme.drive;
@@ -234,7 +239,7 @@ export function drawGoal(f) {
   ctx.beginPath();
   ctx.arc(x, y, 4, 0, 2 * Math.PI);
   ctx.fill();
-  if (drive_request.heading !== null && drive_request.heading !== undefined) {
+  if (drive_request.heading !== null) {
     const heading = drive_request.heading + (drive_request.frame === "map" ? (run.state.localized?.frame[2] ?? 0) : 0);
     ctx.lineWidth = 3;
     ctx.beginPath();

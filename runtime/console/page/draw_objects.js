@@ -1,8 +1,9 @@
+// @ts-check
 // What was recognised: the model's outline with its label and probability, the 95 % ellipse of its place, the clusters
 // it grew from, and for the one that is picked the readings that speak for and against it.
 
 import { addArc, ellipseArc } from "./cross_paths.js";
-import { textWithHalo, overlap } from "./scene.js";
+import { addCross, addLine, textWithHalo, overlap } from "./scene.js";
 import { percent } from "./units.js";
 import { isWall } from "./walls.js";
 
@@ -10,20 +11,21 @@ const CHI2_95 = 5.991;
 const SURE = 0.8; // below this the outline is dashed
 const MAGNIFIED_MAX_M = 0.3; // a longer half axis would look like a wall
 
+/** @param {Drawing} f */
 export function drawClusters(f) {
   const { ctx, px, theme } = f;
   const path = new Path2D();
   for (const [x, y, length, width, angle, , cx = x, cy = y] of f.run.state.clusters) {
     const c = Math.cos(angle),
       s = Math.sin(angle);
+    /** @param {number} a @param {number} b @returns {Pair} */
     const corner = (a, b) => [
       x + (a * c * length) / 2 - (b * s * width) / 2,
       y + (a * s * length) / 2 + (b * c * width) / 2,
     ];
-    const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
-    corners.forEach(([px_, py], i) => (i === 0 ? path.moveTo(px_, py) : path.lineTo(px_, py)));
+    addLine(path, [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)]);
     path.closePath();
-    cross(path, cx, cy, 6 * px);
+    addCross(path, cx, cy, 6 * px);
   }
   f.inWorld();
   ctx.strokeStyle = theme.cluster;
@@ -40,6 +42,10 @@ export function drawClusters(f) {
 }
 
 // The outline of a model as it stands somewhere; a lozenge where there is no such model here.
+/**
+ * @param {Path2D} path @param {ModelRow | null} model @param {Pose & { covariance?: Triple | null }} pose
+ * @param {number} px
+ */
 export function outlinePath(path, model, { x, y, theta, covariance = null }, px) {
   if (!model) {
     const r = 9 * px;
@@ -58,15 +64,14 @@ export function outlinePath(path, model, { x, y, theta, covariance = null }, px)
   }
   const c = Math.cos(theta),
     s = Math.sin(theta);
-  model.vertices.forEach(([vx, vy], i) => {
-    const wx = x + c * vx - s * vy,
-      wy = y + s * vx + c * vy;
-    if (i === 0) path.moveTo(wx, wy);
-    else path.lineTo(wx, wy);
-  });
+  addLine(
+    path,
+    model.vertices.map(([vx, vy]) => [x + c * vx - s * vy, y + s * vx + c * vy]),
+  );
   if (model.closed) path.closePath();
 }
 
+/** @param {Triple | Quad} covariance */
 export function ellipseOf(covariance) {
   const [xx, xy, yy] = covariance;
   const mean = (xx + yy) / 2,
@@ -79,19 +84,21 @@ export function ellipseOf(covariance) {
 }
 
 // What an operator has said counts more than a number; behind a wall no reading checks the number.
+/** @param {ShownObject} object */
 export function certainty(object) {
   if (object.hidden_by !== null && !object.confirmed) return "hidden";
   if (object.placed && !object.confirmed) return "placed";
   return `${object.confirmed ? "✓ " : ""}${percent(object.probability ?? object.score)}`;
 }
 
+/** @param {Drawing} f */
 export function drawAreas(f) {
   const { ctx, run, theme, px } = f;
   const path = new Path2D();
   for (const [, x, y, radius] of run.state.areas) {
     path.moveTo(x + radius, y);
     path.arc(x, y, radius, 0, 2 * Math.PI);
-    cross(path, x, y, radius * Math.SQRT1_2);
+    addCross(path, x, y, radius * Math.SQRT1_2);
   }
   f.inWorld();
   ctx.strokeStyle = theme.muted;
@@ -100,6 +107,7 @@ export function drawAreas(f) {
   ctx.stroke(path);
 }
 
+/** @param {Drawing} f */
 export function drawModels(f) {
   const { ctx, run, theme, px, selection } = f;
   const sure = new Path2D(),
@@ -144,14 +152,12 @@ export function drawModels(f) {
   ctx.stroke(unsure);
 }
 
+/** @param {Drawing} f */
 export function drawOutlines(f) {
   const { ctx, run, theme, px } = f;
   const sure = new Path2D(),
     unsure = new Path2D();
-  for (const { points, probability } of run.polylines) {
-    const path = probability >= SURE ? sure : unsure;
-    points.forEach(([x, y], i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
-  }
+  for (const { points, probability } of run.polylines) addLine(probability >= SURE ? sure : unsure, points);
   f.inWorld();
   ctx.strokeStyle = theme.model;
   ctx.lineWidth = 1.5 * px;
@@ -160,6 +166,7 @@ export function drawOutlines(f) {
   ctx.stroke(unsure);
 }
 
+/** @param {Drawing} f */
 export function drawEllipses(f) {
   const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;
@@ -193,6 +200,7 @@ export function drawEllipses(f) {
 }
 
 // Labels look for a place of their own, within the outline first, and are only a number where none is free.
+/** @param {Drawing} f */
 export function drawLabels(f) {
   const { ctx, run, theme, view } = f;
   f.onScreen();
@@ -206,15 +214,17 @@ export function drawLabels(f) {
   const taken = f.labels;
   const [rx, ry] = view.toScreen(run.state.pose[0], run.state.pose[1]);
   const robot = { x: rx, y: ry, r: (run.session?.body?.radius ?? 0.2) * view.scale };
+  /** @param {{ x: number; y: number; r: number }} spot @param {Quad} box */
   const misses = ({ x, y, r }, [left, top, right, bottom]) =>
     Math.hypot(x - Math.max(left, Math.min(x, right)), y - Math.max(top, Math.min(y, bottom))) > r;
+  /** @param {Quad} box @param {object} own */
   const free = (box, own) =>
     taken.every((one) => !overlap(one, box)) &&
     misses(robot, box) &&
     spots.every((spot) => spot === own || misses(spot, box));
   for (const spot of spots) {
     const { object, x, y, r } = spot;
-    const numbered = object.number !== null && object.number !== undefined;
+    const numbered = object.number !== null;
     const text = `${numbered ? `${object.number} ` : ""}${object.model}  ${certainty(object)}`;
     ctx.font = theme.font(12, 650);
     const half = ctx.measureText(text).width / 2;
@@ -233,14 +243,8 @@ export function drawLabels(f) {
   }
 }
 
-function cross(path, x, y, arm) {
-  path.moveTo(x - arm, y - arm);
-  path.lineTo(x + arm, y + arm);
-  path.moveTo(x - arm, y + arm);
-  path.lineTo(x + arm, y - arm);
-}
-
 // Readings for an object are whole arcs, those against it are dashed and crossed out in the middle.
+/** @param {Drawing} f */
 export function drawEvidence(f) {
   const { ctx, run, theme, px, selection } = f;
   const evidence = run.evidence;
@@ -255,7 +259,7 @@ export function drawEvidence(f) {
     const path = supports ? speaks : against;
     path.moveTo(x1, y1);
     path.lineTo(x2, y2);
-    if (!supports) cross(crosses, (x1 + x2) / 2, (y1 + y2) / 2, 4 * px);
+    if (!supports) addCross(crosses, (x1 + x2) / 2, (y1 + y2) / 2, 4 * px);
   }
   for (const {
     x,
@@ -279,7 +283,7 @@ export function drawEvidence(f) {
     path.arc(x, y, range, angle - half, angle + half);
     rays.moveTo(x, y);
     rays.lineTo(x + range * Math.cos(angle), y + range * Math.sin(angle));
-    if (nats < 0) cross(crosses, x + range * Math.cos(angle), y + range * Math.sin(angle), 4 * px);
+    if (nats < 0) addCross(crosses, x + range * Math.cos(angle), y + range * Math.sin(angle), 4 * px);
   }
   f.inWorld();
   ctx.strokeStyle = theme.muted;

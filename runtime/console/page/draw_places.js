@@ -1,39 +1,40 @@
+// @ts-check
 // The layer of places: flags with names, no-go lines and hatched no-go areas, speed areas with their limit.
 
 import { cornersOf } from "./places.js";
-import { textWithHalo } from "./scene.js";
+import { addLine, textWithHalo } from "./scene.js";
+import { radians } from "./units.js";
 
 const HATCH_PX = 9;
 export const PIN_PX = 8;
 
+/** @param {Drawing} f */
 export function drawPlaces(f) {
-  const { ctx, run, theme, view, units } = f;
+  const { ctx, run, theme, view } = f;
   const { places } = run;
   if (!places || (!places.frameIsKnown && !run.state.localized)) return;
-  const onScreen = (kind, row) =>
-    cornersOf(kind, row)
-      .map((corner) => places.inPlane(corner))
-      .map(([x, y]) => view.toScreen(x, y));
+  /** @param {AreaRow} row */
+  const onScreen = (row) =>
+    cornersOf(row).flatMap((corner) => {
+      const at = places.inPlane(corner);
+      return at === null ? [] : [view.toScreen(at[0], at[1])];
+    });
+  /** @param {PlaceKind} kind @param {number} i */
   const isSelected = (kind, i) => places.selected?.[0] === kind && places.selected[1] === i;
   f.onScreen();
   ctx.globalAlpha = places.frameIsKnown ? 1 : 0.45;
   for (const [i, row] of places.all.speed_area.entries()) {
-    const points = onScreen("speed_area", row);
+    const points = onScreen(row);
     outline(ctx, points, true);
     ctx.fillStyle = ctx.strokeStyle = theme.warning;
     fillFaintly(ctx, 0.12);
     ctx.setLineDash([6, 4]);
     stroke(ctx, isSelected("speed_area", i) ? 3 : 1.5);
     ctx.setLineDash([]);
-    label(
-      f,
-      points,
-      `${row.name ? `${row.name} ` : ""}≤ ${units.speed ? units.speed(row.speed_max_m_s) : `${row.speed_max_m_s} m/s`}`,
-      theme.warning,
-    );
+    label(f, points, `${row.name ? `${row.name} ` : ""}≤ ${row.speed_max_m_s} m/s`, theme.warning);
   }
   for (const [i, row] of places.all.no_go_area.entries()) {
-    const points = onScreen("no_go_area", row);
+    const points = onScreen(row);
     outline(ctx, points, true);
     ctx.fillStyle = ctx.strokeStyle = theme.stop;
     fillFaintly(ctx, 0.1);
@@ -43,22 +44,22 @@ export function drawPlaces(f) {
     label(f, points, row.name || "no-go", theme.stop);
   }
   for (const [i, row] of places.all.no_go_line.entries()) {
-    const points = onScreen("no_go_line", row);
+    const points = onScreen(row);
     outline(ctx, points, false);
     ctx.strokeStyle = theme.stop;
     stroke(ctx, isSelected("no_go_line", i) ? 5 : 3);
     if (row.name) label(f, points, row.name, theme.stop);
   }
-  for (const [i, row] of places.all.place.entries()) drawPlace(f, row, isSelected("place", i));
+  for (const [i, row] of places.all.place.entries()) drawPlace(f, places, row, isSelected("place", i));
   ctx.globalAlpha = 1;
 }
 
-function drawPlace(f, row, isSelected) {
-  const { ctx, run, theme, view } = f;
-  const [x, y, heading] = run.places.inPlane(
-    [row.x_m, row.y_m],
-    row.heading_deg === null ? null : (row.heading_deg * Math.PI) / 180,
-  );
+/** @param {Drawing} f @param {Places} places @param {PlaceConfig} row @param {boolean} isSelected */
+function drawPlace(f, places, row, isSelected) {
+  const { ctx, theme, view } = f;
+  const at = places.inPlane([row.x_m, row.y_m], radians(row.heading_deg));
+  if (at === null) return;
+  const [x, y, heading] = at;
   const [sx, sy] = view.toScreen(x, y);
   ctx.strokeStyle = theme.drive;
   if (heading !== null) {
@@ -78,17 +79,20 @@ function drawPlace(f, row, isSelected) {
   textWithHalo(f, row.name, sx, sy - PIN_PX - 2, theme.drive);
 }
 
+/** @param {CanvasRenderingContext2D} ctx @param {Pair[]} points @param {boolean} isClosed */
 function outline(ctx, points, isClosed) {
   ctx.beginPath();
-  points.forEach(([x, y], i) => (i === 0 ? ctx.moveTo(x, y) : ctx.lineTo(x, y)));
+  addLine(ctx, points);
   if (isClosed) ctx.closePath();
 }
 
+/** @param {CanvasRenderingContext2D} ctx @param {number} width */
 function stroke(ctx, width) {
   ctx.lineWidth = width;
   ctx.stroke();
 }
 
+/** @param {CanvasRenderingContext2D} ctx @param {number} alpha */
 function fillFaintly(ctx, alpha) {
   const { globalAlpha } = ctx;
   ctx.globalAlpha = alpha * globalAlpha;
@@ -97,6 +101,7 @@ function fillFaintly(ctx, alpha) {
 }
 
 // Diagonal lines inside the outline that is the context's path.
+/** @param {CanvasRenderingContext2D} ctx @param {Pair[]} points */
 function hatch(ctx, points) {
   const xs = points.map(([x]) => x),
     ys = points.map(([, y]) => y);
@@ -116,6 +121,7 @@ function hatch(ctx, points) {
   ctx.restore();
 }
 
+/** @param {Drawing} f @param {Pair[]} points @param {string} text @param {string} colour */
 function label(f, points, text, colour) {
   const x = points.reduce((sum, point) => sum + point[0], 0) / points.length;
   const y = points.reduce((sum, point) => sum + point[1], 0) / points.length;

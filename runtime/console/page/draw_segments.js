@@ -1,4 +1,7 @@
+// @ts-check
 // Outline segments, the newer the bolder; pinned ones have square ends, selected ones a band behind them.
+
+import { distanceToLine } from "./walls.js";
 
 const AGES = [
   [2, 1, 2.8],
@@ -8,14 +11,19 @@ const AGES = [
   [Infinity, 0.36, 1.1],
 ]; // s, opacity, px
 
+const OLD_S = Number.MAX_VALUE; // of a segment whose age is not known
+
 export const AGE_LEGEND = "bold: new, thin: old";
 
 // One path for all segments of like age: five strokes draw any number of them.
 class Paths {
   key = "";
+  /** @type {Path2D[]} */
   paths = [];
+  /** @type {Segment[]} */
   pins = [];
 
+  /** @param {RunState} run */
   refresh(run) {
     const key = `${run.segmentsVersion} ${Math.floor(run.state.robot_s)}`;
     if (key === this.key) return;
@@ -23,8 +31,8 @@ class Paths {
     this.paths = AGES.map(() => new Path2D());
     this.pins = [];
     for (const s of run.segments.values()) {
-      const age = run.state.robot_s - s.t;
-      const path = this.paths[AGES.findIndex(([until]) => age < until)] ?? this.paths.at(-1);
+      const age = s.t === null ? OLD_S : run.state.robot_s - s.t;
+      const path = this.paths[AGES.findIndex(([until]) => age < until)];
       path.moveTo(s.x1, s.y1);
       path.lineTo(s.x2, s.y2);
       if (s.pinned) this.pins.push(s);
@@ -32,6 +40,7 @@ class Paths {
   }
 }
 
+/** @returns {(f: Drawing) => void} */
 export function segmentsDrawer() {
   const cache = new Paths();
   return (f) => {
@@ -72,15 +81,12 @@ export function segmentsDrawer() {
 }
 
 // The segment nearest to a point of the plane, within reach (m).
+/** @param {RunState} run @param {number} x @param {number} y @param {number} reach */
 export function nearestSegment(run, x, y, reach) {
-  let best = null,
+  let best = /** @type {Segment | null} */ (null),
     nearest = reach;
   for (const s of run.segments.values()) {
-    const dx = s.x2 - s.x1,
-      dy = s.y2 - s.y1;
-    const square = dx * dx + dy * dy;
-    const along = square > 0 ? Math.max(0, Math.min(1, ((x - s.x1) * dx + (y - s.y1) * dy) / square)) : 0;
-    const away = Math.hypot(x - s.x1 - along * dx, y - s.y1 - along * dy);
+    const away = distanceToLine([s.x1, s.y1, s.x2, s.y2], x, y);
     if (away < nearest) [best, nearest] = [s, away];
   }
   return best;

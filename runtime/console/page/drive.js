@@ -1,22 +1,30 @@
+// @ts-check
 // The drive panel: arm, disarm, HALT, handing control over, goals, and teleoperation.
 
-import { byId, setAttribute, setText, writesText } from "./dom.js";
+import { byId, disable, setAttribute, setText, writesText } from "./dom.js";
+import { Panel } from "./panel.js";
+import { counted, numberIn, radians } from "./units.js";
 import { inMap } from "./map_frame.js";
 import { watchGamepad, watchKeys, watchPad } from "./drive_inputs.js";
 
-export class Drive {
-  constructor({ run, units, connection, notifications, teleoperation, tools, askForToken }) {
-    Object.assign(this, { run, units, connection, notifications, teleoperation, tools, askForToken });
-    const asks = {
-      arm: () => this.arm(),
-      disarm: { type: "disarm" },
-      "take-control": { type: "take_control" },
-      "give-control": { type: "release_control" },
-      "drive-request-legs": { type: "legs" },
-    };
-    for (const [id, message] of Object.entries(asks)) {
-      byId(id).addEventListener("click", typeof message === "function" ? message : () => this.#ask(message));
-    }
+export class Drive extends Panel {
+  /** @type {boolean | undefined} */
+  #enabled = undefined;
+  /** @type {boolean | undefined} */
+  #controller = undefined;
+
+  /** @param {Panels & Pick<Parts, "teleoperation" | "tools" | "askForToken">} parts */
+  constructor(parts) {
+    super(parts);
+    const { run, units, connection, notifications, tools } = parts;
+    this.teleoperation = parts.teleoperation;
+    this.tools = tools;
+    this.askForToken = parts.askForToken;
+    byId("arm").addEventListener("click", () => this.arm());
+    byId("disarm").addEventListener("click", () => this.ask({ type: "disarm" }));
+    byId("take-control").addEventListener("click", () => this.ask({ type: "take_control" }));
+    byId("give-control").addEventListener("click", () => this.ask({ type: "release_control" }));
+    byId("drive-request-legs").addEventListener("click", () => this.ask({ type: "legs" }));
     byId("halt").addEventListener("click", () => this.halt());
     connection.on("halt", (confirmed) =>
       notifications.banner(
@@ -30,7 +38,7 @@ export class Drive {
     byId("drive-request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
     run.on("session", () => {
-      this.enabled = undefined; // new fields may have appeared, which must be disabled for observers
+      this.#enabled = undefined; // new fields may have appeared, which must be disabled for observers
     });
     run.on("state", () => this.#refresh());
     run.on("role", (message) => this.#role(message));
@@ -39,12 +47,8 @@ export class Drive {
     this.#watchTeleoperation();
   }
 
-  #ask(message) {
-    return this.connection.request(message).catch(this.notifications.showError);
-  }
-
   arm() {
-    return this.#ask({ type: "arm" });
+    return this.ask({ type: "arm" });
   }
 
   halt() {
@@ -53,24 +57,25 @@ export class Drive {
   }
 
   // Drives to a place of the plane; the final heading in radians, null for any.
+  /** @param {number} x @param {number} y @param {number | null} heading */
   goal(x, y, heading = null) {
     const { localized } = this.run.state,
       there = inMap(localized, x, y);
-    const turn = there.frame === "map" ? localized.frame[2] : 0;
+    const turn = there.frame === "map" ? (localized?.frame[2] ?? 0) : 0;
     return this.connection.request({ type: "goal", ...there, heading: heading === null ? null : heading - turn });
   }
 
+  /** @param {SubmitEvent} event */
   #goalByForm(event) {
     event.preventDefault();
     const error = byId("goal-error");
     const [x, y] = [byId("goal-x"), byId("goal-y")].map((input) => this.units.parse(input.value));
-    const given = byId("goal-heading").value.trim(),
-      degrees = given === "" ? null : Number(given.replace("−", "-"));
-    if (x === null || y === null || Number.isNaN(degrees)) {
+    const heading = radians(numberIn(byId("goal-heading").value));
+    if (x === null || y === null || Number.isNaN(heading)) {
       setText(error, "two numbers are wanted, and a heading in degrees or none");
       return;
     }
-    this.goal(x, y, degrees === null ? null : (degrees * Math.PI) / 180).then(
+    this.goal(x, y, heading).then(
       () => setText(error, ""),
       (refusal) => setText(error, refusal.message),
     );
@@ -81,31 +86,28 @@ export class Drive {
     const { mode, reason } = this.run.robot;
     setText(byId("arm"), mode === "SAFE_STOP" ? "Re-arm" : "Arm");
     if (mode === "SAFE_STOP" || mode === "FAULT") {
-      const buttons = mode === "SAFE_STOP" && this.enabled ? [["Re-arm", () => this.arm()]] : [];
+      /** @type {Choice[]} */
+      const buttons = mode === "SAFE_STOP" && this.#enabled ? [["Re-arm", () => this.arm()]] : [];
       const what = mode === "FAULT" ? "Fault" : "Stopped";
-      this.notifications.banner(
-        "stopped",
-        `${this.run.watchesRecording ? `The robot itself: ${what.toLowerCase()}` : what}: ${reason ?? "no reason given"}`,
-        { bad: true, buttons },
-      );
+      const named = this.run.watchesRecording ? `The robot itself: ${what.toLowerCase()}` : what;
+      this.notifications.banner("stopped", `${named}: ${reason ?? "no reason given"}`, { bad: true, buttons });
     } else this.notifications.banner("stopped", null);
   }
 
   #refresh() {
     const { controller, drive_request } = this.run.state;
     const { mode, clients } = this.run.robot;
-    const enabled = controller && !this.run.watchesRecording;
-    if (this.enabled !== enabled) {
-      this.enabled = enabled;
-      for (const element of document.querySelectorAll(".control")) element.disabled = !enabled;
+    const { enabled } = this;
+    if (this.#enabled !== enabled) {
+      this.#enabled = enabled;
+      disable(document.querySelectorAll(".control"), !enabled);
       this.tools.enable(enabled);
       this.#mode();
     }
-    if (this.controller !== controller) {
-      this.controller = controller;
+    if (this.#controller !== controller) {
+      this.#controller = controller;
       if (!controller) this.teleoperation.stop("another client controls");
-      const mayAct = this.run.session?.has_token ?? true,
-        justWatch = ["Just watch", () => this.notifications.banner("watching", null)];
+      const mayAct = this.run.session?.has_token ?? true;
       this.notifications.banner(
         "watching",
         controller
@@ -116,9 +118,9 @@ export class Drive {
         {
           buttons: [
             mayAct
-              ? ["Ask for control", () => this.#ask({ type: "take_control" })]
+              ? ["Ask for control", () => this.ask({ type: "take_control" })]
               : ["Enter the token", this.askForToken],
-            justWatch,
+            ["Just watch", () => this.notifications.banner("watching", null)],
           ],
         },
       );
@@ -130,28 +132,26 @@ export class Drive {
     byId("take-control").disabled = controller || !live;
     byId("give-control").disabled = !controller || !live;
     setAttribute(byId("pad"), "aria-disabled", this.teleoperation.refusalReason() !== null);
-    const others = clients - 1;
-    setText(
-      byId("role-text"),
-      `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "no other client is connected."}`,
-    );
+    const others = clients > 1 ? `${counted(clients - 1, "other")} connected.` : "no other client is connected.";
+    setText(byId("role-text"), `${controller ? "You control; " : "You watch; "}${others}`);
     setText(byId("drive-request-text"), driveRequestText(drive_request, this.units, this.run.state.localized));
     setAttribute(byId("drive-request-legs"), "aria-pressed", drive_request?.kind === "legs");
     setAttribute(byId("drive-request-goal"), "aria-pressed", drive_request?.kind === "goal");
   }
 
+  /** @param {RoleMessage} message */
   #role({ asked_by: name, client }) {
-    if (name === null || name === undefined) {
+    if (name === null || client === null) {
       this.notifications.banner("asked", null);
       return;
     }
-    this.notifications.banner("asked", `${typeof name === "number" ? `Client ${name}` : name} asks for control.`, {
+    this.notifications.banner("asked", `${name} asks for control.`, {
       buttons: [
         [
           "Hand over",
           () => {
             this.notifications.banner("asked", null);
-            this.#ask({ type: "grant_control", client: client ?? name });
+            void this.ask({ type: "grant_control", client });
           },
         ],
         ["Keep it", () => this.notifications.banner("asked", null)],
@@ -188,6 +188,7 @@ export class Drive {
   }
 }
 
+/** @param {Shown["drive_request"]} drive_request @param {Units} units @param {Localized} localized */
 function driveRequestText(drive_request, units, localized) {
   if (!drive_request) return "No drive request yet.";
   if (drive_request.kind === "goal") {

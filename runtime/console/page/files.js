@@ -1,51 +1,73 @@
+// @ts-check
 // The recordings as files: the list with length, size and state; play, download, rename, pin, delete; and reports and
 // maps that are made of them, with how far each is.
 
-import { byId, el, setText } from "./dom.js";
+import { messageOf } from "./connection.js";
+import { button, byId, disable, el, setText } from "./dom.js";
+import { Panel } from "./panel.js";
 
 const LONG = { report: "Report", map: "Map" };
 
-export const base = (file) =>
-  String(file ?? "")
-    .split("/")
-    .at(-1);
+// The name of a file without its folders.
+/** @param {string | null} file */
+export const base = (file) => (file ?? "").replace(/^.*\//s, "");
 
 // 3725 s as "1 h 02 min", 65 s as "1 min 05 s".
+/** @param {number | null} s */
 export function duration(s) {
-  if (s === null || s === undefined) return "length unknown";
+  if (s === null) return "length unknown";
   if (s < 60) return `${s.toFixed(1)} s`;
+  /** @param {number} n */
   const two = (n) => String(Math.floor(n)).padStart(2, "0");
   return s < 3600
     ? `${Math.floor(s / 60)} min ${two(s % 60)} s`
     : `${Math.floor(s / 3600)} h ${two((s % 3600) / 60)} min`;
 }
 
+/** @param {number | null} bytes */
 const size = (bytes) =>
   bytes === null ? "size unknown" : bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+/** @param {number | null} unix_s */
 const when = (unix_s) =>
   unix_s === null ? "" : new Date(1000 * unix_s).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+/** @param {ListedRecording} recording */
 const state = ({ live, state: of }) =>
   live ? "this run, up to now" : of === "live" ? "being written" : of === "incomplete" ? "cut off" : "complete";
 
-export class Files {
+export class Files extends Panel {
+  /** @type {ListedRecording[]} */
   #rows = [];
+  /** @type {string | null} */
   #chosen = null;
+  /** @type {Map<number, JobMessage>} */
   #jobs = new Map();
+  /** @type {string | null | undefined} */
   #recording = undefined;
   #shown = "";
 
-  constructor({ run, connection, notifications, address, play, showFiles }) {
-    Object.assign(this, { run, connection, notifications, address, play });
+  /**
+   * @param {Panels & {
+   *   address: (path: string, given: Record<string, string>) => string;
+   *   play: (file: string) => Promise<void>;
+   *   showFiles: () => void;
+   * }} parts
+   */
+  constructor(parts) {
+    super(parts);
+    const { run, connection, notifications } = parts;
+    this.address = parts.address;
+    this.play = parts.play;
+    /** @param {string} id @param {() => unknown} act */
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("files-again", () => this.list(notifications.showError));
     on("files-undo", () => this.undo());
     on("file-play", () => this.#play());
-    on("file-report", () => this.make("report", this.#chosen));
-    on("file-map", () => this.make("map", this.#chosen));
-    on("file-pin", () => this.#change({ type: "pin_recording", file: this.#chosen, pinned: !this.#row.pinned }));
+    on("file-report", () => this.#chosen && this.make("report", this.#chosen));
+    on("file-map", () => this.#chosen && this.make("map", this.#chosen));
+    on("file-pin", () => this.#pin());
     on("file-delete", () => this.#delete());
     on("map-make", () => this.#makeOfRun("map"));
-    on("report", () => void this.#makeOfRun("report").then((started) => started && showFiles()));
+    on("report", () => void this.#makeOfRun("report").then((started) => started && parts.showFiles()));
     byId("file-rename").addEventListener("submit", (event) => this.#rename(event));
     connection.on("job", (job) => this.#follow(job));
     connection.on("opening", ({ share }) => setText(byId("file-opening"), `Opening: ${Math.round(100 * share)} %`));
@@ -58,15 +80,16 @@ export class Files {
     this.list();
     this.connection.request({ type: "list_jobs" }).then(
       (jobs) => {
-        for (const job of [...(jobs ?? [])].reverse()) this.#follow(job, { quiet: true });
+        for (const job of jobs.toReversed()) this.#follow(job, { quiet: true });
       },
       () => {},
     );
   }
 
+  /** @param {(error: unknown) => void} refused */
   async list(refused = () => {}) {
     try {
-      this.#rows = (await this.connection.request({ type: "list_recordings" })) ?? [];
+      this.#rows = await this.connection.request({ type: "list_recordings" });
     } catch (error) {
       refused(error);
       return;
@@ -81,7 +104,7 @@ export class Files {
 
   #refresh() {
     const { controller } = this.run.state,
-      recording = this.run.robot?.recording?.file ?? null;
+      recording = this.run.robot.recording?.file ?? null;
     if (recording !== this.#recording && this.#recording !== undefined && !byId("panel-files").hidden) this.list();
     this.#recording = recording;
     const shown = JSON.stringify([this.#rows, this.#chosen, controller, this.run.watchesRecording]);
@@ -91,40 +114,10 @@ export class Files {
     byId("files-undo").disabled = !controller;
     setText(byId("files-count"), String(this.#rows.length));
     byId("files-empty").hidden = this.#rows.length > 0;
-    byId("files").replaceChildren(
-      ...this.#rows.map((row, i) =>
-        el(
-          "li",
-          {},
-          el(
-            "button",
-            {
-              type: "button",
-              class: "file",
-              id: `file-row-${i}`,
-              "aria-pressed": String(row.file === this.#chosen),
-              onclick: () => this.#choose(row.file),
-            },
-            el("strong", {}, base(row.file)),
-            el(
-              "span",
-              {},
-              [
-                row.live ? null : duration(row.duration_s),
-                row.live ? null : size(row.bytes),
-                state(row),
-                row.pinned ? "pinned" : null,
-              ]
-                .filter(Boolean)
-                .join(", "),
-            ),
-          ),
-        ),
-      ),
-    );
+    byId("files").replaceChildren(...this.#rows.map((row, i) => el("li", {}, this.#line(row, i))));
     const row = this.#row;
     byId("file").hidden = row === null;
-    if (focused?.startsWith("file-row-")) byId(focused)?.focus();
+    if (focused?.startsWith("file-row-")) document.getElementById(focused)?.focus();
     if (row === null) return;
     const isLive = row.live || row.state === "live",
       inFolder = !row.file.includes("/");
@@ -146,16 +139,33 @@ export class Files {
     setText(byId("file-error"), "");
     setText(byId("file-pin"), row.pinned ? "Unpin" : "Pin");
     byId("file-pin").disabled = !controller || !inFolder;
-    for (const id of ["file-new-name", "file-rename-do", "file-delete"])
-      byId(id).disabled = !controller || isLive || !inFolder;
+    disable([byId("file-new-name"), byId("file-rename-do"), byId("file-delete")], !controller || isLive || !inFolder);
   }
 
+  /** @param {ListedRecording} row @param {number} i */
+  #line(row, i) {
+    const facts = [...(row.live ? [] : [duration(row.duration_s), size(row.bytes)]), state(row)];
+    const content = [
+      el("strong", {}, base(row.file)),
+      el("span", {}, [...facts, ...(row.pinned ? ["pinned"] : [])].join(", ")),
+    ];
+    const more = { class: "file", id: `file-row-${i}`, "aria-pressed": String(row.file === this.#chosen) };
+    return button(content, () => this.#choose(row.file), more);
+  }
+
+  #pin() {
+    const row = this.#row;
+    if (row !== null) void this.#change({ type: "pin_recording", file: row.file, pinned: !row.pinned });
+  }
+
+  /** @param {string} file */
   #choose(file) {
     this.#chosen = file === this.#chosen ? null : file;
     this.#refresh();
   }
 
   // What is wrong with the recording that is played stays on the page until it is closed.
+  /** @param {string | null} text */
   #showProblem(text) {
     this.notifications.banner("recording", text, { bad: true, buttons: [["Close", () => this.#showProblem(null)]] });
   }
@@ -164,28 +174,31 @@ export class Files {
     this.#showProblem(null);
     setText(byId("file-opening"), "Opening …");
     try {
-      await this.play(this.#chosen);
+      if (this.#chosen !== null) await this.play(this.#chosen);
     } finally {
       setText(byId("file-opening"), "");
     }
   }
 
+  /** @template {"pin_recording" | "delete_recording"} K @param {Ask<K>} message */
   async #change(message) {
     try {
-      const answer = await this.connection.request(message);
+      await this.connection.request(message);
       setText(byId("file-error"), "");
-      return answer ?? true;
+      return true;
     } catch (error) {
-      setText(byId("file-error"), error.message);
-      return null;
+      setText(byId("file-error"), messageOf(error));
+      return false;
     } finally {
       await this.list();
     }
   }
 
+  /** @param {SubmitEvent} event */
   async #rename(event) {
     event.preventDefault();
     const file = this.#chosen;
+    if (file === null) return;
     let name;
     try {
       name = await this.connection.request({
@@ -194,7 +207,7 @@ export class Files {
         to: byId("file-new-name").value.trim() || "?",
       });
     } catch (error) {
-      setText(byId("file-error"), error.message);
+      setText(byId("file-error"), messageOf(error));
       return;
     }
     this.#chosen = name;
@@ -203,21 +216,22 @@ export class Files {
   }
 
   // Takes back the last new name or pin, whichever recording it was of.
-  undo() {
-    return this.connection
-      .request({ type: "undo_file" })
-      .then(this.notifications.toast.bind(this.notifications), this.notifications.showError)
-      .then(() => this.list());
+  async undo() {
+    const done = await this.ask({ type: "undo_file" });
+    if (done !== undefined) this.notifications.toast(done);
+    await this.list();
   }
 
   #delete() {
     const row = this.#row;
+    if (row === null) return;
     this.notifications.confirm(
       `Delete ${row.file}?`,
       el(
         "p",
         {},
-        `${duration(row.duration_s)}, ${size(row.bytes)}. It is deleted for good; download it first if it may be of use.`,
+        `${duration(row.duration_s)}, ${size(row.bytes)}. `,
+        "It is deleted for good; download it first if it may be of use.",
       ),
       [
         ["Keep it", null],
@@ -233,16 +247,13 @@ export class Files {
   }
 
   // Begins to make a report or a map; what becomes of it comes as messages.
+  /** @param {JobMessage["kind"]} kind @param {string} file */
   async make(kind, file) {
     this.#showJob({ text: `${LONG[kind]} of ${base(file)}: asked for` });
-    try {
-      await this.connection.request({ type: "make_files", kind, file });
-    } catch (error) {
-      this.notifications.showError(error);
-      this.#showRunning();
-    }
+    if ((await this.ask({ type: "make_files", kind, file })) === undefined) this.#showRunning();
   }
 
+  /** @param {{ text: string; share?: number; cancel?: (() => unknown) | null }} job */
   #showJob({ text, share = 0, cancel = null }) {
     byId("job").hidden = false;
     setText(byId("job-text"), text);
@@ -256,15 +267,14 @@ export class Files {
     const running = [...this.#jobs.values()].find(({ over }) => !over);
     byId("job").hidden = running === undefined;
     if (running === undefined) return;
-    this.#showJob({
-      text: `${LONG[running.kind]} of ${base(running.file)}: ${running.what}${running.share > 0 ? `, ${Math.round(100 * running.share)} %` : ""}`,
-      share: running.share,
-      cancel: () =>
-        this.connection.request({ type: "cancel_job", job: running.job }).catch(this.notifications.showError),
-    });
+    const { kind, file, what, share, job } = running;
+    const done = share > 0 ? `, ${Math.round(100 * share)} %` : "";
+    const cancel = () => this.ask({ type: "cancel_job", job });
+    this.#showJob({ text: `${LONG[kind]} of ${base(file)}: ${what}${done}`, share, cancel });
   }
 
   // Returns whether there is a recording of this run.
+  /** @param {JobMessage["kind"]} kind */
   async #makeOfRun(kind) {
     if (![...this.#jobs.values()].some(({ over }) => !over))
       this.#showJob({ text: `${LONG[kind]} of this run: looking for its recording` });
@@ -279,6 +289,7 @@ export class Files {
     return live !== undefined;
   }
 
+  /** @param {JobMessage} job */
   #follow(job, { quiet = false } = {}) {
     const was = this.#jobs.get(job.job);
     this.#jobs.set(job.job, job);
@@ -299,6 +310,7 @@ export class Files {
     );
   }
 
+  /** @param {JobMessage} done */
   #made({ job, kind, file, made }) {
     return el(
       "li",
@@ -310,11 +322,11 @@ export class Files {
           "a",
           {
             class: "button small",
-            href: this.address("/made", { job, file: name }),
+            href: this.address("/made", { job: String(job), file: name }),
             ...(isPage ? { target: "_blank", rel: "noopener" } : { download: name }),
             "aria-label": `${isPage ? "Open" : "Download"} ${name}`,
           },
-          isPage ? "Open" : name.split(".").at(-1).toUpperCase(),
+          isPage ? "Open" : name.replace(/^.*\./s, "").toUpperCase(),
         );
       }),
     );

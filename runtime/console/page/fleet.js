@@ -1,8 +1,11 @@
+// @ts-check
 // The fleet page: a card for each run, HALT for one and for all. The server of `echolocate fleet` holds the
 // connections.
 
-import { byId, el, setAttribute, setText } from "./dom.js";
+import { messageOf } from "./connection.js";
+import { button, byId, el, setAttribute, setText } from "./dom.js";
 import { takeToken } from "./token.js";
+import { counted } from "./units.js";
 
 const EVERY_MS = 200;
 const LOST_MS = 1000;
@@ -14,14 +17,18 @@ const HALT_WORDS = {
   unconfirmed: "HALT not confirmed: use the robot's own stop",
 };
 
+const FACTS = /** @type {const} */ (["mode", "reason", "battery", "place", "address"]);
+
 const token = takeToken("fleet token");
+/** @type {Map<string, ReturnType<typeof card>>} */
 const cards = new Map();
-let rows = [],
+let rows = /** @type {FleetRow[]} */ ([]),
   heard_ms = performance.now(),
   halt_ms = -Infinity,
   problem = "connecting";
 
-async function ask(path, body = undefined) {
+/** @param {string} path @param {object} [body] @returns {Promise<unknown>} */
+async function ask(path, body) {
   const how = body === undefined ? {} : { method: "POST", body: JSON.stringify(body) };
   const answer = await fetch(path, {
     ...how,
@@ -32,6 +39,7 @@ async function ask(path, body = undefined) {
   return answer.json();
 }
 
+/** @param {string | null} address */
 function halt(address) {
   halt_ms = performance.now();
   ask("/halt", { address }).then(refresh, (error) => {
@@ -40,51 +48,36 @@ function halt(address) {
   });
 }
 
+/** @param {string} address */
 function card(address) {
-  const part = (name, properties = {}) => el(name, properties);
   const parts = {
-    name: part("h2"),
-    mode: part("dd", { class: "mode-word" }),
-    reason: part("dd"),
-    battery: part("dd"),
-    place: part("dd"),
-    address: part("dd"),
-    problem: part("p", { class: "error" }),
-    halt: part("p", { class: "halt-state", role: "status" }),
+    name: el("h2"),
+    mode: el("dd", { class: "mode-word" }),
+    reason: el("dd"),
+    battery: el("dd"),
+    place: el("dd"),
+    address: el("dd"),
+    problem: el("p", { class: "error" }),
+    halt: el("p", { class: "halt-state", role: "status" }),
     page: el("a", { target: "_blank", rel: "noopener" }, "its page"),
   };
-  const facts = [
-    ["mode", "mode"],
-    ["reason", "reason"],
-    ["battery", "battery"],
-    ["place", "place"],
-    ["address", "address"],
-  ];
-  parts.remove = el(
-    "button",
-    { type: "button", class: "small", onclick: () => ask("/remove", { address }).then(refresh, () => {}) },
-    "Remove",
-  );
-  parts.root = el(
+  const remove = button("Remove", () => ask("/remove", { address }).then(refresh, () => {}), { class: "small" });
+  const root = el(
     "li",
     {},
     parts.name,
-    el("dl", {}, ...facts.flatMap(([name, key]) => [el("dt", {}, name), parts[key]])),
+    el("dl", {}, ...FACTS.flatMap((name) => [el("dt", {}, name), parts[name]])),
     parts.problem,
     el(
       "div",
       { class: "row" },
-      el(
-        "button",
-        { type: "button", class: "halt", "aria-label": `HALT ${address}`, onclick: () => halt(address) },
-        "HALT",
-      ),
+      button("HALT", () => halt(address), { class: "halt", "aria-label": `HALT ${address}` }),
       parts.page,
-      parts.remove,
+      remove,
     ),
     parts.halt,
   );
-  return parts;
+  return { ...parts, remove, root };
 }
 
 function show() {
@@ -96,14 +89,12 @@ function show() {
     }
   }
   for (const row of rows) {
-    if (!cards.has(row.address)) {
-      cards.set(row.address, card(row.address));
-      list.append(cards.get(row.address).root);
-    }
-    const parts = cards.get(row.address);
+    const parts = cards.get(row.address) ?? card(row.address);
+    if (!cards.has(row.address)) list.append(parts.root);
+    cards.set(row.address, parts);
     setText(parts.name, row.name || row.address);
-    for (const key of ["mode", "reason", "battery", "place", "address", "problem"]) setText(parts[key], row[key]);
-    setText(parts.mode, row.mode || "not known");
+    for (const key of FACTS) setText(parts[key], row[key] || (key === "mode" ? "not known" : ""));
+    setText(parts.problem, row.problem);
     setText(parts.halt, HALT_WORDS[row.halt]);
     setAttribute(parts.halt, "data-halt", row.halt);
     setAttribute(parts.root, "data-mode", row.problem ? "none" : row.mode);
@@ -131,18 +122,17 @@ function show() {
   setText(byId("fleet-alarm"), alarm);
   byId("fleet-alarm").hidden = alarm === "";
   const driving = rows.filter(({ mode, problem: lost }) => mode === "DRIVE" && !lost).length;
-  setText(
-    byId("fleet-summary"),
-    `${rows.length} run${rows.length === 1 ? "" : "s"}, ${driving} driving${rows.some((row) => row.problem) ? `, ${rows.filter((row) => row.problem).length} not reached` : ""}`,
-  );
+  const lost = rows.filter((row) => row.problem).length;
+  const summary = `${counted(rows.length, "run")}, ${driving} driving${lost > 0 ? `, ${lost} not reached` : ""}`;
+  setText(byId("fleet-summary"), summary);
 }
 
 async function refresh() {
   try {
-    rows = await ask("/runs");
+    rows = /** @type {FleetRow[]} */ (await ask("/runs"));
     [heard_ms, problem] = [performance.now(), ""];
   } catch (error) {
-    problem = error.message;
+    problem = messageOf(error);
   }
   show();
 }
@@ -156,7 +146,7 @@ byId("fleet-add").addEventListener("submit", async (event) => {
     setText(byId("fleet-error"), "");
     refresh();
   } catch (error) {
-    setText(byId("fleet-error"), error.message);
+    setText(byId("fleet-error"), messageOf(error));
   }
 });
 addEventListener(

@@ -1,3 +1,4 @@
+// @ts-check
 // The numbers of past frames by time, for the plots: each frame of the last minute, one a second of half an hour
 // before.
 
@@ -7,6 +8,7 @@ const COARSE_S = 1;
 const SLACK = 200; // old frames are thinned out once in so many
 
 // What the places of a short list hold.
+/** @type {Record<string, string[]>} */
 const PLACES = {
   pose: ["x", "y", "heading"],
   frame: ["x", "y", "heading"],
@@ -31,6 +33,7 @@ const LEFT_OUT = new Set([
 ]);
 
 // Yields the parts of a field by name: objects by their number, vectors by their schema, numbers by what they hold.
+/** @param {object} value @param {string} name @returns {Generator<[string, unknown]>} */
 function* parts(value, name) {
   if (!Array.isArray(value)) {
     yield* Object.entries(value);
@@ -44,6 +47,7 @@ function* parts(value, name) {
 }
 
 // Yields the path of every number of a frame: "pose.x", "ranges.3", "objects.7.probability".
+/** @param {object} value @returns {Generator<string>} */
 export function* numericFields(value, path = "", name = "") {
   for (const [key, part] of parts(value, name)) {
     if (LEFT_OUT.has(key)) continue;
@@ -54,8 +58,9 @@ export function* numericFields(value, path = "", name = "") {
 }
 
 // The number at such a path; null where the frame has none.
+/** @param {object} frame @param {string} path */
 export function valueAt(frame, path) {
-  let value = frame,
+  let value = /** @type {unknown} */ (frame),
     name = "";
   for (const key of path.split(".")) {
     if (typeof value !== "object" || value === null) return null;
@@ -65,14 +70,18 @@ export function valueAt(frame, path) {
   return typeof value === "number" || typeof value === "boolean" ? Number(value) : null;
 }
 
+/** @typedef {{ t: number; frame: object; values: Record<string, number | null> }} Sample */
+
 export class History {
-  samples = []; // {t, frame, values}, by time
+  /** @type {Sample[]} */
+  samples = []; // by time
 
   clear() {
     this.samples = [];
   }
 
   // Frames of a recording come in any order; one of the same time replaces the older.
+  /** @param {number} t @param {object} frame */
   add(t, frame) {
     const { samples } = this;
     let at = samples.length;
@@ -81,6 +90,7 @@ export class History {
     if (samples.length % SLACK === 0) this.#thin(t);
   }
 
+  /** @param {number} now */
   #thin(now) {
     let last = -Infinity;
     this.samples = this.samples.filter(({ t }) => {
@@ -93,7 +103,9 @@ export class History {
   }
 
   // The points [t, value] of a field between two times; null where a frame does not have it.
+  /** @param {string} path @param {number} from @param {number} to */
   series(path, from, to) {
+    /** @type {Array<[number, number | null]>} */
     const points = [];
     for (const { t, frame, values } of this.samples) {
       if (t < from || t > to) continue;

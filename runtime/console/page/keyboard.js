@@ -1,3 +1,4 @@
+// @ts-check
 // Global keys. The space bar is HALT everywhere except in text fields; Enter takes over what it usually does: press a
 // button, toggle a checkbox.
 
@@ -25,12 +26,23 @@ const WORDS = [
   ["K", "pause or resume the emulator"],
   [
     "Ctrl+Z",
-    "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; in Tune, the last parameter; in Files, the last name or pin; in Time, the last bookmark",
+    "undo the last edit of the map; with the waypoint tool, of the route; with the places tool, of the places; " +
+      "in Tune, the last parameter; in Files, the last name or pin; in Time, the last bookmark",
   ],
   ["Escape", "cancel; clear the selection"],
   ["?", "this list"],
 ];
 
+/**
+ * @param {Pick<Parts, "tools" | "view" | "notifications"> & {
+ *   drive: import("./drive.js").Drive;
+ *   time: import("./time.js").Time;
+ *   chosen: Record<"delete" | "pin" | "unpin", () => void>;
+ *   fit: () => void;
+ *   undo: () => void;
+ *   drivingByKeys: () => boolean;
+ * }} parts
+ */
 export function watchKeyboard({ drive, tools, view, fit, chosen, time, undo, notifications, drivingByKeys }) {
   const help = () =>
     notifications.confirm(
@@ -44,6 +56,7 @@ export function watchKeyboard({ drive, tools, view, fit, chosen, time, undo, not
     );
   byId("keys").addEventListener("click", help);
 
+  /** @type {Record<string, (event: KeyboardEvent) => unknown>} */
   const acts = {
     "+": () => view.zoom(1.25),
     "=": () => view.zoom(1.25),

@@ -1,3 +1,4 @@
+// @ts-check
 // The layers of the map, bottom to top; each is a draw function that can be switched on and off.
 
 import { el, svg } from "./dom.js";
@@ -22,6 +23,7 @@ import { AGE_LEGEND, segmentsDrawer } from "./draw_segments.js";
 import { prefer, preferred } from "./preferences.js";
 
 // [id, plane, name, draw, on, how it looks: SVG path, and its style sheet's colour]
+/** @type {Array<[string, "back" | "front", string, (f: Drawing) => void, boolean, string, string, string?]>} */
 const TABLE = [
   ["truth", "back", "true outlines (emulator)", drawTruth, true, "M20 2a8 8 0 1 1-.1 0Z", "truth", "3 2"],
   [
@@ -155,6 +157,7 @@ const TABLE = [
   ["scale", "front", "scale", drawScale, true, "M5 7v6h30V7", "ink"],
 ];
 
+/** @returns {Layer[]} */
 export function makeLayers() {
   return TABLE.map(([id, plane, name, draw, on, shape, colour, dash]) => ({
     id,
@@ -168,6 +171,7 @@ export function makeLayers() {
   }));
 }
 
+/** @param {HTMLElement} list @param {Layer[]} layers @param {() => void} changed */
 export function listLayers(list, layers, changed) {
   for (const layer of layers) {
     const box = el("input", {

@@ -1,9 +1,11 @@
+// @ts-check
 // The event log, newest first, filtered by level and text.
 
 import { byId, el } from "./dom.js";
 
 const LEVELS = ["debug", "info", "warning", "error"];
 const SHOWN_MAX = 300;
+/** @type {Record<string, string>} */
 const MARKS = { debug: "·", info: "○", warning: "▲", error: "■" };
 
 const DETAILS_MAX = 600;
@@ -18,11 +20,11 @@ const UNITS = [
 ];
 
 // A line of the log as a sentence: what happened, why, and in brackets what else is known of it.
+/** @param {string} event @param {Record<string, string>} fields */
 export function sentence(event, fields) {
-  const known = Object.fromEntries(
-    Object.entries(fields ?? {}).filter(([, value]) => !["", "None", "null"].includes(String(value))),
-  );
-  const { reason, [event]: what, ...others } = known; // an event named as a field, as "mode", is described by that field
+  const known = Object.fromEntries(Object.entries(fields).filter(([, value]) => !["", "None", "null"].includes(value)));
+  // An event named as a field, as "mode", is described by that field.
+  const { reason, [event]: what, ...others } = known;
   const head = what === undefined ? event : `${event} ${what}`;
   const text = `${head.charAt(0).toUpperCase()}${head.slice(1)}${reason === undefined ? "" : `: ${reason}`}`;
   const details = Object.entries(others)
@@ -35,31 +37,33 @@ export function sentence(event, fields) {
 }
 
 // "took_s", 1.5 as "took 1.5 s"; a flag is named alone.
+/** @param {string} key @param {string} value */
 function detail(key, value) {
-  const shown = typeof value === "object" ? JSON.stringify(value) : String(value);
   const [, unit] = UNITS.find(([end]) => key.endsWith(`_${end}`)) ?? [];
   const words = (unit === undefined ? key : key.slice(0, key.lastIndexOf("_"))).replaceAll("_", " ");
-  if (shown === "True" || shown === "true") return words;
-  if (shown === "False" || shown === "false") return `not ${words}`;
-  if (shown.startsWith(`${words} `)) return shown;
-  return `${words} ${shown}${unit === undefined ? "" : ` ${unit}`}`;
+  if (value === "True") return words;
+  if (value === "False") return `not ${words}`;
+  if (value.startsWith(`${words} `)) return value;
+  return `${words} ${value}${unit === undefined ? "" : ` ${unit}`}`;
 }
 
-// Seconds of the run, or the time of day of a log time stamp.
+// The time of day of a time stamp.
+/** @param {string} t */
 function when(t) {
-  if (typeof t === "number") return `${t.toFixed(1)} s`;
-  const time = /[T ](\d\d:\d\d:\d\d)/.exec(String(t));
+  const time = /[T ](\d\d:\d\d:\d\d)/.exec(t);
   if (time === null) return "–";
   const moment = new Date(t);
   return Number.isNaN(moment.getTime()) ? time[1] : moment.toTimeString().slice(0, 8);
 }
 
 export class Log {
+  /** @type {RunState} */
   #run;
   #list = byId("log");
   #level = byId("log-level");
   #filter = byId("log-filter");
 
+  /** @param {RunState} run */
   constructor(run) {
     this.#run = run;
     run.on("log", (entry) => this.#add(entry));
@@ -67,6 +71,7 @@ export class Log {
     this.#filter.addEventListener("input", () => this.#rebuild());
   }
 
+  /** @param {LogMessage} entry */
   #matches({ level, event, fields }) {
     const found = LEVELS.indexOf(level),
       least = LEVELS.indexOf(this.#level.value);
@@ -76,10 +81,11 @@ export class Log {
     );
   }
 
+  /** @param {LogMessage} entry */
   #add(entry) {
     if (!this.#matches(entry)) return;
     this.#list.prepend(this.#line(entry));
-    while (this.#list.children.length > SHOWN_MAX) this.#list.lastChild.remove();
+    while (this.#list.children.length > SHOWN_MAX) this.#list.lastElementChild?.remove();
   }
 
   #rebuild() {
@@ -90,6 +96,7 @@ export class Log {
     this.#list.replaceChildren(...lines.map((entry) => this.#line(entry)));
   }
 
+  /** @param {LogMessage} entry */
   #line({ timestamp, level, event, fields }) {
     const [text, details] = sentence(event, fields);
     return el(

@@ -1,3 +1,4 @@
+// @ts-check
 // The operator console: creates the modules and connects them.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
@@ -67,8 +68,8 @@ const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
 const layers = makeLayers();
 
-let scene = null,
-  tabs = null;
+/** @type {Scene | null} */
+let scene = null;
 const redraw = () => scene?.invalidate("front");
 const redrawAll = () => scene?.invalidate("back", "front");
 const theme = new Theme(() => {
@@ -76,11 +77,14 @@ const theme = new Theme(() => {
   drawInstruments();
 });
 
-const mapEdits = new MapEdits({ run, units, connection, notifications });
+const panels = { run, units, connection, notifications };
+const tokenField = () => askForToken(notifications);
+
+const mapEdits = new MapEdits(panels);
 const route = new Route({ run, connection, notifications });
 const places = new Places({ run, connection, notifications });
 const places_tool = placesTool({ places, view, redraw });
-const drive = {}; // filled in below: the goal tool and the drive panel need each other
+/** @param {string} text */
 const announce = (text) => setText(byId("announce"), text);
 const tools = new Toolbox({
   box: byId("tools"),
@@ -94,7 +98,7 @@ const tools = new Toolbox({
     placeTool({ run, view, connection, notifications, redraw }),
     goalTool({
       sendGoal: (x, y, heading) =>
-        drive.panel
+        drive
           .goal(x, y, heading)
           .then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError),
       after: () => tools.choose("pan"),
@@ -121,67 +125,47 @@ scene = new Scene({
 watchPointers(front, view, () => tools.current);
 
 const teleoperation = new Teleoperation({ connection, run });
-drive.panel = new Drive({
-  run,
-  units,
-  connection,
-  notifications,
-  teleoperation,
-  tools,
-  askForToken: () => askForToken(notifications),
-});
-new MissionPanel({ run, units, connection, notifications });
-new RoutePanel({ route, run, units, connection, notifications, tools });
+const drive = new Drive({ ...panels, teleoperation, tools, askForToken: tokenField });
+new MissionPanel(panels);
+new RoutePanel({ ...panels, route, tools });
 route.on("changed", redraw);
-new PlacesPanel({ places, tool: places_tool, run, units, connection, notifications, tools });
+new PlacesPanel({ ...panels, places, tool: places_tool, tools });
 places.on("changed", redraw);
 const alerts = new Alerts({ run, connection, seen: () => byId("log").offsetParent !== null });
-const status = new Status({
-  run,
-  units,
-  connection,
-  notifications,
-  alerts,
-  askForToken: () => askForToken(notifications),
-});
-const objects = new Objects({ run, units, selection, connection, notifications, tools });
-const parameters = new Parameters({ run, connection, notifications });
+new Status({ ...panels, alerts, askForToken: tokenField });
+new Objects({ ...panels, selection, tools });
+const parameters = new Parameters(panels);
 const log = new Log(run);
-const time = new Time({ run, connection, notifications, shoot: () => screenshot({ scene, view, run, theme, units }) });
-const ring = new Ring({ canvas: byId("ring"), text: byId("ring-text"), run, theme, units });
-const charts = new Charts({
-  phases: byId("phases"),
-  late: byId("late"),
-  legend: byId("phases-legend"),
-  lateLegend: byId("late-legend"),
-  run,
-  theme,
+const time = new Time({ ...panels, shoot: () => scene && screenshot({ scene, view, run, theme, units }) });
+const ring = new Ring({ run, theme, units });
+const charts = new Charts({ run, theme });
+const tabs = new Tabs((name) => {
+  prefer("tab", name);
+  panelShown(name);
 });
-const plots = new Plots({ run, units, theme, shown: () => tabs?.shows("plot") ?? false });
+const plots = new Plots({ run, units, theme, shown: () => tabs.shows("plot") });
 const chosen = selectionBar({ run, selection, connection, notifications });
+/** @param {string} path @param {Record<string, string>} given */
 const address = (path, given) => `${path}?${new URLSearchParams(token === "" ? given : { ...given, token })}`;
 const files = new Files({
-  run,
-  connection,
-  notifications,
+  ...panels,
   address,
-  play: (file) => time.openFile(file).then((isOpen) => isOpen && tabs.show("time")),
+  play: async (file) => {
+    if (await time.openFile(file)) tabs.show("time");
+  },
   showFiles: () => tabs.show("files"),
 });
-new SettingsFiles({ run, connection, notifications });
-new RobotForm({ run, connection, notifications });
+new SettingsFiles(panels);
+new RobotForm(panels);
 new Robots({ run, connection });
-new MapFile({ run, units, connection, notifications, tools });
+new MapFile({ ...panels, tools });
+/** @param {string} name */
 const panelShown = (name) => {
   drawInstruments();
   alerts.look();
   if (name === "time") time.shown();
   if (name === "files") files.shown();
 };
-tabs = new Tabs((name) => {
-  prefer("tab", name);
-  panelShown(name);
-});
 const buttons = new Buttons({ run, notifications });
 buttons.offer("mission", () =>
   (run.session?.missions ?? []).map(({ name }) => ({
@@ -211,7 +195,7 @@ function drawInstruments() {
 }
 const instrumentsResized = new ResizeObserver(() => drawInstruments());
 for (const id of ["panel-cycle", "plot-lanes"]) instrumentsResized.observe(byId(id));
-watchSplitters(document.querySelector("main"));
+watchSplitters();
 
 // Measure what covers the map, so that fitting keeps clear of it: a row takes height, a column width.
 function measureInsets() {
@@ -256,8 +240,8 @@ units.on("changed", () => {
 });
 byId("units").addEventListener("click", () => prefer("units", units.name));
 byId("ellipse-scale").value = String(options.ellipseScale);
-byId("ellipse-scale").addEventListener("change", (event) => {
-  options.ellipseScale = Number(event.target.value);
+byId("ellipse-scale").addEventListener("change", () => {
+  options.ellipseScale = Number(byId("ellipse-scale").value);
   prefer("ellipse scale", options.ellipseScale);
   redraw();
 });
@@ -268,7 +252,7 @@ run.on("evidence", redraw);
 
 // Messages from the robot.
 run.on("session", (session) => {
-  units.choose(unitsGiven || session.units);
+  units.choose(unitsGiven || (session.units ?? "m"));
   redrawAll();
 });
 let fitted = false;
@@ -282,7 +266,7 @@ run.on("state", (state) => {
   const second = Math.floor(state.robot_s);
   if (run.segmentsVersion !== drawnVersion || second !== drawnSecond) {
     [drawnVersion, drawnSecond] = [run.segmentsVersion, second];
-    scene.invalidate("back");
+    scene?.invalidate("back");
   }
   redraw();
   drawInstruments();
@@ -300,11 +284,11 @@ function fitUntouched(room = 0) {
 }
 
 watchGrid({
-  layer: layers.find(({ id }) => id === "evidence_grid"),
+  layer: layers.find(({ id }) => id === "evidence_grid") ?? layers[0],
   run,
   connection,
   notifications,
-  changed: () => scene.invalidate("back"),
+  changed: () => scene?.invalidate("back"),
 });
 connection.on("session", ({ history: past = null, ...session }) => {
   run.beginSession(session);
@@ -314,7 +298,6 @@ connection.on("state", (state) => run.apply(state, performance.now()));
 connection.on("robot", (status) => run.applyRobot(status, performance.now()));
 connection.on("log", (entry) => run.note(entry));
 connection.on("role", (message) => run.emit("role", message));
-connection.on("evidence", (message) => objects.showEvidence(message));
 connection.on("parameters", (message) => parameters.show(message.parameters));
 connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
@@ -324,7 +307,8 @@ byId("clear-map").addEventListener("click", () =>
     el(
       "p",
       {},
-      "All segments, clusters and objects are deleted; recognition starts again. Undo brings segments, objects and walls back, and vacant areas stay.",
+      "All segments, clusters and objects are deleted; recognition starts again. ",
+      "Undo brings segments, objects and walls back, and vacant areas stay.",
     ),
     [
       ["Keep it", null],
@@ -333,7 +317,7 @@ byId("clear-map").addEventListener("click", () =>
   ),
 );
 watchKeyboard({
-  drive: drive.panel,
+  drive,
   tools,
   view,
   fit,
@@ -364,4 +348,4 @@ const tour = new Tour({ mayAct: () => run.session?.has_token ?? token !== "" });
 run.on("session", () => tour.refresh());
 tour.beginOnce();
 
-export { buttons, connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };
+export { buttons, connection, teleoperation, log, scene, selection, tabs, tools, units, view, run };

@@ -1,7 +1,10 @@
+// @ts-check
 // Undo of map edits, and the list of vacant areas: places of which the operator said that nothing stands there.
 
-import { byId, el, setText } from "./dom.js";
+import { button, byId, el, setText } from "./dom.js";
+import { Panel } from "./panel.js";
 
+/** @type {Record<string, string>} */
 const DONE = {
   delete_segments: "The deleted segments are back",
   pin_segments: "The pins are as before",
@@ -15,12 +18,16 @@ const DONE = {
 const SETTLED_MS = 1500; // by then the readings have moved an object that was placed badly
 const STRAYED_M = 0.03;
 
-export class MapEdits {
+export class MapEdits extends Panel {
+  /** @type {number | undefined} */
+  #timer = undefined;
   #list = byId("areas");
   #shown = "";
 
-  constructor({ run, units, connection, notifications }) {
-    Object.assign(this, { run, units, connection, notifications });
+  /** @param {Panels} parts */
+  constructor(parts) {
+    super(parts);
+    const { run, units, connection, notifications } = parts;
     byId("undo-edit").addEventListener("click", () => this.undo());
     connection.on("waiting", (count) =>
       notifications.banner(
@@ -30,8 +37,8 @@ export class MapEdits {
           : `Paused: ${count} edit${count === 1 ? " of the map waits" : "s of the map wait"} for the next cycle.`,
         {
           buttons: [
-            ["One cycle", () => this.#ask("single_step")],
-            ["Resume", () => this.#ask("resume")],
+            ["One cycle", () => this.ask({ type: "single_step" })],
+            ["Resume", () => this.ask({ type: "resume" })],
           ],
         },
       ),
@@ -40,26 +47,17 @@ export class MapEdits {
     units.on("changed", () => this.#refresh());
   }
 
-  #ask(type) {
-    this.connection.request({ type }).catch(this.notifications.showError);
-  }
-
-  undo() {
-    return this.connection
-      .request({ type: "undo_edit" })
-      .then((kind) => this.notifications.toast(DONE[kind] ?? "The last edit is undone"), this.notifications.showError);
+  async undo() {
+    const kind = await this.ask({ type: "undo_edit" });
+    if (kind !== undefined) this.notifications.toast(DONE[kind] ?? "The last edit is undone");
   }
 
   // Moves an object, and says so if the readings have moved it away again.
+  /** @param {number} number @param {Pose} pose */
   async move(number, { x, y, theta }) {
-    try {
-      await this.connection.request({ type: "move_object", object: number, x, y, theta });
-    } catch (error) {
-      this.notifications.showError(error);
-      return;
-    }
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => {
+    if ((await this.ask({ type: "move_object", object: number, x, y, theta })) === undefined) return;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => {
       const object = this.run.object(number);
       const off = object === null ? 0 : Math.hypot(object.x - x, object.y - y);
       if (off > STRAYED_M)
@@ -69,7 +67,7 @@ export class MapEdits {
 
   #refresh() {
     const { areas } = this.run.state;
-    const enabled = this.run.state.controller && !this.run.watchesRecording;
+    const { enabled } = this;
     const shown = JSON.stringify([areas, this.units.name, enabled]);
     if (shown === this.#shown) return;
     this.#shown = shown;
@@ -77,24 +75,10 @@ export class MapEdits {
     setText(byId("areas-count"), `${areas.length}`);
     this.#list.replaceChildren(
       ...areas.map(([number, x, y, radius]) => {
-        const lift = el(
-          "button",
-          {
-            type: "button",
-            class: "control",
-            "aria-label": `Lift area ${number}`,
-            onclick: () =>
-              this.connection.request({ type: "lift_area", area: number }).catch(this.notifications.showError),
-          },
-          "Lift",
-        );
-        lift.disabled = !enabled;
-        return el(
-          "li",
-          { class: "line" },
-          el("span", {}, `${number}  ${this.units.place(x, y)}, radius ${this.units.length(radius)}`),
-          lift,
-        );
+        const more = { class: "control", "aria-label": `Lift area ${number}`, disabled: !enabled };
+        const lift = button("Lift", () => this.ask({ type: "lift_area", area: number }), more);
+        const text = `${number}  ${this.units.place(x, y)}, radius ${this.units.length(radius)}`;
+        return el("li", { class: "line" }, el("span", {}, text), lift);
       }),
     );
   }

@@ -1,17 +1,24 @@
+// @ts-check
 // The known room: a map that is loaded while the robot stands, forgotten, and the robot's place in it said by numbers.
 
-import { byId, setText } from "./dom.js";
+import { messageOf } from "./connection.js";
+import { byId, disable, setText } from "./dom.js";
+import { Panel } from "./panel.js";
+import { numberIn, radians } from "./units.js";
 
+/** @type {Record<string, string>} */
 const STATUS = {
   tracking: "the robot knows its place there",
   localizing: "the robot looks for its place: drive a little, or say where it is",
   lost: "the robot has lost its place: say where it is, or drive on",
 };
 
-export class MapFile {
-  constructor({ run, units, connection, notifications, tools }) {
-    Object.assign(this, { run, units, connection, notifications, tools });
-    byId("map-load").addEventListener("change", (event) => this.#load(event.target));
+export class MapFile extends Panel {
+  /** @param {Panels & Pick<Parts, "tools">} parts */
+  constructor(parts) {
+    super(parts);
+    const { run, units, notifications, tools } = parts;
+    byId("map-load").addEventListener("change", () => this.#load(byId("map-load")));
     byId("map-forget").addEventListener("click", () =>
       this.#set(null).then(
         (done) =>
@@ -25,20 +32,21 @@ export class MapFile {
   }
 
   #refresh() {
-    const { localized, controller } = this.run.state,
-      { known_room: room } = this.run.session ?? {};
-    const enabled = controller && !this.run.watchesRecording;
+    const { localized } = this.run.state,
+      room = this.run.session?.known_room;
+    const { enabled } = this;
     const isDriving = this.run.robot.mode === "DRIVE";
     const text = room
-      ? `There is a map: ${STATUS[localized?.status] ?? "it is being taken up"}.`
+      ? `There is a map: ${STATUS[localized?.status ?? ""] ?? "it is being taken up"}.`
       : "No map is loaded: positions are relative to the start of the run.";
     setText(byId("map-known"), isDriving && enabled ? `${text} Disarm the robot to load or forget a map.` : text);
     byId("map-load").disabled = !enabled || isDriving;
     byId("map-forget").disabled = !enabled || isDriving || !room;
     byId("map-here").disabled = !enabled || !room;
-    for (const element of byId("here-form").elements) element.disabled = !enabled || !room;
+    disable(byId("here-form").elements, !enabled || !room);
   }
 
+  /** @param {string | null} toml */
   async #set(toml) {
     try {
       await this.connection.request({ type: "load_map", toml }, 600_000);
@@ -47,7 +55,7 @@ export class MapFile {
     } catch (error) {
       setText(
         byId("map-error"),
-        error.message.replace(
+        messageOf(error).replace(
           "the message is too long",
           "the file is too long for the page: start the run with --map FILE",
         ),
@@ -57,8 +65,9 @@ export class MapFile {
   }
 
   // As after a start with --map: the robot looks for its place, or the operator says where it is.
+  /** @param {HTMLInputElement} input */
   async #load(input) {
-    const [file] = input.files;
+    const file = input.files?.[0];
     if (!file) return;
     if (await this.#set(await file.text())) {
       this.notifications.toast(
@@ -68,15 +77,16 @@ export class MapFile {
     input.value = "";
   }
 
+  /** @param {SubmitEvent} event */
   #here(event) {
     event.preventDefault();
-    const [x, y] = ["here-x", "here-y"].map((id) => this.units.parse(byId(id).value));
-    const heading = Number(byId("here-heading").value.trim().replace("−", "-") || "0");
+    const [x, y] = [byId("here-x"), byId("here-y")].map((input) => this.units.parse(input.value));
+    const heading = numberIn(byId("here-heading").value) ?? 0;
     if (x === null || y === null || Number.isNaN(heading)) {
       setText(byId("map-error"), "two numbers are wanted, and a heading in degrees");
       return;
     }
-    this.connection.request({ type: "place_robot", x, y, theta: (heading * Math.PI) / 180 }).then(
+    this.connection.request({ type: "place_robot", x, y, theta: radians(heading) }).then(
       () => {
         setText(byId("map-error"), "");
         this.notifications.toast("The next readings check this place");

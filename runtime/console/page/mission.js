@@ -1,24 +1,24 @@
+// @ts-check
 // The mission panel: its state machine with the step under way and why it waits; start, hold, resume, skip.
 
 import { byId, el, setAttribute, setText } from "./dom.js";
+import { Panel } from "./panel.js";
 
 const ENDS = new Set(["done", "failed"]);
 
-export class MissionPanel {
-  #shown = null; // what the list of steps shows
+export class MissionPanel extends Panel {
+  #shown = ""; // what the list of steps shows
 
-  constructor({ run, units, connection, notifications }) {
-    Object.assign(this, { run, units, connection, notifications });
+  /** @param {Panels} parts */
+  constructor(parts) {
+    super(parts);
+    const { run } = parts;
     byId("mission-start").addEventListener("click", () =>
-      this.#ask({ type: "start_mission", name: byId("mission-name").value }),
+      this.ask({ type: "start_mission", name: byId("mission-name").value }),
     );
-    for (const [id, type] of [
-      ["mission-hold", "hold_mission"],
-      ["mission-resume", "resume_mission"],
-      ["mission-skip", "skip_step"],
-    ]) {
-      byId(id).addEventListener("click", () => this.#ask({ type }));
-    }
+    byId("mission-hold").addEventListener("click", () => this.ask({ type: "hold_mission" }));
+    byId("mission-resume").addEventListener("click", () => this.ask({ type: "resume_mission" }));
+    byId("mission-skip").addEventListener("click", () => this.ask({ type: "skip_step" }));
     run.on("session", ({ missions = [] }) => {
       byId("mission-name").replaceChildren(
         ...missions.map(({ name, about }) => el("option", { value: name, title: about }, name)),
@@ -27,16 +27,11 @@ export class MissionPanel {
     run.on("state", () => this.#refresh());
   }
 
-  #ask(message) {
-    return this.connection.request(message).catch(this.notifications.showError);
-  }
-
   #refresh() {
     const { drive_request: mission, hold_reason: reason } = this.run.state;
-    const isOne = mission?.kind === "mission";
-    byId("mission").hidden = !isOne;
-    if (!isOne) {
-      this.#shown = null;
+    byId("mission").hidden = mission?.kind !== "mission";
+    if (mission?.kind !== "mission") {
+      this.#shown = "";
       return;
     }
     const { name, status, steps } = mission;
@@ -60,14 +55,16 @@ export class MissionPanel {
       if (isCurrent) setAttribute(row, "aria-current", "step");
       else row.removeAttribute("aria-current");
     });
-    if (!this.run.state.controller || this.run.watchesRecording) return;
+    if (!this.enabled) return;
     byId("mission-hold").disabled = status !== "running";
     byId("mission-resume").disabled = status !== "held";
     byId("mission-skip").disabled = ENDS.has(status);
   }
 }
 
+/** @param {StepRow} step */
 function stepRow({ name, schemas, until }) {
+  /** @param {string} go */
   const lead = (go) => (go === "next" ? "next step" : go);
   return el(
     "li",

@@ -1,30 +1,41 @@
+// @ts-check
 // The object list and the selected object: pose, uncertainty, evidence for and against. Screen readers read it in place
 // of the map.
 
-import { byId, el, setAttribute, setText } from "./dom.js";
+import { byId, byKey, el, setAttribute, setText } from "./dom.js";
 import { certainty, ellipseOf } from "./draw_objects.js";
+import { Panel } from "./panel.js";
 import { degrees, percent, times } from "./units.js";
 import { countObjects, isWall } from "./walls.js";
 
 const EVIDENCE_EVERY_MS = 1000;
 
-export class Objects {
+/** @typedef {Record<"element" | "number" | "name" | "sure" | "where" | "off", HTMLElement>} Row */
+
+export class Objects extends Panel {
   #list = byId("objects");
+  /** @type {Map<string | number, Row>} */
   #rows = new Map();
   #asked_ms = -Infinity;
   #asking = false;
   // the object whose evidence was refused: an answer that would not change, and a warning in the log each time
+  /** @type {number | null} */
   #refused = null;
 
-  constructor({ run, units, selection, connection, notifications, tools }) {
-    Object.assign(this, { run, units, selection, connection, notifications });
+  /** @param {Panels & Pick<Parts, "selection" | "tools">} parts */
+  constructor(parts) {
+    super(parts);
+    const { run, units, selection, connection, notifications, tools } = parts;
+    this.selection = selection;
     run.on("state", () => this.refresh());
     run.on("evidence", () => this.#refreshEvidence());
     units.on("changed", () => this.refresh());
     selection.on("object", () => this.#onSelected());
     this.#list.addEventListener("keydown", (event) => this.#key(event));
+    /** @param {"confirm_object" | "reject_object"} type @param {string} done */
     const act = (type, done) => () => {
       const { object } = selection;
+      if (object === null) return;
       connection.request({ type, object }).then(() => {
         if (type === "reject_object" && selection.object === object) selection.pick(null);
         notifications.toast(`Object ${object}: ${done}`);
@@ -50,22 +61,16 @@ export class Objects {
     objects.forEach((object, index) => {
       const key = object.number ?? `-${index}`;
       seen.add(key);
-      if (!this.#rows.has(key)) this.#rows.set(key, this.#row(object.number));
-      const row = this.#rows.get(key);
-      setText(row.number, object.number === null || object.number === undefined ? "–" : `${object.number}`);
+      const row = this.#rows.get(key) ?? this.#row(object.number);
+      this.#rows.set(key, row);
+      setText(row.number, object.number === null ? "–" : `${object.number}`);
       setText(row.name, object.model);
       setText(row.sure, certainty(object));
-      const [x1, y1, x2, y2] = object.ends ?? [];
       setText(
         row.where,
-        object.ends
-          ? `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}`
-          : `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`,
+        object.ends ? this.#between(object.ends) : `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`,
       );
-      setText(
-        row.off,
-        object.ends ? `${this.units.length(Math.hypot(x2 - x1, y2 - y1))} long` : this.units.spread(object.sigma),
-      );
+      setText(row.off, object.ends ? `${this.#long(object.ends)} long` : this.units.spread(object.sigma));
       const picked = object.number !== null && object.number === this.selection.object;
       setAttribute(row.element, "aria-selected", picked);
       if (this.#list.children[index] !== row.element)
@@ -80,6 +85,7 @@ export class Objects {
     this.#askEvidence();
   }
 
+  /** @param {number | null} number */
   #row(number) {
     const parts = {
       number: el("span", { class: "number" }),
@@ -94,19 +100,30 @@ export class Objects {
         role: "option",
         id: `object-${number ?? "x"}`,
         "aria-selected": "false",
-        onclick: () => number !== null && number !== undefined && this.selection.pick(number),
+        onclick: () => number !== null && this.selection.pick(number),
       },
       ...Object.values(parts),
     );
     return { element, ...parts };
   }
 
+  // The ends of a wall, and how long it is.
+  /** @param {Quad} ends */
+  #between([x1, y1, x2, y2]) {
+    return `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}`;
+  }
+
+  /** @param {Quad} ends */
+  #long([x1, y1, x2, y2]) {
+    return this.units.length(Math.hypot(x2 - x1, y2 - y1));
+  }
+
+  /** @param {KeyboardEvent} event */
   #key(event) {
     const numbers = this.run.state.objects.map(({ number }) => number).filter((number) => number !== null);
-    const at = numbers.indexOf(this.selection.object);
-    const to = { ArrowDown: at + 1, ArrowUp: at < 0 ? numbers.length - 1 : at - 1, Home: 0, End: numbers.length - 1 }[
-      event.key
-    ];
+    const at = this.selection.object === null ? -1 : numbers.indexOf(this.selection.object);
+    const last = numbers.length - 1;
+    const to = byKey(event, { ArrowDown: at + 1, ArrowUp: at < 0 ? last : at - 1, Home: 0, End: last });
     if (event.key === "Escape") this.selection.pick(null);
     if (to === undefined || numbers.length === 0) return;
     event.preventDefault();
@@ -116,7 +133,7 @@ export class Objects {
   #onSelected() {
     this.run.evidence = this.#refused = null;
     this.#asked_ms = -Infinity;
-    const picked = this.selection.object === null ? null : this.run.object(this.selection.object);
+    const picked = this.run.object(this.selection.object);
     const why = this.run.watchesRecording
       ? "The readings are shown in the live run only."
       : picked !== null && isWall(picked)
@@ -128,12 +145,12 @@ export class Objects {
     if (object === null) this.#list.removeAttribute("aria-activedescendant");
     else {
       this.#list.setAttribute("aria-activedescendant", `object-${object}`);
-      byId(`object-${object}`)?.scrollIntoView({ block: "nearest" });
+      document.getElementById(`object-${object}`)?.scrollIntoView({ block: "nearest" });
     }
   }
 
   #refreshSelected() {
-    const object = this.selection.object === null ? null : this.run.object(this.selection.object);
+    const object = this.run.object(this.selection.object);
     byId("object").hidden = this.selection.object === null;
     if (this.selection.object === null) return;
     if (object === null) {
@@ -142,11 +159,8 @@ export class Objects {
       return;
     }
     setText(byId("object-name"), `${object.number} ${object.model}`);
-    const [x1, y1, x2, y2] = object.ends ?? [];
     const chance =
-      object.probability === null || object.probability === undefined
-        ? `fit ${percent(object.score)}`
-        : `probability ${percent(object.probability)}`;
+      object.probability === null ? `fit ${percent(object.score)}` : `probability ${percent(object.probability)}`;
     const facts = [
       [
         "state",
@@ -162,16 +176,9 @@ export class Objects {
           ? chance
           : `behind wall ${object.hidden_by}, where no reading checks it; before: ${chance}`,
       ],
-      [
-        "place",
-        isWall(object)
-          ? `${this.units.number(x1)}, ${this.units.number(y1)} to ${this.units.place(x2, y2)}`
-          : this.units.place(object.x, object.y, 3),
-      ],
+      ["place", isWall(object) ? this.#between(object.ends) : this.units.place(object.x, object.y, 3)],
       ["turned by", degrees(object.theta)],
-      isWall(object)
-        ? ["length", this.units.length(Math.hypot(x2 - x1, y2 - y1))]
-        : ["uncertainty", this.units.spread(object.sigma)],
+      isWall(object) ? ["length", this.#long(object.ends)] : ["uncertainty", this.units.spread(object.sigma)],
     ];
     if (object.covariance && !isWall(object)) {
       const { major, minor, angle } = ellipseOf(object.covariance);
@@ -182,7 +189,7 @@ export class Objects {
     }
     facts.push(["readings", `${object.support}`]);
     // a wall is where its readings are
-    for (const id of ["object-confirm", "object-move"]) byId(id).hidden = isWall(object);
+    byId("object-confirm").hidden = byId("object-move").hidden = isWall(object);
     const list = byId("object-facts");
     if (list.children.length !== 2 * facts.length) list.replaceChildren(...facts.flatMap(() => [el("dt"), el("dd")]));
     facts.forEach(([name, text], i) => {
@@ -194,8 +201,9 @@ export class Objects {
   #askEvidence() {
     const now = performance.now();
     const { object } = this.selection;
-    const picked = object === null ? null : this.run.object(object);
+    const picked = this.run.object(object);
     if (
+      object === null ||
       picked === null ||
       isWall(picked) ||
       object === this.#refused ||
@@ -209,12 +217,10 @@ export class Objects {
     this.connection
       .request({ type: "evidence", object })
       .then(
-        (data) => {
-          if (data?.readings) this.showEvidence({ object, ...data });
-        },
+        (data) => this.#takeEvidence(data),
         (error) => {
           if (error.answered) this.#refused = object;
-          this.#showEvidenceError(error);
+          byId("evidence").replaceChildren(el("p", { class: "hint" }, error.message));
         },
       )
       .finally(() => {
@@ -222,8 +228,8 @@ export class Objects {
       });
   }
 
-  // Evidence arrives as an answer, or as a message of its own.
-  showEvidence(message) {
+  /** @param {EvidenceAnswer} message */
+  #takeEvidence(message) {
     const readings = message.readings.map(([x, y, range, angle, nats, ...listener]) => ({
       x,
       y,
@@ -232,33 +238,23 @@ export class Objects {
       nats,
       listener,
     }));
-    const lines = (message.lines ?? []).map(([number, x1, y1, x2, y2, supports]) => ({
-      number,
-      x1,
-      y1,
-      x2,
-      y2,
-      supports,
-    }));
+    const lines = message.lines.map(([number, x1, y1, x2, y2, supports]) => ({ number, x1, y1, x2, y2, supports }));
     this.run.evidence = {
       object: message.object,
       pro: message.for,
       contra: message.against,
       readings,
       lines,
-      rivals: message.rivals ?? [],
+      rivals: message.rivals,
     };
     this.run.emit("evidence");
-  }
-
-  #showEvidenceError(error) {
-    byId("evidence").replaceChildren(el("p", { class: "hint" }, error.message));
   }
 
   #refreshEvidence() {
     const { evidence } = this.run;
     if (evidence === null || evidence.object !== this.selection.object) return;
     const most = Math.max(evidence.pro, evidence.contra, 1e-9);
+    /** @param {string} kind @param {string} name @param {number} nats */
     const bar = (kind, name, nats) => {
       const fill = el("span", { class: "fill" });
       fill.style.width = `${(100 * nats) / most}%`;
@@ -282,7 +278,8 @@ export class Objects {
         el(
           "p",
           { class: "hint" },
-          `${readings.length + lines.length} ${lines.length > 0 ? "segments" : "readings"} on the map, ${against} of them against (dashed, ✕)`,
+          `${readings.length + lines.length} ${lines.length > 0 ? "segments" : "readings"} on the map, `,
+          `${against} of them against (dashed, ✕)`,
         ),
         others === "" ? null : el("p", { class: "hint" }, `Other explanations: ${others}`),
       ].filter((part) => part !== null),
@@ -291,6 +288,7 @@ export class Objects {
 }
 
 // Describes the map in a sentence, for screen readers.
+/** @param {RunState} run @param {Units} units */
 export function describeMap(run, units) {
   const { objects, pose } = run.state;
   const named = objects
@@ -298,5 +296,6 @@ export function describeMap(run, units) {
     .slice(0, 12)
     .map((object) => `${object.model} at ${units.place(object.x, object.y, 1)}`)
     .join("; ");
-  return `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}. Objects: ${countObjects(objects)}${named ? `; ${named}` : ""}. ${run.segments.size} segments.`;
+  const robot = `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}`;
+  return `${robot}. Objects: ${countObjects(objects)}${named ? `; ${named}` : ""}. ${run.segments.size} segments.`;
 }

@@ -1,18 +1,28 @@
+// @ts-check
 // The live settings: each is validated by the robot's process, and its error is shown beside its field. The schemas'
-// gains
-// appear in the drive panel as well; both places show the same value.
+// gains appear in the drive panel as well; both places show the same value.
 
+import { messageOf, RequestError } from "./connection.js";
 import { byId, download, el, setAttribute, setText } from "./dom.js";
+import { Panel } from "./panel.js";
+import { numberIn } from "./units.js";
 
 const GAIN = /^behaviors\.(?!arbiter)[a-z_]+\.[a-z_]*gain$/;
 const MODEL_BYTES_MAX = 60_000;
+/** @param {Input} input @returns {input is HTMLInputElement} */
+const isBox = (input) => input.type === "checkbox";
+/** @param {Element} field */
+const pathOf = (field) => field.getAttribute("data-path") ?? "";
 const LOADING_MAX_MS = 600_000; // the first model with corners may have to wait for its kernels to compile
 
-export class Parameters {
-  #fields = new Map(); // path → the fields that show it
+export class Parameters extends Panel {
+  /** @type {Map<string, Field[]>} */
+  #fields = new Map(); // those that show a setting, by its path
 
-  constructor({ run, connection, notifications }) {
-    Object.assign(this, { run, connection, notifications });
+  /** @param {Panels} parts */
+  constructor(parts) {
+    super(parts);
+    const { run } = parts;
     run.on("session", ({ parameters }) => this.#list(parameters ?? []));
     byId("tune-filter").addEventListener("input", () => this.#filter());
     byId("tune-undo").addEventListener("click", () => this.undo());
@@ -20,9 +30,10 @@ export class Parameters {
     byId("model-file").addEventListener("change", () => this.#loadModel());
   }
 
+  /** @param {Parameter[]} parameters */
   #list(parameters) {
     const typing =
-      document.activeElement?.closest?.(".field") !== null &&
+      document.activeElement?.closest(".field") !== null &&
       parameters.length > 0 &&
       parameters.every(({ path }) => this.#fields.has(path)) &&
       parameters.length === this.#fields.size;
@@ -32,6 +43,7 @@ export class Parameters {
       return;
     }
     this.#fields.clear();
+    /** @type {Map<string, HTMLElement>} */
     const sections = new Map();
     for (const parameter of parameters) {
       const section = parameter.path.split(".").slice(0, -1).join(".");
@@ -40,7 +52,7 @@ export class Parameters {
           section,
           el("fieldset", {}, el("legend", {}, section.replaceAll("_", " ").replaceAll(".", " › "))),
         );
-      sections.get(section).append(this.#field(parameter, "tune"));
+      sections.get(section)?.append(this.#field(parameter, "tune"));
     }
     byId("tune-fields").replaceChildren(...sections.values());
     const gains = parameters.filter(({ path }) => GAIN.test(path)).map((parameter) => this.#field(parameter, "gain"));
@@ -50,11 +62,13 @@ export class Parameters {
     this.#filter();
   }
 
+  /** @param {Parameter} parameter @param {string} place */
   #field(parameter, place) {
     const { path, label, kind, choices, low, high, help } = parameter;
     const id = `${place}-${path.replaceAll(".", "-")}`;
+    /** @type {Input} */
     let input;
-    if (kind === "choice" || choices)
+    if (choices !== null)
       input = el(
         "select",
         { id },
@@ -79,32 +93,32 @@ export class Parameters {
     const element = el(
       "div",
       { class: "field", "data-path": path },
-      el("label", { for: id }, label || path.split(".").at(-1).replaceAll("_", " ")),
+      el("label", { for: id }, label),
       input,
       error,
       el("span", { class: "help", id: `${id}-help` }, text),
     );
-    const field = { parameter, element, input, error };
+    const field = { parameter, first: parameter.value, element, input, error };
     input.addEventListener("change", () => this.#set(field));
-    input.addEventListener("keydown", (event) => {
+    element.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.#showIn(field, parameter.value);
     });
-    if (!this.#fields.has(path)) this.#fields.set(path, []);
-    this.#fields.get(path).push(field);
+    this.#fields.set(path, [...(this.#fields.get(path) ?? []), field]);
     this.#showIn(field, parameter.value);
     return element;
   }
 
-  #showIn({ parameter, input, error, element }, value) {
-    if (input.type === "checkbox") input.checked = value === true;
-    else input.value = value === null || value === undefined ? "" : String(value);
+  /** @param {Field} field @param {Parameter["value"]} value */
+  #showIn({ first, input, error, element }, value) {
+    if (isBox(input)) input.checked = value === true;
+    else input.value = value === null ? "" : String(value);
     setText(error, "");
     input.removeAttribute("aria-invalid");
-    parameter.first ??= { value };
-    element.classList.toggle("changed", value !== parameter.first.value);
+    element.classList.toggle("changed", value !== first);
   }
 
   // Shows the values now in force in every field that displays them.
+  /** @param {ChangedValue[]} parameters */
   show(parameters) {
     for (const { path, value } of parameters) {
       for (const field of this.#fields.get(path) ?? []) {
@@ -114,9 +128,10 @@ export class Parameters {
     }
   }
 
+  /** @param {Field} field */
   async #set(field) {
     const {
-      parameter: { path, kind, optional = false },
+      parameter: { path, kind, optional },
       input,
     } = field;
     const value = read(kind, input, optional);
@@ -130,29 +145,25 @@ export class Parameters {
         one.parameter.value = value;
         this.#showIn(one, value);
       }
-      this.#onMode(data); // more may have changed with it
+      this.show(data); // more may have changed with it
     } catch (error) {
-      const other = error.field && error.field !== path ? this.#fields.get(error.field) : null;
-      this.#refuse(field, other ? `${error.field}: ${error.message}` : error.message);
+      const at = error instanceof RequestError ? error.field : null;
+      const isOther = at !== null && at !== path && this.#fields.has(at);
+      this.#refuse(field, isOther ? `${at}: ${messageOf(error)}` : messageOf(error));
     }
   }
 
+  /** @param {Field} field @param {string} text */
   #refuse({ input, error }, text) {
     setText(error, text);
     setAttribute(input, "aria-invalid", "true");
   }
 
-  #onMode(data) {
-    if (Array.isArray(data)) this.show(data);
-    else if (Array.isArray(data?.parameters)) this.show(data.parameters);
-    else if (data?.path !== undefined) this.show([data]);
-  }
-
-  undo() {
-    return this.connection.request({ type: "undo_parameter" }).then((data) => {
-      this.#onMode(data);
-      this.notifications.toast(data?.path ? `${data.path} is ${data.value} again` : "The last change is undone");
-    }, this.notifications.showError);
+  async undo() {
+    const data = await this.ask({ type: "undo_parameter" });
+    if (data === undefined) return;
+    this.show(Array.isArray(data) ? data : [data]);
+    this.notifications.toast(Array.isArray(data) ? "The last change is undone" : `${data.path} is ${data.value} again`);
   }
 
   #filter() {
@@ -160,23 +171,17 @@ export class Parameters {
     for (const section of byId("tune-fields").children) {
       let some = false;
       for (const field of section.querySelectorAll(".field")) {
-        const found = text === "" || `${field.dataset.path} ${field.textContent}`.toLowerCase().includes(text);
-        field.hidden = !found;
+        const found = text === "" || `${pathOf(field)} ${field.textContent}`.toLowerCase().includes(text);
+        field.toggleAttribute("hidden", !found);
         some ||= found;
       }
-      section.hidden = !some;
+      section.toggleAttribute("hidden", !some);
     }
   }
 
   async #save() {
-    let text;
-    try {
-      const data = await this.connection.request({ type: "save_toml" });
-      text = typeof data === "string" ? data : (data?.toml ?? "");
-    } catch (error) {
-      this.notifications.showError(error);
-      return;
-    }
+    const text = await this.ask({ type: "save_toml" });
+    if (text === undefined) return;
     const area = el("textarea", { readonly: true, "aria-label": "The settings in force, as TOML", id: "toml" });
     area.value = text;
     this.notifications.confirm("Settings as TOML", area, [
@@ -188,7 +193,7 @@ export class Parameters {
   async #loadModel() {
     const input = byId("model-file"),
       error = byId("model-error");
-    const [file] = input.files;
+    const file = input.files?.[0];
     if (!file) return;
     setText(error, "");
     if (file.size > MODEL_BYTES_MAX) {
@@ -199,26 +204,27 @@ export class Parameters {
       await this.connection.request({ type: "load_model", toml: await file.text() }, LOADING_MAX_MS);
       this.notifications.toast(`${file.name} is loaded`);
     } catch (problem) {
-      setText(error, problem.message);
+      setText(error, messageOf(problem));
     }
     input.value = ""; // so that the same file can be chosen again after it was mended
   }
 }
 
 // What a field says: undefined where that is no value of its kind, null where it is empty and may be.
+/** @param {string} kind @param {Input} input @param {boolean} optional */
 function read(kind, input, optional) {
-  if (input.type === "checkbox") return input.checked;
+  if (isBox(input)) return input.checked;
   const text = input.value.trim();
   if (text === "" && optional) return null;
   if (kind !== "float" && kind !== "int") return text;
   if (text === "") return undefined;
-  const value = Number(text.replace(",", "."));
+  const value = numberIn(text) ?? 0;
   return Number.isFinite(value) && (kind === "float" || Number.isInteger(value)) ? value : undefined;
 }
 
+/** @param {number | null} low @param {number | null} high */
 function describeRange(low, high) {
-  const known = (bound) => bound !== null && bound !== undefined;
-  if (known(low) && known(high)) return `${low} to ${high}.`;
-  if (known(low)) return `${low} or more.`;
-  return known(high) ? `${high} or less.` : "";
+  if (low !== null && high !== null) return `${low} to ${high}.`;
+  if (low !== null) return `${low} or more.`;
+  return high !== null ? `${high} or less.` : "";
 }

@@ -1,30 +1,48 @@
+// @ts-check
 // Named places, no-go lines and areas, and speed areas: what the run has of them, and how the operator changes it.
 // The process holds them and their undo, so that they outlive a reload of the page.
 
 import { Emitter } from "./emitter.js";
-import { inPlane } from "./map_frame.js";
+import { messageOf } from "./connection.js";
+import { inPlane, ofPlane } from "./map_frame.js";
 
+/** @type {Record<PlaceKind, string>} */
 export const KINDS = { place: "place", no_go_line: "no-go line", no_go_area: "no-go area", speed_area: "speed area" };
+/** @type {Record<PlaceKind, number>} */
 export const CORNERS_MIN = { place: 1, no_go_line: 2, no_go_area: 3, speed_area: 3 };
 const SPEED_M_S = 0.15; // of a new speed area
+/** @type {Omit<PlacesMessage, "type">} */
 const NONE = { frame: "odom", place: [], no_go_line: [], no_go_area: [], speed_area: [] };
+/** @param {number} rad */
 const degrees = (rad) => Math.round((rad * 180) / Math.PI) % 360;
+/** @param {number} value */
 const millimetres = (value) => Math.round(value * 1000) / 1000;
 
-export const cornersOf = (kind, row) =>
-  kind === "place" ? [[row.x_m, row.y_m]] : kind === "no_go_line" ? row.points_m : row.vertices_m;
-const withCorners = (kind, row, corners) =>
-  kind === "place"
-    ? { ...row, x_m: corners[0][0], y_m: corners[0][1] }
-    : { ...row, [kind === "no_go_line" ? "points_m" : "vertices_m"]: corners };
+export const KIND_NAMES = /** @type {PlaceKind[]} */ (Object.keys(KINDS));
 
+/** @param {PlaceRow} row @returns {Pair[]} */
+export const cornersOf = (row) =>
+  "x_m" in row ? [[row.x_m, row.y_m]] : "points_m" in row ? row.points_m : row.vertices_m;
+/** @param {PlaceRow} row @param {Pair[]} corners @returns {PlaceRow} */
+const withCorners = (row, corners) =>
+  "x_m" in row
+    ? { ...row, x_m: corners[0][0], y_m: corners[0][1] }
+    : "points_m" in row
+      ? { ...row, points_m: corners }
+      : { ...row, vertices_m: corners };
+
+/** @extends {Emitter<{ changed: [] }>} */
 export class Places extends Emitter {
   all = NONE;
-  selected = null; // [kind, index]
+  /** @type {[PlaceKind, number] | null} */
+  selected = null;
 
+  /** @param {Pick<Parts, "run" | "connection" | "notifications">} parts */
   constructor({ run, connection, notifications }) {
     super();
-    Object.assign(this, { run, connection, notifications });
+    this.run = run;
+    this.connection = connection;
+    this.notifications = notifications;
     run.places = this;
     run.on("session", ({ places }) => this.#show(places ?? NONE));
     connection.on("places", (message) => this.#show(message));
@@ -35,11 +53,16 @@ export class Places extends Emitter {
   }
 
   // A corner in the plane, [x, y, heading]; null while the map frame is not known.
+  /** @param {Pair} corner @param {number | null} heading */
   inPlane([x, y], heading = null) {
     return inPlane(this.run.state.localized, this.all.frame, x, y, heading);
   }
 
   // A place of the plane in the frame of the places; null where that is not known, which is said.
+  /**
+   * @param {number} x @param {number} y @param {number | null} heading
+   * @returns {[number, number, number | null] | null}
+   */
   ofPlane(x, y, heading = null) {
     const { localized } = this.run.state;
     if (this.all.frame === "odom") return [millimetres(x), millimetres(y), heading];
@@ -49,31 +72,32 @@ export class Places extends Emitter {
       );
       return null;
     }
-    const [x0, y0, turn] = localized.frame,
-      c = Math.cos(turn),
-      s = Math.sin(turn);
-    return [
-      millimetres(c * (x - x0) + s * (y - y0)),
-      millimetres(c * (y - y0) - s * (x - x0)),
-      heading === null ? null : heading - turn,
-    ];
+    const [mapX, mapY] = ofPlane(localized.frame, x, y);
+    return [millimetres(mapX), millimetres(mapY), heading === null ? null : heading - localized.frame[2]];
   }
 
   // Adds what was drawn: corners in the frame of the places; a heading in radians for a place.
+  /** @param {PlaceKind} kind @param {Pair[]} corners @param {number | null} heading */
   add(kind, corners, heading = null) {
-    const row = withCorners(kind, {}, corners);
-    if (kind === "place")
-      Object.assign(row, { name: this.#freeName(), heading_deg: heading === null ? null : degrees(heading) });
-    else row.name = "";
-    if (kind === "speed_area") row.speed_max_m_s = SPEED_M_S;
-    return this.#change(kind, [...this.all[kind], row], this.all[kind].length);
+    const [[x_m, y_m]] = corners;
+    /** @type {Record<PlaceKind, PlaceRow>} */
+    const rows = {
+      place: { name: this.#freeName(), x_m, y_m, heading_deg: heading === null ? null : degrees(heading) },
+      no_go_line: { name: "", points_m: corners },
+      no_go_area: { name: "", vertices_m: corners },
+      speed_area: { name: "", vertices_m: corners, speed_max_m_s: SPEED_M_S },
+    };
+    return this.#change(kind, [...this.all[kind], rows[kind]], this.all[kind].length);
   }
 
+  /** @param {PlaceKind} kind @param {number} i @param {number} corner @param {Pair} to */
   moveCorner(kind, i, corner, to) {
-    const corners = cornersOf(kind, this.all[kind][i]).map((one, k) => (k === corner ? to : one));
-    return this.set(kind, i, withCorners(kind, this.all[kind][i], corners));
+    const row = this.all[kind][i];
+    const corners = cornersOf(row).map((one, k) => (k === corner ? to : one));
+    return this.set(kind, i, withCorners(row, corners));
   }
 
+  /** @param {PlaceKind} kind @param {number} i @param {PlaceRow} row */
   set(kind, i, row) {
     return this.#change(
       kind,
@@ -82,6 +106,7 @@ export class Places extends Emitter {
     );
   }
 
+  /** @param {PlaceKind} kind @param {number} i */
   remove(kind, i) {
     return this.#change(
       kind,
@@ -90,6 +115,7 @@ export class Places extends Emitter {
     );
   }
 
+  /** @param {[PlaceKind, number] | null} selected */
   select(selected) {
     this.selected = selected;
     this.emit("changed");
@@ -101,11 +127,17 @@ export class Places extends Emitter {
   }
 
   // Adds all places of a map file to those that there are; one of the same name is replaced.
+  /** @param {string} text */
   async load(text) {
     const read = await this.connection.request({ type: "read_places", text });
     const names = new Set(read.place.map(({ name }) => name));
     const kept = { ...this.all, place: this.all.place.filter(({ name }) => !names.has(name)) };
-    await this.#send(Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, [...kept[kind], ...read[kind]]])));
+    await this.#send({
+      place: [...kept.place, ...read.place],
+      no_go_line: [...kept.no_go_line, ...read.no_go_line],
+      no_go_area: [...kept.no_go_area, ...read.no_go_area],
+      speed_area: [...kept.speed_area, ...read.speed_area],
+    });
   }
 
   #freeName() {
@@ -115,6 +147,7 @@ export class Places extends Emitter {
     return `place-${n}`;
   }
 
+  /** @param {PlaceKind} kind @param {PlaceRow[]} rows @param {number | null} selected */
   async #change(kind, rows, selected) {
     try {
       await this.#send({ ...this.all, [kind]: rows });
@@ -123,15 +156,17 @@ export class Places extends Emitter {
       return null;
     } catch (error) {
       this.notifications.showError(error);
-      return error.message;
+      return messageOf(error);
     }
   }
 
-  #send(all) {
-    const places = Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, all[kind]]));
+  /** @param {PlacesConfig} all */
+  #send({ place, no_go_line, no_go_area, speed_area }) {
+    const places = { place, no_go_line, no_go_area, speed_area };
     return this.connection.request({ type: "set_places", places });
   }
 
+  /** @param {Omit<PlacesMessage, "type">} message */
   #show(message) {
     this.all = { ...NONE, ...message };
     if (this.selected && this.selected[1] >= this.all[this.selected[0]].length) this.selected = null;

@@ -1,8 +1,15 @@
+// @ts-check
 // Places in the panel: what to draw, a row for each, the numbers of the selected one, and files.
 
-import { byId, download, el, setText } from "./dom.js";
-import { cornersOf, KINDS } from "./places.js";
+import { messageOf } from "./connection.js";
+import { button, byId, disable, download, el, setText } from "./dom.js";
+import { Panel } from "./panel.js";
+import { cornersOf, KINDS, KIND_NAMES } from "./places.js";
+import { numberIn } from "./units.js";
 
+const FIELDS = /** @type {const} */ (["name", "x", "y", "heading", "speed"]);
+
+/** @type {Record<PlaceKind, string>} */
 const HINTS = {
   place: "Click on the map; drag from there for the heading.",
   no_go_line: "Click the corners; click the last one again to end. The robot does not cross the line.",
@@ -10,25 +17,30 @@ const HINTS = {
   speed_area: "Click the corners; click the first one again to end. The robot drives no faster in the area.",
 };
 
-export class PlacesPanel {
+export class PlacesPanel extends Panel {
   #shown = "";
 
-  constructor({ places, tool, run, units, connection, notifications, tools }) {
-    Object.assign(this, { places, tool, run, units, connection, notifications });
+  /** @param {Panels & Pick<Parts, "places" | "tools"> & { tool: PlacesTool }} parts */
+  constructor(parts) {
+    super(parts);
+    const { places, tool, run, units, tools } = parts;
+    this.places = places;
+    this.tool = tool;
     const kind = el(
       "select",
       {
         id: "places-kind",
         "aria-label": "What to draw",
         onchange: () => {
-          tool.kind = kind.value;
+          tool.kind = /** @type {PlaceKind} */ (kind.value);
           tools.choose("places");
         },
       },
       ...Object.entries(KINDS).map(([value, name]) => el("option", { value }, name)),
     );
-    const button = (id, text, act, how = {}) =>
-      el("button", { type: "button", id: `places-${id}`, onclick: act, ...how }, text);
+    /** @param {string} id @param {string} text @param {() => unknown} act @param {Properties} how */
+    const named = (id, text, act, how = {}) => button(text, act, { id: `places-${id}`, ...how });
+    /** @param {string} id @param {string} name @param {string} unit @param {Properties} how */
     const field = (id, name, unit = "", how = {}) =>
       el(
         "label",
@@ -43,14 +55,19 @@ export class PlacesPanel {
         "div",
         { class: "row" },
         kind,
-        button("draw", "Draw on the map", () => tools.choose("places", { focus: true }), { class: "control" }),
-        button("finish", "Finish", () => tool.finish()),
+        named("draw", "Draw on the map", () => tools.choose("places", { focus: true }), { class: "control" }),
+        named("finish", "Finish", () => tool.finish()),
       ),
       el("p", { class: "hint", id: "places-text" }),
       el("ol", { class: "route", id: "places-list", "aria-label": "Places and no-go areas" }),
       el(
         "form",
-        { class: "row", id: "places-form", hidden: true, onsubmit: (event) => this.#set(event) },
+        {
+          class: "row",
+          id: "places-form",
+          hidden: true,
+          onsubmit: (/** @type {SubmitEvent} */ event) => this.#set(event),
+        },
         field("name", "Name", "", { class: "", inputmode: "text", maxlength: "40", size: "14" }),
         field("x", "x"),
         field("y", "y"),
@@ -61,9 +78,9 @@ export class PlacesPanel {
       el(
         "div",
         { class: "row" },
-        button("undo", "Undo", () => places.undo(), { class: "control" }),
-        button("save", "Save the map", () => this.#save("toml")),
-        button("geojson", "Save as GeoJSON", () => this.#save("geojson")),
+        named("undo", "Undo", () => places.undo(), { class: "control" }),
+        named("save", "Save the map", () => this.#save("toml")),
+        named("geojson", "Save as GeoJSON", () => this.#save("geojson")),
       ),
       el(
         "label",
@@ -75,19 +92,20 @@ export class PlacesPanel {
           id: "places-file",
           accept: ".toml,.geojson,.json",
           class: "control",
-          onchange: (event) => this.#load(event.target),
+          onchange: () => this.#load(byId("places-file")),
         }),
       ),
       el("output", { class: "error", id: "places-error" }),
     );
-    for (const part of [places, run, units]) part.on(part === run ? "state" : "changed", () => this.#refresh());
+    places.on("changed", () => this.#refresh());
+    run.on("state", () => this.#refresh());
+    units.on("changed", () => this.#refresh());
     this.#refresh();
   }
 
   #refresh() {
-    const { places, tool, units } = this,
+    const { places, tool, units, enabled } = this,
       { all, selected } = places;
-    const enabled = this.run.state.controller && !this.run.watchesRecording;
     const shown = JSON.stringify([
       all,
       selected,
@@ -105,13 +123,13 @@ export class PlacesPanel {
     byId("places-finish").disabled = !tool.canFinish;
     byId("places-kind").value = tool.kind;
     byId("places-list").replaceChildren(
-      ...Object.keys(KINDS).flatMap((kind) => all[kind].map((row, i) => this.#row(kind, row, i, enabled))),
+      ...KIND_NAMES.flatMap((kind) => [...all[kind].entries()].map(([i, row]) => this.#row(kind, row, i, enabled))),
     );
-    for (const id of ["draw", "undo", "file"]) byId(`places-${id}`).disabled = !enabled;
+    disable([byId("places-draw"), byId("places-undo"), byId("places-file")], !enabled);
     const row = selected === null ? null : all[selected[0]][selected[1]];
     byId("places-form").hidden = !row;
-    if (row) this.#fill(selected[0], row);
-    if (focused && document.activeElement?.id !== focused) byId(focused)?.focus();
+    if (row) this.#fill(row);
+    if (focused && document.activeElement?.id !== focused) document.getElementById(focused)?.focus();
   }
 
   #text() {
@@ -120,105 +138,89 @@ export class PlacesPanel {
       places.all.frame === "map"
         ? "They lie in the map."
         : "There is no map: they lie in the odometry of this run, and the next run does not know them.";
-    const limits = ["no_go_line", "no_go_area", "speed_area"].some((kind) => places.all[kind].length > 0);
+    const limits = KIND_NAMES.some((kind) => kind !== "place" && places.all[kind].length > 0);
     if (limits && !places.frameIsKnown && run.session)
-      return "The robot does not know its place in the map, so no-go areas and speed limits are not kept: it stands, and teleoperation is slow.";
+      return (
+        "The robot does not know its place in the map, so no-go areas and speed limits are not kept: " +
+        "it stands, and teleoperation is slow."
+      );
     return `${HINTS[tool.kind]} ${where}`;
   }
 
+  /** @param {PlaceKind} kind @param {PlaceRow} row @param {number} i @param {boolean} enabled */
   #row(kind, row, i, enabled) {
     const { places } = this,
       isSelected = places.selected?.[0] === kind && places.selected[1] === i;
     const name = row.name || `${KINDS[kind]} ${i + 1}`;
     const what =
-      kind === "place"
+      "x_m" in row
         ? this.units.place(row.x_m, row.y_m)
-        : kind === "speed_area"
+        : "speed_max_m_s" in row
           ? `at most ${row.speed_max_m_s} m/s`
-          : `${KINDS[kind]}, ${cornersOf(kind, row).length} corners`;
-    const choose = el(
-      "button",
-      {
-        type: "button",
-        class: "place",
-        id: `places-row-${kind}-${i}`,
-        "aria-pressed": String(isSelected),
-        onclick: () => places.select(isSelected ? null : [kind, i]),
-      },
-      el("strong", {}, name),
-      ` ${what}`,
+          : `${KINDS[kind]}, ${cornersOf(row).length} corners`;
+    const choose = button([el("strong", {}, name), ` ${what}`], () => places.select(isSelected ? null : [kind, i]), {
+      class: "place",
+      id: `places-row-${kind}-${i}`,
+      "aria-pressed": String(isSelected),
+    });
+    const small = { class: "small", disabled: !enabled };
+    const goes = { ...small, id: `places-go-${i}`, "aria-label": `Go to ${name}` };
+    const go = kind === "place" ? button("Go", () => this.#go(row.name), goes) : null;
+    const removes = { ...small, id: `places-remove-${kind}-${i}`, "aria-label": `Remove ${name}`, title: "Remove" };
+    return el(
+      "li",
+      {},
+      choose,
+      go,
+      button("✕", () => places.remove(kind, i), removes),
     );
-    const go =
-      kind !== "place"
-        ? null
-        : el(
-            "button",
-            {
-              type: "button",
-              class: "small",
-              id: `places-go-${i}`,
-              "aria-label": `Go to ${name}`,
-              onclick: () => this.#go(row.name),
-            },
-            "Go",
-          );
-    const remove = el(
-      "button",
-      {
-        type: "button",
-        class: "small",
-        id: `places-remove-${kind}-${i}`,
-        "aria-label": `Remove ${name}`,
-        title: "Remove",
-        onclick: () => places.remove(kind, i),
-      },
-      "✕",
-    );
-    for (const one of [go, remove]) if (one) one.disabled = !enabled;
-    return el("li", {}, choose, go, remove);
   }
 
-  #fill(kind, row) {
-    const { units } = this,
-      given = { name: row.name };
-    if (kind === "place")
+  /** @param {PlaceRow} row */
+  #fill(row) {
+    const { units } = this;
+    /** @type {Record<string, string>} */
+    const given = { name: row.name };
+    if ("x_m" in row)
       Object.assign(given, {
         x: units.number(row.x_m),
         y: units.number(row.y_m),
         heading: row.heading_deg === null ? "" : String(row.heading_deg),
       });
-    if (kind === "speed_area") given.speed = String(row.speed_max_m_s);
-    for (const id of ["name", "x", "y", "heading", "speed"]) {
+    if ("speed_max_m_s" in row) given.speed = String(row.speed_max_m_s);
+    for (const id of FIELDS) {
       byId(`places-${id}-field`).hidden = !(id in given);
       byId(`places-${id}`).value = given[id] ?? "";
     }
   }
 
+  /** @param {SubmitEvent} event */
   async #set(event) {
     event.preventDefault();
-    const [kind, i] = this.places.selected,
-      value = (id) => byId(`places-${id}`).value.trim().replace("−", "-");
-    const row = { ...this.places.all[kind][i], name: value("name") };
-    if (kind === "place") {
-      [row.x_m, row.y_m] = ["x", "y"].map((id) => this.units.parse(byId(`places-${id}`).value));
-      row.heading_deg = value("heading") === "" ? null : Number(value("heading"));
+    if (this.places.selected === null) return undefined;
+    const [kind, i] = this.places.selected;
+    const row = { ...this.places.all[kind][i], name: byId("places-name").value.trim() };
+    if ("x_m" in row) {
+      row.x_m = this.units.parse(byId("places-x").value) ?? Number.NaN;
+      row.y_m = this.units.parse(byId("places-y").value) ?? Number.NaN;
+      row.heading_deg = numberIn(byId("places-heading").value);
     }
-    if (kind === "speed_area") row.speed_max_m_s = Number(value("speed"));
-    const isWrong =
-      Object.values(row).some((one) => one !== null && typeof one === "number" && !Number.isFinite(one)) ||
-      (kind === "place" && (row.x_m === null || row.y_m === null));
-    if (isWrong) return setText(byId("places-error"), "numbers are wanted here");
+    if ("speed_max_m_s" in row) row.speed_max_m_s = numberIn(byId("places-speed").value) ?? 0;
+    if (Object.values(row).some((one) => typeof one === "number" && !Number.isFinite(one)))
+      return setText(byId("places-error"), "numbers are wanted here");
     if (kind === "place" && !/^[a-z0-9][a-z0-9_-]{0,39}$/.test(row.name))
       return setText(byId("places-error"), "the name of a place has small letters, digits, - and _, 40 at most");
     return setText(byId("places-error"), (await this.places.set(kind, i, row)) ?? "");
   }
 
+  /** @param {string} name */
   #go(name) {
     this.connection
       .request({ type: "go_to_place", name })
       .then(() => this.notifications.toast(`Goal: ${name}`), this.notifications.showError);
   }
 
+  /** @param {"toml" | "geojson"} format */
   async #save(format) {
     try {
       const text = await this.connection.request({ type: "save_map", format });
@@ -227,18 +229,19 @@ export class PlacesPanel {
         new Blob([text], { type: format === "toml" ? "application/toml" : "application/geo+json" }),
       );
     } catch (error) {
-      setText(byId("places-error"), error.message);
+      setText(byId("places-error"), messageOf(error));
     }
   }
 
+  /** @param {HTMLInputElement} input */
   async #load(input) {
-    const [file] = input.files;
+    const file = input.files?.[0];
     if (!file) return;
     try {
       await this.places.load(await file.text());
       setText(byId("places-error"), "");
     } catch (error) {
-      setText(byId("places-error"), error.message);
+      setText(byId("places-error"), messageOf(error));
     }
     input.value = "";
   }

@@ -1,3 +1,4 @@
+// @ts-check
 // What a plot draws: the axes of time and values, and the line.
 
 import { ticks } from "./plot_time.js";
@@ -6,6 +7,10 @@ export const LEFT = 46;
 export const FOOT = 14; // the time below a lane
 const GAP_S = 2.5; // a line is broken where frames are missing
 
+/**
+ * @param {CanvasRenderingContext2D} ctx @param {Theme} theme @param {Span} span
+ * @param {(t: number) => number} x @param {number} height
+ */
 export function timeAxis(ctx, theme, span, x, height) {
   ctx.font = theme.font(10);
   ctx.textAlign = "center";
@@ -22,6 +27,11 @@ export function timeAxis(ctx, theme, span, x, height) {
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} ctx @param {Theme} theme
+ * @param {(value: number) => number} y @param {number[]} marks
+ * @param {{ right: boolean; width: number; colour: string }} how
+ */
 export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
   ctx.font = theme.font(10.5);
   ctx.textAlign = right ? "left" : "right";
@@ -41,9 +51,13 @@ export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
   }
 }
 
+/**
+ * @param {TimedValue[]} points @param {(t: number) => number} x @param {(value: number) => number} y
+ * @param {boolean} isAngle
+ */
 export function linePath(points, x, y, isAngle) {
   const path = new Path2D();
-  let before = null;
+  let before = /** @type {Pair | null} */ (null);
   for (const [t, value] of points) {
     const broken =
       before === null || value === null || t - before[0] > GAP_S || (isAngle && Math.abs(value - before[1]) > 180);
@@ -55,6 +69,7 @@ export function linePath(points, x, y, isAngle) {
 }
 
 // A little more than the values take; a constant has room around it.
+/** @param {number[]} values */
 export function bounds(values) {
   const low = Math.min(...values),
     high = Math.max(...values);
@@ -62,6 +77,7 @@ export function bounds(values) {
   return high > low ? [low - 0.04 * (high - low), high + 0.04 * (high - low)] : [low - 0.5, high + 0.5];
 }
 
+/** @param {number} value */
 export function digits(value) {
   const size = Math.abs(value);
   const text =

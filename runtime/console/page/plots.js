@@ -1,8 +1,8 @@
+// @ts-check
 // The plot panel: any number of a frame over time, live and in playback: a lane for each field, or for two with an axis
-// each.
-// All lanes share a time axis. Reading a lane at a time: pointer or slider.
+// each. All lanes share a time axis. Reading a lane at a time: pointer or slider.
 
-import { byId, download, el, setAttribute, setText } from "./dom.js";
+import { button, byId, download, el, setAttribute, setText } from "./dom.js";
 import { History, numericFields } from "./history.js";
 import { bounds, digits, FOOT, LEFT, linePath, timeAxis, valueAxis } from "./plot_draw.js";
 import { difference, fieldName, rateOf, seriesOf, shownAs } from "./plot_fields.js";
@@ -17,14 +17,20 @@ const LISTED_EVERY_MS = 1000;
 const SECOND = "&"; // between the two fields of a lane, as it is kept
 
 export class Plots {
-  #lanes = new Map(); // path of the left axis → {element, canvas, value, combine, second: path or null}
+  /** @type {Map<string, Lane>} */
+  #lanes = new Map(); // by the path of the left axis; `second` is that of the right one
   #history = new History();
   #listed = { names: "", at_ms: -Infinity };
+  /** @type {Shown | null} */
   #last = null;
   #time = new PlotTime(() => this.draw());
 
+  /** @param {Pick<Parts, "run" | "units" | "theme"> & { shown: () => boolean }} parts */
   constructor({ run, units, theme, shown }) {
-    Object.assign(this, { run, units, theme, shown });
+    this.run = run;
+    this.units = units;
+    this.theme = theme;
+    this.shown = shown;
     this.window = byId("plot-window");
     this.at = byId("plot-at");
     this.window.value = preferred("plot window", "30");
@@ -44,7 +50,7 @@ export class Plots {
     };
     for (const [id, act] of Object.entries(acts)) byId(id).addEventListener("click", act);
     for (const lane of preferred("plot fields", ["twist.v", "ranges.0"]))
-      if (typeof lane === "string") this.#addLane(...lane.split(SECOND));
+      if (typeof lane === "string") this.#addLane(lane.split(SECOND)[0], lane.split(SECOND)[1] ?? null);
     run.on("session", () => run.watchesRecording && this.#history.clear());
     run.on("history", (samples) => {
       for (const sample of samples) this.#history.add(sample.robot_s, sample);
@@ -53,6 +59,7 @@ export class Plots {
     units.on("changed", () => this.draw());
   }
 
+  /** @param {Shown} state */
   #take(state) {
     if (state === this.#last) return; // a report of the robot beside a recording
     const before = this.#last;
@@ -85,7 +92,9 @@ export class Plots {
         const box = el("input", {
           type: "checkbox",
           "data-path": path,
-          onchange: () => this.#choose(path, box.checked),
+          onchange: () => {
+            this.#choose(path, box.checked);
+          },
         });
         box.checked = this.#fields.includes(path);
         return el("li", {}, el("label", {}, box, fieldName(path)));
@@ -98,11 +107,13 @@ export class Plots {
     return [...this.#lanes].flatMap(([path, { second }]) => (second === null ? [path] : [path, second]));
   }
 
+  /** @param {number} share */
   #move(share) {
     const { from, to } = this.#span;
     this.#time.pan({ from, to }, share * (to - from));
   }
 
+  /** @param {string} path @param {boolean} on */
   #choose(path, on) {
     if (on) this.#addLane(path);
     else this.#remove(path);
@@ -118,9 +129,11 @@ export class Plots {
     this.draw();
   }
 
+  /** @param {string} path @param {string | null} second */
   #addLane(path, second = null) {
     if (this.#fields.includes(path)) return;
-    if (this.#lanes.size >= LANES_MAX) this.#remove(this.#lanes.keys().next().value);
+    const [oldest] = this.#lanes.keys();
+    if (this.#lanes.size >= LANES_MAX) this.#remove(oldest);
     const value = el("b"),
       canvas = el("canvas", { role: "img", "aria-label": fieldName(path) }),
       name = el("span", {}, fieldName(path));
@@ -128,18 +141,12 @@ export class Plots {
       class: "combine",
       "aria-label": `Combine ${fieldName(path)}`,
       title: "A second axis, the rate, or a difference",
-      onchange: () => this.#combine(path, combine.value),
-    });
-    const remove = el(
-      "button",
-      {
-        type: "button",
-        class: "small",
-        "aria-label": `Remove ${fieldName(path)}`,
-        onclick: () => this.#choose(path, false),
+      onchange: () => {
+        this.#combine(path, combine.value);
       },
-      "✕",
-    );
+    });
+    const more = { class: "small", "aria-label": `Remove ${fieldName(path)}` };
+    const remove = button("✕", () => this.#choose(path, false), more);
     const element = el(
       "figure",
       { class: "lane", "data-path": path },
@@ -160,6 +167,7 @@ export class Plots {
   }
 
   // What a lane can be combined with: the fields of the other lanes.
+  /** @param {string} path @param {Lane} lane */
   #offerCombinations(path, { combine, second }) {
     const others = [...this.#lanes]
       .filter(([other, lane]) => other !== path && lane.second === null)
@@ -175,24 +183,26 @@ export class Plots {
     combine.replaceChildren(...options.map(([value, text]) => el("option", { value }, text)));
   }
 
+  /** @param {string} path @param {string} what */
   #combine(path, what) {
     const [kind, other] = [what.split(" ")[0], what.slice(what.indexOf(" ") + 1)];
-    const lane = this.#lanes.get(path);
+    const second = this.#lanes.get(path)?.second ?? null;
     if (kind === "rate") this.#addLane(rateOf(path));
     else if (kind === "minus") this.#addLane(difference(path, other));
     else if (kind === "axis") {
       this.#remove(other);
       this.#setSecond(path, other);
-    } else if (kind === "apart") {
-      const { second } = lane;
+    } else if (kind === "apart" && second !== null) {
       this.#setSecond(path, null);
       this.#addLane(second);
     }
     this.#keep();
   }
 
+  /** @param {string} path @param {string | null} second */
   #setSecond(path, second) {
     const lane = this.#lanes.get(path);
+    if (lane === undefined) return;
     if (lane.second !== null) this.#tick(lane.second, false);
     lane.second = second;
     if (second !== null) this.#tick(second, true);
@@ -200,6 +210,7 @@ export class Plots {
   }
 
   // Removes a field, and its lane if it is the one of the left axis.
+  /** @param {string} path */
   #remove(path) {
     for (const [left, { second }] of this.#lanes) if (second === path) this.#setSecond(left, null);
     const lane = this.#lanes.get(path);
@@ -210,10 +221,12 @@ export class Plots {
     this.#tick(path, false);
   }
 
+  /** @param {string} path @param {boolean} on */
   #tick(path, on) {
     for (const box of byId("plot-fields").querySelectorAll("input")) if (box.dataset.path === path) box.checked = on;
   }
 
+  /** @param {number} share */
   #readAt(share) {
     this.at.value = String(Math.round(Number(this.at.max) * Math.max(0, Math.min(1, share))));
     this.draw();
@@ -243,24 +256,30 @@ export class Plots {
     for (const [path, lane] of this.#lanes) this.#drawLane(path, lane, span, read, margins);
   }
 
+  /** @param {string} path @param {Span} span @returns {TimedValue[]} */
   #points(path, { from, to }) {
     const { factor } = shownAs(path, this.units);
     return seriesOf(this.#history, path, from, to).map(([t, one]) => [t, one === null ? null : one * factor]);
   }
 
+  /** @param {string} path @param {Lane} lane @param {Span} span @param {number} read @param {number} margins */
   #drawLane(path, { canvas, value, second }, span, read, margins) {
     const { from, to, now } = span,
       { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
+    /** @param {number} t */
     const x = (t) => LEFT + ((t - from) / (to - from)) * (width - margins);
     timeAxis(ctx, this.theme, span, x, height);
-    const curves = [[path, this.theme.accent, []], ...(second === null ? [] : [[second, this.theme.segment, [5, 3]]])];
+    /** @type {Array<[string, string, number[]]>} */
+    const curves = [[path, this.theme.accent, []]];
+    if (second !== null) curves.push([second, this.theme.segment, [5, 3]]);
     const words = curves.map(([of, colour, dash], i) => {
       const points = this.#points(of, span),
         { name, isAngle } = shownAs(of, this.units);
-      const known = points.filter(([, one]) => one !== null).map(([, one]) => one);
-      const [low, high] = bounds(known),
-        y = (one) => height - FOOT - 4 - ((one - low) / (high - low)) * (height - FOOT - 12);
+      const known = points.map(([, one]) => one).filter((one) => one !== null);
+      const [low, high] = bounds(known);
+      /** @param {number} one */
+      const y = (one) => height - FOOT - 4 - ((one - low) / (high - low)) * (height - FOOT - 12);
       valueAxis(ctx, this.theme, y, known.length > 0 ? [low, (low + high) / 2, high] : [], {
         right: i === 1,
         width: width - margins + LEFT,
@@ -279,7 +298,7 @@ export class Plots {
       ctx.setLineDash([]);
       const at = points.reduce(
         (best, point) => (best === null || Math.abs(point[0] - read) < Math.abs(best[0] - read) ? point : best),
-        null,
+        /** @type {TimedValue | null} */ (null),
       );
       const range =
         known.length > 0 ? `${digits(Math.min(...known))} to ${digits(Math.max(...known))} ${name}` : "no value";

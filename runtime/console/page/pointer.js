@@ -1,19 +1,31 @@
+// @ts-check
 // Pointers on the map: one does what the tool does, two pinch and pan whatever the tool, the wheel zooms, the middle
 // and the right button pan.
 
 const WHEEL = 0.0016;
 
+/** @param {HTMLCanvasElement} canvas @param {View} view @param {() => Tool} tool */
 export function watchPointers(canvas, view, tool) {
+  /** @type {Map<number, Spot>} */
   const down = new Map();
   let pinching = false;
+  /** @type {number | null} */
   let panning = null;
 
+  /** @param {PointerEvent | WheelEvent} event @returns {Spot} */
   const spot = (event) => {
     const box = canvas.getBoundingClientRect();
     const sx = event.clientX - box.left,
       sy = event.clientY - box.top;
     const [x, y] = view.toWorld(sx, sy);
-    return { sx, sy, x, y, shift: event.shiftKey, touch: event.pointerType === "touch" };
+    return {
+      sx,
+      sy,
+      x,
+      y,
+      shift: event.shiftKey,
+      touch: event instanceof PointerEvent && event.pointerType === "touch",
+    };
   };
   const pair = () => {
     const [a, b] = [...down.values()];
@@ -56,6 +68,7 @@ export function watchPointers(canvas, view, tool) {
     else if (!pinching) tool().move?.(at, was);
   });
 
+  /** @param {PointerEvent} event @param {boolean} cancelled */
   const up = (event, cancelled) => {
     if (!down.delete(event.pointerId)) return;
     if (panning === event.pointerId) panning = null;

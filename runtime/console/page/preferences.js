@@ -1,7 +1,9 @@
+// @ts-check
 // Preferences of this browser: units, layers. Silently not kept where the browser has no storage.
 
 const KEY = "echolocate";
 
+/** @returns {Record<string, unknown>} */
 function read() {
   try {
     const kept = JSON.parse(localStorage.getItem(KEY) ?? "{}");
@@ -11,11 +13,14 @@ function read() {
   }
 }
 
+/** @template T @param {string} name @param {T} otherwise @returns {T} */
 export function preferred(name, otherwise) {
   const kept = read()[name];
-  return typeof kept === typeof otherwise ? kept : otherwise;
+  const isAlike = typeof kept === typeof otherwise && Array.isArray(kept) === Array.isArray(otherwise);
+  return isAlike ? /** @type {T} */ (kept) : otherwise;
 }
 
+/** @param {string} name @param {unknown} value */
 export function prefer(name, value) {
   try {
     localStorage.setItem(KEY, JSON.stringify({ ...read(), [name]: value }));

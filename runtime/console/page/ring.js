@@ -1,27 +1,26 @@
+// @ts-check
 // The ring with a sector for each sensor, as long as its range. An empty rim: no echo; a cross: not trusted; nothing:
 // never fired. The outline is bold while the sensor fires.
 
-import { setText } from "./dom.js";
+import { byId, setText } from "./dom.js";
+import { addCross, addHeading } from "./scene.js";
 import { fitted } from "./theme.js";
 
 const OLD_S = 1;
 
 export class Ring {
-  #canvas;
-  #text;
-  #run;
-  #theme;
-  #units;
-
-  constructor({ canvas, text, run, theme, units }) {
-    [this.#canvas, this.#text, this.#run, this.#theme, this.#units] = [canvas, text, run, theme, units];
+  /** @param {Pick<Parts, "run" | "theme" | "units">} parts */
+  constructor({ run, theme, units }) {
+    this.run = run;
+    this.theme = theme;
+    this.units = units;
   }
 
   draw() {
-    const canvas = this.#canvas;
+    const canvas = byId("ring");
     if (canvas.clientWidth === 0) return;
-    const run = this.#run,
-      theme = this.#theme,
+    const run = this.run,
+      theme = this.theme,
       ring = run.session?.ring;
     const { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
@@ -31,6 +30,7 @@ export class Ring {
       cy = height / 2;
     const rim = Math.min(width, height) / 2 - 15;
     // What is near matters most: along a radius goes the square root of the range.
+    /** @param {number} range */
     const reach = (range) => rim * Math.sqrt(Math.min(1, Math.max(0, range) / ring.range_max));
     const half = Math.min(ring.half_angle, Math.PI / Math.max(ring.mounts.length, 1)) * 0.94;
     const faulty = new Set(sensors.map(([index]) => index));
@@ -39,7 +39,7 @@ export class Ring {
     ctx.strokeStyle = theme.line;
     ctx.lineWidth = 1;
     for (const range of [1, 3, 10, 30]
-      .map((step) => step * this.#units.metres)
+      .map((step) => step * this.units.metres)
       .filter((step) => step < ring.range_max)
       .concat(ring.range_max)) {
       ctx.beginPath();
@@ -51,7 +51,7 @@ export class Ring {
       firesNow = new Path2D(),
       silent = new Path2D(),
       crosses = new Path2D();
-    let nearest = null;
+    let nearest = /** @type {{ range: number; index: number } | null} */ (null);
     ctx.font = theme.font(9.5, 600);
     ctx.textAlign = "center";
     ctx.textBaseline = "middle";
@@ -60,16 +60,13 @@ export class Ring {
       const range = ranges[index];
       if (fires.has(index)) {
         firesNow.moveTo(cx, cy);
-        firesNow.arc(cx, cy, range >= 0 ? Math.max(2, reach(range)) : rim, at - half, at + half);
+        firesNow.arc(cx, cy, range !== null && range >= 0 ? Math.max(2, reach(range)) : rim, at - half, at + half);
         firesNow.closePath();
       }
       if (faulty.has(index)) {
         const x = cx + 0.88 * rim * Math.cos(at),
           y = cy + 0.88 * rim * Math.sin(at);
-        crosses.moveTo(x - 4, y - 4);
-        crosses.lineTo(x + 4, y + 4);
-        crosses.moveTo(x - 4, y + 4);
-        crosses.lineTo(x + 4, y - 4);
+        addCross(crosses, x, y, 4);
       }
       ctx.fillStyle = fires.has(index) ? theme.ink : theme.muted;
       ctx.fillText(String(index), cx + (rim + 8) * Math.cos(at), cy + (rim + 8) * Math.sin(at));
@@ -79,7 +76,7 @@ export class Ring {
         silent.arc(cx, cy, rim, at - half, at + half);
         return;
       }
-      if (nearest === null || range < ranges[nearest]) nearest = index;
+      if (nearest === null || range < nearest.range) nearest = { range, index };
       const path = (age[index] ?? Infinity) > OLD_S ? old : fresh;
       path.moveTo(cx, cy);
       path.arc(cx, cy, Math.max(2, reach(range)), at - half, at + half);
@@ -108,7 +105,7 @@ export class Ring {
     this.#scale(ctx, cx, cy, reach, ring.range_max);
     this.#heading(ctx, cx, cy, -pose[2]);
     const text = [];
-    if (nearest !== null) text.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
+    if (nearest !== null) text.push(`nearest ${this.units.length(nearest.range)}, by sensor ${nearest.index}`);
     if (sensors.length > 0)
       text.push(
         `not trusted: ${sensors
@@ -116,36 +113,35 @@ export class Ring {
           .map(([index, fault]) => `${index} (${fault})`)
           .join(", ")}${sensors.length > 3 ? "…" : ""}`,
       );
-    setText(this.#text, text.join("; ") || "nothing heard");
+    setText(byId("ring-text"), text.join("; ") || "nothing heard");
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} ctx @param {number} cx @param {number} cy
+   * @param {(range: number) => number} reach @param {number} range_max
+   */
   #scale(ctx, cx, cy, reach, range_max) {
-    const theme = this.#theme;
+    const theme = this.theme;
     ctx.font = theme.font(9, 600);
     ctx.lineWidth = 3;
     ctx.strokeStyle = theme.panel;
     ctx.fillStyle = theme.muted;
     for (const step of [3, 10]) {
-      const range = step * this.#units.metres;
+      const range = step * this.units.metres;
       if (range >= range_max) continue;
       const x = cx + reach(range) * 0.53,
         y = cy + reach(range) * 0.85;
-      ctx.strokeText(`${step} ${this.#units.name}`, x, y);
-      ctx.fillText(`${step} ${this.#units.name}`, x, y);
+      ctx.strokeText(`${step} ${this.units.name}`, x, y);
+      ctx.fillText(`${step} ${this.units.name}`, x, y);
     }
   }
 
+  /** @param {CanvasRenderingContext2D} ctx @param {number} cx @param {number} cy @param {number} angle */
   #heading(ctx, cx, cy, angle) {
-    const tip = (turn, reach) => [cx + reach * Math.cos(angle + turn), cy + reach * Math.sin(angle + turn)];
-    ctx.beginPath();
-    ctx.moveTo(...tip(0, 15));
-    ctx.lineTo(...tip(2.5, 10));
-    ctx.lineTo(...tip(Math.PI, 4));
-    ctx.lineTo(...tip(-2.5, 10));
-    ctx.closePath();
-    ctx.fillStyle = this.#theme.robot;
+    addHeading(ctx, cx, cy, angle, 19);
+    ctx.fillStyle = this.theme.robot;
     ctx.fill();
-    ctx.strokeStyle = this.#theme.panel;
+    ctx.strokeStyle = this.theme.panel;
     ctx.lineWidth = 1;
     ctx.stroke();
   }

@@ -1,46 +1,58 @@
+// @ts-check
 // A robot described in a form: its ring is drawn as it is edited, and its file is saved once it is one that can drive.
 
-import { byId, download, el, setText, svg } from "./dom.js";
+import { messageOf } from "./connection.js";
+import { button, byId, download, el, setText, svg } from "./dom.js";
+import { Panel } from "./panel.js";
+import { counted, numberIn } from "./units.js";
 
-const FIELDS = [
-  "name",
-  "driver",
+const NUMBERS = [
   "count",
   "radius_m",
   "beam_half_angle_deg",
   "resolution_m",
   "range_min_m",
   "range_max_m",
-  "preset",
   "step_period_s",
   "body_radius_m",
   "speed_max_m_s",
   "turn_max_rad_s",
 ];
-const TEXTS = new Set(["name", "driver", "preset"]);
 const SENSORS_MAX = 255; // config.robot.SENSORS_MAX
-const input = (field) => byId(`new-${field.replaceAll("_", "-")}`);
-const number = (field) => Number(input(field).value.trim().replace("−", "-").replace(",", "."));
+/** @param {string} field @returns {HTMLInputElement | HTMLSelectElement} */
+const input = (field) => {
+  const found = byId(`new-${field.replaceAll("_", "-")}`);
+  if (found instanceof HTMLInputElement || found instanceof HTMLSelectElement) return found;
+  throw new Error(`${field} is no field of the form`);
+};
+/** @param {string} field */
+const number = (field) => numberIn(input(field).value) ?? 0;
+/** @param {number} value */
 const round = (value, digits = 4) => Number(value.toFixed(digits));
+/** @param {number} angle */
 const degrees = (angle) => round((angle * 180) / Math.PI, 2);
 
-export class RobotForm {
+export class RobotForm extends Panel {
+  /** @type {Triple[] | null} */
   #sensors = null; // [x, y, degrees] of each; null for a regular ring
 
-  constructor({ run, connection, notifications }) {
-    Object.assign(this, { run, connection, notifications });
+  /** @param {Panels} parts */
+  constructor(parts) {
+    super(parts);
     const form = byId("robot-form");
     form.addEventListener("input", () => this.draw());
     form.addEventListener("submit", (event) => this.#save(event));
     byId("robot-each").addEventListener("change", () => this.#each());
     byId("robot-this").addEventListener("click", () => this.#ofRun());
-    byId("robot-add").addEventListener("click", () =>
-      this.#change([...this.#sensors, [...(this.#sensors.at(-1) ?? [0.1, 0, 0])]]),
-    );
+    byId("robot-add").addEventListener("click", () => {
+      const sensors = this.#sensors ?? [];
+      this.#change([...sensors, [...(sensors.at(-1) ?? [0.1, 0, 0])]]);
+    });
     this.draw();
   }
 
   // x, y (m) and direction (rad) of each sensor as the form has it now.
+  /** @returns {Triple[]} */
   mounts() {
     if (this.#sensors !== null) return this.#sensors.map(([x, y, turn]) => [x, y, (turn * Math.PI) / 180]);
     const count = Math.min(SENSORS_MAX, Math.max(0, Math.floor(number("count")) || 0)),
@@ -59,8 +71,10 @@ export class RobotForm {
       beam = 0.45 * reach,
       size = 1.25 * (reach + beam);
     const half = (Math.min(89, Math.max(0.1, number("beam_half_angle_deg") || 0.1)) * Math.PI) / 180;
+    /** @param {number} x @param {number} y @param {number} angle @param {number} far */
     const at = (x, y, angle, far) => `${round(x + far * Math.cos(angle))},${round(-(y + far * Math.sin(angle)))}`;
     const text = Math.min(0.09, 2.2 / Math.max(1, mounts.length)) * size;
+    /** @param {Triple} mount @param {number} i */
     const sensor = ([x, y, angle], i) => {
       const name = svg("text", {
         x: x + 1.18 * beam * Math.cos(angle),
@@ -71,9 +85,10 @@ export class RobotForm {
         class: "mark",
       });
       name.textContent = String(i);
+      const arc = `A${beam},${beam} 0 0 0 ${at(x, y, angle + half, beam)}`;
       return [
         svg("path", {
-          d: `M${at(x, y, 0, 0)} L${at(x, y, angle - half, beam)} A${beam},${beam} 0 0 0 ${at(x, y, angle + half, beam)}Z`,
+          d: `M${at(x, y, 0, 0)} L${at(x, y, angle - half, beam)} ${arc}Z`,
           class: "beam",
           "stroke-width": 0.005 * size,
         }),
@@ -83,10 +98,7 @@ export class RobotForm {
     };
     const view = byId("robot-picture");
     view.setAttribute("viewBox", `${-size} ${-size} ${2 * size} ${2 * size}`);
-    view.setAttribute(
-      "aria-label",
-      `The ring from above, its front to the right: ${mounts.length} sensor${mounts.length === 1 ? "" : "s"}`,
-    );
+    view.setAttribute("aria-label", `The ring from above, its front to the right: ${counted(mounts.length, "sensor")}`);
     view.replaceChildren(
       svg("circle", { cx: 0, cy: 0, r: body, class: "body", "stroke-width": 0.012 * size }),
       svg("polygon", {
@@ -97,6 +109,7 @@ export class RobotForm {
     );
   }
 
+  /** @param {Triple[] | null} sensors */
   #change(sensors) {
     this.#sensors = sensors;
     const isOwn = sensors !== null;
@@ -110,7 +123,9 @@ export class RobotForm {
     this.draw();
   }
 
+  /** @param {Triple} sensor @param {number} i */
   #row(sensor, i) {
+    /** @param {0 | 1 | 2} k @param {string} name */
     const value = (k, name) =>
       el("input", {
         class: "number",
@@ -118,8 +133,8 @@ export class RobotForm {
         autocomplete: "off",
         value: String(sensor[k]),
         "aria-label": `${name} of sensor ${i}`,
-        oninput: (event) => {
-          sensor[k] = Number(event.target.value.replace("−", "-").replace(",", ".")) || 0;
+        oninput: (/** @type {InputEvent} */ { target }) => {
+          if (target instanceof HTMLInputElement) sensor[k] = numberIn(target.value) || 0;
         },
       });
     return el(
@@ -129,16 +144,10 @@ export class RobotForm {
       value(0, "x (m)"),
       value(1, "y (m)"),
       value(2, "direction (degrees)"),
-      el(
-        "button",
-        {
-          type: "button",
-          class: "small",
-          "aria-label": `Remove sensor ${i}`,
-          onclick: () => this.#change(this.#sensors.filter((_, k) => k !== i)),
-        },
-        "✕",
-      ),
+      button("✕", () => this.#change((this.#sensors ?? []).filter((_, k) => k !== i)), {
+        class: "small",
+        "aria-label": `Remove sensor ${i}`,
+      }),
     );
   }
 
@@ -151,6 +160,7 @@ export class RobotForm {
 
   // Begins with the robot of this run.
   #ofRun() {
+    if (this.run.session === null) return;
     const { name, ring, body } = this.run.session;
     const given = {
       name: name ?? "",
@@ -165,37 +175,46 @@ export class RobotForm {
     this.#change(ring.mounts.map(([x, y, angle]) => [round(x), round(y), degrees(angle)]));
   }
 
+  /** @param {SubmitEvent} event */
   async #save(event) {
     event.preventDefault();
     const isOwn = this.#sensors !== null,
-      shape = isOwn ? { count: null, radius_m: null } : {};
-    const asked = Object.fromEntries(
-      FIELDS.map((field) => [field, TEXTS.has(field) ? input(field).value.trim() : number(field)]),
-    );
-    const wrong = FIELDS.find(
+      name = byId("new-name").value.trim();
+    const wrong = NUMBERS.find(
       (field) =>
-        !TEXTS.has(field) && !(field in shape) && (input(field).value.trim() === "" || !Number.isFinite(asked[field])),
+        !(isOwn && ["count", "radius_m"].includes(field)) &&
+        !Number.isFinite(numberIn(input(field).value) ?? Number.NaN),
     );
     if (wrong) {
-      setText(byId("robot-error"), `${input(wrong).labels[0].firstChild.textContent.trim()}: a number is wanted`);
+      setText(byId("robot-error"), `${input(wrong).labels?.[0].firstChild?.textContent?.trim()}: a number is wanted`);
       input(wrong).focus();
       return;
     }
-    asked.count = Math.floor(asked.count);
     try {
       const toml = await this.connection.request({
         type: "robot_file",
-        ...asked,
+        name,
+        driver: byId("new-driver").value,
+        preset: byId("new-preset").value,
+        count: isOwn ? null : Math.floor(number("count")),
+        radius_m: isOwn ? null : number("radius_m"),
         sensors: this.#sensors,
-        ...shape,
+        beam_half_angle_deg: number("beam_half_angle_deg"),
+        resolution_m: number("resolution_m"),
+        range_min_m: number("range_min_m"),
+        range_max_m: number("range_max_m"),
+        step_period_s: number("step_period_s"),
+        body_radius_m: number("body_radius_m"),
+        speed_max_m_s: number("speed_max_m_s"),
+        turn_max_rad_s: number("turn_max_rad_s"),
         synchro: byId("robot-synchro").checked,
       });
       setText(byId("robot-error"), "");
-      const file = `${(asked.name || "my-robot").toLowerCase().replace(/[^a-z0-9_-]+/g, "-")}.toml`;
+      const file = `${(name || "my-robot").toLowerCase().replace(/[^a-z0-9_-]+/g, "-")}.toml`;
       download(file, new Blob([toml], { type: "application/toml" }));
       this.notifications.toast(`${file}: good. Drive it in the emulator: echolocate run --robot ${file}`);
     } catch (error) {
-      setText(byId("robot-error"), error.message);
+      setText(byId("robot-error"), messageOf(error));
     }
   }
 }

@@ -1,24 +1,37 @@
+// @ts-check
 // The route that the operator sets: its waypoints in one frame, a history for undo, and what of it the robot drives.
 // While the robot drives the route, each change is sent at once; what lies behind the robot cannot be changed.
 
 import { Emitter } from "./emitter.js";
-import { inPlane } from "./map_frame.js";
+import { inPlane, ofPlane } from "./map_frame.js";
+import { radians } from "./units.js";
 
 const HISTORY = 50;
 const WAYPOINTS_MAX = 64; // config.mission_step.STEPS_MAX
+/** @param {number} rad */
 const degrees = (rad) => Math.round((rad * 180) / Math.PI) % 360;
+/** @param {unknown} a @param {unknown} b */
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
+/** @extends {Emitter<{ changed: [] }>} */
 export class Route extends Emitter {
-  waypoints = []; // [x, y, final heading in degrees or null]
+  /** @type {Waypoint[]} */
+  waypoints = []; // x, y, final heading in degrees or null
+  /** @type {Frame} */
   frame = "odom";
-  selected = null; // index
+  /** @type {number | null} */
+  selected = null;
+  /** @type {Array<{ waypoints: Waypoint[]; frame: Frame }>} */
   #history = [];
+  /** @type {Waypoint[] | null} */
   #sent = null; // waypoints that the robot does not show yet
 
+  /** @param {Pick<Parts, "run" | "connection" | "notifications">} parts */
   constructor({ run, connection, notifications }) {
     super();
-    Object.assign(this, { run, connection, notifications });
+    this.run = run;
+    this.connection = connection;
+    this.notifications = notifications;
     run.on("state", () => this.#follow());
     connection.on("closed", () => {
       this.#sent = null;
@@ -33,7 +46,8 @@ export class Route extends Emitter {
 
   // The same, if it goes on.
   get #driven() {
-    return ["running", "held"].includes(this.#shown?.status) ? this.#shown : null;
+    const shown = this.#shown;
+    return shown?.status === "running" || shown?.status === "held" ? shown : null;
   }
 
   get isDriven() {
@@ -50,11 +64,13 @@ export class Route extends Emitter {
   }
 
   // A waypoint in the plane: [x, y, heading in radians or null]; null where the map frame is not known.
+  /** @param {Waypoint} waypoint */
   inPlane([x, y, turn]) {
-    return inPlane(this.run.state.localized, this.frame, x, y, turn === null ? null : (turn * Math.PI) / 180);
+    return inPlane(this.run.state.localized, this.frame, x, y, radians(turn));
   }
 
   // Adds a waypoint of the plane at the end; heading in radians, null for any.
+  /** @param {number} x @param {number} y @param {number | null} heading */
   add(x, y, heading) {
     if (this.waypoints.length === 0) this.frame = this.run.state.localized?.status === "tracking" ? "map" : "odom";
     if (this.waypoints.length >= WAYPOINTS_MAX)
@@ -63,18 +79,21 @@ export class Route extends Emitter {
     return there && this.#change([...this.waypoints, there], this.waypoints.length);
   }
 
+  /** @param {number} i @param {number} x @param {number} y */
   move(i, x, y, heading = this.inPlane(this.waypoints[i])?.[2] ?? null) {
     const there = this.#ofPlane(x, y, heading);
     return there && this.set(i, heading === null ? there : [there[0], there[1], this.waypoints[i][2] ?? there[2]]);
   }
 
   // Gives a waypoint its final heading in the plane, radians; null for any.
+  /** @param {number} i @param {number | null} heading */
   turn(i, heading) {
     const [x, y] = this.waypoints[i],
       frame = this.frame === "map" ? (this.run.state.localized?.frame[2] ?? 0) : 0;
     return this.set(i, [x, y, heading === null ? null : degrees(heading - frame)]);
   }
 
+  /** @param {number} i @param {Waypoint} waypoint */
   set(i, waypoint) {
     return this.#change(
       this.waypoints.map((one, k) => (k === i ? waypoint : one)),
@@ -82,12 +101,14 @@ export class Route extends Emitter {
     );
   }
 
+  /** @param {number} i */
   remove(i) {
     const rest = this.waypoints.filter((_, k) => k !== i);
     return this.#change(rest, rest.length === 0 ? null : Math.min(i, rest.length - 1));
   }
 
   // Moves a waypoint earlier (-1) or later (1).
+  /** @param {number} i @param {number} by */
   reorder(i, by) {
     const to = i + by;
     if (to < this.behind || to >= this.waypoints.length || i < this.behind) return undefined;
@@ -100,12 +121,9 @@ export class Route extends Emitter {
     return this.#change(this.waypoints.slice(0, this.behind), null);
   }
 
+  /** @param {Waypoint[]} waypoints @param {Frame} frame */
   load(waypoints, frame) {
-    return this.#change(
-      waypoints.map((one) => [...one]),
-      null,
-      frame,
-    );
+    return this.#change(waypoints, null, frame);
   }
 
   undo() {
@@ -115,6 +133,7 @@ export class Route extends Emitter {
     return this.#changed(null);
   }
 
+  /** @param {number | null} i */
   select(i) {
     this.selected = i;
     this.emit("changed");
@@ -126,6 +145,7 @@ export class Route extends Emitter {
     return this.notifications.toast("There is no waypoint yet: choose the tool and click on the map");
   }
 
+  /** @param {number} x @param {number} y @param {number | null} heading @returns {Waypoint | null} */
   #ofPlane(x, y, heading) {
     const { localized } = this.run.state;
     if (this.frame === "odom") return [x, y, heading === null ? null : degrees(heading)];
@@ -135,16 +155,11 @@ export class Route extends Emitter {
       );
       return null;
     }
-    const [x0, y0, turn] = localized.frame,
-      c = Math.cos(turn),
-      s = Math.sin(turn);
-    return [
-      c * (x - x0) + s * (y - y0),
-      c * (y - y0) - s * (x - x0),
-      heading === null ? null : degrees(heading - turn),
-    ];
+    const turned = heading === null ? null : degrees(heading - localized.frame[2]);
+    return [...ofPlane(localized.frame, x, y), turned];
   }
 
+  /** @param {Waypoint[]} waypoints @param {number | null} selected */
   #change(waypoints, selected, frame = this.frame) {
     if (this.isDriven && !same(waypoints.slice(0, this.behind), this.waypoints.slice(0, this.behind))) {
       return this.notifications.toast(
@@ -156,6 +171,7 @@ export class Route extends Emitter {
     return this.#changed(selected);
   }
 
+  /** @param {number | null} selected */
   #changed(selected) {
     this.selected = selected;
     this.emit("changed");
@@ -177,13 +193,13 @@ export class Route extends Emitter {
   // Takes over the route that the robot drives, unless a change of it is on its way.
   #follow() {
     const mission = this.#shown;
-    const driven = mission?.steps.map(({ places }) => places[0]) ?? null;
+    const driven = mission?.steps.map(({ places }) => places[0]) ?? [];
     if (this.#sent !== null) {
       if (this.#sent.length > 0 && !same(driven, this.#sent)) return;
       this.#sent = null;
       this.emit("changed");
     }
-    if (this.#driven === null || same(driven, this.waypoints)) return;
+    if (mission === null || this.#driven === null || same(driven, this.waypoints)) return;
     if (this.waypoints.length > 0) this.#history.push({ waypoints: this.waypoints, frame: this.frame });
     [this.waypoints, this.frame, this.selected] = [driven, mission.steps[0].frame, null];
     this.emit("changed");

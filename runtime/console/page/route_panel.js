@@ -1,29 +1,34 @@
+// @ts-check
 // The route in the panel: every waypoint as a row, with what a pointer can do on the map done by buttons and numbers.
 
-import { byId, download, el, setText } from "./dom.js";
+import { messageOf } from "./connection.js";
+import { button, byId, download, el, setText } from "./dom.js";
+import { Panel } from "./panel.js";
+import { counted, numberIn } from "./units.js";
 
-export class RoutePanel {
+export class RoutePanel extends Panel {
   #shown = "";
 
-  constructor({ route, run, units, connection, notifications, tools }) {
-    Object.assign(this, { route, run, units, connection, notifications });
-    const on = (id, act) => byId(id).addEventListener("click", act);
-    on("route-add", () => tools.choose("route", { focus: true }));
-    on("route-drive", () => route.drive());
-    on("route-undo", () => route.undo());
-    on("route-clear", () => route.clear());
+  /** @param {Panels & Pick<Parts, "route" | "tools">} parts */
+  constructor(parts) {
+    super(parts);
+    const { route, run, units, tools } = parts;
+    this.route = route;
+    byId("route-add").addEventListener("click", () => tools.choose("route", { focus: true }));
+    byId("route-drive").addEventListener("click", () => route.drive());
+    byId("route-undo").addEventListener("click", () => route.undo());
+    byId("route-clear").addEventListener("click", () => route.clear());
     byId("route-form").addEventListener("submit", (event) => this.#set(event));
     byId("route-save").addEventListener("submit", (event) => this.#save(event));
-    byId("route-file").addEventListener("change", (event) => this.#load(event.target));
+    byId("route-file").addEventListener("change", () => this.#load(byId("route-file")));
     route.on("changed", () => this.#refresh());
     run.on("state", () => this.#refresh());
     units.on("changed", () => this.#refresh());
   }
 
   #refresh() {
-    const { route, units } = this,
+    const { route, units, enabled } = this,
       { behind, isDriven, waypoints, selected } = route;
-    const enabled = this.run.state.controller && !this.run.watchesRecording;
     const shown = JSON.stringify([
       waypoints,
       route.frame,
@@ -47,73 +52,59 @@ export class RoutePanel {
     if (selected !== null && selected >= behind) {
       const [x, y, heading] = waypoints[selected];
       setText(byId("route-form-number"), `Waypoint ${selected + 1}`);
-      for (const [id, value] of [
-        ["x", units.number(x)],
-        ["y", units.number(y)],
-        ["heading", heading === null ? "" : String(heading)],
-      ])
-        byId(`route-${id}`).value = value;
+      byId("route-x").value = units.number(x);
+      byId("route-y").value = units.number(y);
+      byId("route-heading").value = heading === null ? "" : String(heading);
       setText(byId("route-unit"), units.name);
     }
-    if (focused && document.activeElement?.id !== focused) byId(focused)?.focus();
+    if (focused && document.activeElement?.id !== focused) document.getElementById(focused)?.focus();
   }
 
+  /** @param {Waypoint} waypoint @param {number} i @param {boolean} enabled */
   #row([x, y, heading], i, enabled) {
     const { route, units } = this,
       number = i + 1,
       isBehind = i < route.behind;
-    const button = (name, sign, act, off) => {
-      const made = el(
-        "button",
-        {
-          type: "button",
-          class: "small",
-          id: `route-${name.replace(" ", "-").toLowerCase()}-${i}`,
-          "aria-label": `${name} waypoint ${number}`,
-          title: name,
-          onclick: act,
-        },
-        sign,
-      );
-      made.disabled = !enabled || isBehind || off;
-      return made;
-    };
-    const name = el(
-      "button",
-      {
-        type: "button",
-        class: "place",
-        id: `route-row-${i}`,
-        "aria-pressed": String(route.selected === i),
-        onclick: () => route.select(route.selected === i ? null : i),
-      },
-      el("strong", {}, String(number)),
-      ` ${units.place(x, y)}${heading === null ? "" : `, ${heading}°`}`,
+    /** @param {string} name @param {string} sign @param {() => void} act @param {boolean} off */
+    const small = (name, sign, act, off) =>
+      button(sign, act, {
+        class: "small",
+        id: `route-${name.toLowerCase()}-${i}`,
+        "aria-label": `${name} waypoint ${number}`,
+        title: name,
+        disabled: !enabled || isBehind || off,
+      });
+    const isSelected = route.selected === i;
+    const name = button(
+      [el("strong", {}, String(number)), ` ${units.place(x, y)}${heading === null ? "" : `, ${heading}°`}`],
+      () => route.select(isSelected ? null : i),
+      { class: "place", id: `route-row-${i}`, "aria-pressed": String(isSelected), disabled: isBehind },
     );
-    name.disabled = isBehind;
     return el(
       "li",
       {},
       name,
-      button("Earlier", "↑", () => route.reorder(i, -1), i <= route.behind),
-      button("Later", "↓", () => route.reorder(i, 1), i === route.waypoints.length - 1),
-      button("Remove", "✕", () => route.remove(i), false),
+      small("Earlier", "↑", () => route.reorder(i, -1), i <= route.behind),
+      small("Later", "↓", () => route.reorder(i, 1), i === route.waypoints.length - 1),
+      small("Remove", "✕", () => route.remove(i), false),
     );
   }
 
+  /** @param {SubmitEvent} event */
   #set(event) {
     event.preventDefault();
-    const [x, y] = ["route-x", "route-y"].map((id) => this.units.parse(byId(id).value));
-    const given = byId("route-heading").value.trim(),
-      heading = given === "" ? null : Number(given.replace("−", "-"));
+    const [x, y] = [byId("route-x"), byId("route-y")].map((input) => this.units.parse(input.value));
+    const heading = numberIn(byId("route-heading").value);
     const isWrong = x === null || y === null || (heading !== null && !(Math.abs(heading) <= 360));
     setText(
       byId("route-error"),
       isWrong ? "two numbers are wanted, and a heading from -360 to 360 degrees or none" : "",
     );
-    if (!isWrong) this.route.set(this.route.selected, [x, y, heading]);
+    const { selected } = this.route;
+    if (x !== null && y !== null && !isWrong && selected !== null) void this.route.set(selected, [x, y, heading]);
   }
 
+  /** @param {SubmitEvent} event */
   async #save(event) {
     event.preventDefault();
     const { waypoints, frame } = this.route,
@@ -123,39 +114,39 @@ export class RoutePanel {
       download(`${name}.toml`, new Blob([toml], { type: "application/toml" }));
       setText(byId("route-error"), "");
     } catch (error) {
-      setText(byId("route-error"), error.message);
+      setText(byId("route-error"), messageOf(error));
     }
   }
 
   // A route goes into the editor; a mission that does more is started as it is, if the operator confirms.
+  /** @param {HTMLInputElement} input */
   async #load(input) {
-    const [file] = input.files;
+    const file = input.files?.[0];
     if (!file) return;
     try {
       const toml = await file.text();
       const { name, about, waypoints, frame } = await this.connection.request({ type: "read_mission", toml });
       setText(byId("route-error"), "");
-      if (waypoints !== null) {
+      if (waypoints !== null && frame !== null) {
         this.route.load(waypoints, frame);
         if (!this.route.isDriven) byId("route-name").value = name;
       } else {
         this.notifications.confirm(`Start the mission ${name}?`, el("p", {}, about || "It is more than a route."), [
           ["Leave it", null],
-          [
-            "Start it",
-            () => void this.connection.request({ type: "run_mission", toml }).catch(this.notifications.showError),
-          ],
+          ["Start it", () => void this.ask({ type: "run_mission", toml })],
         ]);
       }
     } catch (error) {
-      setText(byId("route-error"), error.message);
+      setText(byId("route-error"), messageOf(error));
     }
     input.value = "";
   }
 }
 
+/** @param {Route} route */
 function text({ waypoints, behind, isDriven, frame }) {
-  const count = `${waypoints.length} waypoint${waypoints.length === 1 ? "" : "s"}${frame === "map" && waypoints.length > 0 ? ", in the map" : ""}`;
+  const where = frame === "map" && waypoints.length > 0 ? ", in the map" : "";
+  const count = `${counted(waypoints.length, "waypoint")}${where}`;
   if (isDriven) return `Under way: ${count}, ${behind} behind the robot. Changes ahead of it count at once.`;
   if (waypoints.length === 0) return "No waypoint yet: click on the map, or load a file.";
   return `${count}; nothing is driven before you say so.`;

@@ -1,12 +1,22 @@
+// @ts-check
 // Two stacked canvases, drawn only when something on them changed, at most once a frame of the screen. What seldom
 // changes (grid, truth, segments) lies on the back one, so that a moving robot redraws the front one only.
 
 import { fitted } from "./theme.js";
 
+// The corners of an arrow head: direction off the front, and reach as a share of the radius.
+const HEAD = /** @type {Pair[]} */ ([
+  [0, 0.78],
+  [2.5, 0.5],
+  [Math.PI, 0.18],
+  [-2.5, 0.5],
+]);
+
 export class Scene {
   #planes;
   #requested = false;
 
+  /** @param {Canvases & SceneShared} parts */
   constructor({ back, front, layers, overlay, run, view, theme, units, selection, options }) {
     this.#planes = { back: { canvas: back, dirty: true }, front: { canvas: front, dirty: true } };
     this.layers = layers;
@@ -18,6 +28,7 @@ export class Scene {
     }).observe(front);
   }
 
+  /** @param {("back" | "front")[]} names */
   invalidate(...names) {
     for (const name of names) this.#planes[name].dirty = true;
     if (this.#requested) return;
@@ -36,6 +47,7 @@ export class Scene {
     }
   }
 
+  /** @param {string} name @param {Drawing} f */
   paint(name, f) {
     for (const layer of this.layers) {
       if (layer.plane !== name || !layer.on) continue;
@@ -47,6 +59,7 @@ export class Scene {
   }
 
   // Everything on one canvas of its own, for a screenshot.
+  /** @param {CanvasRenderingContext2D} ctx */
   picture(ctx) {
     const { width, height } = this.shared.view;
     ctx.fillStyle = this.shared.theme.map;
@@ -55,6 +68,7 @@ export class Scene {
   }
 }
 
+/** @param {CanvasRenderingContext2D} ctx @param {SceneShared} shared @returns {Drawing} */
 function frame(ctx, shared) {
   const { view } = shared;
   const base = ctx.getTransform();
@@ -78,8 +92,10 @@ function frame(ctx, shared) {
 }
 
 // Whether two boxes [left, top, right, bottom] do.
+/** @param {Quad} a @param {Quad} b */
 export const overlap = (a, b) => !(a[2] < b[0] || a[0] > b[2] || a[3] < b[1] || a[1] > b[3]);
 
+/** @param {Drawing} f @param {string} text @param {number} x @param {number} y @param {string} colour */
 export function textWithHalo(f, text, x, y, colour) {
   const { ctx } = f;
   ctx.lineJoin = "round";
@@ -88,4 +104,35 @@ export function textWithHalo(f, text, x, y, colour) {
   ctx.strokeText(text, x, y);
   ctx.fillStyle = colour;
   ctx.fillText(text, x, y);
+}
+
+// Adds the line through some points to a path.
+/** @param {CanvasPath} path @param {ReadonlyArray<readonly [number, number, ...unknown[]]>} points */
+export function addLine(path, points) {
+  points.forEach(([x, y], i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
+}
+
+/** @param {Point} point @returns {Pair} */
+export const pairOf = ({ x, y }) => [x, y];
+
+/** @param {CanvasPath} path @param {number} x @param {number} y @param {number} arm */
+export function addCross(path, x, y, arm) {
+  path.moveTo(x - arm, y - arm);
+  path.lineTo(x + arm, y + arm);
+  path.moveTo(x - arm, y + arm);
+  path.lineTo(x + arm, y - arm);
+}
+
+// Begins a path of an arrow head that shows where a robot of some radius looks.
+/**
+ * @param {CanvasRenderingContext2D} ctx @param {number} x @param {number} y @param {number} angle
+ * @param {number} radius
+ */
+export function addHeading(ctx, x, y, angle, radius) {
+  ctx.beginPath();
+  for (const [turn, share] of HEAD) {
+    const reach = share * radius;
+    ctx.lineTo(x + reach * Math.cos(angle + turn), y + reach * Math.sin(angle + turn));
+  }
+  ctx.closePath();
 }

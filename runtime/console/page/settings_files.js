@@ -1,29 +1,36 @@
+// @ts-check
 // The files of the run's settings: their text with what is wrong beside its lines, the difference, saving, and a
 // restart.
 
-import { byId, download, el, setText } from "./dom.js";
+import { messageOf } from "./connection.js";
+import { button, byId, download, el, setText } from "./dom.js";
+import { base } from "./files.js";
+import { Panel } from "./panel.js";
 
 const CHECK_AFTER_MS = 400;
 
-export class SettingsFiles {
+export class SettingsFiles extends Panel {
+  /** @type {SettingsRow[]} */
   #rows = [];
   #at = 0;
+  /** @type {SettingsText | null} */
   #held = null; // text and digest of the file, as it was opened
   #asked = 0;
-  #timer = null;
+  /** @type {number | undefined} */
+  #timer = undefined;
   #good = false;
 
-  constructor({ run, connection, notifications }) {
-    Object.assign(this, { run, connection, notifications });
+  /** @param {Panels} parts */
+  constructor(parts) {
+    super(parts);
+    const { run } = parts;
+    /** @param {string} id @param {() => void} act */
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("settings-open", () => void this.open());
     on("settings-close", () => this.#close());
     on("settings-save", () => void this.#save());
     on("settings-copy", () =>
-      download(
-        this.#rows[this.#at].name.split("/").at(-1),
-        new Blob([byId("settings-text").value], { type: "application/toml" }),
-      ),
+      download(base(this.#rows[this.#at].name), new Blob([byId("settings-text").value], { type: "application/toml" })),
     );
     on("settings-restart", () => this.#restart());
     byId("settings-file").addEventListener("change", () =>
@@ -39,12 +46,9 @@ export class SettingsFiles {
   }
 
   async open() {
-    try {
-      this.#rows = await this.connection.request({ type: "list_settings" });
-    } catch (error) {
-      this.notifications.showError(error);
-      return;
-    }
+    const rows = await this.ask({ type: "list_settings" });
+    if (rows === undefined) return;
+    this.#rows = rows;
     byId("settings-file").replaceChildren(
       ...this.#rows.map(({ kind, name, shipped }, i) =>
         el("option", { value: i }, `${kind}: ${name}${shipped ? " (comes with the program)" : ""}`),
@@ -63,16 +67,18 @@ export class SettingsFiles {
     return this.#held !== null && byId("settings-text").value !== this.#held.text;
   }
 
+  /** @param {number} number */
   async #show(number) {
     this.#at = number;
     byId("settings-file").value = String(number);
     try {
       this.#hold(await this.connection.request({ type: "read_settings", file: number }));
     } catch (error) {
-      setText(byId("settings-state"), error.message);
+      setText(byId("settings-state"), messageOf(error));
     }
   }
 
+  /** @param {SettingsText} held */
   #hold(held) {
     this.#held = { ...held, text: held.text.replaceAll("\r\n", "\n") };
     const text = byId("settings-text");
@@ -89,6 +95,7 @@ export class SettingsFiles {
   }
 
   // Runs an action, after a question where it would lose a change.
+  /** @param {() => void} act */
   #leave(act) {
     if (!this.#isChanged) {
       act();
@@ -130,11 +137,12 @@ export class SettingsFiles {
       this.#good = found.problems.length === 0;
       this.#list(found);
     } catch (error) {
-      setText(byId("settings-state"), error.message);
+      setText(byId("settings-state"), messageOf(error));
     }
     this.#refresh();
   }
 
+  /** @param {SettingsCheck} check */
   #list({ problems, warnings, difference }) {
     this.#number(problems.map(({ line }) => line));
     byId("settings-problems").replaceChildren(
@@ -142,13 +150,7 @@ export class SettingsFiles {
         el(
           "li",
           { class: "bad" },
-          line === null
-            ? text
-            : el(
-                "button",
-                { type: "button", class: "small", onclick: () => this.#goTo(line) },
-                `line ${line}: ${text}`,
-              ),
+          line === null ? text : button(`line ${line}: ${text}`, () => this.#goTo(line), { class: "small" }),
         ),
       ),
       ...warnings.map((text) => el("li", {}, text)),
@@ -171,6 +173,7 @@ export class SettingsFiles {
       );
   }
 
+  /** @param {(number | null)[]} bad */
   #number(bad) {
     const count = byId("settings-text").value.split("\n").length;
     byId("settings-lines").replaceChildren(
@@ -181,6 +184,7 @@ export class SettingsFiles {
     byId("settings-lines").scrollTop = byId("settings-text").scrollTop;
   }
 
+  /** @param {number} line */
   #goTo(line) {
     const text = byId("settings-text"),
       lines = text.value.split("\n");
@@ -193,12 +197,13 @@ export class SettingsFiles {
   #refresh() {
     const { controller } = this.run.state;
     byId("settings-save").disabled = !controller || !this.#isChanged || !this.#good;
-    byId("settings-restart").disabled = !controller || this.run.robot?.mode === "DRIVE";
+    byId("settings-restart").disabled = !controller || this.run.robot.mode === "DRIVE";
     byId("settings-restart").title =
-      this.run.robot?.mode === "DRIVE" ? "Disarm the robot first" : controller ? "" : "Ask for control first";
+      this.run.robot.mode === "DRIVE" ? "Disarm the robot first" : controller ? "" : "Ask for control first";
   }
 
   async #save() {
+    if (this.#held === null) return;
     try {
       this.#hold(
         await this.connection.request({
@@ -211,7 +216,7 @@ export class SettingsFiles {
       byId("settings-text").focus(); // the button that had the focus is disabled now
       setText(byId("settings-state"), "Saved. It counts once the run is started again.");
     } catch (error) {
-      setText(byId("settings-state"), error.message);
+      setText(byId("settings-state"), messageOf(error));
     }
   }
 
@@ -222,7 +227,8 @@ export class SettingsFiles {
         el(
           "p",
           {},
-          "The run ends and begins anew with the files as they are now; its map starts empty. A real robot stays disarmed. This page comes back by itself.",
+          "The run ends and begins anew with the files as they are now; its map starts empty. ",
+          "A real robot stays disarmed. This page comes back by itself.",
         ),
         [
           ["Go on with this run", null],

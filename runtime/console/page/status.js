@@ -1,38 +1,38 @@
+// @ts-check
 // The status bar: one state for the whole page, which always names the robot's own mode; its reason, the age of the
 // data, line counters. Changes of the state are announced to screen readers.
 
 import { byId, setAttribute, setText } from "./dom.js";
+import { Panel } from "./panel.js";
 import { degrees, percent } from "./units.js";
 
 const STALE_S = 2.5; // while the robot does not answer, updates come once a second
 const RECENT_MS = 5000;
+/** @type {Record<string, string>} */
 const ICONS = { "NO DATA": "m-connecting", PLAYBACK: "i-play", PAUSED: "i-pause" };
 const SILENT_S = 3; // the text changes seldom, so that a screen reader does not repeat it all the time
 
-export class Status {
-  #run;
-  #units;
-  #connection;
-  #notifications;
-  #alerts;
+export class Status extends Panel {
   #announce = byId("announce");
+  /** @type {string | null} */
   #announced = null;
+  /** @type {number | null} */
   #closed = null;
+  /** @type {string | null} */
   #trouble = null; // why there is no connection, where that is known
   #silent = false;
+  /** @type {string | null} */
   #version = null;
   #was_open = false;
+  /** @type {Map<string, { count: number; at: number }>} */
   #counts = new Map();
 
-  constructor({ run, units, connection, notifications, alerts, askForToken }) {
-    this.askForToken = askForToken;
-    [this.#run, this.#units, this.#connection, this.#notifications, this.#alerts] = [
-      run,
-      units,
-      connection,
-      notifications,
-      alerts,
-    ];
+  /** @param {Panels & Pick<Parts, "alerts" | "askForToken">} parts */
+  constructor(parts) {
+    super(parts);
+    const { run, connection, notifications, alerts } = parts;
+    this.askForToken = parts.askForToken;
+    this.alerts = alerts;
     alerts.on("changed", () => this.#show());
     run.on("session", (session) => {
       setText(byId("robot-name"), session.name || "echolocate");
@@ -65,14 +65,14 @@ export class Status {
   }
 
   get #isOld() {
-    return this.#closed !== null || this.#run.age(performance.now()) > STALE_S;
+    return this.#closed !== null || this.run.age(performance.now()) > STALE_S;
   }
 
   #show() {
-    const { robot } = this.#run;
+    const { robot } = this.run;
     const old = this.#isOld,
       mode = robot.mode.replace("_", " ");
-    const special = old ? "NO DATA" : this.#run.watchesRecording ? "PLAYBACK" : robot.paused ? "PAUSED" : null;
+    const special = old ? "NO DATA" : this.run.watchesRecording ? "PLAYBACK" : robot.paused ? "PAUSED" : null;
     const reason = old ? (this.#trouble ?? "") : (reasonOf(robot) ?? "");
     const named =
       special === null || robot.mode === "no data" ? "" : old ? `the robot was in ${mode}` : `the robot: ${mode}`;
@@ -85,11 +85,11 @@ export class Status {
     setAttribute(
       byId("facts"),
       "aria-label",
-      this.#run.watchesRecording ? "State in the recording" : "State of the run",
+      this.run.watchesRecording ? "State in the recording" : "State of the run",
     );
     if (old) fact("twist", "unknown");
-    const warnings = this.#alerts.unseen > 0 ? `(${this.#alerts.unseen}) ` : "";
-    const title = `${warnings}${special ?? mode} · ${this.#run.session?.name || "robot"} · echolocate`;
+    const warnings = this.alerts.unseen > 0 ? `(${this.alerts.unseen}) ` : "";
+    const title = `${warnings}${special ?? mode} · ${this.run.session?.name || "robot"} · echolocate`;
     if (document.title !== title) document.title = title;
     // A reason that counts is announced once, not each second; that data are missing is announced by #age and #lost.
     const kind = `${special ?? ""} ${mode} ${reason}`.replace(/\d+/g, "");
@@ -101,22 +101,21 @@ export class Status {
   }
 
   // The bar has no room for the progress, which counts.
+  /** @param {Robot} robot */
   #preparation(robot) {
     const { mode } = robot,
       reason = reasonOf(robot);
     const preparing = mode === "CONNECTING" && Boolean(reason?.startsWith("recognition is being prepared"));
-    this.#notifications.banner("preparation", preparing ? "Recognition is being prepared." : null);
-    this.#notifications.updateBanner("preparation", `The robot stands: ${reason}.`);
+    this.notifications.banner("preparation", preparing ? "Recognition is being prepared." : null);
+    this.notifications.updateBanner("preparation", `The robot stands: ${reason}.`);
   }
 
   #facts() {
-    const { twist, localized, flags, link, dropped, late, missed, controller } = this.#run.state;
-    const { clients, recording } = this.#run.robot;
+    const { twist, localized, flags, link, dropped, late, missed, controller } = this.run.state;
+    const { clients, recording } = this.run.robot;
     const turn = Math.round((twist[1] * 180) / Math.PI);
-    fact(
-      "twist",
-      `${this.#units.number(twist[0])} ${this.#units.name}/s ${turn < 0 ? "↻" : turn > 0 ? "↺" : ""} ${Math.abs(turn)}°/s`,
-    );
+    const sense = turn < 0 ? "↻" : turn > 0 ? "↺" : "";
+    fact("twist", `${this.units.number(twist[0])} ${this.units.name}/s ${sense} ${Math.abs(turn)}°/s`);
     byId("place").hidden = localized === null;
     if (localized !== null) fact("place", this.#place(localized), localized.status === "lost");
     if (link === null) fact("link", "not recorded");
@@ -124,84 +123,89 @@ export class Status {
     fact("flags", flags.join(", ").toLowerCase() || "none", flags.length > 0);
     fact("dropped", String(dropped), this.#hasGrown("dropped", dropped));
     if (late === null) fact("late", "not recorded");
-    else fact("late", `${late} / ${missed}`, this.#hasGrown("late", late + missed));
+    else fact("late", `${late} / ${missed}`, this.#hasGrown("late", late + (missed ?? 0)));
     fact("clients", String(clients));
     fact("role", controller ? "control" : "watch");
     const size = recording
       ? `${(recording.bytes / 1e6).toFixed(1)} MB${recording.dropped ? `, ${recording.dropped} lost` : ""}`
       : "off";
-    fact("recording", recording ? `● ${size}` : size, recording?.dropped > 0);
+    fact("recording", recording ? `● ${size}` : size, recording !== null && recording.dropped > 0);
   }
 
   // With one standard deviation: of the place in its worst direction, and of the heading.
+  /** @param {LocalizedRow} localized */
   #place({ pose: [x, y, theta], covariance, status, probability }) {
     const said = `${status} ${percent(probability)}`;
     if (covariance === null) return `unknown, ${said}`;
     const [xx, xy, yy, heading] = covariance;
     const sigma = Math.sqrt((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy));
-    const place = `${this.#units.number(x)}, ${this.#units.number(y)} ${this.#units.spread(sigma)}`;
+    const place = `${this.units.number(x)}, ${this.units.number(y)} ${this.units.spread(sigma)}`;
     return `${place}, ${degrees(theta)} ± ${((Math.sqrt(heading) * 180) / Math.PI).toFixed(1)}°, ${said}`;
   }
 
   // Whether a count has grown recently: one bad frame an hour ago does not matter now.
+  /** @param {string} name @param {number} count */
   #hasGrown(name, count) {
     const known = this.#counts.get(name);
     const now = performance.now();
     if (known === undefined || count < known.count) this.#counts.set(name, { count, at: -Infinity });
     else if (count > known.count) this.#counts.set(name, { count, at: now });
-    return now - this.#counts.get(name).at < RECENT_MS;
+    return now - (this.#counts.get(name)?.at ?? -Infinity) < RECENT_MS;
   }
 
   #age() {
-    const age = this.#run.age(performance.now());
+    const age = this.run.age(performance.now());
     const quiet = age > STALE_S;
     if (this.#isOld !== document.body.classList.contains("old")) this.#show();
     // The moment shown of a recording has an age of years; whether the robot answers is in the state.
-    if (this.#run.watchesRecording) fact("age", "a recording", quiet);
+    if (this.run.watchesRecording) fact("age", "a recording", quiet);
     else fact("age", age === Infinity ? "none" : age < 1 ? `${age.toFixed(1)} s` : `${Math.round(age)} s`, quiet);
     if (this.#closed === null) {
       const text = `No update for ${Math.round(age)} s: what you see is old.`;
       const silent = quiet && age > SILENT_S && age !== Infinity;
       if (silent && !this.#silent) setText(this.#announce, "No update: what you see is old");
       this.#silent = silent;
-      this.#notifications.banner("stale", silent ? "No update: what you see is old." : null, { bad: true });
-      this.#notifications.updateBanner("stale", text);
+      this.notifications.banner("stale", silent ? "No update: what you see is old." : null, { bad: true });
+      this.notifications.updateBanner("stale", text);
     }
   }
 
   // A browser does not report why a websocket was rejected; a plain request to the same address does.
+  /** @param {boolean} opened */
   async #lost(opened) {
     if (this.#closed === null) setText(this.#announce, "Connection lost");
     this.#closed ??= performance.now();
     this.#show();
-    this.#notifications.banner("stale", null);
+    this.notifications.banner("stale", null);
     const lost = "No connection to the robot's process; trying again. The base stops by itself without commands.";
     if (opened) {
-      this.#notifications.banner("connection", lost, { bad: true });
+      this.notifications.banner("connection", lost, { bad: true });
       return;
     }
-    const status = await this.#connection.probe();
-    if (this.#connection.open) return;
+    const status = await this.connection.probe();
+    if (this.connection.open) return;
     if (status === 401 || status === 403) {
       const why = this.#was_open ? "The run was started again with another token" : "The token is missing or wrong";
-      this.#notifications.banner(
+      this.notifications.banner(
         "connection",
         `${why}: open the address that the run printed when it started, or enter its token.`,
         { bad: true, buttons: [["Enter the token", this.askForToken]] },
       );
-      this.#connection.retryLater();
+      this.connection.retryLater();
       this.#trouble = "token missing or wrong";
       this.#show();
-    } else this.#notifications.banner("connection", lost, { bad: true });
+    } else this.notifications.banner("connection", lost, { bad: true });
   }
 }
 
+/** @param {Robot} robot */
 function reasonOf({ reason, arming, hold_reason: hold }) {
   return reason ?? (arming ? "arming…" : hold);
 }
 
+/** @param {string} name @param {string} text */
 function fact(name, text, bad = false) {
   const element = byId(`fact-${name}`);
   setText(element, text);
-  element.parentElement.classList.toggle("bad", Boolean(bad));
+  element.parentElement?.classList.toggle("bad", bad);
 }

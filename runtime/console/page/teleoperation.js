@@ -1,21 +1,25 @@
+// @ts-check
 // Teleoperation with a deadman: sends a velocity at 20 Hz while a control is held, and zero as soon as it is released,
-// the
-// page loses focus, is hidden or left, a pointer or gamepad disappears, or the network stalls. The robot's process
-// stops
-// by itself 250 ms after the last message; this code stops it sooner.
+// the page loses focus, is hidden or left, a pointer or gamepad disappears, or the network stalls. The robot's process
+// stops by itself 250 ms after the last message; this code stops it sooner.
 
 import { Emitter } from "./emitter.js";
 
 const EVERY_MS = 50;
 
+/** @extends {Emitter<{ refused: [string]; changed: [string | null] }>} */
 export class Teleoperation extends Emitter {
+  /** @type {Map<string, { v: number; w: number }>} */
   #held = new Map(); // held control → {v, w}, each from -1 to 1
-  #timer = null;
+  /** @type {number | undefined} */
+  #timer = undefined;
   limit = 0.5;
 
+  /** @param {Pick<Parts, "connection" | "run">} parts */
   constructor({ connection, run }) {
     super();
-    Object.assign(this, { connection, run });
+    this.connection = connection;
+    this.run = run;
     addEventListener("blur", () => this.stop("the window lost the focus"));
     addEventListener("pagehide", () => this.stop("the page was left"));
     document.addEventListener("visibilitychange", () => document.hidden && this.stop("the page was hidden"));
@@ -38,6 +42,7 @@ export class Teleoperation extends Emitter {
   }
 
   // Starts or changes a held velocity; emits the reason if it is refused.
+  /** @param {string} source @param {number} v @param {number} w */
   hold(source, v, w) {
     const why = this.refusalReason();
     if (why !== null) {
@@ -54,21 +59,23 @@ export class Teleoperation extends Emitter {
     return true;
   }
 
+  /** @param {string} source */
   release(source) {
     if (!this.#held.delete(source)) return;
     if (this.#held.size === 0) this.#end(null);
     else this.emit("changed", null);
   }
 
+  /** @param {string} why */
   stop(why) {
     if (this.#held.size === 0) return;
     this.#held.clear();
     this.#end(why);
   }
 
+  /** @param {string | null} why */
   #end(why) {
     clearInterval(this.#timer);
-    this.#timer = null;
     this.connection.send({ type: "teleoperate", v: 0, w: 0 });
     this.emit("changed", why);
   }
@@ -81,6 +88,7 @@ export class Teleoperation extends Emitter {
       v += held.v;
       w += held.w;
     }
+    /** @param {number} share */
     const clamp = (share) => Math.max(-1, Math.min(1, share)) * this.limit;
     return { v: clamp(v) * speed_max, w: clamp(w) * turn_max };
   }

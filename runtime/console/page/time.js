@@ -1,43 +1,51 @@
+// @ts-check
 // The time panel: pause, single-step and speed of the emulator, recording, and playback.
 
-import { byId, download, el, setAttribute, setText } from "./dom.js";
+import { button, byId, disable, download, el, setAttribute, setText } from "./dom.js";
+import { base } from "./files.js";
 import { Pace, paceText } from "./pace.js";
+import { Panel } from "./panel.js";
+import { context } from "./theme.js";
 import { countObjects } from "./walls.js";
 
 const OPEN_MAX_MS = 600_000;
 const DOUBLE_MS = 600; // the second press of a double click comes within this
 
+/** @param {number} s */
 const clock = (s) => `${s.toFixed(1)} s`;
 
-export class Time {
+export class Time extends Panel {
+  /** @type {string | null} */
   #file = null; // the recording that is open
+  /** @type {SessionMessage | null} */
   #liveSession = null; // the live run's greeting meanwhile
   #scrubbing = false;
   #marked_ms = -Infinity;
   #pace = new Pace(); // of the emulator
   #playPace = new Pace();
 
-  constructor({ run, connection, notifications, shoot }) {
-    Object.assign(this, { run, connection, notifications, shoot });
+  /** @param {Panels & { shoot: () => void }} parts */
+  constructor(parts) {
+    super(parts);
+    const { run, connection, notifications } = parts;
+    /** @param {string} id @param {() => unknown} act */
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("pause", () => this.pause());
-    on("single-step", () => this.#ask({ type: "single_step" }));
-    on("record", () => this.#ask({ type: "record", on: run.robot.recording === null }));
+    on("single-step", () => this.ask({ type: "single_step" }));
+    on("record", () => this.ask({ type: "record", on: run.robot.recording === null }));
     on("recordings-again", () => this.#list(notifications.showError));
     on("open", () => this.#open());
-    on("play", () =>
-      this.#ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }),
-    );
-    on("play-step", () => this.#ask({ type: "step_recording", cycles: 1 }));
-    on("play-back", () => this.#ask({ type: "step_recording", cycles: -1 }));
+    on("play", () => this.ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
+    on("play-step", () => this.ask({ type: "step_recording", cycles: 1 }));
+    on("play-back", () => this.ask({ type: "step_recording", cycles: -1 }));
     on("live", () => this.#backToLive());
-    on("screenshot", () => shoot());
-    byId("speed").addEventListener("change", (event) =>
-      this.#ask({ type: "set_speed", factor: Number(event.target.value) }),
+    on("screenshot", () => parts.shoot());
+    byId("speed").addEventListener("change", () =>
+      this.ask({ type: "set_speed", factor: Number(byId("speed").value) }),
     );
     byId("play-speed").addEventListener(
       "change",
-      (event) => this.#playing && this.#ask({ type: "play_recording", speed: Number(event.target.value) }),
+      () => this.#playing && this.ask({ type: "play_recording", speed: Number(byId("play-speed").value) }),
     );
     byId("bookmark-form").addEventListener("submit", (event) => this.#bookmark(event));
     on("bookmark-undo", () => this.undo());
@@ -59,16 +67,12 @@ export class Time {
     if (byId("recordings").options.length === 0) this.#list();
   }
 
-  #ask(message) {
-    return this.connection.request(message).catch((error) => this.notifications.showError(error));
-  }
-
   get #playing() {
     return this.run.state.playback?.is_playing ?? false;
   }
 
   pause() {
-    return this.#ask({ type: this.run.robot.paused ? "resume" : "pause" });
+    return this.ask({ type: this.run.robot.paused ? "resume" : "pause" });
   }
 
   #refresh() {
@@ -84,26 +88,27 @@ export class Time {
       performance.now() / 1000,
       playback?.is_playing ? playback.speed : null,
     );
-    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 || reached !== null ? `, ${paceText(speed, reached)}` : ""}`;
+    const pace = speed !== 1 || reached !== null ? `, ${paceText(speed, reached)}` : "";
+    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${pace}`;
     const plays = playback?.is_playing ? `, ${paceText(playback.speed, played)}` : "";
     setText(
       byId("time-text"),
-      playback ? `Recording ${name(this.#file)}${plays}: ${at}, the robot then ${then}` : live,
+      playback ? `Recording ${base(this.#file)}${plays}: ${at}, the robot then ${then}` : live,
     );
     setText(byId("pause"), paused ? "Resume" : "Pause");
-    for (const id of ["pause", "single-step", "speed"])
-      byId(id).disabled = !controller || !emulated || playback !== null;
+    disable([byId("pause"), byId("single-step"), byId("speed")], !controller || !emulated || playback !== null);
     if (document.activeElement !== byId("speed")) choose(byId("speed"), String(speed));
     setAttribute(byId("record"), "aria-pressed", recording !== null);
-    setText(byId("record-text"), recording ? `to ${name(recording.file)}` : "off");
+    setText(byId("record-text"), recording ? `to ${base(recording.file)}` : "off");
     if (playback) this.#follow(playback);
     this.notifications.banner(
       "playback",
-      playback ? `This is a recording, not the live run: ${name(this.#file)}` : null,
+      playback ? `This is a recording, not the live run: ${base(this.#file)}` : null,
       { buttons: [["Back to the live run", () => this.#backToLive()]] },
     );
   }
 
+  /** @param {Pick<PlaybackRow, "s" | "is_playing">} playback */
   #follow({ s, is_playing: playing }) {
     const scrub = byId("scrub");
     if (!this.#scrubbing) {
@@ -115,7 +120,7 @@ export class Time {
   }
 
   async #backToLive() {
-    if ((await this.#ask({ type: "close_recording" })) === undefined) return;
+    if ((await this.ask({ type: "close_recording" })) === undefined) return;
     if (this.#liveSession !== null) this.run.beginSession(this.#liveSession);
     this.#discard();
   }
@@ -125,6 +130,7 @@ export class Time {
     byId("playback").hidden = true;
   }
 
+  /** @param {(error: unknown) => void} refused */
   async #list(refused = () => {}) {
     const chooser = byId("recordings"),
       chosen = chooser.value;
@@ -136,9 +142,9 @@ export class Time {
       return;
     }
     chooser.replaceChildren(
-      ...(list ?? []).map(({ file, bytes = null, live = false }) => {
+      ...list.map(({ file, bytes, live }) => {
         const size = bytes === null ? "" : `, ${(bytes / 1e6).toFixed(1)} MB`;
-        return el("option", { value: file }, live ? `this run, up to now` : `${name(file)}${size}`);
+        return el("option", { value: file }, live ? `this run, up to now` : `${base(file)}${size}`);
       }),
     );
     if ([...chooser.options].some(({ value }) => value === chosen)) chooser.value = chosen;
@@ -154,11 +160,12 @@ export class Time {
   }
 
   // Shows a recording in place of the live run; returns whether it is open.
+  /** @param {string} file */
   async openFile(file, timeout_ms = OPEN_MAX_MS) {
     let data;
-    const busy = ["open", "file-play"].map(byId);
-    this.notifications.banner("opening", `Opening ${name(file)} …`);
-    for (const button of busy) button.disabled = true;
+    const busy = [byId("open"), byId("file-play")];
+    this.notifications.banner("opening", `Opening ${base(file)} …`);
+    disable(busy, true);
     try {
       data = await this.connection.request({ type: "open_recording", file }, timeout_ms);
     } catch (error) {
@@ -166,33 +173,39 @@ export class Time {
       return false;
     } finally {
       this.notifications.banner("opening", null);
-      for (const button of busy) button.disabled = false;
+      disable(busy, false);
     }
     this.#file = file;
     byId("playback").hidden = false;
-    byId("scrub").max = String(data?.duration_s ?? 1);
+    byId("scrub").max = String(data.duration_s);
+    /** @type {Array<[number, string]>} */
     const places = [
-      ...(data?.bookmarks ?? []).map(([s, text]) => [s, `✎ ${text}`]),
-      ...(data?.modes ?? []).map(([s, mode, reason]) => [s, `${mode.replace("_", " ")}${reason ? `: ${reason}` : ""}`]),
+      ...data.bookmarks.map(([s, text]) => /** @type {[number, string]} */ ([s, `✎ ${text}`])),
+      ...data.modes.map(([s, mode, reason]) => /** @type {[number, string]} */ ([s, said(mode, reason)])),
     ];
     byId("bookmarks").replaceChildren(
       ...places
         .sort(([a], [b]) => a - b)
         .map(([s, text]) =>
-          el("li", {}, el("button", { type: "button", onclick: () => this.#scrub(s) }, `${clock(s)}  ${text}`)),
+          el(
+            "li",
+            {},
+            button(`${clock(s)}  ${text}`, () => this.#scrub(s)),
+          ),
         ),
     );
-    if (data?.about) {
+    this.#liveSession ??= this.run.session;
+    if (this.#liveSession !== null)
       // the recording may be of another robot with other models
-      this.#liveSession ??= this.run.session;
       this.run.beginSession({ ...this.#liveSession, ...data.about, parameters: this.#liveSession.parameters });
-    }
     this.#follow({ s: 0, is_playing: false });
     return true;
   }
 
   // While the slider is dragged, one request at a time: the newest position after the answer to the previous one.
+  /** @type {number | null} */
   #wanted = null;
+  /** @param {number} s */
   async #scrub(s) {
     setText(byId("scrub-value"), clock(s));
     this.#wanted = s;
@@ -201,11 +214,12 @@ export class Time {
     while (this.#wanted !== null) {
       const to = this.#wanted;
       this.#wanted = null;
-      await this.#ask({ type: "seek_recording", s: to });
+      await this.ask({ type: "seek_recording", s: to });
     }
     this.#scrubbing = false;
   }
 
+  /** @param {SubmitEvent} event */
   #bookmark(event) {
     event.preventDefault();
     const input = byId("bookmark-text"),
@@ -219,30 +233,29 @@ export class Time {
     }, this.notifications.showError);
   }
 
-  undo() {
-    return this.connection
-      .request({ type: "undo_bookmark" })
-      .then((text) => this.notifications.toast(`No longer bookmarked: ${text}`), this.notifications.showError);
+  async undo() {
+    const text = await this.ask({ type: "undo_bookmark" });
+    if (text !== undefined) this.notifications.toast(`No longer bookmarked: ${text}`);
   }
 }
 
-const name = (file) =>
-  String(file ?? "")
-    .split("/")
-    .at(-1);
+/** @param {string} mode @param {string | null} reason */
+const said = (mode, reason) => `${mode.replace("_", " ")}${reason ? `: ${reason}` : ""}`;
 
+/** @param {HTMLSelectElement} select @param {string} value */
 function choose(select, value) {
   if ([...select.options].some((option) => option.value === value)) select.value = value;
 }
 
 // Saves the map as a picture with a caption: robot, time, mode.
+/** @param {Pick<Parts, "view" | "run" | "theme" | "units"> & { scene: Scene }} parts */
 export function screenshot({ scene, view, run, theme, units }) {
   const ratio = 2,
     foot = 34;
   const canvas = el("canvas");
   canvas.width = view.width * ratio;
   canvas.height = (view.height + foot) * ratio;
-  const ctx = canvas.getContext("2d");
+  const ctx = context(canvas);
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   scene.picture(ctx);
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -252,7 +265,8 @@ export function screenshot({ scene, view, run, theme, units }) {
   ctx.font = theme.font(13);
   ctx.textBaseline = "middle";
   const { robot_s, mode, cycle, objects } = run.state;
-  const text = `${run.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}, objects: ${countObjects(objects)}, in ${units.word}`;
+  const moment = `${run.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}`;
+  const text = `${moment}, objects: ${countObjects(objects)}, in ${units.word}`;
   ctx.fillText(text, 12, view.height + foot / 2);
-  canvas.toBlob((blob) => download(`echolocate-${robot_s.toFixed(1)}s.png`, blob));
+  canvas.toBlob((blob) => blob !== null && download(`echolocate-${robot_s.toFixed(1)}s.png`, blob));
 }

@@ -1,3 +1,4 @@
+// @ts-check
 // The run's token: taken from the address, kept for a reload, and asked for where the page has none or a wrong one.
 
 import { el } from "./dom.js";
@@ -15,6 +16,7 @@ export function takeToken(key = KEY) {
 }
 
 // Shows a field for the token, or for the whole address that the run printed, and loads the page again with it.
+/** @param {Notifications} notifications */
 export function askForToken(notifications) {
   const input = el("input", {
     id: "token-given",
@@ -50,6 +52,7 @@ export function askForToken(notifications) {
   input.focus();
 }
 
+/** @param {string} text */
 function tokenIn(text) {
   const [, after] = /[?&]token=([^&#\s]+)/.exec(text) ?? [];
   return after === undefined ? text.trim() : decodeURIComponent(after);

@@ -1,6 +1,8 @@
+// @ts-check
 // Tools that move and rotate an object, or place a model, which then relaxes from there.
 
-import { byId, el } from "./dom.js";
+import { byId, byKey, el } from "./dom.js";
+import { ofPlane } from "./map_frame.js";
 import { drawPreview } from "./tool_overlays.js";
 import { objectAt } from "./tool_select.js";
 import { isWall } from "./walls.js";
@@ -10,23 +12,29 @@ const ARM_PX = 30;
 const NUDGE_M = 0.01;
 const TURN = Math.PI / 36;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const TURNS = { "[": TURN, "]": -TURN };
 
+/** @param {ModelRow | null} model */
 const radiusOf = (model) => {
   if (!model) return 0.1;
   return model.arc_radius_m ?? Math.max(...model.vertices.map(([x, y]) => Math.hypot(x, y)));
 };
 
+/** @param {View} view @param {ModelRow | null} model @param {Pose} pose */
 function handleOf(view, model, { x, y, theta }) {
   const reach = radiusOf(model) + ARM_PX / view.scale;
   return { x: x + reach * Math.cos(theta), y: y + reach * Math.sin(theta) };
 }
 
+/** @param {Pick<Parts, "run" | "view" | "selection" | "mapEdits" | "redraw">} parts @returns {Tool} */
 export function moveTool({ run, view, selection, mapEdits, redraw }) {
-  let held = null; // {pose, dx, dy, turning}
+  /** @type {{ pose: Pose; dx: number; dy: number; turning: boolean; model: string; moved: boolean } | null} */
+  let held = null;
 
-  const send = (number, pose) => mapEdits.move(number, pose);
+  /** @param {ShownObject | null} object */
   const standing = (object) => (object === null || isWall(object) ? null : object); // walls are not moved
   const picked = () => (selection.object === null ? null : standing(run.object(selection.object)));
+  /** @param {Pose} object */
   const poseOf = ({ x, y, theta }) => ({ x, y, theta });
   const drop = () => {
     held = null;
@@ -42,7 +50,7 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
       if (object !== null) {
         const handle = handleOf(view, run.model(object.model), object);
         if (Math.hypot(handle.x - at.x, handle.y - at.y) < HANDLE_PX / view.scale) {
-          held = { pose: poseOf(object), turning: true, model: object.model };
+          held = { pose: poseOf(object), dx: 0, dy: 0, turning: true, model: object.model, moved: false };
           return;
         }
       }
@@ -51,7 +59,7 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
       held =
         hit === null
           ? null
-          : { pose: poseOf(hit), dx: hit.x - at.x, dy: hit.y - at.y, turning: false, model: hit.model, began: at };
+          : { pose: poseOf(hit), dx: hit.x - at.x, dy: hit.y - at.y, turning: false, model: hit.model, moved: false };
       redraw();
     },
     move(at) {
@@ -62,7 +70,7 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
       redraw();
     },
     up() {
-      if (held?.moved) send(selection.object, held.pose);
+      if (held?.moved && selection.object !== null) mapEdits.move(selection.object, held.pose);
       drop();
     },
     cancel: drop,
@@ -74,15 +82,14 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
         selection.pick(standing(objectAt(run, view, spot()))?.number ?? null);
         return true;
       }
-      if (object === null) return false;
-      const by = ARROWS[event.key],
-        turn = { "[": TURN, "]": -TURN }[event.key];
-      if (!by && !turn) return false;
+      if (object === null || object.number === null) return false;
+      const by = byKey(event, ARROWS),
+        turn = byKey(event, TURNS);
       const step = NUDGE_M * (event.shiftKey ? 10 : 1);
       const pose = poseOf(object);
-      if (by) send(object.number, { ...pose, x: pose.x + by[0] * step, y: pose.y + by[1] * step });
-      else send(object.number, { ...pose, theta: pose.theta + turn });
-      return true;
+      if (by) mapEdits.move(object.number, { ...pose, x: pose.x + by[0] * step, y: pose.y + by[1] * step });
+      else if (turn) mapEdits.move(object.number, { ...pose, theta: pose.theta + turn });
+      return Boolean(by ?? turn);
     },
     draw(f) {
       const object = picked();
@@ -93,7 +100,12 @@ export function moveTool({ run, view, selection, mapEdits, redraw }) {
 }
 
 // "I am here": a drag from the robot's place in the known room, as it is drawn, towards where it looks.
+/**
+ * @param {Pick<Parts, "run" | "connection" | "notifications" | "redraw"> & { choose: (id: string) => void }} parts
+ * @returns {Tool}
+ */
 export function hereTool({ run, connection, notifications, redraw, choose }) {
+  /** @type {(Pose & { dragged: boolean }) | null} */
   let pose = null;
 
   run.on("session", ({ known_room: room }) => {
@@ -104,13 +116,11 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
     redraw();
   };
   // From odometry's frame, in which the page draws, to the map's.
-  const inMap = ({ x, y, theta }) => {
-    const [x0, y0, turn] = run.state.localized?.frame ?? [0, 0, 0];
-    const c = Math.cos(turn),
-      s = Math.sin(turn),
-      dx = x - x0,
-      dy = y - y0;
-    return { x: c * dx + s * dy, y: c * dy - s * dx, theta: theta - turn };
+  /** @param {Pose} pose @returns {Pose} */
+  const inMap = (pose) => {
+    const frame = run.state.localized?.frame ?? [0, 0, 0];
+    const [x, y] = ofPlane(frame, pose.x, pose.y);
+    return { x, y, theta: pose.theta - frame[2] };
   };
   return {
     id: "here",
@@ -140,7 +150,7 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
       if (pose === null) return;
       const radius = run.session?.body?.radius ?? 0.2,
         reach = radius + ARM_PX * f.px;
-      const disc = { vertices: [], closed: true, arc_radius_m: radius };
+      const disc = { name: "", vertices: [], closed: true, arc_radius_m: radius };
       drawPreview(f, disc, pose, {
         x: pose.x + reach * Math.cos(pose.theta),
         y: pose.y + reach * Math.sin(pose.theta),
@@ -149,8 +159,10 @@ export function hereTool({ run, connection, notifications, redraw, choose }) {
   };
 }
 
+/** @param {Pick<Parts, "run" | "view" | "connection" | "notifications" | "redraw">} parts @returns {Tool} */
 export function placeTool({ run, view, connection, notifications, redraw }) {
   const chooser = byId("placing-model");
+  /** @type {(Pose & { pressed?: boolean }) | null} */
   let pose = null;
   let last = 0; // the previous heading, for placing a row of equal objects
 
@@ -159,6 +171,7 @@ export function placeTool({ run, view, connection, notifications, redraw }) {
     chooser.replaceChildren(...models.map(({ name }) => el("option", { value: name }, name)));
     if (models.some(({ name }) => name === chosen)) chooser.value = chosen;
   });
+  /** @param {Pose} pose */
   const put = ({ x, y, theta }) =>
     connection
       .request({ type: "place_model", model: chooser.value, x, y, theta })
@@ -202,7 +215,7 @@ export function placeTool({ run, view, connection, notifications, redraw }) {
       discard();
     },
     key(event) {
-      const turn = { "[": TURN, "]": -TURN }[event.key];
+      const turn = byKey(event, TURNS);
       if (!turn) return false;
       last += turn;
       if (pose) pose.theta = last;

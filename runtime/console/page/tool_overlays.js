@@ -1,20 +1,19 @@
+// @ts-check
 // What the tools draw on the map: the crosshair, the lasso, the outline being moved, the tape.
 
 import { outlinePath } from "./draw_objects.js";
-import { textWithHalo } from "./scene.js";
+import { addLine, pairOf, textWithHalo } from "./scene.js";
 import { degrees } from "./units.js";
 
+/** @param {Drawing} f @param {Point} at */
 export function drawCross(f, { x, y }) {
   const { ctx, theme } = f;
   const [sx, sy] = f.view.toScreen(x, y);
   f.onScreen();
   ctx.save();
-  for (const [colour, width] of [
-    [theme.map, 5],
-    [theme.ink, 2],
-  ]) {
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = width;
+  for (const isHalo of [true, false]) {
+    ctx.strokeStyle = isHalo ? theme.map : theme.ink;
+    ctx.lineWidth = isHalo ? 5 : 2;
     ctx.beginPath();
     for (const [dx, dy] of [
       [1, 0],
@@ -33,13 +32,14 @@ export function drawCross(f, { x, y }) {
   ctx.restore();
 }
 
+/** @param {Drawing} f @param {Point[]} points */
 export function drawLasso(f, points) {
   if (points.length < 2) return;
   const { ctx, theme, px } = f;
   ctx.save();
   f.inWorld();
   ctx.beginPath();
-  points.forEach(({ x, y }, i) => (i === 0 ? ctx.moveTo(x, y) : ctx.lineTo(x, y)));
+  addLine(ctx, points.map(pairOf));
   ctx.closePath();
   ctx.globalAlpha = 0.15;
   ctx.fillStyle = theme.accent;
@@ -53,6 +53,7 @@ export function drawLasso(f, points) {
 }
 
 // Previews an outline at its new pose, with the handle that rotates it.
+/** @param {Drawing} f @param {ModelRow | null} model @param {Pose} pose @param {Point | null} handle */
 export function drawPreview(f, model, pose, handle) {
   const { x, y, theta } = pose;
   const { ctx, theme, px } = f;
@@ -86,6 +87,7 @@ export function drawPreview(f, model, pose, handle) {
   ctx.restore();
 }
 
+/** @param {Drawing} f @param {Point} from @param {Point} to */
 export function drawTape(f, from, to) {
   const { ctx, theme } = f;
   const [ax, ay] = f.view.toScreen(from.x, from.y),
@@ -95,12 +97,9 @@ export function drawTape(f, from, to) {
     dy = 7 * Math.sin(angle);
   ctx.save();
   f.onScreen();
-  for (const [colour, width] of [
-    [theme.map, 5],
-    [theme.ink, 2],
-  ]) {
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = width;
+  for (const isHalo of [true, false]) {
+    ctx.strokeStyle = isHalo ? theme.map : theme.ink;
+    ctx.lineWidth = isHalo ? 5 : 2;
     ctx.beginPath();
     ctx.moveTo(ax, ay);
     ctx.lineTo(bx, by);
@@ -121,6 +120,7 @@ export function drawTape(f, from, to) {
   ctx.restore();
 }
 
+/** @param {Units} units @param {Point} from @param {Point} to */
 export function describeTape(units, from, to) {
   const dx = to.x - from.x,
     dy = to.y - from.y;

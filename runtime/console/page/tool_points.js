@@ -1,12 +1,17 @@
+// @ts-check
 // Tools that take points: the goal to drive to, and the measuring tape.
 
 import { drawTape, describeTape } from "./tool_overlays.js";
 import { pressedHeading } from "./tool_route.js";
 
 // A click gives the place, a drag from it the final heading there.
+/**
+ * @typedef {(x: number, y: number, heading: number | null) => void} SendGoal
+ * @param {Pick<Parts, "redraw"> & { sendGoal: SendGoal; after: () => void }} parts @returns {Tool}
+ */
 export function goalTool({ sendGoal, after, redraw }) {
-  let from = null,
-    to = null;
+  let from = /** @type {Spot | null} */ (null),
+    to = /** @type {Spot | null} */ (null);
   const stop = () => {
     from = to = null;
     redraw();
@@ -30,16 +35,18 @@ export function goalTool({ sendGoal, after, redraw }) {
       after();
     },
     cancel: stop,
-    draw: (f) => pressedHeading(from, to) !== null && drawTape(f, from, to),
+    draw: (f) => {
+      if (from !== null && to !== null && pressedHeading(from, to) !== null) drawTape(f, from, to);
+    },
   };
 }
 
+/** @param {Pick<Parts, "units" | "redraw"> & { announce: (text: string) => void }} parts @returns {Tool} */
 export function tapeTool({ units, announce, redraw }) {
-  let from = null,
-    to = null,
+  let from = /** @type {Spot | null} */ (null),
+    to = /** @type {Spot | null} */ (null),
     pulling = false;
 
-  const tell = () => announce(`Tape: ${describeTape(units, from, to)}`);
   return {
     id: "tape",
     name: "Measuring tape",
@@ -60,9 +67,9 @@ export function tapeTool({ units, announce, redraw }) {
     up(at) {
       if (!pulling) return;
       to = at;
-      if (Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4) {
+      if (from !== null && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4) {
         pulling = false;
-        tell();
+        announce(`Tape: ${describeTape(units, from, to)}`);
       }
       redraw();
     },
@@ -72,6 +79,8 @@ export function tapeTool({ units, announce, redraw }) {
     none() {
       from = to = null;
     },
-    drawAlways: (f) => from && to && from !== to && drawTape(f, from, to),
+    drawAlways: (f) => {
+      if (from && to && from !== to) drawTape(f, from, to);
+    },
   };
 }

@@ -1,8 +1,9 @@
+// @ts-check
 // The waypoint tool: a click adds a waypoint, a drag from it gives its final heading; a waypoint can be dragged
 // elsewhere, and its heading by the end of its line.
 
 import { drawTape } from "./tool_overlays.js";
-import { textWithHalo } from "./scene.js";
+import { addLine, textWithHalo } from "./scene.js";
 
 export const DOT_PX = 9;
 export const HEADING_PX = 24;
@@ -12,23 +13,28 @@ const DRAG_PX = 12;
 const TURN_RAD = Math.PI / 12;
 
 // Presses and drags of tools that take a place and, by a drag from it, a direction.
+/** @param {Spot | null} from @param {Spot | null} to */
 export function pressedHeading(from, to) {
   return from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > DRAG_PX
     ? Math.atan2(to.y - from.y, to.x - from.x)
     : null;
 }
 
+/** @param {Pick<Parts, "route" | "view" | "redraw">} parts @returns {Tool} */
 export function routeTool({ route, view, redraw }) {
-  let from = null,
-    to = null;
-  let grip = null; // the waypoint that is dragged: its index, and whether by the end of its heading
+  let from = /** @type {Spot | null} */ (null),
+    to = /** @type {Spot | null} */ (null);
+  // The waypoint that is dragged: its index, and whether by the end of its heading.
+  let grip = /** @type {{ i: number; turns: boolean } | null} */ (null);
 
+  /** @param {number} i */
   const shown = (i) => {
     const at = route.inPlane(route.waypoints[i]);
     if (at === null) return null;
     const [sx, sy] = view.toScreen(at[0], at[1]);
     return { sx, sy, heading: at[2] };
   };
+  /** @param {Spot} at */
   const gripAt = ({ sx, sy, touch }) => {
     const reach = touch ? TOUCH_PX : REACH_PX;
     for (let i = route.waypoints.length - 1; i >= route.behind; i--) {
@@ -46,7 +52,7 @@ export function routeTool({ route, view, redraw }) {
     from = to = grip = null;
     redraw();
   };
-  const moved = () => from && to && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4;
+  const moved = () => from !== null && to !== null && Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4;
   return {
     id: "route",
     sends: true,
@@ -66,8 +72,8 @@ export function routeTool({ route, view, redraw }) {
       if (grip === null) route.add(from.x, from.y, pressedHeading(from, to));
       else if (!moved()) route.select(grip.i === route.selected ? null : grip.i);
       else if (grip.turns) {
-        const { sx, sy } = shown(grip.i);
-        route.turn(grip.i, Math.atan2(sy - at.sy, at.sx - sx));
+        const dot = shown(grip.i);
+        if (dot !== null) route.turn(grip.i, Math.atan2(dot.sy - at.sy, at.sx - dot.sx));
       } else route.move(grip.i, at.x, at.y);
       stop();
     },
@@ -84,27 +90,28 @@ export function routeTool({ route, view, redraw }) {
     none: () => route.select(null),
     cancel: stop,
     draw(f) {
-      if (grip !== null && moved()) drawTape(f, from, to);
-      else if (pressedHeading(from, to) !== null) drawTape(f, from, to);
+      const isPressed = (grip !== null && moved()) || pressedHeading(from, to) !== null;
+      if (isPressed && from !== null && to !== null) drawTape(f, from, to);
     },
     drawAlways: (f) => drawRoute(f, route),
   };
 }
 
 // The waypoints that the robot does not drive yet, and the selected one. Those that it drives are a layer of the map.
+/** @param {Drawing} f @param {Route} route */
 function drawRoute(f, route) {
   const { ctx, theme, view } = f;
-  const places = route.waypoints.map((waypoint) => route.inPlane(waypoint));
-  if (places.length === 0 || places.includes(null)) return;
+  const places = route.waypoints.map((waypoint) => route.inPlane(waypoint)).filter((place) => place !== null);
+  if (places.length === 0 || places.length < route.waypoints.length) return;
   f.onScreen();
   ctx.save();
-  const points = places.map(([x, y, heading]) => [...view.toScreen(x, y), heading]);
+  const points = places.map(([x, y, heading]) => /** @type {const} */ ([...view.toScreen(x, y), heading]));
   ctx.strokeStyle = ctx.fillStyle = theme.drive;
   ctx.lineWidth = 2;
   if (!route.isDriven) {
     ctx.setLineDash([3, 4]);
     ctx.beginPath();
-    points.forEach(([x, y], i) => (i === 0 ? ctx.moveTo(x, y) : ctx.lineTo(x, y)));
+    addLine(ctx, points);
     ctx.stroke();
     ctx.setLineDash([]);
     ctx.font = theme.font(11, 700);
@@ -133,9 +140,8 @@ function drawRoute(f, route) {
       ctx.fillText(String(i + 1), x, y);
     }
   }
-  const chosen = points[route.selected];
-  if (chosen !== undefined) {
-    const [x, y] = chosen,
+  if (route.selected !== null && route.selected < points.length) {
+    const [x, y] = points[route.selected],
       [px, py, turn] = route.waypoints[route.selected];
     ctx.lineWidth = 3;
     ctx.strokeStyle = theme.accent;

@@ -1,14 +1,17 @@
+// @ts-check
 // Pan and select: a click selects the object or segment under it, a drag lassoes segments; Shift adds to the selection.
 
 import { byId, setText } from "./dom.js";
 import { nearestSegment } from "./draw_segments.js";
 import { drawLasso } from "./tool_overlays.js";
+import { counted } from "./units.js";
 import { distanceToLine, isWall } from "./walls.js";
 
 const CLICK_PX = 4;
 const REACH_PX = 12;
 const TOUCH_PX = 22;
 
+/** @param {View} view @returns {Tool} */
 export const panTool = (view) => ({
   id: "pan",
   name: "Move the map",
@@ -17,11 +20,12 @@ export const panTool = (view) => ({
 });
 
 // The object under a point: inside its outline's circle, or near its middle.
+/** @param {RunState} run @param {View} view @param {Spot} at */
 export function objectAt(run, view, { x, y, touch }) {
-  let best = null,
+  let best = /** @type {ShownObject | null} */ (null),
     nearest = Infinity;
   for (const object of run.state.objects) {
-    if (object.number === null || object.number === undefined) continue;
+    if (object.number === null) continue;
     const radius = run.model(object.model)?.arc_radius_m ?? 0;
     const away = isWall(object) ? distanceToLine(object.ends, x, y) : Math.hypot(object.x - x, object.y - y);
     if (away < Math.max(radius, (touch ? TOUCH_PX : REACH_PX) / view.scale) && away < nearest)
@@ -30,14 +34,15 @@ export function objectAt(run, view, { x, y, touch }) {
   return best;
 }
 
+/** @param {Pick<Parts, "run" | "view" | "selection" | "redraw">} parts @returns {Tool} */
 export function selectTool({ run, view, selection, redraw }) {
   const tip = byId("tip");
   const hideTip = () => {
     tip.hidden = true;
   };
-  let lasso = null;
-  let began = null;
+  let lasso = /** @type {Spot[]} */ ([]);
 
+  /** @param {Spot} at */
   const click = (at) => {
     const reach = (at.touch ? TOUCH_PX : REACH_PX) / view.scale;
     const segment = nearestSegment(run, at.x, at.y, reach);
@@ -56,7 +61,7 @@ export function selectTool({ run, view, selection, redraw }) {
     }
   };
   const stop = () => {
-    lasso = began = null;
+    lasso = [];
     redraw();
   };
   return {
@@ -68,9 +73,8 @@ export function selectTool({ run, view, selection, redraw }) {
       const segment = nearestSegment(run, at.x, at.y, REACH_PX / view.scale);
       tip.hidden = segment === null;
       if (segment === null) return;
-      const age = Number.isFinite(segment.t)
-        ? `${Math.max(0, run.state.robot_s - segment.t).toFixed(1)} s old`
-        : "of unknown age";
+      const age =
+        segment.t === null ? "of unknown age" : `${Math.max(0, run.state.robot_s - segment.t).toFixed(1)} s old`;
       setText(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
       const left = at.sx + 220 > view.width ? at.sx - 190 : at.sx + 14;
       tip.style.transform = `translate(${left}px, ${Math.max(4, at.sy - 34)}px)`;
@@ -79,16 +83,16 @@ export function selectTool({ run, view, selection, redraw }) {
     end: hideTip,
     down(at) {
       hideTip();
-      began = at;
       lasso = [at];
     },
     move(at) {
-      if (began === null) return;
+      if (lasso.length === 0) return;
       lasso.push(at);
       redraw();
     },
     up(at) {
-      if (began === null) return;
+      if (lasso.length === 0) return;
+      const [began] = lasso;
       const moved = lasso.some(({ sx, sy }) => Math.hypot(sx - began.sx, sy - began.sy) > CLICK_PX);
       if (!moved) click(at);
       else {
@@ -118,12 +122,14 @@ export function selectTool({ run, view, selection, redraw }) {
       selection.pick(null);
     },
     cancel: stop,
-    draw: (f) => lasso && drawLasso(f, lasso),
+    draw: (f) => drawLasso(f, lasso),
   };
 }
 
 // The segments whose middle lies within a polygon.
+/** @param {RunState} run @param {Point[]} polygon */
 function within(run, polygon) {
+  /** @type {number[]} */
   const found = [];
   for (const s of run.segments.values()) {
     const x = (s.x1 + s.x2) / 2,
@@ -140,27 +146,31 @@ function within(run, polygon) {
 }
 
 // The row of buttons for the selected segments.
+/** @param {Pick<Parts, "run" | "selection" | "connection" | "notifications">} parts */
 export function selectionBar({ run, selection, connection, notifications }) {
-  const numbers = () => [...selection.segments];
   const refresh = () => {
     const count = selection.segments.size;
     byId("selection-bar").hidden = count === 0;
-    setText(byId("selection-count"), `${count} segment${count === 1 ? "" : "s"}`);
+    setText(byId("selection-count"), counted(count, "segment"));
   };
-  const act = (message, done) => {
-    if (selection.segments.size === 0) return;
-    connection.request({ ...message, numbers: numbers() }).then(done, notifications.showError);
+  /** @param {boolean} pinned */
+  const pin = (pinned) => {
+    const numbers = [...selection.segments];
+    if (numbers.length > 0)
+      connection.request({ type: "pin_segments", numbers, pinned }).catch(notifications.showError);
   };
   const actions = {
     delete: () => {
-      const count = selection.segments.size;
-      act({ type: "delete_segments" }, () => {
+      const numbers = [...selection.segments],
+        count = numbers.length;
+      if (count === 0) return;
+      connection.request({ type: "delete_segments", numbers }).then(() => {
         selection.choose([]);
         notifications.toast(`${count} segment${count === 1 ? " is" : "s are"} deleted; Ctrl+Z undoes it`);
-      });
+      }, notifications.showError);
     },
-    pin: () => act({ type: "pin_segments", pinned: true }),
-    unpin: () => act({ type: "pin_segments", pinned: false }),
+    pin: () => pin(true),
+    unpin: () => pin(false),
     none: () => selection.choose([]),
   };
   for (const [name, action] of Object.entries(actions)) byId(`selection-${name}`).addEventListener("click", action);

@@ -1,11 +1,12 @@
+// @ts-check
 // Five steps through the page for a first visit, beside what they explain. Never in the way of HALT, never shown again
-// once
-// it was left; a button brings it back.
+// once it was left; a button brings it back.
 
 import { byId, setText } from "./dom.js";
 import { prefer, preferred } from "./preferences.js";
 
 const SEEN = "tour seen";
+/** @type {Array<[keyof PageElements, string, string | ((mayAct: boolean) => string)]>} */
 const STEPS = [
   [
     "halt",
@@ -13,18 +14,21 @@ const STEPS = [
     (mayAct) =>
       mayAct
         ? "Stops the robot at once; so does the space bar. It stands until you arm it again."
-        : "This page has no token, so it only watches: HALT does nothing here. Use the robot's own stop, or open the address with its token.",
+        : "This page has no token, so it only watches: HALT does nothing here. " +
+          "Use the robot's own stop, or open the address with its token.",
   ],
   ["mode", "One state", "What the robot does now, and why. NO DATA, grey and dashed, means that what you see is old."],
   [
     "map-front",
     "The map",
-    "What the ring hears and what was recognised. Drag to move it, turn the wheel to zoom. The tools at its edge select, measure, place objects and set goals.",
+    "What the ring hears and what was recognised. Drag to move it, turn the wheel to zoom. " +
+      "The tools at its edge select, measure, place objects and set goals.",
   ],
   [
     "tabs",
     "Panels",
-    "The objects with their evidence, layers, settings, recordings, plots, the log. A number on Log counts new warnings.",
+    "The objects with their evidence, layers, settings, recordings, plots, the log. " +
+      "A number on Log counts new warnings.",
   ],
   [
     "tab-drive",
@@ -39,9 +43,11 @@ const STEPS = [
 export class Tour {
   #card = byId("tour");
   #step = 0;
+  /** @type {Element | null} */
   #marked = null;
 
   // `mayAct` says whether the page has the run's token.
+  /** @param {{ mayAct: () => boolean }} parts */
   constructor({ mayAct }) {
     this.mayAct = mayAct;
     byId("tour-next").addEventListener("click", () =>
@@ -71,6 +77,7 @@ export class Tour {
     byId("map-front").focus();
   }
 
+  /** @param {number} step */
   #show(step) {
     this.#step = step;
     const [target, title, text] = STEPS[step];
@@ -88,6 +95,7 @@ export class Tour {
     if (!this.#card.hidden) this.#show(this.#step);
   }
 
+  /** @param {Element | null} element */
   #mark(element) {
     this.#marked?.classList.remove("toured");
     element?.classList.add("toured");
@@ -96,10 +104,12 @@ export class Tour {
 
   // Below what is explained, above it, or in the middle of something large; always within the window.
   #place() {
+    if (this.#marked === null) return;
     const { left, right, top, bottom } = this.#marked.getBoundingClientRect();
     const { offsetWidth: width, offsetHeight: height } = this.#card;
-    const room = 12,
-      clamp = (at, size, all) => Math.max(room, Math.min(at, all - size - room));
+    const room = 12;
+    /** @param {number} at @param {number} size @param {number} all */
+    const clamp = (at, size, all) => Math.max(room, Math.min(at, all - size - room));
     let y = bottom + room;
     if (y + height > innerHeight) y = top - height - room;
     if (y < room) y = (top + bottom - height) / 2;

@@ -1,12 +1,15 @@
+// @ts-check
 // Feet or metres: the wire is SI; everything displayed is in the chosen unit.
 
 import { Emitter } from "./emitter.js";
 
 const METRES_A_FOOT = 0.3048;
 
+/** @extends {Emitter<{ changed: [] }>} */
 export class Units extends Emitter {
   name = "m";
 
+  /** @param {string} name */
   choose(name) {
     this.name = name === "ft" ? "ft" : "m";
     this.emit("changed");
@@ -20,40 +23,62 @@ export class Units extends Emitter {
     return this.name === "ft" ? "feet" : "metres";
   }
 
+  /** @param {number} metres */
   number(metres, digits = 2) {
     return (metres / this.metres).toFixed(digits).replace("-", "−");
   }
 
+  /** @param {number} metres */
   length(metres, digits = 2) {
     return `${this.number(metres, digits)} ${this.name}`;
   }
 
   // A standard error, in millimetres where it is less than one.
+  /** @param {number} sigma */
   spread(sigma) {
     if (!(sigma < 10000)) return "± more than 10 km";
     if (sigma >= 0.001) return `± ${this.length(sigma, 3)}`;
     return sigma >= 0.00005 ? `± ${(1000 * sigma).toFixed(1)} mm` : "± less than 0.1 mm";
   }
 
+  /** @param {number} x @param {number} y */
   place(x, y, digits = 2) {
     return `${this.number(x, digits)}, ${this.number(y, digits)} ${this.name}`;
   }
 
+  /** @param {string} text */
   parse(text) {
-    const value = Number(text.trim().replace("−", "-").replace(",", "."));
-    return text.trim() === "" || !Number.isFinite(value) ? null : value * this.metres;
+    const value = numberIn(text);
+    return value === null || !Number.isFinite(value) ? null : value * this.metres;
   }
 }
 
+// The number in a field: null where nothing is written, NaN where that is no number.
+/** @param {string} text */
+export function numberIn(text) {
+  const written = text.trim();
+  return written === "" ? null : Number(written.replace("−", "-").replace(",", "."));
+}
+
+// "1 run", "2 runs"
+/** @param {number} count @param {string} noun */
+export const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
+
+/** @template {number | null} T @param {T} degrees */
+export const radians = (degrees) => /** @type {T} */ (degrees === null ? null : (degrees * Math.PI) / 180);
+
 // From −180° to 180°, however often the robot has turned.
+/** @param {number} radians */
 export const degrees = (radians) =>
   `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−");
 
 // A probability; no evidence makes it 0 or 100.
+/** @param {number} share */
 export const percent = (share) => `${share >= 0.995 ? "> 99" : share < 0.005 ? "< 1" : Math.round(100 * share)} %`;
 
 // A natural logarithm of odds as the number of times: 1.2, 11, 10⁵. Readings are not so independent that a greater
 // number could be meant.
+/** @param {number} logarithm */
 export function times(logarithm) {
   const tens = logarithm / Math.LN10;
   if (tens < 4) return String(Number(Math.exp(logarithm).toPrecision(2)));
@@ -61,4 +86,5 @@ export function times(logarithm) {
 }
 
 // The magnitude of a schema's vector; inside the safety margin it is a million, for Arkin's infinity.
+/** @param {number} size */
 export const magnitude = (size) => (size < 1000 ? size.toFixed(2) : "unbounded");

@@ -1,3 +1,4 @@
+// @ts-check
 // Converts metres in the odometry frame (y up) to screen pixels (y down) and back; pan, zoom, follow, fit.
 
 import { Emitter } from "./emitter.js";
@@ -5,6 +6,7 @@ import { Emitter } from "./emitter.js";
 const SCALE_MIN = 3;
 const SCALE_MAX = 6000;
 
+/** @extends {Emitter<{ changed: []; follow: [boolean] }>} */
 export class View extends Emitter {
   width = 1;
   height = 1;
@@ -15,21 +17,25 @@ export class View extends Emitter {
   insets = { left: 20, right: 20, top: 20, bottom: 30 }; // px covered by controls over the map
   touched = false; // by the operator: from then on the view is not fitted automatically
 
+  /** @param {number} width @param {number} height */
   resize(width, height) {
     this.width = Math.max(1, width);
     this.height = Math.max(1, height);
     this.emit("changed");
   }
 
+  /** @param {number} x @param {number} y @returns {Pair} */
   toScreen(x, y) {
     return [this.width / 2 + (x - this.x) * this.scale, this.height / 2 - (y - this.y) * this.scale];
   }
 
+  /** @param {number} sx @param {number} sy @returns {Pair} */
   toWorld(sx, sy) {
     return [this.x + (sx - this.width / 2) / this.scale, this.y - (sy - this.height / 2) / this.scale];
   }
 
   // Moves the view by this many pixels.
+  /** @param {number} dx @param {number} dy */
   pan(dx, dy) {
     this.x -= dx / this.scale;
     this.y += dy / this.scale;
@@ -39,6 +45,7 @@ export class View extends Emitter {
   }
 
   // Zooms about (sx, sy), or about the robot while following it.
+  /** @param {number} factor */
   zoom(factor, sx = this.width / 2, sy = this.height / 2) {
     const scale = Math.min(SCALE_MAX, Math.max(SCALE_MIN, this.scale * factor));
     if (!this.follow) {
@@ -51,6 +58,7 @@ export class View extends Emitter {
     this.emit("changed");
   }
 
+  /** @param {Spacing} box */
   fit({ left, right, bottom, top }) {
     const { insets } = this;
     const wide = Math.max(40, this.width - insets.left - insets.right) / Math.max(right - left, 0.5);
@@ -63,12 +71,14 @@ export class View extends Emitter {
   }
 
   // Whether a box lies within the view.
+  /** @param {Spacing} box */
   shows({ left, right, bottom, top }) {
     const [x1, y1] = this.toScreen(left, top),
       [x2, y2] = this.toScreen(right, bottom);
     return x1 >= 0 && y1 >= 0 && x2 <= this.width && y2 <= this.height;
   }
 
+  /** @param {boolean} on */
   setFollow(on) {
     if (this.follow === on) return;
     this.follow = on;
@@ -76,6 +86,7 @@ export class View extends Emitter {
     this.emit("follow", on);
   }
 
+  /** @param {number} x @param {number} y */
   followTo(x, y) {
     if (!this.follow || (this.x === x && this.y === y)) return;
     this.x = x;
@@ -85,8 +96,10 @@ export class View extends Emitter {
 }
 
 // The bounding box of everything on the map.
+/** @param {RunState} run */
 export function extent(run) {
   const box = { left: Infinity, right: -Infinity, bottom: Infinity, top: -Infinity };
+  /** @param {number} x @param {number} y */
   const add = (x, y, r = 0) => {
     box.left = Math.min(box.left, x - r);
     box.right = Math.max(box.right, x + r);
@@ -100,8 +113,10 @@ export function extent(run) {
     add(s.x2, s.y2);
   }
   for (const { x, y, ends } of run.state.objects) {
-    if (ends) [ends.slice(0, 2), ends.slice(2)].forEach(([ex, ey]) => add(ex, ey, 0));
-    else add(x, y, 0.4);
+    if (ends) {
+      add(ends[0], ends[1]);
+      add(ends[2], ends[3]);
+    } else add(x, y, 0.4);
   }
   const truth = run.session?.truth;
   for (const [dx, dy, r] of truth?.drums ?? []) add(dx, dy, r);

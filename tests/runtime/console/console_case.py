@@ -37,6 +37,7 @@ from runtime.timing.clock_sampler import ClockSampler
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.time_control import TimeControl
 from runtime.timing.timing_monitor import TimingMonitor
+from tests.page_types import shape_error
 
 TIMEOUT_S = 60.0
 """Only a hang reaches it."""
@@ -107,6 +108,7 @@ class Page:
             message = await asyncio.wait_for(self.socket.receive(), TIMEOUT_S)
             assert message.type is aiohttp.WSMsgType.TEXT, message
             content: dict[str, Any] = orjson.loads(message.data)
+            assert shape_error(content) is None
             self.received.append(content)
             if content["type"] in kinds:
                 return content
