@@ -28,6 +28,7 @@ from bench.map_commands import (
     imperfect_rooms,
     map_size,
     range_statistics,
+    real_rooms,
     standing,
     walls,
 )
@@ -273,6 +274,7 @@ for command in (
     corner_bound,
     false_drums,
     false_walls,
+    real_rooms,
     false_canyons,
     free_cells,
     imperfect_rooms,

@@ -325,3 +325,25 @@ def range_statistics(
         lambda _, tell: measure(seeds, models, real, tell),
         lambda rows: rows_table("ranges of real drives and of generated rooms", rows), json, parts=(EMULATOR,),
     )  # fmt: skip
+
+
+def real_rooms(drives: tuple[Path, ...], *, json: str = "real_rooms.json", rounded: int = 0) -> int:
+    """Measure what is explained of drives through real rooms, whose echoes were cut from the scans of a laser.
+
+    Parameters
+    ----------
+    drives
+        Folders with ring.csv, robot.toml, truth.csv and bearings.csv, and beside each NAME-points.csv.
+    json
+        File to write.
+    rounded
+        Times that each is perceived again with rounded poses, ranges and times; the spread is then a figure.
+    """
+    use_kernel_cache()
+    from bench.real_rooms import measure
+
+    console, settings = Console(stderr=True), load_settings("hallway").of_log()
+    prepare_kernels(settings, console)
+    with console.status("bench") as status:
+        rows = measure(drives, max(0, rounded), status.update)
+    return report(json, rows, rows_table("real rooms, exact poses", rows))

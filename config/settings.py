@@ -167,20 +167,41 @@ class GridConfig(Strict):
     """Cells along each side of the window, which moves with the robot."""
 
 
+class SurfacesConfig(Strict):
+    """`[perception.surfaces]`: walls and outlines of what is not made of the models' shapes, from all echoes."""
+
+    map: Literal["logs", "always", "never"] = "logs"
+    """When they are mapped: from ring logs alone, in runs as well, or never; only with the Bayesian method."""
+    quanta_per_firing: int = Field(default=16, ge=1, le=QUANTA_MAX)
+    """Most quanta of work on them after each firing, a twentieth of a millisecond each; the others follow later."""
+
+
 class PerceptionConfig(Strict):
-    """Perception: the method and its settings; the sections after `grid` are the paper's steps."""
+    """Perception: the method and its settings; the sections after `surfaces` are the paper's steps."""
 
     method: Literal["paper", "bayes"] = "bayes"
     """How objects are recognised: `paper` as Santamaría & Arkin do, `bayes` by comparing raw ranges."""
     bayes: BayesConfig = BayesConfig()
     localization: LocalizationConfig = LocalizationConfig()
     grid: GridConfig = GridConfig()
+    surfaces: SurfacesConfig = SurfacesConfig()
 
     segments: SegmentsConfig = SegmentsConfig()
     map: MapConfig = MapConfig()
     clusters: ClustersConfig = ClustersConfig()
     relaxation: RelaxationConfig = RelaxationConfig()
     recognition: RecognitionConfig = RecognitionConfig()
+
+    @property
+    def maps_surfaces(self) -> bool:
+        """Whether surfaces of any shape are mapped."""
+        return self.surfaces.map == "always" and self.method == "bayes"
+
+    def of_log(self) -> PerceptionConfig:
+        """Return the settings for a ring log, which has time for what is mapped from logs alone."""
+        if self.surfaces.map != "logs":
+            return self
+        return self.model_copy(update={"surfaces": SurfacesConfig(map="always", quanta_per_firing=QUANTA_MAX)})
 
 
 class GoalConfig(Strict):
@@ -288,6 +309,10 @@ class Settings(RobotConfig):
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()
     console: ConsoleConfig = ConsoleConfig()
+
+    def of_log(self) -> Settings:
+        """Return the settings for a ring log, which has time for what is mapped from logs alone."""
+        return self.model_copy(update={"perception": self.perception.of_log()})
 
     @property
     def places_frame(self) -> Frame:

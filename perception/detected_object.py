@@ -55,6 +55,50 @@ class DetectedObject:
         return self.x - half * tx, self.y - half * ty, self.x + half * tx, self.y + half * ty
 
 
+def worst_sigma(xx: float, xy: float, yy: float) -> float:
+    """Return the standard deviation along a covariance's longest axis, m: the root of the greatest eigenvalue.
+
+    Parameters
+    ----------
+    xx, xy, yy : float
+        The covariance, m².
+    """
+    middle = 0.5 * (xx + yy)
+    return math.sqrt(max(0.0, middle + math.hypot(0.5 * (xx - yy), xy)))
+
+
+def wall_between(
+    ends: tuple[float, float, float, float], variance_across: float, variance_turn: float, echoes: int,
+    log_odds: float, number: int | None = None,
+) -> DetectedObject:  # fmt: skip
+    """Return a wall as a detected object: its middle and direction; its length is in the covariance.
+
+    Parameters
+    ----------
+    ends : tuple of float
+        x, y, x, y, m.
+    variance_across, variance_turn : float
+        Of its middle across the wall, m², and of its direction, rad².
+    echoes : int
+        Echoes that support it.
+    log_odds : float
+        That it is a wall, nat.
+    number : int, optional
+        The object's.
+    """
+    x1, y1, x2, y2 = ends
+    length = math.hypot(x2 - x1, y2 - y1) or 1.0  # 0 in a damaged recording
+    tx, ty = (x2 - x1) / length, (y2 - y1) / length
+    along = length * length / 12.0
+    across = variance_across + along * variance_turn
+    xx, yy, xy = tx * tx * along + ty * ty * across, ty * ty * along + tx * tx * across, tx * ty * (along - across)
+    probability = 1.0 / (1.0 + math.exp(-log_odds))
+    return DetectedObject(
+        "wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.atan2(ty, tx), worst_sigma(xx, xy, yy), echoes,
+        probability, probability, (xx, xy, yy), number, sigma_theta=math.sqrt(variance_turn),
+    )  # fmt: skip
+
+
 class MapCounts(NamedTuple):
     """The numbers of segments and hypotheses that a method holds."""
 

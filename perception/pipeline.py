@@ -36,6 +36,7 @@ from perception.localization.equal_edit import edit_equally
 from perception.localization.localized_pose import LocalizedPose
 from perception.localization.odometry_frame import OdometryFrame
 from perception.mapping.canyons import ENDS_M, CanyonMap
+from perception.mapping.no_surfaces import NoSurfaces
 from perception.method import Method
 from perception.no_method import NOT_READY, NoMethod
 from perception.obstacle_echoes.fresh_echoes import FreshEchoes
@@ -88,22 +89,22 @@ class Perception:
         refuted, it changes places with `method`, which stops."""
         self._ring = ring
         self.known_room: KnownRoom | None = None
-        """Finds the robot in the room of the settings, where there is one."""
         self.room: WorldConfig | None = None
-        """That room."""
+        """The room of the settings, where there is one, and what finds the robot in it."""
         self.grid: EvidenceGrid | None = None
         """The evidence grid in the odometry's frame, where the settings have one."""
+        self.surfaces = NoSurfaces()
+        """The map of surfaces in the frame of `method`."""
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning, ring.window_m)
-        self._reach_m = reach_m(ring)
-        self._sensors = len(ring.mounts)
+        self._reach_m, self._sensors = reach_m(ring), len(ring.mounts)
         self._models = tuple(models)
         self.vacant = VacantAreas()
         """In the frame of `method`."""
-        radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
-        self.canyon_map = CanyonMap(2.0 * (radius_m + PASSAGE_M) - ENDS_M)
+        width_m = 2.0 * (max(math.hypot(*mount[:2]) for mount in mounts.tolist()) + PASSAGE_M)
+        self.canyon_map = CanyonMap(width_m - ENDS_M)
         """The box canyons found so far, in odometry's frame."""
         if recognises:
             self.recognise(models, config)
@@ -117,18 +118,18 @@ class Perception:
         """Begin to recognise these models, with an empty map, as at a start; or stop, and have no map."""
         self._models = tuple(models)
         parts = begin_recognition(self._ring, models, config) if on else NO_RECOGNITION
-        self.method, self._other, self.map_frame, self.known_room, self.grid = parts
+        self.method, self._other, self.map_frame, self.known_room, self.grid, self.surfaces = parts
         self.room = config.localization.known_room if on else None
 
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return any(one.can_refine for one in self._fed()) or self.canyon_map.is_due or self._can_localize
+        return any(one.can_refine for one in self._refined()) or self.canyon_map.is_due or self._can_localize
 
     @property
     def converged(self) -> bool:
         """Whether nothing is left to improve, now or with the next firing."""
-        return all(one.converged for one in self._fed()) and not self.canyon_map.is_due and not self._can_localize
+        return all(one.converged for one in self._refined()) and not self.canyon_map.is_due and not self._can_localize
 
     @property
     def _can_localize(self) -> bool:
@@ -156,6 +157,7 @@ class Perception:
             self.known_room.observe(trusted)
         placed = self._correct(trusted)
         made = self.method.observe(placed)
+        self.surfaces.observe(placed)
         if self.grid is not None:
             self.method.locate_echoes(self.grid.bearings)
             self.grid.observe(trusted)
@@ -173,6 +175,7 @@ class Perception:
             return firing
         if not was_corrected:
             self.method, self._other = self._other, self.method
+            self.surfaces.clear()  # it was in odometry's frame
         return placed
 
     def refine(self) -> int:
@@ -184,12 +187,12 @@ class Perception:
             return self.method.refine()
         if self.canyon_map.is_due:
             radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
-            self.canyon_map.refine(self.labelled_objects(), radii_m)
+            self.canyon_map.refine(self._in_odometry(self.vacant.outside(self.method.labelled_objects())), radii_m)
             return 1
         if self.known_room is not None and self._can_localize:
             self.known_room.refine()
             return 1
-        return next((one.refine() for one in self._fed()[1:] if one.can_refine), 0)
+        return next((one.refine() for one in self._refined()[1:] if one.can_refine), 0)
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
@@ -221,8 +224,9 @@ class Perception:
         return self._in_odometry(self.vacant.outside(self.method.near_objects()))
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return what has a label near the robot: models, walls, corners, posts, unknowns."""
-        return self._in_odometry(self.vacant.outside(self.method.labelled_objects()))
+        """Return what has a label: models, walls, corners, posts, unknowns near the robot, and pieces of walls."""
+        walls, _ = self.surfaces.report(self._known)
+        return self._in_odometry(self.vacant.outside((*self.method.labelled_objects(), *walls)))
 
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label and was left behind; without correction the same tuple until it changes."""
@@ -230,7 +234,8 @@ class Perception:
 
     def polylines(self) -> tuple[Polyline, ...]:
         """Return what is not straight; without correction the same tuple until it changes."""
-        return self.map_frame.polylines_in_odometry(self.vacant.polylines_outside(()))
+        _, seen = self.surfaces.report(self._known)
+        return self.map_frame.polylines_in_odometry(self.vacant.polylines_outside(seen))
 
     def vacant_areas(self) -> tuple[VacantArea, ...]:
         """Return the areas in which nothing stands, in odometry's frame."""
@@ -335,16 +340,15 @@ class Perception:
         for part in (*self._methods(), self.map_frame, self.known_room, self.sensor_monitor, self.ring_monitor):
             if part is not None:
                 part.reset()
-        if self.grid is not None:
-            self.grid.clear()
-        self.vacant.clear()
-        self.canyon_map.clear()
-        self._echoes.clear()
+        for memory in (self.grid, self.surfaces, self.vacant, self.canyon_map, self._echoes):
+            if memory is not None:
+                memory.clear()
 
     def apply_settings(self, config: PerceptionConfig) -> None:
         """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
         for method in self._methods():
             method.apply_settings(config)
+        self.surfaces.apply_settings(config.surfaces)
         room = config.localization.known_room
         if self.recognises and room != self.room:
             self.room, self.known_room = room, find_in_room(room, self._ring)
@@ -356,6 +360,7 @@ class Perception:
             for method in self._methods():
                 method.set_models(models)
             self.map_frame.set_models(models)
+            self.surfaces.set_models(models)
 
     def _methods(self) -> tuple[Method, ...]:
         return (self.method,) if self._other is None else (self.method, self._other)
@@ -363,6 +368,9 @@ class Perception:
     def _fed(self) -> tuple[Method, ...]:
         """Return the methods that enter firings."""
         return (self.method,) if self.map_frame.is_applied else self._methods()
+
+    def _refined(self) -> tuple[Method | NoSurfaces, ...]:
+        return (*self._fed(), self.surfaces)
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""
@@ -387,6 +395,6 @@ class Perception:
             The snapshot was made with other settings.
         """
         put_back(self, snapshot)
-        for part in (*self._methods(), self.vacant, self.grid, self.known_room):
+        for part in (*self._methods(), self.vacant, self.grid, self.surfaces, self.known_room):
             if part is not None:
                 part.drop_caches()

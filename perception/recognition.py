@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from config.model import ModelConfig
 from config.robot import RingConfig
-from config.settings import PerceptionConfig
+from config.settings import PerceptionConfig, SurfacesConfig
 from config.world import WorldConfig
 from drivers.messages import Pose
 from perception.edits import PlaceRobot, invalid_pose
 from perception.localization.odometry_frame import OdometryFrame
+from perception.mapping.no_surfaces import NoSurfaces
 from perception.no_method import NoMethod
 
 if TYPE_CHECKING:
@@ -32,9 +33,10 @@ class Recognition(NamedTuple):
     map_frame: OdometryFrame
     known_room: KnownRoom | None
     grid: EvidenceGrid | None
+    surfaces: NoSurfaces
 
 
-NO_RECOGNITION: Final = Recognition(NoMethod(), None, OdometryFrame(), None, None)
+NO_RECOGNITION: Final = Recognition(NoMethod(), None, OdometryFrame(), None, None, NoSurfaces())
 
 
 def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Recognition:
@@ -50,7 +52,14 @@ def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: P
         MapFrame(ring, models) if corrects else OdometryFrame(),
         find_in_room(config.localization.known_room, ring),
         None if config.grid.method == "off" else EvidenceGrid(ring, config.grid),
+        _map_surfaces(ring, models, config.surfaces) if config.maps_surfaces else NoSurfaces(),
     )
+
+
+def _map_surfaces(ring: RingConfig, models: Sequence[ModelConfig], config: SurfacesConfig) -> NoSurfaces:
+    from perception.mapping.surfaces.surface_map import SurfaceMap
+
+    return SurfaceMap(ring, models, config)
 
 
 def find_in_room(room: WorldConfig | None, ring: RingConfig) -> KnownRoom | None:

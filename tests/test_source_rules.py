@@ -53,6 +53,8 @@ WITHOUT_TEST: Final = MappingProxyType(
         "perception/bayes/memory/job_records.py": "records and constants",
         "perception/localization/drift/landmark_state.py": "records and constants",
         "perception/localization/localized_pose.py": "one record",
+        "perception/mapping/surfaces/parameters.py": "constants",
+        "perception/mapping/surfaces/records.py": "records",
         "runtime/console/commands/command.py": "dataclasses and an enumeration",
         "runtime/console/commands/command_error.py": "an exception with one attribute",
         "runtime/console/frames/state_message.py": "typed dictionaries",

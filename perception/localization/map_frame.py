@@ -15,8 +15,7 @@ from typing import Final, TypeAlias
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
-from perception.bayes.reports.object_report import worst_sigma
-from perception.detected_object import DetectedObject, turned_object
+from perception.detected_object import DetectedObject, turned_object, worst_sigma
 from perception.edits import (
     Evidence,
     MarkVacant,

@@ -226,7 +226,7 @@ class _Collector:
 def _of_ring_log(
     path: Path, source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress
 ) -> Timeline:
-    settings = load_settings(None, source.sets, robot=source.robot, models=source.models)
+    settings = load_settings(None, source.sets, robot=source.robot, models=source.models).of_log()
     found: list[str] = []
     firings = open_ring_log(path, settings, source.log, found.append)
     first = next(firings)  # reports an invalid file before kernels are compiled

@@ -49,6 +49,7 @@ class FiringReplayer:
                 quanta += 1
             self._cycle_stats.add_cycle(time.perf_counter() - started_s)
             yield firing
+        perception.surfaces.finish()
 
     def summary(self, to: Pose | None = None, objects: Iterable[DetectedObject] | None = None) -> ReplaySummary:
         """Return the results of perception so far, and the time they took.

@@ -48,6 +48,7 @@ PACKAGES: Final = (
     "perception.localization.known_room",
     "perception.localization.drift",
     "perception.mapping.grid",
+    "perception.mapping.surfaces",
     "behaviors.valley",
     "drivers.emulator",
 )
@@ -61,12 +62,13 @@ RING: Final = "ring"
 LOCALIZATION: Final = "localization"
 KNOWN_ROOM: Final = "known_room"
 VALLEY: Final = "valley"
+SURFACES: Final = "surfaces"
 GRIDS: Final = ("directed", "moravec_elfes", "elfes")
-PARTS: Final = (EMULATOR, RING, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, *GRIDS)
+PARTS: Final = (EMULATOR, RING, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, SURFACES, *GRIDS)
 """What is compiled separately: what keeps the ring's echoes and finds false ones, without which no robot drives; a
 method by its name, what the Bayesian method needs beyond it for polygons, the emulator, the correction of drift,
-finding the robot in a known room, the choice of a valley, and each kind of evidence grid. A file with the name of a
-part in the folder of `use_kernel_cache` says that it is compiled."""
+finding the robot in a known room, the choice of a valley, the map of surfaces, and each kind of evidence grid. A file
+with the name of a part in the folder of `use_kernel_cache` says that it is compiled."""
 
 COMPILED_SUFFIX: Final = ".compiled"
 """Ending of empty files in the folder of `use_kernel_cache`, one for each kernel that was compiled; progress is
@@ -154,7 +156,9 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     localization = (LOCALIZATION,) if settings.perception.localization.correct_drift else ()
     known_room = () if settings.perception.localization.known_room is None else (KNOWN_ROOM,)
     grid = () if settings.perception.grid.method == "off" else (settings.perception.grid.method,)
-    return (EMULATOR, RING, settings.perception.method, *polygons, *localization, *known_room, VALLEY, *grid)
+    surfaces = (SURFACES,) if settings.perception.maps_surfaces else ()
+    method = settings.perception.method
+    return (EMULATOR, RING, method, *polygons, *localization, *known_room, VALLEY, *surfaces, *grid)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:

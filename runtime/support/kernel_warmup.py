@@ -30,6 +30,7 @@ from runtime.support.kernel_cache import (
     PAPER,
     POLYGONS,
     RING,
+    SURFACES,
     VALLEY,
     is_interpreted,
     needed_parts,
@@ -99,12 +100,20 @@ def _ring(settings: Settings) -> None:
 
 def _grid(settings: Settings, method: str) -> None:
     """Drive past a wall with an evidence grid, and ask for it."""
-    from perception.pipeline import Perception
-
     grid = settings.perception.grid.model_copy(update={"method": method})
-    perception = Perception(settings.ring, settings.models, settings.perception.model_copy(update={"grid": grid}))
+    with_grid = settings.model_copy(update={"perception": settings.perception.model_copy(update={"grid": grid})})
+    perception = _perception(with_grid, settings.perception.method, settings.models)
     _drive(settings, perception, refines=False)
     perception.occupancy()
+
+
+def _surfaces(settings: Settings) -> None:
+    """Drive past a wall and map it as a surface, also after the memory was restored."""
+    perception = _perception(settings.of_log(), BAYES, settings.models)
+    _drive(settings, perception)
+    perception.surfaces.finish()
+    perception.polylines()
+    perception.restore(perception.snapshot())
 
 
 def _square() -> ModelConfig:
@@ -116,32 +125,24 @@ def _square() -> ModelConfig:
 
 def _edit(settings: Settings, perception: Perception, models: Sequence[ModelConfig], firings: int) -> None:
     """Do every kind of edit with each model, and drive in between: the operator's first must not delay a cycle."""
-    from perception.edits import (
-        ClearMap,
-        ConfirmObject,
-        DeleteSegments,
-        MoveObject,
-        PinSegments,
-        PlaceModel,
-        RemoveObject,
-    )
+    from perception import edits
     from perception.paper.cluster_view import ClusterView
 
     ClusterView(settings.perception).boxes(perception.segments().geometry)  # the console shows them for either method
     numbers = tuple(perception.segments().numbers[:2].tolist())
-    perception.edit(PinSegments(numbers, pinned=True))
+    perception.edit(edits.PinSegments(numbers, pinned=True))
     _drive(settings, perception, firings)  # its segments overwrite the pinned ones, which are put back
     for model in models:
-        perception.edit(PlaceModel(model.name, 1.0, 2.5, 0.0))
+        perception.edit(edits.PlaceModel(model.name, 1.0, 2.5, 0.0))
     for seen in perception.objects():
         if seen.number is not None:
             perception.evidence(seen.number)
-            perception.edit(MoveObject(seen.number, 1.1, 2.5, 0.0))
-            perception.edit(MoveObject(seen.number, 9.0, 9.0, 0.0))
-            perception.edit(ConfirmObject(seen.number))
-            perception.edit(RemoveObject(seen.number))
-    perception.edit(DeleteSegments(numbers))
-    perception.edit(ClearMap())
+            perception.edit(edits.MoveObject(seen.number, 1.1, 2.5, 0.0))
+            perception.edit(edits.MoveObject(seen.number, 9.0, 9.0, 0.0))
+            perception.edit(edits.ConfirmObject(seen.number))
+            perception.edit(edits.RemoveObject(seen.number))
+    perception.edit(edits.DeleteSegments(numbers))
+    perception.edit(edits.ClearMap())
 
 
 def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
@@ -247,7 +248,7 @@ def _valley(settings: Settings) -> None:
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
     EMULATOR: _emulator, RING: _ring, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper,
-    LOCALIZATION: _localization, KNOWN_ROOM: _known_room, VALLEY: _valley,
+    LOCALIZATION: _localization, KNOWN_ROOM: _known_room, VALLEY: _valley, SURFACES: _surfaces,
     **{method: partial(_grid, method=method) for method in GRIDS},
 })  # fmt: skip
 """Runs each part once."""

@@ -27,7 +27,7 @@ from perception.bayes.tracks.track_archive import TrackArchive
 from perception.bayes.walls.contact import EDGE_REACH_M
 from perception.bayes.walls.crossing import CORNER_SINE_MIN
 from perception.bayes.walls.report import has_mirrors, room_report
-from perception.detected_object import DetectedObject
+from perception.detected_object import DetectedObject, wall_between, worst_sigma
 from perception.kernel import Floats
 
 CIRCLE_FIELDS: Final = (
@@ -41,18 +41,6 @@ WALL_OFF_M: Final = 0.05
 """A post this near to the end of a sure wall, and this near to touching its line, is the edge in which the wall ends:
 their ranges differ by less than the noise, and every wall ends somewhere."""
 Row = tuple[float, ...]
-
-
-def worst_sigma(xx: float, xy: float, yy: float) -> float:
-    """Return the standard deviation along a covariance's longest axis, m: the root of the greatest eigenvalue.
-
-    Parameters
-    ----------
-    xx, xy, yy : float
-        The covariance, m².
-    """
-    middle = 0.5 * (xx + yy)
-    return math.sqrt(max(0.0, middle + math.hypot(0.5 * (xx - yy), xy)))
 
 
 def circle_object(row: Row, label: str, probability: float) -> DetectedObject:
@@ -144,18 +132,9 @@ def known_walls(memory: Memory) -> NDArray[Any]:
 
 
 def wall_object(segment: Row) -> DetectedObject:
-    """Return a `WallSegment` as a reported object: its middle and direction; its length is in the covariance."""
+    """Return a `WallSegment` as a reported object."""
     x1, y1, x2, y2, variance_across, variance_turn, echoes, log_odds, number = segment
-    length = math.hypot(x2 - x1, y2 - y1) or 1.0  # 0 in a damaged recording
-    tx, ty = (x2 - x1) / length, (y2 - y1) / length
-    along = length * length / 12.0
-    across = variance_across + along * variance_turn
-    xx, yy, xy = tx * tx * along + ty * ty * across, ty * ty * along + tx * tx * across, tx * ty * (along - across)
-    probability = 1.0 / (1.0 + math.exp(-log_odds))
-    return DetectedObject(
-        "wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.atan2(ty, tx), worst_sigma(xx, xy, yy), int(echoes),
-        probability, probability, (xx, xy, yy), int(number) or None, sigma_theta=math.sqrt(variance_turn),
-    )  # fmt: skip
+    return wall_between((x1, y1, x2, y2), variance_across, variance_turn, int(echoes), log_odds, int(number) or None)
 
 
 def corner_object(corner: Row) -> DetectedObject:

@@ -120,7 +120,7 @@ def twist(v: float, w: float, units: Units) -> str:
 
 def localized_place(here: LocalizedPose, units: Units) -> str:
     """Return the robot's place in the map frame, with the standard errors of its worst direction and its heading."""
-    from perception.bayes.reports.object_report import worst_sigma
+    from perception.detected_object import worst_sigma
 
     said = f"{here.status} {percent(here.probability)}"
     covariance = here.covariance

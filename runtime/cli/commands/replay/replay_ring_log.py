@@ -46,7 +46,7 @@ def replay_log(
     log, sets, robot, models, json_file, force, units, localize, trajectory, map_file, options
         As of `runtime.cli.commands.replay.replay.replay`.
     """
-    settings = load_settings(None, sets, robot=robot, models=models)
+    settings = load_settings(None, sets, robot=robot, models=models).of_log()
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     console = EscapingConsole(stderr=True)

@@ -14,6 +14,7 @@ from perception.bayes.memory.parameters import PLACED_SIGMA_M, UNKNOWN_HITS_MIN
 from perception.bayes.memory.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.bayes.reports import object_report
+from perception.detected_object import worst_sigma
 from tests import naive_walls
 from tests.naive_tracks import FT, Line
 from tests.perception.bayes.random_tracks import (
@@ -56,7 +57,7 @@ def test_greatest_deviation_lines_and_names_of_rivals_equal_their_oracles(exampl
         root = rng.normal(0, 1, (2, 2))
         cov = root @ root.T
         worst = math.sqrt(float(np.linalg.eigvalsh(cov)[1]))
-        assert object_report.worst_sigma(cov[0, 0], cov[0, 1], cov[1, 1]) == pytest.approx(worst, rel=1e-12)
+        assert worst_sigma(cov[0, 0], cov[0, 1], cov[1, 1]) == pytest.approx(worst, rel=1e-12)
         lines = random_lines(rng, memory, 16)
         long = [k for k, line in lines.items() if line.echoes > 10 and line.high - line.low > 2 * FT]
         assert [wall["normal_x"] for wall in object_report.known_walls(memory)] == [

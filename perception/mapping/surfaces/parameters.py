@@ -1,0 +1,91 @@
+"""The numbers of the map of surfaces, each with its unit and source.
+
+"Drives" are real drives whose ranges were cut from a laser's, with the truth of every echo: an office of tables and
+shelves, and a corridor with rooms, each with surfaces that answer at any angle and with mirrors. Explained is the
+share of their echoes that lie within 0.1 m of an occupied cell; false is the share of the occupied cells with
+nothing within 0.15 m.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+CELL_M: Final = 0.05
+"""Edge of a cell: half of the distance within which a surface explains an echo."""
+CELLS: Final = 640
+"""Cells along an edge of a local map: 32 m. Even, as passes are counted in cells of twice the size."""
+LEFT_M: Final = 9.7
+LEFT_MAX_M: Final = 10.4
+"""A robot so far from a local map's centre begins another one, once this one was searched, and at the latest; …"""
+REACH_M: Final = 5.5
+"""… and an echo from farther away is as good as silence: its arc is longer than objects are."""
+DIRECTIONS: Final = 12
+"""Looking directions for which a cell counts apart: a mirror answers to one and is silent to the next."""
+SAMPLES: Final = 24
+"""Places on an arc among which an echo is shared: 1° of a beam of ±12°."""
+WHOLE: Final = 127
+"""Share of a whole echo; shares are whole numbers, so that adding and taking away are exact in any order."""
+SHARES_A_WORD: Final = 8
+SHARE_BITS: Final = 7
+"""Shares of an echo are kept eight to a number."""
+WHOLE_PASS: Final = 16
+"""A pass along the beam's axis; at the beam's edge it counts half."""
+NEARER_M: Final = 0.1
+"""A range passed through what is nearer by this. Drives: 0.06 and 0.15 lose 1 to 2 % at the same false share."""
+SILENCE_M: Final = 2.5
+"""Way for which silence counts as a pass."""
+PRIOR_READINGS: Final = 1.0
+"""Readings of one direction for which the other directions of a cell stand. Drives: 0.1 to 1 within 1 %."""
+OUTLIER: Final = 0.005
+"""Probability of an echo from nowhere, beside those of the places on its arc."""
+REVISITS: Final = 3
+"""Times that an earlier echo is shared again for each new reading. Drives: 2 as good, none 2 to 4 % more false."""
+LAST_REVISITS: Final = 3
+"""Times that all echoes are shared again before a local map is left."""
+SPACING_M: Final = 0.02
+SPACING_RAD: Final = 0.02
+"""A sensor that has moved and turned by less says the same again."""
+READINGS_MAX: Final = 12288
+"""Readings of a local map, and …"""
+READINGS_KEPT: Final = 6144
+"""… how many of them the next one begins with, at most."""
+
+STRENGTH_MIN: Final = 0.9
+"""Echoes by which a cell is occupied: each direction counts one at most, and a tenth of the rest; less where few are
+its own and not its neighbours'."""
+STRENGTH_SHARE: Final = 0.1
+ANSWER_MIN: Final = 0.05
+"""Least probability of an answer of an occupied cell, to the direction to which it answers most."""
+TAIL_SHARE: Final = 0.03
+TAIL_CELLS: Final = 3
+"""A cell with less than this share of the hits of one within three cells has got them by that one's noise."""
+OWN_HITS_MIN: Final = 0.05
+"""Least echoes of the cell itself, without its neighbours."""
+SURFACE_CELLS_MAX: Final = 12288
+"""Occupied cells of a local map, at most."""
+PIECES_MAX: Final = 384
+"""Straight pieces of a local map, at most."""
+OFF_LINE_M: Final = 0.06
+"""A cell belongs to a straight piece within this."""
+TAKEN_M: Final = 0.06
+"""Cells within this of a piece start no other one."""
+GAP_M: Final = 0.15
+"""Greatest gap in a piece; 0.2 adds false length, 0.1 loses walls between mirrors."""
+PIECE_MIN_M: Final = 0.25
+"""Length of the shortest piece that is a wall."""
+COVERED_MIN: Final = 0.6
+"""Least share of a piece's length with occupied cells."""
+END_STRENGTH: Final = 1.5
+"""A piece ends at its outermost cell of this strength. Drives: false length 4.0 to 1.7 % in the office."""
+NODE_STRENGTH: Final = 1.5
+"""Strength of the cells from which polylines are drawn."""
+NODE_M: Final = 0.1
+"""Distance between the points of a polyline, at least, …"""
+LINK_M: Final = 0.2
+"""… and at most: twice as much, as there may be no cell for a point between them."""
+AGREES_M: Final = 0.1
+"""Two surfaces within this are one: the distance within which a surface explains an echo."""
+KNOWN_NAT: Final = 40.0
+UNKNOWN_M: Final = 10.0
+"""Log odds that a piece is a wall, before its own evidence: from this, where nothing that was heard lies along what
+the method knows, to as much against it, where all does. So many metres count as known before anything is heard."""

@@ -1,0 +1,172 @@
+"""Where echoes of a piece came from, the line that fits them best, and whether a round object would fit better."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import Floats, kernel
+from perception.mapping.surfaces.cells import cell_of, share_of
+from perception.mapping.surfaces.parameters import REACH_M, SAMPLES, WHOLE
+from perception.mapping.surfaces.records import FREE, CellCounts, KeptReading, LocalMap, Piece
+
+OWN_SHARE_MIN: Final = 0.3
+"""An echo is from a piece if so much of it is shared to the piece's cells."""
+ROUNDS: Final = 4
+SCALE_M: Final = 0.09
+"""Errors beyond this count ever less (Geman-McClure): three times what a pose's error and a cell's size leave."""
+SIGMA_MIN_M: Final = 0.01
+ECHOES_A_PLACE: Final = 4.0
+"""So many echoes of a piece say what one independent echo would: their poses err together."""
+
+
+@kernel
+def locate(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
+    """Write from which piece a reading's echo came, and where on it: the mean of its places there."""
+    q, point = room.readings[k], room.points[k]
+    point.piece = FREE
+    if q.range_m > REACH_M:
+        return
+    most, piece = 0, FREE
+    for n in range(SAMPLES):
+        share = share_of(q, n)
+        if share > most:
+            owner = owner_at(room, counts, q, n, half)
+            if owner >= 0:
+                most, piece = share, owner
+    if piece < 0:
+        return
+    total, x, y = 0.0, 0.0, 0.0
+    for n in range(SAMPLES):
+        share = share_of(q, n)
+        if share > 0 and owner_at(room, counts, q, n, half) == piece:
+            angle = q.axis + ((2.0 * n + 1.0) / SAMPLES - 1.0) * half
+            total += share
+            x += share * (q.x + q.range_m * math.cos(angle))
+            y += share * (q.y + q.range_m * math.sin(angle))
+    if total >= OWN_SHARE_MIN * WHOLE:
+        point.x, point.y, point.piece = x / total, y / total, piece
+
+
+@kernel
+def owner_at(room: LocalMap, counts: CellCounts, q: KeptReading, n: int, half: float) -> int:
+    """Return the owner of the cell at a place on a reading's arc."""
+    angle = q.axis + ((2.0 * n + 1.0) / SAMPLES - 1.0) * half
+    i = cell_of(q.x + q.range_m * math.cos(angle))
+    j = cell_of(q.y + q.range_m * math.sin(angle))
+    if i < 0 or j < 0 or counts.index[i, j] == 0:
+        return FREE
+    return int(room.cells[counts.index[i, j] - 1].owner)
+
+
+@kernel
+def locate_all(room: LocalMap, counts: CellCounts, begin: int, end: int, half: float) -> None:
+    """Write of some readings from which piece their echoes came, and where on it."""
+    for k in range(begin, end):
+        locate(room, counts, k, half)
+
+
+@kernel
+def robust(error: float) -> tuple[float, float]:
+    """Return the weight of an error (m) and what it adds to the sum of squares, m²."""
+    share = 1.0 / (1.0 + error * error / (SCALE_M * SCALE_M))
+    return share * share, error * error * share
+
+
+@kernel
+def fit_line(room: LocalMap, number: int) -> float:
+    """Fit a piece's line to its echoes, by robust least squares; return the sum of squares, m²."""
+    piece = room.pieces[number]
+    total = 0.0
+    for _ in range(ROUNDS):
+        w0, wu, wuu, wv, wuv, total, echoes = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(room.swept):
+            if room.points[k].piece != number:
+                continue
+            dx, dy = room.points[k].x - piece.x, room.points[k].y - piece.y
+            u, v = dx * piece.ux + dy * piece.uy, dy * piece.ux - dx * piece.uy
+            weight, square = robust(v)
+            w0 += weight
+            wu += weight * u
+            wuu += weight * u * u
+            wv += weight * v
+            wuv += weight * u * v
+            total += square
+            echoes += 1.0
+        spread = wuu - wu * wu / w0 if w0 > 0.0 else 0.0
+        piece.echoes = echoes
+        if echoes < 3.0 or spread <= 0.0:
+            break
+        turn = (wuv - wu * wv / w0) / spread
+        middle, offset = wu / w0, wv / w0
+        variance = max(total / echoes, SIGMA_MIN_M**2) * ECHOES_A_PLACE
+        piece.variance_across, piece.variance_turn = variance / w0, variance / spread
+        piece.x += middle * piece.ux - offset * piece.uy
+        piece.y += middle * piece.uy + offset * piece.ux
+        piece.low -= middle
+        piece.high -= middle
+        c, s = math.cos(turn), math.sin(turn)
+        piece.ux, piece.uy = c * piece.ux - s * piece.uy, c * piece.uy + s * piece.ux
+    return total
+
+
+@kernel
+def fit_circle(room: LocalMap, number: int, radius: float) -> float:
+    """Return the sum of squares (m²) of a circle of this radius at its best place, behind a piece's echoes."""
+    piece = room.pieces[number]
+    side = 0.0
+    for k in range(room.swept):
+        if room.points[k].piece == number:
+            q = room.readings[k]
+            side += 1.0 if (q.y - piece.y) * piece.ux - (q.x - piece.x) * piece.uy < 0.0 else -1.0
+    way = radius if side > 0.0 else -radius
+    x, y = piece.x - way * piece.uy, piece.y + way * piece.ux
+    total = 0.0
+    for _ in range(ROUNDS):
+        xx, xy, yy, ex, ey, total = 1e-9, 0.0, 1e-9, 0.0, 0.0, 0.0
+        for k in range(room.swept):
+            if room.points[k].piece != number:
+                continue
+            dx, dy = room.points[k].x - x, room.points[k].y - y
+            away = max(math.hypot(dx, dy), 1e-6)
+            error = away - radius
+            weight, square = robust(error)
+            nx, ny = dx / away, dy / away
+            xx += weight * nx * nx
+            xy += weight * nx * ny
+            yy += weight * ny * ny
+            ex += weight * nx * error
+            ey += weight * ny * error
+            total += square
+        det = xx * yy - xy * xy
+        if det <= 1e-12:
+            break
+        x += (yy * ex - xy * ey) / det
+        y += (xx * ey - xy * ex) / det
+    return total
+
+
+@kernel
+def judge(room: LocalMap, number: int, radii: Floats) -> None:
+    """Fit a piece and write its evidence: how much better its line fits than a circle of one of the models.
+
+    Parameters
+    ----------
+    room : LocalMap
+        Updated.
+    number : int
+        The piece's.
+    radii : (k,) float
+        Radii of the models, m.
+    """
+    piece: Piece = room.pieces[number]
+    line = fit_line(room, number)
+    if piece.echoes < 3.0:
+        piece.evidence = -1.0
+        return
+    # Without round models the alternative is that nothing is there: an echo that fits is worth one of nat.
+    circle = line + 2.0 * SIGMA_MIN_M**2 * piece.echoes * ECHOES_A_PLACE if len(radii) == 0 else math.inf
+    for k in range(len(radii)):
+        circle = min(circle, fit_circle(room, number, radii[k]))
+    variance = max(min(line, circle) / piece.echoes, SIGMA_MIN_M**2)
+    piece.evidence = (circle - line) / (2.0 * variance * ECHOES_A_PLACE)

@@ -1,0 +1,231 @@
+"""Straight pieces in the occupied cells: each begins at the strongest free cell and grows along its best line."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import kernel
+from perception.mapping.surfaces.cells import cell_of, strength_of
+from perception.mapping.surfaces.parameters import (
+    CELL_M,
+    CELLS,
+    COVERED_MIN,
+    END_STRENGTH,
+    GAP_M,
+    OFF_LINE_M,
+    PIECE_MIN_M,
+    STRENGTH_MIN,
+    SURFACE_CELLS_MAX,
+    TAKEN_M,
+)
+from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap, Piece, SurfaceCell
+from perception.records import Records
+
+ANGLES: Final = 36
+"""Directions that are tried through a seed: 5° apart, and the fit does the rest."""
+SEED_CELLS: Final = 10
+"""Cells around a seed among which its direction is sought: half a metre."""
+STRONG: Final = 4.0
+"""Greatest strength of a cell as a weight."""
+TAKEN_WEIGHT: Final = 0.3
+"""Weight of the cells of other pieces in that search: lines cross."""
+REACHES_M: Final = (0.5, 1.0, 2.0, 6.0, 13.0, 13.0)
+"""How far a line is followed in each round of fitting; the last one is not fitted again."""
+STEP_M: Final = 0.7 * CELL_M
+OFFSETS: Final = 2
+"""Steps to each side of the line in which cells are looked for."""
+
+
+@kernel
+def offset_of(at: int) -> float:
+    """Return the place of a row's or column's middle from the map's centre, m."""
+    return (at + 0.5 - 0.5 * CELLS) * CELL_M
+
+
+@kernel
+def capture(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
+    """Append the occupied cells of some rows to the map's; those that find no room are left out."""
+    for i in range(begin, end):
+        for j in range(2, CELLS - 2):
+            counts.index[i, j] = 0
+            if counts.all_hits[i, j] == 0 or room.cell_count >= SURFACE_CELLS_MAX:
+                continue
+            strength = strength_of(counts, i, j)
+            if strength > STRENGTH_MIN:
+                cell = room.cells[room.cell_count]
+                cell.i, cell.j, cell.strength, cell.owner = i, j, strength, FREE
+                room.cell_count += 1
+                counts.index[i, j] = room.cell_count
+
+
+@kernel
+def walk(
+    cells: Records[SurfaceCell], counts: CellCounts, line: Piece, begin: float, reach: float
+) -> None:  # fmt: skip
+    """Follow a line through occupied cells to both sides, as far as no gap is too wide, and sum them.
+
+    `counts.sums` is overwritten: weight, its sums of x, y, xx, xy, yy about the line's point, cells, cells without an
+    owner, the ends, and the share of the steps that met a cell.
+
+    Parameters
+    ----------
+    cells, counts
+        The occupied cells; their index, and the marks of walks, which are updated.
+    line : Piece
+        The line.
+    begin, reach : float
+        Where on the line to begin, and how far from there to go, m.
+    """
+    sums = counts.sums
+    sums[:] = 0.0
+    counts.walks += 1
+    ux, uy = line.ux, line.uy
+    low, high = begin, begin
+    steps, met_steps = 0, 0
+    for side in range(2):
+        way = 1.0 - 2.0 * side
+        t, last, since = 0.0, 0.0, 0
+        while t <= reach and t - last <= GAP_M + STEP_M:
+            is_met = False
+            for k in range(-OFFSETS, OFFSETS + 1):
+                off = k * OFF_LINE_M / OFFSETS
+                i = cell_of(line.x + (begin + way * t) * ux - off * uy)
+                j = cell_of(line.y + (begin + way * t) * uy + off * ux)
+                if i < 0 or j < 0 or counts.index[i, j] == 0:
+                    continue
+                n = counts.index[i, j] - 1
+                dx, dy = offset_of(i) - line.x, offset_of(j) - line.y
+                if abs(dy * ux - dx * uy) > OFF_LINE_M:
+                    continue
+                is_met = True
+                if counts.marks[n] == counts.walks:
+                    continue
+                counts.marks[n] = counts.walks
+                w = min(cells[n].strength, STRONG)
+                sums[0] += w
+                sums[1] += w * dx
+                sums[2] += w * dy
+                sums[3] += w * dx * dx
+                sums[4] += w * dx * dy
+                sums[5] += w * dy * dy
+                sums[6] += 1.0
+                if cells[n].owner == FREE:
+                    sums[7] += 1.0
+                along = dx * ux + dy * uy
+                low, high = min(low, along), max(high, along)
+            since += 1
+            if is_met:
+                last = t
+                met_steps += 1
+                steps += since
+                since = 0
+            t += STEP_M
+    sums[8], sums[9] = low, high
+    sums[10] = met_steps / max(steps, 1)
+
+
+@kernel
+def best_direction(cells: Records[SurfaceCell], counts: CellCounts, seed: int) -> float:
+    """Return the direction of the line through a cell that meets most of the cells around it, rad."""
+    i0, j0 = cells[seed].i, cells[seed].j
+    count = 0
+    for i in range(max(0, i0 - SEED_CELLS), min(CELLS, i0 + SEED_CELLS + 1)):
+        for j in range(max(0, j0 - SEED_CELLS), min(CELLS, j0 + SEED_CELLS + 1)):
+            if counts.index[i, j] != 0:
+                counts.near[count] = counts.index[i, j] - 1
+                count += 1
+    best, direction = -1.0, 0.0
+    for a in range(ANGLES):
+        angle = math.pi * a / ANGLES
+        ux, uy = math.cos(angle), math.sin(angle)
+        score = 0.0
+        for k in range(count):
+            cell = cells[counts.near[k]]
+            off = ((cell.j - j0) * ux - (cell.i - i0) * uy) * CELL_M / OFF_LINE_M
+            if abs(off) < 1.0:
+                weight = 1.0 if cell.owner == FREE else TAKEN_WEIGHT
+                score += min(cell.strength, STRONG) * weight * (1.0 - off * off)
+        if score > best:
+            best, direction = score, angle
+    return direction
+
+
+@kernel
+def grow(room: LocalMap, counts: CellCounts, seed: int) -> bool:
+    """Grow a straight piece from a cell, the map's last; return whether there is one, then it owns its cells.
+
+    Parameters
+    ----------
+    room, counts
+        The map, updated, and its counts.
+    seed : int
+        The cell.
+    """
+    cells, sums = room.cells, counts.sums
+    angle = best_direction(cells, counts, seed)
+    seed_x, seed_y = offset_of(cells[seed].i), offset_of(cells[seed].j)
+    number = room.piece_count
+    piece = room.pieces[number]
+    piece.x, piece.y, piece.ux, piece.uy = seed_x, seed_y, math.cos(angle), math.sin(angle)
+    for k in range(len(REACHES_M)):
+        begin = (seed_x - piece.x) * piece.ux + (seed_y - piece.y) * piece.uy
+        walk(cells, counts, piece, begin, REACHES_M[k])
+        if sums[6] < 3.0:
+            return False
+        if k < len(REACHES_M) - 1:
+            mx, my = sums[1] / sums[0], sums[2] / sums[0]
+            xx, xy, yy = sums[3] / sums[0] - mx * mx, sums[4] / sums[0] - mx * my, sums[5] / sums[0] - my * my
+            turn = 0.5 * math.atan2(2.0 * xy, xx - yy)
+            piece.x, piece.y, piece.ux, piece.uy = piece.x + mx, piece.y + my, math.cos(turn), math.sin(turn)
+    piece.low, piece.high = sums[8] - 0.5 * CELL_M, sums[9] + 0.5 * CELL_M
+    is_long = piece.high - piece.low >= PIECE_MIN_M
+    if not is_long or sums[10] < COVERED_MIN or sums[7] < 0.5 * sums[6]:
+        return False
+    take(room, counts, number)
+    room.piece_count += 1
+    return True
+
+
+@kernel
+def take(room: LocalMap, counts: CellCounts, number: int) -> None:
+    """Give a piece the free cells along it, and end it at its outermost strong ones."""
+    piece = room.pieces[number]
+    steps = int((piece.high - piece.low) / STEP_M) + 1
+    low, high = piece.high, piece.low
+    for step in range(steps + 1):
+        along = piece.low + step * STEP_M
+        for k in range(-OFFSETS, OFFSETS + 1):
+            off = k * TAKEN_M / OFFSETS
+            i = cell_of(piece.x + along * piece.ux - off * piece.uy)
+            j = cell_of(piece.y + along * piece.uy + off * piece.ux)
+            if i < 0 or j < 0 or counts.index[i, j] == 0:
+                continue
+            cell = room.cells[counts.index[i, j] - 1]
+            if cell.owner == FREE:
+                cell.owner = number
+            if cell.strength > END_STRENGTH:
+                t = (offset_of(i) - piece.x) * piece.ux + (offset_of(j) - piece.y) * piece.uy
+                low, high = min(low, t - 0.5 * CELL_M), max(high, t + 0.5 * CELL_M)
+    piece.low, piece.high = max(low, piece.low), min(high, piece.high)
+
+
+@kernel
+def grow_all(room: LocalMap, counts: CellCounts, most: int) -> int:
+    """Grow pieces from the strongest free cells; return how many were tried, fewer than `most` at the end.
+
+    Parameters
+    ----------
+    room, counts
+        The map, updated: `room.at` is the next cell in order.
+    most : int
+        Cells that are tried, at most.
+    """
+    tried = 0
+    while tried < most and room.at < room.cell_count and room.piece_count < len(room.pieces):
+        seed = counts.order[room.at]
+        room.at += 1
+        if room.cells[seed].owner == FREE:
+            tried += 1
+            grow(room, counts, seed)
+    return tried

@@ -1,0 +1,154 @@
+"""Memory of a local map of surfaces: its readings, its occupied cells, and the straight pieces in them.
+
+Places are offsets from the map's centre, m.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from config.robot import SENSORS_MAX
+from config.settings import QUANTA_MAX
+from perception.bounds import FLAG, PLACE, Bound, Count, Finite, Place, up_to
+from perception.kernel import Floats, Ints
+from perception.mapping.surfaces.parameters import (
+    CELLS,
+    DIRECTIONS,
+    PIECES_MAX,
+    READINGS_MAX,
+    SAMPLES,
+    SHARES_A_WORD,
+    SURFACE_CELLS_MAX,
+)
+from perception.records import Record, Records
+
+WORDS: Final = SAMPLES // SHARES_A_WORD
+ANY: Final = Bound(-(2**63), 2**63 - 1)
+"""Of shares packed into a word."""
+CHAIN_MAX: Final = 64
+NODES_MAX: Final = 4096
+"""Points of a polyline, at most."""
+FREE: Final = -1
+NODE: Final = -2
+"""Owners of a cell that are no piece: none yet, and a polyline."""
+
+
+class KeptReading(Record):
+    """A reading of a sensor that had moved."""
+
+    x: Place
+    """Where the sensor was."""
+    y: Place
+    axis: Place
+    """Its direction, rad."""
+    range_m: Finite
+    """10⁶ for silence."""
+    shares: Annotated[Ints, WORDS, ANY]
+    """Shares of the echo of the places on its arc, `SHARES_A_WORD` in each number."""
+
+
+class SurfaceCell(Record):
+    """An occupied cell, while pieces are sought."""
+
+    i: Annotated[int, up_to(CELLS - 1)]
+    """Row and column."""
+    j: Annotated[int, up_to(CELLS - 1)]
+    strength: Finite
+    """Echoes that speak for it."""
+    owner: Annotated[int, Bound(NODE, PIECES_MAX)]
+    """The piece that took it, `FREE` before."""
+
+
+class Piece(Record):
+    """A straight piece of surface."""
+
+    x: Place
+    """A point of its line, the middle of its cells."""
+    y: Place
+    ux: Place
+    """The line's direction, a unit vector."""
+    uy: Place
+    low: Place
+    """Its ends along the line, from that point."""
+    high: Place
+    echoes: Finite
+    """Echoes that came from it."""
+    variance_across: Finite
+    """Of the line at the point, m²."""
+    variance_turn: Finite
+    """Of its direction, rad²."""
+    evidence: Finite
+    """Log odds of a straight surface against a round one of the models, nat."""
+
+
+class EchoPoint(Record):
+    """Where an echo came from, if from a piece."""
+
+    x: Place
+    y: Place
+    piece: Annotated[int, Bound(FREE, PIECES_MAX)]
+
+
+class LocalMap(Record):
+    """What is remembered of a local map."""
+
+    centre_x: Place
+    centre_y: Place
+    count: Annotated[int, up_to(READINGS_MAX)]
+    """Readings that it has, …"""
+    entered: Annotated[int, up_to(READINGS_MAX)]
+    """… and how many of them are in the cells."""
+    revisited: Annotated[int, up_to(READINGS_MAX)]
+    """The next of them that is shared again, …"""
+    owed: Count
+    """… and how many are."""
+    swept: Annotated[int, up_to(READINGS_MAX)]
+    """Readings that were entered when pieces were sought last."""
+    is_left: Annotated[int, FLAG]
+    """Whether the robot needs another map, once this one was searched with the last readings."""
+    phase: Annotated[int, up_to(6)]
+    """The step of the search for pieces; see `surface_map`."""
+    at: Count
+    """How far that step is."""
+    left: Annotated[int, up_to(QUANTA_MAX)]
+    """Quanta that are left after the last firing."""
+    cell_count: Annotated[int, up_to(SURFACE_CELLS_MAX)]
+    piece_count: Annotated[int, up_to(PIECES_MAX)]
+    kept_x: Annotated[Floats, SENSORS_MAX, PLACE]
+    """Where each sensor was at its last kept reading, in odometry's frame."""
+    kept_y: Annotated[Floats, SENSORS_MAX, PLACE]
+    kept_axis: Annotated[Floats, SENSORS_MAX, PLACE]
+    is_kept: Annotated[Ints, SENSORS_MAX, FLAG]
+    readings: Annotated[Records[KeptReading], READINGS_MAX]
+    cells: Annotated[Records[SurfaceCell], SURFACE_CELLS_MAX]
+    pieces: Annotated[Records[Piece], PIECES_MAX]
+    points: Annotated[Records[EchoPoint], READINGS_MAX]
+    chained: Annotated[int, up_to(NODES_MAX)]
+    """Numbers in `chains`: …"""
+    chains: Annotated[Ints, NODES_MAX, up_to(SURFACE_CELLS_MAX)]
+    """… the cells of each polyline in order, one more than the cell's number, and 0 at its end."""
+
+
+class CellCounts(Record):
+    """The cells, made from the readings and their shares; and scratch."""
+
+    hits: Annotated[Ints, CELLS, CELLS, DIRECTIONS]
+    """Echoes from each cell by looking direction, in parts of `WHOLE`."""
+    all_hits: Annotated[Ints, CELLS, CELLS]
+    """The same for all directions together."""
+    passes: Annotated[Ints, CELLS // 2, CELLS // 2, DIRECTIONS]
+    """Ranges that went on, in parts of `WHOLE_PASS`."""
+    all_passes: Annotated[Ints, CELLS // 2, CELLS // 2]
+    index: Annotated[Ints, CELLS, CELLS]
+    """One more than the number of the occupied cell at each place, 0 where there is none."""
+    marks: Annotated[Ints, SURFACE_CELLS_MAX]
+    """The last walk that met each occupied cell."""
+    walks: int
+    """Walks so far."""
+    order: Annotated[Ints, SURFACE_CELLS_MAX]
+    """The occupied cells, the strongest first."""
+    likelihoods: Annotated[Floats, SAMPLES]
+    near: Annotated[Ints, 441]
+    sums: Annotated[Floats, 12]
+    chain: Annotated[Ints, CHAIN_MAX]
+    """The cells of a polyline."""

@@ -1,0 +1,136 @@
+"""The surfaces found so far, those of the present local map and those behind, as rows that a snapshot holds."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.bounds import COUNT, SIGNED, Finite, Flag, Place, bounds
+from perception.kernel import Floats, Ints, kernel
+from perception.mapping.surfaces.parameters import AGREES_M
+from perception.records import Record, zeros
+
+
+class Surface(Record):
+    """A straight piece of surface, or a part of a polyline, in the method's frame."""
+
+    number: Annotated[int, SIGNED]
+    """The polyline's, in order of its parts; less than 0 of a straight piece, which may be a wall."""
+    is_live: Flag
+    """Whether it is of the present local map."""
+    x1: Place
+    y1: Place
+    x2: Place
+    y2: Place
+    variance_across: Finite
+    """Of its middle, across, m²."""
+    variance_turn: Finite
+    """Of its direction, rad²."""
+    echoes: Finite
+    evidence: Finite
+    """Log odds that something is there, nat."""
+
+
+ENDS: Final = ("x1", "y1", "x2", "y2")
+PLACES: Final = 5
+"""Places along a surface that are compared with others."""
+
+
+def ends_of(rows: NDArray[Any]) -> Floats:
+    """Return the ends x, y, x, y of surfaces, shape (n, 4), m."""
+    return np.column_stack([rows[name] for name in ENDS]).reshape(-1, 4)
+
+
+@kernel
+def find_near(points: Floats, ends: Floats, within: float, found: Ints) -> None:
+    """Write 1 for each point that lies near one of some segments, and leave the others as they are.
+
+    Parameters
+    ----------
+    points : (n, 2) float
+        m.
+    ends : (k, 4) float
+        Ends x, y, x, y of the segments, m.
+    within : float
+        m.
+    found : (n,) int
+        Updated.
+    """
+    for k in range(len(ends)):
+        ax, ay = ends[k, 0], ends[k, 1]
+        bx, by = ends[k, 2] - ax, ends[k, 3] - ay
+        squared = max(bx * bx + by * by, 1e-12)
+        low_x, high_x = min(ax, ends[k, 2]) - within, max(ax, ends[k, 2]) + within
+        low_y, high_y = min(ay, ends[k, 3]) - within, max(ay, ends[k, 3]) + within
+        for n in range(len(points)):
+            x, y = points[n, 0], points[n, 1]
+            if found[n] == 1 or not (low_x <= x <= high_x and low_y <= y <= high_y):
+                continue
+            t = min(max(((x - ax) * bx + (y - ay) * by) / squared, 0.0), 1.0)
+            dx, dy = x - ax - t * bx, y - ay - t * by
+            if dx * dx + dy * dy < within * within:
+                found[n] = 1
+
+
+def places_on(rows: NDArray[Any], count: int) -> Floats:
+    """Return places along surfaces, shape (n · count, 2), m."""
+    ends = ends_of(rows)
+    shares = (np.arange(count) + 0.5) / count
+    return (ends[:, None, :2] + shares[:, None] * (ends[:, None, 2:] - ends[:, None, :2])).reshape(-1, 2)
+
+
+def is_covered(rows: NDArray[Any], by: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which surfaces lie along others, shape (n,)."""
+    found = np.zeros(len(rows) * PLACES, np.int64)
+    find_near(places_on(rows, PLACES), ends_of(by), AGREES_M, found)
+    return np.asarray(found.reshape(len(rows), PLACES).all(axis=1))
+
+
+class SurfaceList:
+    """Rows of surfaces.
+
+    Attributes
+    ----------
+    archived_rows : (n,) record of Surface
+        All of them.
+    numbered : int
+        Pieces and polylines that have got a number.
+    """
+
+    BOUNDS: Final = bounds(archived_rows=Surface.BOUNDS, numbered=COUNT)
+
+    def __init__(self) -> None:
+        self.archived_rows = zeros(Surface, 0)
+        self.numbered = 0
+
+    @property
+    def live(self) -> NDArray[Any]:
+        """The surfaces of the present local map."""
+        return self._of(1)
+
+    @property
+    def left_behind(self) -> NDArray[Any]:
+        """The others."""
+        return self._of(0)
+
+    def _of(self, is_live: int) -> NDArray[Any]:
+        return np.asarray(self.archived_rows[self.archived_rows["is_live"] == is_live])
+
+    def replace_live(self, rows: NDArray[Any]) -> None:
+        """Replace those of the present local map; what they show anew is no longer among those left behind."""
+        behind = self.left_behind
+        shown = is_covered(rows, behind)
+        # What is as long as before stays as it is: a part that is heard again says less than the whole.
+        behind = behind[~is_covered(behind, rows)]
+        fresh = rows[~(shown & is_covered(rows, behind))]
+        self.archived_rows = np.concatenate([behind, fresh])
+
+    def leave(self) -> None:
+        """Leave all behind: another local map begins."""
+        self.archived_rows["is_live"] = 0
+
+    def clear(self) -> None:
+        """Forget everything but how many have got a number."""
+        self.archived_rows = zeros(Surface, 0)

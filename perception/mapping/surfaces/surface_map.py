@@ -1,0 +1,181 @@
+"""The map of surfaces, whatever their shape: walls in pieces, and polylines, an anytime algorithm.
+
+It is for places that are not made of the shapes of the models. Echoes are shared among the places on their arcs as
+the map explains them (`cells`), and the surest lines of occupied cells become walls, the rest polylines (`pieces`,
+`polylines`). Local maps hold the readings of a few metres of way; what was found in them stays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.model import ModelConfig
+from config.robot import RingConfig
+from config.settings import SurfacesConfig
+from drivers.messages import Firing
+from perception.bounds import bounds
+from perception.detected_object import DetectedObject
+from perception.kernel import Floats
+from perception.mapping.no_surfaces import NoSurfaces
+from perception.mapping.surfaces.beside_known import beside_known
+from perception.mapping.surfaces.local_map import LocalMapSearch
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_MIN_M
+from perception.mapping.surfaces.surface_list import Surface, SurfaceList
+from perception.polyline import Polyline
+from perception.records import zeros
+from perception.sensor_mounts import mounts_array, mounts_at
+
+HALF_ANGLE_MAX: Final = math.radians(45.0)
+CELL_SIGMA_M: Final = CELL_M / math.sqrt(12.0)
+RIVAL_RADII_M: Final = (0.107, 0.671)
+"""Radii of a post and of a barrel, as the Bayesian method compares them."""
+
+
+class SurfaceMap(NoSurfaces):
+    """Walls and polylines from all echoes, in the frame in which firings are given.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise: what one of the round ones explains better is no wall.
+    config : SurfacesConfig
+        The settings.
+    """
+
+    SCRATCH: Final = ("_known", "_report")
+    BOUNDS: Final = bounds()
+
+    def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: SurfacesConfig) -> None:
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
+        self._config = config
+        half = min(math.radians(ring.beam_half_angle_deg), HALF_ANGLE_MAX)
+        self._search = LocalMapSearch(half, ring.range_max_m, round_radii(models))
+        self._list = SurfaceList()
+        self._reach_m = {one.name: one.reach_m for one in models}
+        self._forget_derived()
+
+    def _forget_derived(self) -> None:
+        self._known: tuple[DetectedObject, ...] = ()
+        self._report: tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]] | None = None
+
+    @property
+    def can_refine(self) -> bool:
+        """Whether `refine` has anything to improve before the next firing."""
+        return self._search.quanta_left > 0 and self._search.is_due
+
+    @property
+    def converged(self) -> bool:
+        """Whether nothing is left to improve."""
+        return not self._search.is_due
+
+    def observe(self, firing: Firing) -> None:
+        """Take a firing; its readings are entered by `refine`."""
+        x, y = float(firing.pose.x), float(firing.pose.y)
+        if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(firing.ring_yaw)):
+            return
+        if self._search.has_left(x, y):
+            self._list.leave()
+            self._search.begin_at(x, y)
+        self._search.keep(firing, mounts_at(firing, self._mounts, self._turning))
+        self._search.quanta_left = self._config.quanta_per_firing
+
+    def refine(self) -> int:
+        """Do one quantum of refinement; return 1."""
+        self._search.quanta_left -= 1
+        if self._search.refine():
+            self._take_over()
+        return 1
+
+    def finish(self) -> None:
+        """Refine until nothing is left, and search with the last readings: at the end of a log there is time."""
+        if self._search.finish():
+            self._take_over()
+
+    def _take_over(self) -> None:
+        self._list.replace_live(self._found())
+        self._forget_derived()
+
+    def _found(self) -> NDArray[Any]:
+        """Return the surfaces of the search that has just ended, as records of `Surface`."""
+        pieces = self._search.pieces()
+        pieces = pieces[pieces["high"] - pieces["low"] >= PIECE_MIN_M]
+        x, y = self._search.centre
+        rows = zeros(Surface, len(pieces))
+        for end, along in (("1", pieces["low"]), ("2", pieces["high"])):
+            rows[f"x{end}"] = x + pieces["x"] + along * pieces["ux"]
+            rows[f"y{end}"] = y + pieces["y"] + along * pieces["uy"]
+        middle = 0.5 * (pieces["low"] + pieces["high"])
+        rows["variance_turn"] = pieces["variance_turn"]
+        rows["variance_across"] = pieces["variance_across"] + middle**2 * pieces["variance_turn"]
+        rows["echoes"], rows["evidence"] = pieces["echoes"], pieces["evidence"]
+        rows["number"] = -(self._list.numbered + 1 + np.arange(len(rows)))
+        self._list.numbered += len(rows)
+        parts = [rows, *(self._polyline_rows(cells) for cells in self._search.chains())]
+        found = np.concatenate(parts)
+        found["is_live"] = 1
+        return found
+
+    def _polyline_rows(self, cells: NDArray[Any]) -> NDArray[Any]:
+        """Return the parts of a polyline through the middles of cells, as records of `Surface`."""
+        x, y = self._search.centre
+        xs = x + (cells["i"] + 0.5 - 0.5 * CELLS) * CELL_M
+        ys = y + (cells["j"] + 0.5 - 0.5 * CELLS) * CELL_M
+        if len(cells) == 1:  # the cell's own extent
+            xs, ys = np.array([xs[0] - 0.5 * CELL_M, xs[0] + 0.5 * CELL_M]), np.repeat(ys, 2)
+        rows = zeros(Surface, len(xs) - 1)
+        self._list.numbered += 1
+        rows["number"] = self._list.numbered
+        rows["x1"], rows["x2"], rows["y1"], rows["y2"] = xs[:-1], xs[1:], ys[:-1], ys[1:]
+        rows["variance_across"] = CELL_SIGMA_M**2
+        rows["echoes"] = float(cells["strength"].mean())
+        rows["evidence"] = rows["echoes"]
+        return rows
+
+    def report(
+        self, known: Callable[[], tuple[DetectedObject, ...]]
+    ) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
+        """Return walls and polylines beside what the method reports; the same tuples until they change.
+
+        Parameters
+        ----------
+        known : callable
+            Returns what the method reports.
+        """
+        objects = known()
+        if self._report is None or objects != self._known:
+            self._known, self._report = objects, beside_known(self._list.archived_rows, objects, self._reach_m)
+        return self._report
+
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
+        """Compare with the round ones of these models."""
+        self._search.radii = round_radii(models)
+        self._reach_m = {one.name: one.reach_m for one in models}
+        self._forget_derived()
+
+    def apply_settings(self, config: SurfacesConfig) -> None:
+        """Use other settings."""
+        self._config = config
+
+    def drop_caches(self) -> None:
+        """Derive anew what depends on the memory, after it was overwritten."""
+        self._search.drop_caches()
+        self._forget_derived()
+
+    def clear(self) -> None:
+        """Forget everything, as after a reset of the odometry."""
+        self._search.clear()
+        self._list.clear()
+        self._forget_derived()
+
+
+def round_radii(models: Sequence[ModelConfig]) -> Floats:
+    """Return the radii of the round models, and of what is round besides, m."""
+    radii = {one.arc_radius_m for one in models if one.arc_radius_m is not None}
+    return np.array(sorted({*RIVAL_RADII_M, *radii}), np.float64)

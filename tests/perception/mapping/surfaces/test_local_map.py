@@ -1,0 +1,67 @@
+"""The readings of a local map: which are kept, and when another map begins."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.messages import Firing, Pose
+from perception.mapping.surfaces.local_map import SILENCE, LocalMapSearch
+from perception.mapping.surfaces.parameters import LEFT_M, LEFT_MAX_M, READINGS_MAX, SPACING_M
+
+pytestmark = pytest.mark.compiled
+MOUNTS = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 1.5]])
+
+
+def search() -> LocalMapSearch:
+    return LocalMapSearch(math.radians(12.0), 5.0, np.array([0.3]))
+
+
+def fire(at: LocalMapSearch, x: float, y: float = 0.0, ranges: tuple[float, ...] = (2.0, math.inf)) -> None:
+    at.keep(Firing(0.0, Pose(x, y, 0.0), 0.0, np.array(ranges)), MOUNTS)
+
+
+def test_a_sensor_that_has_moved_is_kept() -> None:
+    ours = search()
+    fire(ours, 1.0)
+    fire(ours, 1.0 + 0.5 * SPACING_M)
+    assert ours.room[0].count == 2
+    fire(ours, 1.0 + 1.1 * SPACING_M, ranges=(math.nan, 1.0))
+    assert ours.room[0].count == 3
+    readings = ours.local["readings"][0, :3]
+    np.testing.assert_allclose(readings["x"], [0.1, 0.0, 1.1 * SPACING_M])
+    np.testing.assert_allclose(readings["range_m"], [2.0, SILENCE, 1.0])
+    assert ours.centre == (1.0, 0.0)
+
+
+def test_another_map_begins_with_the_readings_from_around_its_centre() -> None:
+    ours = search()
+    for k in range(300):
+        fire(ours, 0.05 * k)
+    assert not ours.has_left(LEFT_M - 0.1, 0.0)
+    assert not ours.has_left(LEFT_M + 0.1, 0.0)  # it is searched first
+    assert ours.has_left(LEFT_MAX_M + 0.1, 0.0)
+    before = int(ours.room[0].count)
+    ours.begin_at(15.0, 0.0)
+    kept = ours.local["readings"][0, : int(ours.room[0].count)]
+    assert 0 < len(kept) < before
+    assert np.abs(kept["x"]).max() < 16.0
+    assert ours.centre == (15.0, 0.0)
+    assert ours.is_due
+    ours.finish()
+    assert ours.room[0].entered == len(kept)
+
+
+def test_a_full_map_takes_no_more_and_another_one_begins() -> None:
+    ours = search()
+    for k in range(READINGS_MAX):
+        fire(ours, 0.03 * (k % 100), 0.03 * (k // 100))
+    assert ours.room[0].count == READINGS_MAX
+    assert not ours.has_left(*ours.centre)
+    while ours.is_due:
+        ours.refine()
+    assert ours.has_left(*ours.centre)
+    ours.clear()
+    assert not ours.is_due

@@ -1,0 +1,81 @@
+"""Straight pieces that grow in cells: along a wall, not over a doorway, and to where the wall is surely there."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, WHOLE
+from perception.mapping.surfaces.pieces import capture, grow_all, offset_of
+from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
+from perception.records import Records, records, zeros
+
+pytestmark = pytest.mark.compiled
+
+
+def mapped(points: NDArray[Any], echoes: float = 3.0) -> tuple[Records[LocalMap], NDArray[Any], NDArray[Any]]:
+    """Return a map, in two views, whose cells at some places (m from the centre) have been heard, and its counts."""
+    counts, local = zeros(CellCounts, 1), zeros(LocalMap, 1)
+    for x, y in points:
+        i, j = math.floor(x / CELL_M) + CELLS // 2, math.floor(y / CELL_M) + CELLS // 2
+        for b in range(DIRECTIONS // 2):
+            counts["hits"][0, i, j, b] = int(echoes * WHOLE / 3)
+        counts["all_hits"][0, i, j] = int(echoes * WHOLE / 3) * (DIRECTIONS // 2)
+    room, seen = records(LocalMap, local), records(CellCounts, counts)
+    capture(room[0], seen[0], 2, CELLS - 2)
+    count = int(local["cell_count"][0])
+    counts["order"][0, :count] = np.argsort(-local["cells"]["strength"][0, :count], kind="stable")
+    return room, local, counts
+
+
+def grown(points: NDArray[Any]) -> NDArray[Any]:
+    """Return the pieces in such a map, the longest first."""
+    room, local, counts = mapped(points)
+    assert grow_all(room[0], records(CellCounts, counts)[0], 10_000) < 10_000
+    found = local["pieces"][0, : int(local["piece_count"][0])]
+    longest: NDArray[Any] = found[np.argsort(found["low"] - found["high"])]
+    return longest
+
+
+def line(x1: float, y1: float, x2: float, y2: float) -> NDArray[Any]:
+    shares = np.linspace(0.0, 1.0, 1 + int(math.hypot(x2 - x1, y2 - y1) / 0.02))[:, None]
+    return np.asarray(np.array([x1, y1]) + shares * (np.array([x2, y2]) - np.array([x1, y1])))
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.0, 1.6, 2.5])
+def test_a_wall_is_one_piece_with_its_ends(turn: float) -> None:
+    ends = np.array([[-1.5, 0.4], [1.3, 0.4]]) @ np.array(
+        [[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]
+    )
+    pieces = grown(line(*ends.ravel()))
+    assert len(pieces) == 1
+    piece = pieces[0]
+    assert piece["high"] - piece["low"] == pytest.approx(2.8, abs=0.1)
+    off = (ends - (piece["x"], piece["y"])) @ np.array([-piece["uy"], piece["ux"]])
+    assert np.abs(off).max() < 0.03
+
+
+def test_a_doorway_parts_a_wall_and_a_corner_parts_two() -> None:
+    pieces = grown(np.concatenate([line(-2.0, 0.0, -0.4, 0.0), line(0.4, 0.0, 2.0, 0.0), line(2.0, 0.0, 2.0, 1.5)]))
+    assert len(pieces) == 3
+    np.testing.assert_allclose(pieces["high"] - pieces["low"], [1.6, 1.6, 1.5], atol=0.15)
+
+
+def test_parallel_surfaces_ten_centimetres_apart_are_two() -> None:
+    pieces = grown(np.concatenate([line(-1.0, 0.0, 1.0, 0.0), line(-0.3, 0.15, 0.9, 0.15)]))
+    np.testing.assert_allclose(pieces["high"] - pieces["low"], [2.0, 1.2], atol=0.15)
+
+
+def test_a_few_cells_are_no_piece() -> None:
+    room, local, counts = mapped(line(0.0, 0.0, 0.12, 0.0))
+    grow_all(room[0], records(CellCounts, counts)[0], 100)
+    assert local["piece_count"][0] == 0
+    assert (local["cells"]["owner"][0, : int(local["cell_count"][0])] == FREE).all()
+
+
+def test_places_of_cells() -> None:
+    assert offset_of(CELLS // 2) == pytest.approx(0.5 * CELL_M)

@@ -1,0 +1,52 @@
+"""Polylines through cells that no piece has taken."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.mapping.surfaces.parameters import CELL_M, LINK_M, NODE_M
+from perception.mapping.surfaces.polylines import chain_all, choose_nodes
+from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts
+from perception.records import records
+from tests.perception.mapping.surfaces.test_pieces import mapped
+
+pytestmark = pytest.mark.compiled
+
+
+def chains(points: np.ndarray) -> list[np.ndarray]:
+    """Return the polylines through places that were heard, as places (m)."""
+    room, local, counts = mapped(points)
+    view, count = records(CellCounts, counts)[0], int(local["cell_count"][0])
+    choose_nodes(room[0], view, 0, count)
+    assert (local["cells"]["owner"][0, :count] == NODE).any()
+    chain_all(room[0], view, 0, count)
+    numbers = local["chains"][0, : int(local["chained"][0])]
+    cells = local["cells"][0]
+    parts = [part[part > 0] - 1 for part in np.split(numbers, np.flatnonzero(numbers == 0) + 1)]
+    assert (cells["owner"][:count] != NODE).all()
+    return [np.column_stack([cells["i"][p], cells["j"][p]]) * CELL_M for p in parts if len(p)]
+
+
+def test_a_bend_is_one_polyline_in_order() -> None:
+    angles = np.linspace(0.0, 2.0, 200)
+    found = chains(np.column_stack([np.cos(angles), np.sin(angles)]))
+    assert len(found) == 1
+    steps = np.hypot(*np.diff(found[0], axis=0).T)
+    assert (steps >= NODE_M - 1e-9).all()
+    assert (steps <= LINK_M + CELL_M).all()
+    assert steps.sum() == pytest.approx(2.0, abs=0.3)
+
+
+def test_objects_apart_are_polylines_apart() -> None:
+    found = chains(np.array([[0.0, 0.0], [1.0, 1.0], [1.1, 1.05], [3.0, -2.0]]))
+    assert sorted(len(one) for one in found) == [1, 1, 2]
+
+
+def test_a_long_outline_is_cut() -> None:
+    along = np.arange(0.0, 0.1 * (CHAIN_MAX + 20), 0.02)
+    found = chains(np.column_stack([along - 4.0, 0.2 * np.sin(3.0 * along)]))
+    assert max(len(one) for one in found) <= CHAIN_MAX
+    assert math.isclose(FREE, -1)

@@ -1,0 +1,49 @@
+"""Surfaces that replace others, and points near segments against plain geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from perception.mapping.surfaces.surface_list import ENDS, Surface, SurfaceList, find_near, is_covered
+from perception.records import zeros
+
+
+def rows(*ends: tuple[float, float, float, float]) -> np.ndarray:
+    """Return surfaces between these ends, of the present local map."""
+    made = zeros(Surface, len(ends))
+    for row, end in zip(made, ends, strict=True):
+        for name, value in zip(ENDS, end, strict=True):
+            row[name] = value
+    made["is_live"] = 1
+    return made
+
+
+def test_points_near_segments() -> None:
+    rng = np.random.default_rng(2)
+    points, ends = rng.uniform(-2.0, 2.0, (200, 2)), rng.uniform(-2.0, 2.0, (7, 4))
+    found = np.zeros(200, np.int64)
+    find_near(points, ends, 0.3, found)
+    shares = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    dense = ends[:, :2] + shares * (ends[:, 2:] - ends[:, :2])
+    nearest = np.array([np.hypot(*(dense - point).reshape(-1, 2).T).min() for point in points])
+    clear = np.abs(nearest - 0.3) > 2e-3
+    np.testing.assert_array_equal(found[clear] == 1, (nearest < 0.3)[clear])
+
+
+def test_a_surface_is_covered_by_a_longer_one_only() -> None:
+    long, short = rows((0.0, 0.0, 3.0, 0.0)), rows((1.0, 0.05, 1.5, 0.05))
+    assert is_covered(short, long).tolist() == [True]
+    assert is_covered(long, short).tolist() == [False]
+    assert is_covered(short, rows()).tolist() == [False]
+
+
+def test_what_is_left_behind_stays_until_it_is_seen_anew() -> None:
+    listed = SurfaceList()
+    listed.replace_live(rows((0.0, 0.0, 3.0, 0.0), (5.0, 0.0, 5.0, 2.0)))
+    assert len(listed.live) == 2
+    listed.leave()
+    listed.replace_live(rows((1.0, 0.02, 1.4, 0.02), (4.9, -0.1, 5.05, 2.2)))
+    assert listed.left_behind["x2"].tolist() == [3.0]  # a part of it that is heard again says less
+    assert listed.live["x1"].tolist() == [4.9]  # this one shows the second wall whole
+    listed.clear()
+    assert len(listed.archived_rows) == 0

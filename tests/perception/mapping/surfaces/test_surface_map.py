@@ -1,0 +1,155 @@
+"""The map of surfaces in rooms that are generated here, and as a part of perception: exact continuation, standing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.messages import Firing, Pose
+from perception.mapping.surfaces.surface_map import SurfaceMap
+from perception.pipeline import Perception
+
+pytestmark = pytest.mark.compiled
+
+WALLS = np.array([(-3.0, -2.0, 3.0, -2.0), (3.0, -2.0, 3.0, 2.0), (3.0, 2.0, 0.5, 2.0), (-0.5, 2.0, -3.0, 2.0),
+                  (-3.0, 2.0, -3.0, -2.0), (0.4, 0.2, 0.7, 0.2)])  # fmt: skip
+"""A room with a doorway, and a box's side in it."""
+SIDES = 12
+HALF = math.radians(12.0)
+
+
+def perception_settings() -> Settings:
+    """Return settings with a ring of twelve sensors, without models, that map surfaces always."""
+    loaded = load_settings()
+    sensors = [{"x_m": 0.0, "y_m": 0.0, "angle_deg": 360.0 / SIDES * k} for k in range(SIDES)]
+    ring = loaded.ring.model_validate(
+        {
+            "sensors": sensors,
+            "beam_half_angle_deg": 12.0,
+            "resolution_m": 0.01,
+            "range_min_m": 0.1,
+            "range_max_m": 5.0,
+        }
+    )
+    return loaded.model_copy(update={"ring": ring, "models": (), "perception": loaded.perception.of_log()})
+
+
+def hear(pose: Pose) -> np.ndarray:
+    """Return the range to the nearest point of the walls in each beam, in whole centimetres."""
+    shares = np.linspace(0.0, 1.0, 400)[:, None, None]
+    points = (WALLS[:, :2] + shares * (WALLS[:, 2:] - WALLS[:, :2])).reshape(-1, 2) - (pose.x, pose.y)
+    away, bearing = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
+    ranges = np.full(SIDES, math.inf)
+    for k in range(SIDES):
+        off = np.abs(np.angle(np.exp(1j * (bearing - pose.theta - 2.0 * math.pi * k / SIDES))))
+        if (off < HALF).any():
+            ranges[k] = round(float(away[off < HALF].min()), 2)
+    return ranges
+
+
+def drive(count: int, begin: int = 0) -> list[Firing]:
+    """Return firings on a way through the room, seven centimetres apart."""
+    firings = []
+    for n in range(begin, begin + count):
+        a = 0.05 * n
+        pose = Pose(1.8 * math.cos(a), 1.1 * math.sin(a), a + 1.5)
+        firings.append(Firing(0.1 * n, pose, pose.theta, hear(pose)))
+    return firings
+
+
+def run(perception: Perception, firings: list[Firing]) -> None:
+    for firing in firings:
+        perception.observe(firing)
+        while perception.can_refine and perception.refine():
+            pass
+
+
+@pytest.fixture(scope="module")
+def driven() -> Perception:
+    settings = perception_settings()
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    run(perception, drive(130))
+    perception.surfaces.finish()
+    return perception
+
+
+def test_walls_and_what_is_not_one_are_mapped(driven: Perception) -> None:
+    """Each wall is reported along most of its length, the doorway stays open, and the box's side is on the map."""
+    walls = [seen.ends for seen in driven.labelled_objects() if seen.ends is not None]
+    parts = [np.column_stack([one.points[:-1], one.points[1:]]) for one in driven.polylines()]
+    pieces = np.concatenate([np.array(walls).reshape(-1, 4), *parts])
+    shares = np.linspace(0.0, 1.0, 50)[:, None, None]
+    mapped = (pieces[:, :2] + shares * (pieces[:, 2:] - pieces[:, :2])).reshape(-1, 2)
+    for wall in WALLS:
+        along = wall[:2] + np.linspace(0.05, 0.95, 60)[:, None] * (wall[2:] - wall[:2])
+        nearest = np.hypot(*(along[:, None] - mapped).transpose(2, 0, 1)).min(axis=1)
+        assert (nearest < 0.1).mean() > 0.8, wall
+    assert np.hypot(*(mapped - (0.0, 2.0)).T).min() > 0.15
+
+
+def test_a_robot_that_stands_adds_nothing(driven: Perception) -> None:
+    assert isinstance(driven.surfaces, SurfaceMap)
+    search = driven.surfaces._search
+    firing = drive(1, 129)[0]
+    before = int(search.room[0].count)
+    for _ in range(5):
+        driven.observe(firing)
+    assert search.room[0].count <= before + SIDES
+    assert not search._search_is_due
+
+
+def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
+    """At many moments: while readings are entered, shared again, and in each step of a search."""
+    settings = perception_settings()
+    ours = Perception(settings.ring, settings.models, settings.perception)
+    steps = set()
+    for k, firing in enumerate(drive(60)):
+        ours.observe(firing)
+        assert isinstance(ours.surfaces, SurfaceMap)
+        for _ in range(40):
+            if ours.can_refine:
+                ours.refine()
+                steps.add(int(ours.surfaces._search.room[0].phase))
+        if k % 6 == 5:
+            other = Perception(settings.ring, settings.models, settings.perception)
+            other.restore(ours.snapshot())
+            for later in drive(3, k + 1):
+                for one in (ours, other):
+                    one.observe(later)
+                    while one.can_refine:
+                        one.refine()
+            mine, theirs = ours.snapshot(), other.snapshot()
+            for name, array in mine.items():
+                assert array.tobytes() == theirs[name].tobytes(), name
+            assert ours.polylines() == () or len(ours.polylines()) == len(other.polylines())
+    assert len(steps) >= 4
+
+
+def test_a_robot_that_goes_away_begins_another_local_map_and_keeps_what_it_found() -> None:
+    settings = perception_settings()
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    run(perception, drive(130))
+    perception.surfaces.finish()
+    surfaces = perception.surfaces
+    assert isinstance(surfaces, SurfaceMap)
+    before = len(surfaces._list.live)
+    silent = np.full(SIDES, math.inf)
+    run(perception, [Firing(20.0 + k, Pose(0.5 * k, 0.0, 0.0), 0.0, silent) for k in range(40)])
+    assert before > 0
+    assert len(surfaces._list.left_behind) > 0.9 * before
+    assert surfaces._search.centre[0] > 9.0
+
+
+def test_nothing_is_mapped_in_a_run_unless_the_settings_say_so() -> None:
+    settings = load_settings()
+    assert Perception(settings.ring, settings.models, settings.perception).polylines() == ()
+    made = Perception(settings.ring, settings.models, settings.perception.of_log())
+    assert isinstance(made.surfaces, SurfaceMap)
+    made.observe(Firing(0.0, Pose(math.nan, 0.0, 0.0), 0.0, np.full(len(settings.ring.mounts), 1.0)))
+    assert made.polylines() == ()
+    made.reset()
+    assert made.surfaces.converged
