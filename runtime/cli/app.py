@@ -17,6 +17,7 @@ from cyclopts import App, CycloptsError, Group
 from config.errors import DONE, WRONG_CALL, UserError
 from config.files import noting_files_read, one_line
 from runtime.cli.first_signals import EXIT_CODE_BASE
+from runtime.cli.standard_streams import ReaderGoneError
 from runtime.cli.start_signals import ending_in_order
 
 COMMANDS: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType({
@@ -123,7 +124,7 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         with ending_in_order():
             code = run_command(sys.argv[1:] if arguments is None else arguments)
-    except BrokenPipeError:  # the reader of the pipe has what it wants, as `head` does
+    except ReaderGoneError:
         code = DONE
     sys.exit(code)
 

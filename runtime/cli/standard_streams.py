@@ -24,6 +24,13 @@ ESCAPED: Final = "backslashreplace"
 """How characters are written that the stream's character set does not have."""
 
 
+class ReaderGoneError(Exception):
+    """The reader of standard output has what it wants, as `head` does.
+
+    It is no BrokenPipeError, at which rich ends the program as failed.
+    """
+
+
 class StandardOutput(io.TextIOWrapper):
     """Standard output, which reports why it cannot be written."""
 
@@ -32,7 +39,7 @@ class StandardOutput(io.TextIOWrapper):
 
         Raises
         ------
-        BrokenPipeError
+        ReaderGoneError
             The reader has gone.
         UserError
             Standard output cannot be written for another reason.
@@ -52,7 +59,7 @@ class StandardOutput(io.TextIOWrapper):
         except OSError as error:
             redirect_to_null(self.fileno())  # Python flushes once more at exit
             if isinstance(error, BrokenPipeError):
-                raise
+                raise ReaderGoneError from None
             raise UserError(
                 f"standard output cannot be written: {error.strerror}; make room or redirect it elsewhere", FAILED
             ) from None

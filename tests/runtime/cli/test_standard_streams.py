@@ -57,6 +57,18 @@ def test_a_stream_that_takes_nothing_changes_no_exit_code(redirection: str, argu
     assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
 
 
+@pytest.mark.parametrize("arguments", ["-m runtime.cli settings", "-m runtime.cli --help", CHECK])
+def test_a_reader_that_has_what_it_wants_is_no_failure(arguments: str) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, *arguments.split()], env=child_environment(), stdout=write, stderr=subprocess.PIPE,
+        timeout=600, check=False,
+    )  # fmt: skip
+    os.close(write)
+    assert (done.returncode, done.stderr) == (DONE, b"")
+
+
 def test_a_pipe_that_is_never_read_holds_no_end() -> None:
     """The pipe is full before the call, and stays so."""
     read, write = os.pipe()
