@@ -266,14 +266,14 @@ class ArcosDevice(EventDevice):
 
     def _report(self) -> None:
         """Send a SIP with the ranges heard since the last one, and the packets that go with it."""
-        front, rear, stalled = self._touched()
+        touched = self._touched()
         known = self._readings.take(self._now_us)
         sip = make_sip(
-            self._body, self._firmware, self._requested, front=front, rear=rear, stalled=stalled,
+            self._body, self._firmware, self._requested, touched=touched,
             battery=self._volts(), stop=self._faults.has(StopButton), arrays=self._arrays.flags,
-            sonar=known[-SONAR_MAX:], motors=self._servo.enabled, heading_goal=self._servo.heading_goal,
+            sonar=known[-SONAR_MAX:], servo=self._servo,
         )  # fmt: skip
-        for packet in (sip, *self._requested.due(self._body, self._firmware, front, rear)):
+        for packet in (sip, *self._requested.due(self._body, self._firmware, *touched[:2])):
             self._send(packet)
 
     def _volts(self) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from drivers.arcos.commands import Command, CommandNumber
+from drivers.arcos.device_motion import MotionServo
 from drivers.arcos.firmware import Firmware
 from drivers.arcos.frames import (
     SIP_MOVING,
@@ -84,15 +85,12 @@ def make_sip(
     firmware: Firmware,
     settings: RequestedPackets,
     *,
-    front: int,
-    rear: int,
-    stalled: bool,
+    touched: tuple[int, int, bool],
     battery: int,
     stop: bool,
     arrays: int,
     sonar: Sequence[SonarReading],
-    motors: bool,
-    heading_goal: float | None,
+    servo: MotionServo,
 ) -> Sip:
     """Return the SIP.
 
@@ -104,10 +102,8 @@ def make_sip(
         Factors.
     settings
         What else clients have set.
-    front, rear
-        Pressed segments of the bumpers: bit k is segment k.
-    stalled
-        Whether the wheels stall.
+    touched
+        Pressed segments of the front and the rear bumper, bit k is segment k; and whether the wheels stall.
     battery
         0.1 V.
     stop
@@ -116,17 +112,16 @@ def make_sip(
         Bits of the sonar arrays that are on, as in the flags.
     sonar
         The ranges since the last SIP.
-    motors
-        Whether the motors are enabled.
-    heading_goal
-        Goal of the rotation, rad by odometry; None for the present heading.
+    servo
+        Whether the motors are enabled, and the goal of the rotation.
     """
     pose, twist = body.odometry_pose, body.twist
+    (front, rear, stalled), heading_goal = touched, servo.heading_goal
     half = twist.w / firmware.rad_s_per_mm_s
     left, right = (int((1e3 * twist.v + side * half) / firmware.mm_s_per_count) for side in (-1, 1))
     moving = twist.v != 0.0 or twist.w != 0.0
     flags = arrays | SipFlags.POWER_GOOD
-    flags |= SipFlags.MOTORS_ENABLED * motors | SipFlags.STOP_BUTTON * stop
+    flags |= SipFlags.MOTORS_ENABLED * servo.enabled | SipFlags.STOP_BUTTON * stop
     return Sip(
         SIP_MOVING if moving else SIP_STOPPED,
         _signed(round(1e3 * pose.x / firmware.mm_per_count), 16),

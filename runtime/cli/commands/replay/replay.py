@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from config.errors import WRONG_CALL, UserError
-from runtime.cli.options import Flag, Force, JsonFile, ModelFiles, RobotFile, Sets, UnitsOption
+from runtime.cli.options import Flag, Force, JsonFile, ModelFiles, ReplayOptions, RobotFile, Sets, UnitsOption
 from runtime.cli.source_options import LogOptions
 from runtime.recording.conventions.options import AUTO
 
@@ -79,6 +79,7 @@ def replay(
     """
     from runtime.recording.reader import is_recording
 
+    common = ReplayOptions(sets, robot, model, json, force, units)
     if trajectory is not None and not localize:
         raise UserError("--trajectory gives poses in the map frame: give --localize too", WRONG_CALL)
     if map_file is not None and not localize:
@@ -89,10 +90,7 @@ def replay(
         options.refuse_for(log)
         from runtime.cli.commands.replay.replay_recording import Span, replay_recording
 
-        return replay_recording(
-            log, sets, span=Span(since, until, speed), verify=verify, other=other, robot=robot, models=model,
-            json_file=json, force=force, units=units,
-        )  # fmt: skip
+        return replay_recording(log, common, span=Span(since, until, speed), verify=verify, other=other)
     if verify or other is not None or since or until is not None or speed is not None:
         raise UserError(
             f"{log}: is a ring log; --verify, --with, --from, --to and --speed apply to recordings (MCAP) only",
@@ -100,7 +98,4 @@ def replay(
         )
     from runtime.cli.commands.replay.replay_ring_log import replay_log
 
-    return replay_log(
-        log, sets, robot=robot, models=model, json_file=json, force=force, units=units, localize=localize,
-        trajectory=trajectory, map_file=map_file, options=options,
-    )  # fmt: skip
+    return replay_log(log, common, localize=localize, trajectory=trajectory, map_file=map_file, options=options)

@@ -16,6 +16,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.options import ReplayOptions
 from runtime.cli.tables import objects_table, polylines_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
@@ -62,23 +63,20 @@ class Span:
 
 def replay_recording(
     log: str,
-    sets: Sequence[str],
+    common: ReplayOptions,
     *,
     span: Span,
     verify: bool,
     other: str | None,
-    robot: str | None,
-    models: Sequence[str],
-    json_file: str | None,
-    force: bool,
-    units: Units,
 ) -> int:
     """Replay a recording, print the outcome and return the exit code.
 
     Parameters
     ----------
-    log, sets, verify, other, robot, models, json_file, force, units
+    log, verify, other
         As of `runtime.cli.commands.replay.replay.replay`.
+    common
+        What a ring log is given, too.
     span : Span
         The part to replay.
 
@@ -90,6 +88,7 @@ def replay_recording(
     from runtime.recording.reader import open_recording
 
     span.validate()
+    sets, robot, models, json_file = common.sets, common.robot, common.models, common.json_file
     has_other_settings = other is not None or bool(sets) or bool(models) or robot is not None
     is_part = span != Span(0.0, None, None)
     for option, is_given in (
@@ -104,9 +103,9 @@ def replay_recording(
     with open_recording(Path(log)) as recording:
         if has_other_settings:
             settings = other_settings(recording, other, sets, robot=robot, models=models)
-            return compare_with_settings(recording, settings, console, units)
-        check_outputs({"--json": json_file}, (log,), force=force)
-        return replay_again(recording, console, span=span, verify=verify, json_file=json_file, units=units)
+            return compare_with_settings(recording, settings, console, common.units)
+        check_outputs({"--json": json_file}, (log,), force=common.force)
+        return replay_again(recording, console, span=span, verify=verify, json_file=json_file, units=common.units)
 
 
 def other_settings(

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from config.errors import DONE
 from config.load import load_settings, with_known_room
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.cli.options import ReplayOptions
 from runtime.cli.tables import objects_table, polylines_line, pose_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import write_json
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts
 from runtime.support.kernel_warmup import prepare_kernels
-from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
 TRAJECTORY_HEADER: Final = "t,x,y,theta,sxx,sxy,syy,stt,status"
@@ -27,13 +27,8 @@ if TYPE_CHECKING:
 
 def replay_log(
     log: str,
-    sets: Sequence[str],
+    common: ReplayOptions,
     *,
-    robot: str | None,
-    models: Sequence[str],
-    json_file: str | None,
-    force: bool,
-    units: Units,
     localize: bool = False,
     trajectory: str | None = None,
     map_file: str | None = None,
@@ -43,14 +38,17 @@ def replay_log(
 
     Parameters
     ----------
-    log, sets, robot, models, json_file, force, units, localize, trajectory, map_file, options
+    log, localize, trajectory, map_file, options
         As of `runtime.cli.commands.replay.replay.replay`.
+    common
+        What a recording is given, too.
     """
-    settings = load_settings(None, sets, robot=robot, models=models).of_log()
+    json_file, units = common.json_file, common.units
+    settings = load_settings(None, common.sets, robot=common.robot, models=common.models).of_log()
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file, "--trajectory": trajectory}, (log,), force=force)
+    check_outputs({"--json": json_file, "--trajectory": trajectory}, (log,), force=common.force)
     corrects_drift = localize and map_file is None
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.conventions.reading import open_ring_log
