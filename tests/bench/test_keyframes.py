@@ -17,6 +17,7 @@ from bench.keyframes import (
     Adopted,
     adopt_all,
     main,
+    once,
     runs,
     settings_of,
     shares_after,
@@ -31,8 +32,7 @@ pytestmark = pytest.mark.compiled
 SHORT_S = 6.0
 HOUR_S = 3600.0
 ROWS = tuple(runs())
-SHORT = tuple(ROWS[len(ROBOTS) * (r // 4) + r] for r in range(len(ROBOTS)))
-"""Each robot once, and all methods, grids, ways of localisation and worlds among them."""
+SHORT = tuple(once())
 
 
 def check(found: Adopted, seconds: float, period_s: float) -> None:
@@ -44,7 +44,13 @@ def test_any_two_values_meet_in_a_run() -> None:
     factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS)
     for (i, some), (j, others) in itertools.combinations(enumerate(factors), 2):
         assert {(row[i], row[j]) for row in ROWS} == set(itertools.product(some, others))
+
+
+def test_each_robot_drives_once_and_every_method_meets_every_grid() -> None:
+    factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS)
+    assert tuple(run.robot for run in SHORT) == ROBOTS
     assert [set(column) for column in zip(*SHORT, strict=True)] == [set(values) for values in factors]
+    assert {(run.method, run.grid) for run in SHORT} == set(itertools.product(METHODS, GRIDS))
 
 
 @pytest.mark.parametrize("seed", range(len(SHORT)))
