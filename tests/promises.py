@@ -41,9 +41,9 @@ LIMITS: Sequence[str] = (
     "of the room contradicts them; without one, only a bumper stops the robot.",
     "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "
     "which the robot drives goes on, and one that turns into it has never heard that part.",
-    "Echoes of an earlier drive that fit the present one: replays in a corridor along its walls, or of a drive like "
-    "this one. They change as the motion says, and what returns to an earlier place are a few sensors ahead and "
-    "behind.",
+    "Echoes of an earlier drive that fit the present one, until they come again: replays in a corridor along its "
+    "walls, or of a drive like this one. They change as the motion says, and what returns to an earlier place are a "
+    "few sensors ahead and behind. When they come again they are equal to the bit.",
     "A ring that is mounted turned by a small angle, or two sensors exchanged, until the objects that result are "
     "seen to be wrong: measure it with `echolocate calibrate`. So is one of eight sensors or fewer that is turned.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "

@@ -28,6 +28,8 @@ from perception.kernel import Floats, kernel
 from perception.obstacle_echoes.blind_walls import BlindWalls, has_blind_sides
 from perception.obstacle_echoes.unheard_echoes import (
     ALONE,
+    SILENT,
+    UNCHANGED,
     UnheardEcho,
     UnheardEchoes,
     contradict_echoes,
@@ -276,8 +278,8 @@ class FreshEchoes:
             firing.ranges_m, mounts, x, y, yaw, core, self._heard_reach_m, self._radius_m, self._agreed,
             self.unheard.records, self.unheard.silences,
         )  # fmt: skip
-        if self.unheard.falls_silent:
-            since = float(firing.robot_s) - STEADY_S
+        if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
+            since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
             keep_sudden(self._points, self._times, self._heard, since, x, y, self.unheard.records)
         if self._blind_walls is not None:
             self._blind_walls.update(firing)

@@ -8,7 +8,8 @@ the ring stands on it. Echoes of the same surface in other directions contradict
 robot that stands has left, and is not kept.
 
 While no sensor hears anything, the ring itself may have failed: several echoes that are lost in such a silence are
-kept, even if the robot stood or turned on the spot.
+kept, even if the robot stood or turned on the spot. A sensor that has moved and repeats its reading to the bit may
+not have heard it, so it does not end such a silence: some sensors of a frozen ring repeat an echo, others silence.
 """
 
 from __future__ import annotations
@@ -38,15 +39,19 @@ SUDDEN_MIN: Final = 3
 
 NONE, LEFT, KEPT, ALONE = range(4)
 """Of a sensor's echo: none is kept; one was lost that was random or before which the robot stood, and the ring has
-heard nothing since; one is kept; and one is kept and the ring has heard nothing since."""
+heard nothing new since; one is kept; and one is kept and the ring has heard nothing new since."""
+SILENT, UNCHANGED = range(2)
+"""Looks that are counted: since the ring last heard anything, and since it last heard anything new."""
 
 
 class UnheardEcho(Record):
     """What is remembered of one sensor."""
 
     ring_x: Place
-    """Place of the ring when the sensor looked last, m."""
+    """Place of the ring when the sensor looked last, m, …"""
     ring_y: Place
+    range_m: Place
+    """… and what it heard then, m; below zero for nothing."""
     state: Annotated[int, index_of(4)]
     """`NONE`, `LEFT`, `KEPT` or `ALONE`."""
     x: Place
@@ -96,20 +101,28 @@ def contradict_echoes(
         Whether another look agrees with the sensor's echo in this firing: a random one contradicts nothing.
     echoes : (n,) records
         What is remembered of each sensor. Updated.
-    silences : (1,) int
-        Looks since the ring last heard anything. Updated.
+    silences : (2,) int
+        Looks since the ring last heard anything, and since it heard anything new. Updated.
     """
     c, s = math.cos(yaw), math.sin(yaw)
     kept = 0
     hears = False
+    is_new = False
     for i in range(ranges.shape[0]):
+        one = echoes[i]
         if not math.isnan(ranges[i]):
-            silences[0] += 1
-            hears = hears or ranges[i] < reach
-            echoes[i].ring_x, echoes[i].ring_y = x, y
-        kept += echoes[i].state != NONE
+            r = ranges[i] if ranges[i] < reach else -1.0
+            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) > NEARER_M
+            silences[SILENT] += 1
+            silences[UNCHANGED] += 1
+            hears = hears or r >= 0.0
+            is_new = is_new or (r >= 0.0 and (r != one.range_m or not has_moved))
+            one.ring_x, one.ring_y, one.range_m = x, y, r
+        kept += one.state != NONE
     if hears:
-        silences[0] = 0
+        silences[SILENT] = 0
+    if is_new:
+        silences[UNCHANGED] = 0
     if kept == 0:
         return
     for k in range(ranges.shape[0]):
@@ -120,7 +133,7 @@ def contradict_echoes(
         if away < radius:
             one.state = NONE
             continue
-        if not hears:  # nor has it had the chance to hear the echo again
+        if not is_new:  # nor has it had the chance to hear the echo again
             continue
         if away > one.lost_m + AWAY_M:
             one.state = NONE
@@ -153,7 +166,7 @@ def keep_sudden(
     heard : (n, looks) bool
         Whether it is an echo that no look has removed.
     since : float
-        Older looks do not count, s.
+        Older looks do not count, s; with +inf only what was lost does.
     x, y : float
         Place of the ring, m.
     echoes : (n,) records
@@ -194,22 +207,26 @@ class UnheardEchoes:
     def __init__(self, mounts: Floats) -> None:
         self._echoes = zeros(UnheardEcho, len(mounts))
         self.records = records(UnheardEcho, self._echoes)
-        self.silences = np.zeros(1, np.int64)
+        self.silences = np.zeros(2, np.int64)
 
-    @property
-    def falls_silent(self) -> bool:
-        """Whether half of the ring's sensors have looked since it last heard anything, and not yet all twice."""
-        return len(self._echoes) <= 2 * int(self.silences[0]) <= 4 * len(self._echoes)
+    def falls_silent(self, which: int) -> bool:
+        """Return whether half of the ring's sensors have looked since it heard anything (new), and not all twice."""
+        return len(self._echoes) <= 2 * int(self.silences[which]) <= 4 * len(self._echoes)
 
     @property
     def is_ring_silent(self) -> bool:
-        """Whether echoes were lost since the ring last heard anything, and half of its sensors have looked since."""
-        return 2 * int(self.silences[0]) >= len(self._echoes) and bool((self._echoes["state"] == ALONE).any())
+        """Whether echoes were lost since the ring heard anything new, and half of its sensors have looked since.
+
+        Of a ring that repeats what it hears, several must have been lost.
+        """
+        count, alone = len(self._echoes), int((self._echoes["state"] == ALONE).sum())
+        least = 1 if 2 * int(self.silences[SILENT]) >= count else SUDDEN_MIN
+        return 2 * int(self.silences[UNCHANGED]) >= count and alone >= least
 
     @property
     def has_been_silent(self) -> bool:
-        """Whether the ring has heard nothing for `SILENT_ROUNDS`."""
-        return int(self.silences[0]) >= SILENT_ROUNDS * len(self._echoes)
+        """Whether the ring has heard nothing new for `SILENT_ROUNDS`."""
+        return int(self.silences[UNCHANGED]) >= SILENT_ROUNDS * len(self._echoes)
 
     def points(self, least: int = KEPT) -> Floats:
         """Return the places of what is kept, or with `ALONE` of what was lost since the ring heard: (k, 2), m."""

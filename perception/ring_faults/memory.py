@@ -48,7 +48,9 @@ class EchoTrace(Record):
     repeated: SensorPlace
     """Where it repeated its reading first in that standstill."""
     repeated_nat: Annotated[float, POSITIVE]
-    """Evidence that it repeats an old reading, nat."""
+    """Evidence that it repeats an old reading, nat: of changes that were due, …"""
+    equal_nat: Annotated[float, POSITIVE]
+    """… and of readings that need not have changed, but had no reason to be equal to the bit."""
     heard: SensorPlace
     """The last echo."""
     agreed: Count
@@ -79,7 +81,11 @@ class RingTrace(Record):
     standstill: Count
     """Number of the present standstill of the readings; a reading that changes ends it."""
     repeated_nat: Annotated[float, POSITIVE]
-    """Evidence that the ring repeats old readings, nat."""
+    """Evidence that the ring repeats old readings, nat: of all its sensors, …"""
+    equal_nat: Annotated[float, POSITIVE]
+    """… likewise."""
+    noise_nat: Annotated[float, POSITIVE]
+    """Evidence that its ranges have noise, from readings at a standstill, nat."""
     missed_nat: Annotated[Floats, HALVES, POSITIVE]
     """Evidence that readings do not depend on what is there, nat."""
     silent: Count

@@ -6,13 +6,14 @@ can only be compared with how it moves. An honest ring among objects that stand 
 - *Repeating.* Every sensor that looks ahead repeats its last reading to the bit, although the odometry brings it
   nearer to whatever answers. A wall along the path explains equal readings. A robot whose wheels slip looks the same,
   so the reason names both.
+- *Replaying.* Readings change, but as others did before, to the bit (`perception.ring_faults.replays`).
 - *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
   ranges are. How often an honest ring misses a known echo is learned on the way.
 - *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°.
 - *Changed.* All readings change at once from one round of the firing pattern to the next, by a change that the
   sensors have in common (`perception.ring_faults.changes`).
 
-The first three are sequential tests, with one threshold for all, `perception.ring_faults.motion_tests.EVIDENCE_NAT`.
+The first four are sequential tests, with one threshold for all, `perception.ring_faults.motion_tests.EVIDENCE_NAT`.
 A lie that agrees with the motion, as ranges that are all too long by the same amount do, can be found only as it
 begins.
 """
@@ -27,7 +28,7 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Firing
-from perception.bounds import CONSTANT, bounds, index_of
+from perception.bounds import CONSTANT, COUNT, PLACE, POSITIVE, bounds, index_of
 from perception.records import records, zeros
 from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
 from perception.ring_faults.memory import EchoTrace, RingTrace
@@ -40,6 +41,7 @@ from perception.ring_faults.motion_tests import (
     VANISHED,
     check_motion,
 )
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
 from perception.sensor_mounts import mounts_array, turn_mounts
 
@@ -80,7 +82,8 @@ class RingMonitor:
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT, _turning=CONSTANT, _turns=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
-        _reach_m=CONSTANT, _echoes=EchoTrace.BOUNDS, _ring=RingTrace.BOUNDS, _found=index_of(CHANGED + EXCHANGED + 1),
+        _reach_m=CONSTANT, _past=PLACE, _looks=COUNT, _replayed_nat=POSITIVE,
+        _echoes=EchoTrace.BOUNDS, _ring=RingTrace.BOUNDS, _found=index_of(CHANGED + EXCHANGED + 1),
     )  # fmt: skip
 
     def __init__(self, ring: RingConfig) -> None:
@@ -96,6 +99,9 @@ class RingMonitor:
         self._ring = zeros(RingTrace, 1)
         self._ring_records = records(RingTrace, self._ring)
         self._expected = records(Expected, zeros(Expected, len(ring.mounts)))
+        self._past = np.zeros((len(ring.mounts), PAST_LOOKS, PAST_FIELDS))
+        self._looks = np.zeros(len(ring.mounts), np.int64)
+        self._replayed_nat = np.zeros(PAST_LOOKS)
         self._found = NOTHING
 
     def observe(self, firing: Firing) -> None:
@@ -107,6 +113,7 @@ class RingMonitor:
         found = check_motion(
             firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), mounts, self._half_angle,
             self._tolerance, self._reach_m, self._echo_records, self._ring_records, self._expected,
+            self._past, self._looks, self._replayed_nat,
         )  # fmt: skip
         if found != NOTHING:
             self._found = int(found)
@@ -124,4 +131,6 @@ class RingMonitor:
         """Start again after the odometry was reset."""
         self._echoes[...] = np.zeros((), self._echoes.dtype)
         self._ring[...] = np.zeros((), self._ring.dtype)
+        self._looks[:] = 0
+        self._replayed_nat[:] = 0.0
         self._found = NOTHING

@@ -11,11 +11,19 @@ import math
 from typing import Final
 
 from perception.angles import wrapped
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.ring_faults.changes import NO_CHANGE, NOISE_M, Expected, weigh_changes
 from perception.ring_faults.memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
-from perception.ring_faults.repeats import STEP_MIN_M, is_parallel_wall, mark, weigh_repeat
+from perception.ring_faults.repeats import (
+    STEP_MIN_M,
+    is_parallel_wall,
+    learn_noise,
+    mark,
+    repeat_evidence,
+    weigh_repeat,
+)
+from perception.ring_faults.replays import PAST_LOOKS, weigh_replay
 from perception.sensor_faults.wall import NOISE_SHARE
 
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
@@ -23,6 +31,8 @@ EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
 thousand are to have a false alarm. In 40 hours of simulated honest drives the greatest sum was 19.5."""
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """The same for changes from one round of the firing pattern to the next, of which a day has some 3·10⁵, nat."""
+REPLAY_NAT: Final = EVIDENCE_NAT + math.log(PAST_LOOKS)
+"""The same for a replay, of which each lag is tested, nat."""
 LEAP_M: Final = 0.25
 """The memory starts again where the ring has moved farther than this between two firings, m."""
 AHEAD_COS: Final = math.cos(math.radians(100.0))
@@ -190,7 +200,7 @@ def weigh_change(
 @kernel
 def conclusion(all_of: RingTrace) -> int:
     """Return what the evidence says of the ring: `NOTHING`, or what is wrong."""
-    if all_of.repeated_nat >= EVIDENCE_NAT:
+    if repeat_evidence(all_of) >= EVIDENCE_NAT:
         return REPEATED
     for quarter in range(QUARTERS):
         if all_of.turned_nat[quarter] >= EVIDENCE_NAT:
@@ -205,7 +215,7 @@ def conclusion(all_of: RingTrace) -> int:
 def begin_evidence(all_of: RingTrace) -> None:
     """Drop all evidence; what is known of the ring's misses stays."""
     all_of.standstill += 1
-    all_of.repeated_nat = 0.0
+    all_of.repeated_nat = all_of.equal_nat = 0.0
     all_of.missed_nat[:] = 0.0
     for quarter in range(QUARTERS):
         all_of.turned_nat[quarter] = min(0.0, all_of.turned_nat[quarter])
@@ -215,7 +225,8 @@ def begin_evidence(all_of: RingTrace) -> None:
 @kernel
 def check_motion(
     ranges: Floats, x: float, y: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float, reach: float,
-    echoes: Records[EchoTrace], ring: Records[RingTrace], expected: Records[Expected],
+    echoes: Records[EchoTrace], ring: Records[RingTrace], expected: Records[Expected], past: Floats, looks: Ints,
+    replayed_nat: Floats,
 ) -> int:  # fmt: skip
     """Test the readings of a firing; return what is wrong, `NOTHING` where nothing is.
 
@@ -239,6 +250,8 @@ def check_motion(
         What is remembered of the ring. Updated. After a finding the evidence is dropped.
     expected : (n,) records
         Overwritten.
+    past, looks, replayed_nat
+        As for `replays.weigh_replay`. Updated.
     """
     if not math.isfinite(x + y + yaw):
         return NOTHING
@@ -247,6 +260,8 @@ def check_motion(
     if not all_of.is_started or moved > LEAP_M:
         all_of.is_started = 1
         begin_evidence(all_of)
+        replayed_nat[:] = 0.0
+        looks[:] = 0
         for i in range(len(echoes)):
             echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
             echoes[i].heard.range_m = echoes[i].agreed_m = SILENCE_M
@@ -255,6 +270,7 @@ def check_motion(
         all_of.path_m += moved
     all_of.x, all_of.y = x, y
     c, s = math.cos(yaw), math.sin(yaw)
+    replayed = 0.0
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
             continue
@@ -267,11 +283,15 @@ def check_motion(
         echoes[i].is_compared = echoes[i].is_known
         mark(echoes[i].before, then.range_m, then.x, then.y, then.axis, then.path_m)
         mark(then, r, x, y, axis, all_of.path_m)
+        learn_noise(echoes[i], r, x, y, axis, tolerance, all_of)
         weigh_repeat(i, r, own_x, own_y, axis, yaw, is_ahead, mounts, half_angle, tolerance, reach, echoes, ring)
+        heard_before = echoes[i].before.range_m if echoes[i].is_compared else SILENCE_M
+        nats = weigh_replay(i, r, heard_before, own_x, own_y, axis, half_angle, tolerance, past, looks, replayed_nat)
+        replayed = max(replayed, nats)
         weigh_look(echoes[i], r, own_x, own_y, axis, is_ahead, half_angle, tolerance, reach, all_of)
         if r >= 0.0:
             weigh_change(i, r, own_x, own_y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of)
-    found = conclusion(all_of)
+    found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)
     if found == NOTHING:
         missed = honest_share(all_of, STEADY)
         change, nats = weigh_changes(mounts, half_angle, tolerance, reach, missed, echoes, expected)
@@ -279,6 +299,7 @@ def check_motion(
             found = CHANGED + change
     if found != NOTHING:
         begin_evidence(all_of)
+        replayed_nat[:] = 0.0
         for i in range(len(echoes)):
             echoes[i].is_compared = 0
     return found

@@ -17,6 +17,17 @@ STEP_MIN_M: Final = 0.06
 """See `REPEAT_NAT`, m: ten times the error of a short way's odometry and of a range in steps of a millimetre."""
 REPEATS_MAX: Final = 3.0
 """Such changes of one sensor that count: a single sensor may be stuck, which says nothing about the ring."""
+CHATTER_SHARE: Final = 0.002
+"""A range varies by at least this share of it from look to look, also where a wall along the path answers."""
+EQUAL_PRIOR: Final = 2e-8
+"""Odds that an honest ring is without such noise, as that of an emulator between walls may be: equal readings alone
+fall short of `motion_tests.EVIDENCE_NAT` by one change that was due, …"""
+NOISY_NAT: Final = math.log(0.5 / 0.02)
+EQUAL_NAT: Final = math.log(0.5 / 0.98)
+"""… unless its noise is known: of the readings between which the sensor hardly moves, half change by more than their
+resolution with noise, and two of a hundred without, as what is there may move. The evidence of each reading, nat."""
+SENSOR_NAT: Final = REPEATS_MAX * REPEAT_NAT
+"""Greatest evidence of a sensor, nat."""
 
 
 @kernel
@@ -98,7 +109,7 @@ def changes_due(
     c = echoes[i]
     r = c.latest.range_m
     dx, dy, turned = x - c.repeated.x, y - c.repeated.y, axis - c.repeated.axis
-    if abs(turned) <= half_angle:
+    if abs(turned) <= 2.0 * half_angle:  # it may still hear the same surface
         beam = half_angle + abs(turned)
         along = abs(dx * math.cos(axis) + dy * math.sin(axis))
         across = abs(dy * math.cos(axis) - dx * math.sin(axis))
@@ -109,8 +120,6 @@ def changes_due(
         if is_parallel_wall(i, r, dx, dy, yaw, mounts, half_angle, tolerance, lean, reach, echoes, path_m):
             return 0.0
         return min(REPEATS_MAX, float(due))
-    if abs(turned) <= 2.0 * half_angle:
-        return 0.0
     nearest, off = -1, half_angle
     for k in range(len(echoes)):
         away = abs(wrapped(mounts[k, 2] - mounts[i, 2] - turned))
@@ -119,6 +128,39 @@ def changes_due(
     if nearest < 0 or abs(echoes[nearest].latest.range_m - r) <= tolerance + 0.1 * r:
         return 0.0
     return min(REPEATS_MAX, math.floor(abs(turned) / (2.0 * half_angle)))
+
+
+@kernel
+def repeat_evidence(all_of: RingTrace) -> float:
+    """Return all evidence that the ring repeats old readings, nat; equal ones alone convict it if it has noise."""
+    without_noise = EQUAL_PRIOR * math.exp(-all_of.noise_nat)
+    return all_of.repeated_nat - math.log(without_noise + (1.0 - without_noise) * math.exp(-all_of.equal_nat))
+
+
+@kernel
+def learn_noise(c: EchoTrace, r: float, x: float, y: float, axis: float, tolerance: float, all_of: RingTrace) -> None:
+    """Learn whether the ring's ranges have noise, from a reading before which the sensor has hardly moved.
+
+    No ring loses its noise, so once it is known it stays known.
+
+    Parameters
+    ----------
+    c : record
+        What is remembered of the sensor; this reading has been entered.
+    r, x, y, axis : float
+        The reading (m; below zero without an echo), the ring's place (m) and the sensor's direction (rad).
+    tolerance : float
+        As for `check_motion`.
+    all_of : record
+        What is remembered of the ring. Updated.
+    """
+    then = c.before
+    if not c.is_compared or r < 0.0 or then.range_m < 0.0 or all_of.noise_nat >= SENSOR_NAT:
+        return
+    expected, change = math.hypot(x - then.x, y - then.y) + r * abs(axis - then.axis), abs(r - then.range_m)
+    if expected <= tolerance and change <= tolerance + NOISE_SHARE * r:
+        nats = NOISY_NAT if change > tolerance + expected else EQUAL_NAT
+        all_of.noise_nat = min(max(0.0, all_of.noise_nat + nats), SENSOR_NAT)
 
 
 @kernel
@@ -145,18 +187,23 @@ def weigh_repeat(
     if not c.is_known or r != c.before.range_m:
         if c.is_known and is_ahead:
             all_of.standstill += 1
-            all_of.repeated_nat = 0.0
+            all_of.repeated_nat = all_of.equal_nat = 0.0
         elif c.is_known and c.standstill == all_of.standstill:
             all_of.repeated_nat = max(0.0, all_of.repeated_nat - c.repeated_nat)
-        c.standstill, c.repeated_nat = 0, 0.0
+            all_of.equal_nat = max(0.0, all_of.equal_nat - c.equal_nat)
+        c.standstill, c.repeated_nat, c.equal_nat = 0, 0.0, 0.0
         c.is_known = 1
     elif c.standstill != all_of.standstill:
-        c.standstill, c.repeated_nat = all_of.standstill, 0.0
+        c.standstill, c.repeated_nat, c.equal_nat = all_of.standstill, 0.0, 0.0
         mark(c.repeated, r, x, y, axis, all_of.path_m)
-    elif r >= 0.0 and c.repeated_nat < REPEATS_MAX * REPEAT_NAT:
+    elif r >= 0.0 and c.repeated_nat < SENSOR_NAT:
         due = REPEAT_NAT * changes_due(
             i, x, y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of.path_m
         )
         if due > c.repeated_nat:
             all_of.repeated_nat += due - c.repeated_nat
             c.repeated_nat = due
+        steps = math.floor(math.hypot(x - c.repeated.x, y - c.repeated.y) / max(STEP_MIN_M, 3.0 * tolerance))
+        equal = min(steps * math.log(1.0 + CHATTER_SHARE * r / tolerance), SENSOR_NAT - c.repeated_nat)
+        all_of.equal_nat = max(0.0, all_of.equal_nat + equal - c.equal_nat)
+        c.equal_nat = equal

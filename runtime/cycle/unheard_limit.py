@@ -14,8 +14,8 @@ from perception.percept import Floats, Percept
 CREEP_M_S: Final = 0.04
 """Speed that is always left, m/s: most of what falls silent is a mirror that left the beam, and a bumper bears it."""
 LOST: Final = (
-    "the ring hears nothing any more, not even what it heard a moment ago: the robot drives slowly until it hears "
-    "something; check the ring's power and cables"
+    "the ring hears nothing new any more, not even what it heard a moment ago: the robot drives slowly until it "
+    "hears something; check the ring's power and cables"
 )
 UNHEARD: Final = (
     "the ring no longer hears what stood in the way, although the robot has come nearer: the robot drives slowly "

@@ -79,7 +79,7 @@ def lost(echo_of: int = 1) -> FreshEchoes:
 
 def look(ring: FreshEchoes, x: float, first: float, t: float, yaw: float = 0.0) -> int:
     """Return how many echoes are kept after a firing."""
-    ring.update(Firing(t, Pose(x, 0.0, 0.0), yaw, np.array([first, 2.0])))
+    ring.update(Firing(t, Pose(x, 0.0, 0.0), yaw, np.array([first, 2.0 + 0.001 * t])))
     return len(ring.unheard.points())
 
 
@@ -105,14 +105,34 @@ def test_an_echo_beside_it_or_before_it_contradicts_nothing() -> None:
         assert look(ring, 1.65, 2.4, t, yaw=math.radians(20.0)) == 1
 
 
+AROUND = np.array([[0.4 * math.cos(a), 0.4 * math.sin(a), a] for a in np.radians(30.0 * np.arange(12.0)).tolist()])
+
+
+@pytest.mark.parametrize(("sensors", "is_kept"), [(2, False), (3, True)])
+@pytest.mark.parametrize(("speed", "chatter"), [(0.03, 0.0), (0.03, 0.001), (0.0, 0.0)])
+def test_an_echo_that_repeats_to_the_bit_on_the_way_does_not_end_the_silence_of_others(
+    sensors: int, is_kept: bool, speed: float, chatter: float
+) -> None:
+    """A frozen ring may repeat silence in the place of walls, and an echo behind."""
+    ring = FreshEchoes(AROUND, BEAM, (), REACH_M)
+    for k in range(14):
+        ranges = np.full(12, math.inf)
+        ranges[8] = 3.0 + chatter * k
+        if k < 8:
+            ranges[:sensors] = 2.0
+        ring.update(Firing(0.1 * k, Pose(speed * k, 0.0, 0.0), 0.0, ranges))
+    is_alive = speed == 0.0 or chatter > 0.0
+    assert ring.unheard.is_ring_silent == (is_kept and not is_alive)
+    ranges[8] = 2.9
+    ring.update(Firing(1.4, Pose(14.0 * speed, 0.0, 0.0), 0.0, ranges))
+    assert not ring.unheard.is_ring_silent
+
+
 @pytest.mark.parametrize(("sensors", "is_kept"), [(2, False), (3, True)])
 def test_a_ring_that_loses_several_echoes_at_once_keeps_them_although_it_only_turns(
     sensors: int, is_kept: bool
 ) -> None:
-    mounts = np.array(
-        [[0.4 * math.cos(a), 0.4 * math.sin(a), a] for a in np.radians(30.0 * np.arange(12.0)).tolist()]
-    )
-    ring = FreshEchoes(mounts, BEAM, (), REACH_M)
+    ring = FreshEchoes(AROUND, BEAM, (), REACH_M)
     for k in range(10):
         ranges = np.full(12, math.inf)
         if k < 8:

@@ -21,6 +21,7 @@ from perception.ring_faults.motion_tests import (
     VANISHED,
     check_motion,
 )
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS
 
 COUNT = 24
 MOUNTS = np.array([[0.0, 0.0, math.tau * k / COUNT] for k in range(COUNT)])
@@ -34,12 +35,15 @@ class Ring:
     def __init__(self) -> None:
         self.echoes, self.memory = zeros(EchoTrace, COUNT), zeros(RingTrace, 1)
         self.expected = zeros(Expected, COUNT)
+        self.past = np.zeros((COUNT, PAST_LOOKS, PAST_FIELDS))
+        self.looks, self.replayed_nat = np.zeros(COUNT, np.int64), np.zeros(PAST_LOOKS)
         self.x = 0.0
 
     def fire(self, ranges: Floats) -> int:
         found = check_motion(
             ranges, self.x, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, REACH, records(EchoTrace, self.echoes),
             records(RingTrace, self.memory), records(Expected, self.expected),
+            self.past, self.looks, self.replayed_nat,
         )  # fmt: skip
         self.x += STEP_M
         return int(found)

@@ -9,7 +9,21 @@ import pytest
 
 from perception.records import Records, records, zeros
 from perception.ring_faults.memory import SILENCE_M, EchoTrace, RingTrace
-from perception.ring_faults.repeats import REPEAT_NAT, REPEATS_MAX, changes_due, is_parallel_wall, mark, weigh_repeat
+from perception.ring_faults.motion_tests import EVIDENCE_NAT
+from perception.ring_faults.repeats import (
+    EQUAL_NAT,
+    EQUAL_PRIOR,
+    NOISY_NAT,
+    REPEAT_NAT,
+    REPEATS_MAX,
+    SENSOR_NAT,
+    changes_due,
+    is_parallel_wall,
+    learn_noise,
+    mark,
+    repeat_evidence,
+    weigh_repeat,
+)
 
 MOUNTS = np.array([[0.0, 0.0, math.radians(15.0 * k)] for k in range(24)])
 HALF = math.radians(12.0)
@@ -75,3 +89,50 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
     assert ring[0].repeated_nat == pytest.approx(REPEAT_NAT)
     fire(0, 1.9, 0.08)
     assert ring[0].repeated_nat == 0.0
+
+
+@pytest.mark.parametrize("is_due", [False, True])
+def test_walls_along_the_path_do_not_explain_readings_without_noise_besides_one_that_was_due(is_due: bool) -> None:
+    echoes, ring = heard(), records(RingTrace, zeros(RingTrace, 1))
+    all_of = ring[0]
+    all_of.standstill = 1
+    sides = (5, 6, 7, 17, 18, 19)
+    for k in range(40):
+        x = 0.05 * k
+        for i in (*sides, 12):
+            echoes[i].before.range_m = echoes[i].latest.range_m
+            r = 0.7 / math.sin(MOUNTS[5, 2] + HALF) if i in sides else 3.0
+            if i == 12 and not is_due:
+                r += x
+            axis = MOUNTS[i, 2]
+            mark(echoes[i].latest, r, x, 0.0, axis, x)
+            echoes[i].agreed_m, echoes[i].agreed_path_m = r, x
+            weigh_repeat(i, r, x, 0.0, axis, 0.0, i != 12, MOUNTS, HALF, TOLERANCE, 5.0, echoes, ring)
+    equal = -math.log(EQUAL_PRIOR)
+    assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * REPEAT_NAT)
+    assert repeat_evidence(all_of) == pytest.approx(all_of.repeated_nat + equal, abs=0.1)
+    assert (repeat_evidence(all_of) > EVIDENCE_NAT) is is_due
+
+
+def test_noise_is_learned_at_a_standstill_from_changes_that_noise_explains() -> None:
+    echoes, ring = heard((0, 2.0)), records(RingTrace, zeros(RingTrace, 1))
+    c, all_of = echoes[0], ring[0]
+
+    def look(r: float, x: float = 0.0) -> float:
+        c.is_compared = 1
+        mark(c.before, c.latest.range_m, c.latest.x, c.latest.y, c.latest.axis, 0.0)
+        mark(c.latest, r, x, 0.0, 0.0, 0.0)
+        learn_noise(c, r, x, 0.0, 0.0, TOLERANCE, all_of)
+        return float(all_of.noise_nat)
+
+    assert look(2.01) == pytest.approx(NOISY_NAT)
+    assert look(2.01) == look(2.013, 0.0) + -EQUAL_NAT
+    known = look(2.013)
+    for r, x in ((3.0, 0.0), (SILENCE_M, 0.0), (3.0, 0.0), (3.01, 0.1)):
+        assert look(r, x) == pytest.approx(known), "a leap, silence and a reading after a way say nothing"
+    for k in range(9):
+        look(3.0 + 0.01 * (k % 2), 0.1)
+    assert all_of.noise_nat == SENSOR_NAT
+    assert look(3.0, 0.1) == look(3.0, 0.1) == SENSOR_NAT, "a ring that is frozen had noise"
+    all_of.equal_nat = EVIDENCE_NAT + 1.0
+    assert repeat_evidence(all_of) > EVIDENCE_NAT

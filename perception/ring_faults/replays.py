@@ -1,0 +1,69 @@
+"""The test of whether a ring replays a sequence of old readings: each changes, but as another one did before.
+
+Noise and motion leave no two parts of a drive with the same ranges to the bit. For each lag, in looks of a
+sensor, the readings of all sensors are compared with those of that lag before: a sequential test as those of
+`perception.ring_faults.motion_tests`. Only what changed since the look before counts, where the sensor has moved or
+turned since the older look: a robot at a standstill, and a wall along the path, repeat readings honestly.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import Floats, Ints, kernel
+from perception.ring_faults.repeats import STEP_MIN_M
+
+PAST_LOOKS: Final = 64
+"""Looks of each sensor that are kept: 10 to 25 s of the shipped rings."""
+PAST_FIELDS: Final = 4
+"""Range (m; below zero without an echo), place x, y (m) and direction (rad) of a look."""
+DIFFERS: Final = 0.05
+"""Share of a replay's readings that differ from those of the lag before, as where it begins anew."""
+
+
+@kernel
+def weigh_replay(
+    i: int, r: float, before: float, x: float, y: float, axis: float, half_angle: float, tolerance: float,
+    past: Floats, looks: Ints, replayed_nat: Floats,
+) -> float:  # fmt: skip
+    """Compare a reading with those of each lag before, and keep it; return the greatest evidence of a lag, nat.
+
+    Two readings of a range that varies by Δ from look to look are equal to within the tolerance with a probability
+    of some tolerance/(tolerance + Δ).
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    r, before : float
+        Its reading and the one before, m; below zero without an echo.
+    x, y, axis : float
+        Its place (m) and the direction of its axis (rad).
+    half_angle, tolerance
+        As for `motion_tests.check_motion`.
+    past : (n, PAST_LOOKS, PAST_FIELDS) float
+        The last looks of each sensor, the oldest overwritten first. Updated.
+    looks : (n,) int
+        Looks of each sensor so far. Updated.
+    replayed_nat : (PAST_LOOKS,) float
+        Evidence that the ring replays what it heard so many looks before. Updated.
+    """
+    size = past.shape[1]
+    is_new = r >= 0.0 and before >= 0.0 and r != before
+    chance = tolerance / (tolerance + abs(r - before)) if is_new else 0.0
+    differs = math.log(DIFFERS / max(1.0 - chance, DIFFERS))
+    most = 0.0
+    for lag in range(2, min(looks[i] + 1, size)):
+        k = (looks[i] - lag) % size
+        if r != past[i, k, 0]:
+            replayed_nat[lag] = max(0.0, replayed_nat[lag] + differs)
+        elif is_new:
+            moved = math.hypot(x - past[i, k, 1], y - past[i, k, 2])
+            if moved > max(STEP_MIN_M, 3.0 * tolerance) or abs(axis - past[i, k, 3]) > half_angle:
+                replayed_nat[lag] -= math.log(chance)
+        most = max(most, replayed_nat[lag])
+    k = looks[i] % size
+    past[i, k, 0], past[i, k, 1], past[i, k, 2], past[i, k, 3] = r, x, y, axis
+    looks[i] += 1
+    return most
