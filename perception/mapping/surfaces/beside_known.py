@@ -25,7 +25,7 @@ CORNERS: Final = ("inside corner", "edge")
 CORNER_REACH_M: Final = 0.25
 """Around a corner its echoes are shared among places that are as far from the robot."""
 STRAIGHT_M: Final = 1.0
-STRAIGHT_NAT: Final = 40.0
+STRAIGHT_NAT: Final = 15.0
 """Evidence for straight pieces of this length by which walls are expected; so much speaks against them before."""
 THIN_SHARE: Final = 0.25
 """A piece with less than this share of the usual echoes a metre is none."""
