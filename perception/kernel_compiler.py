@@ -15,7 +15,12 @@ from typing import Any, Final
 import numpy as np
 from llvmlite.binding import Linkage
 from numba.core import compiler, config, event, sigutils, typed_passes, types, typing, untyped_passes
-from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.caching import (
+    IndexDataCacheFile,
+    InTreeCacheLocator,
+    UserProvidedCacheLocator,
+    UserWideCacheLocator,
+)
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import _FunctionCompiler
@@ -187,19 +192,27 @@ class _KernelCache:
 
 
 class _Folder(UserProvidedCacheLocator):  # type: ignore[misc]  # numba has no types
-    """Numba's cache folder, without its folders by the places of sources."""
+    """The folder of kernels: numba's, without its folders by the places of sources."""
 
     def __init__(self) -> None:
         pass
 
     def get_cache_path(self) -> str:
-        return str(config.CACHE_DIR)
+        if config.CACHE_DIR:
+            return str(config.CACHE_DIR)
+        # A program that uses the library names none: beside this module then, or the user's where that is read only.
+        return str(next(filter(None, map(_place, (InTreeCacheLocator, UserWideCacheLocator)))).get_cache_path())
+
+
+def _place(kind: Untyped) -> Untyped:
+    """Return where numba would keep the code of this function, None where that cannot be written."""
+    return kind.from_function(_place, __file__)
 
 
 @functools.cache
 def _files() -> IndexDataCacheFile:
-    """Return what reads and writes files in numba's cache folder, each of them whole; the index of it is not used."""
-    return IndexDataCacheFile(config.CACHE_DIR, "", "")
+    """Return what reads and writes files in the cache folder, each of them whole; the index of it is not used."""
+    return IndexDataCacheFile(_Folder().get_cache_path(), "", "")
 
 
 @functools.cache

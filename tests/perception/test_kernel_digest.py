@@ -135,3 +135,16 @@ def test_a_copy_loads_what_another_compiled_and_an_edit_compiles_anew(tmp_path: 
     assert run("copy", changed("OTHER = 7", "OTHER = 8")) == ["8.5", "1"]
     assert run("copy", changed("LIMIT = 2.5", "LIMIT = 3.5")) == ["9.5", "0"], "a constant of what it calls"
     assert run("first", SOURCE) == ["8.5", "1"]
+
+
+def test_a_program_that_names_no_folder_leaves_no_kernels_where_it_runs(tmp_path: Path) -> None:
+    """Not in the folder it runs in: beside the sources, or in the user's cache."""
+    (tmp_path / "kernels_of_test.py").write_text(SOURCE)
+    environment = {**child_environment(), "HOME": str(tmp_path / "home")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    environment["PYTHONPATH"] += f":{tmp_path}"
+    command = [sys.executable, "-c", CALLS]
+    subprocess.run(command, env=environment, cwd=tmp_path, check=True, capture_output=True)
+    assert list(tmp_path.glob("*.nbc")) == []
+    again = subprocess.run(command, env=environment, cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert again.stdout.split() == ["8.5", "1"]
