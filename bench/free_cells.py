@@ -56,8 +56,8 @@ def mark_reachable(
     ----------
     points : (n, 2) float
         m.
-    beams : (m, 3) float
-        Place x, y (m) and direction (rad) of each sensor at each of its firings.
+    beams : (m, 4) float
+        Place x, y (m) and axis x, y (unit vector) of each sensor at each of its firings.
     half_angle, reach_m
         Half the beam's width, rad, and its length, m.
     slack_m
@@ -73,8 +73,8 @@ def mark_reachable(
         for m in range(beams.shape[0]):
             dx = points[n, 0] - beams[m, 0]
             dy = points[n, 1] - beams[m, 1]
-            d = math.hypot(dx, dy)
-            if d > reach_m or dx * math.cos(beams[m, 2]) + dy * math.sin(beams[m, 2]) < cosine * d:
+            d = math.sqrt(dx * dx + dy * dy)
+            if d > reach_m or dx * beams[m, 2] + dy * beams[m, 3] < cosine * d:
                 continue
             if not hidden(beams[m, 0], beams[m, 1], points[n, 0], points[n, 1], slack_m, circles, segments):
                 out[n] = True
@@ -84,11 +84,12 @@ def mark_reachable(
 def reachable(cells: Floats, cell_m: float, beams: Floats, ring: Ring, scene: Scene) -> Bools:
     """Return which cells, given by their middles (n, 2) m, sound could have reached in part."""
     found = np.zeros(len(cells), np.bool_)
+    axes = np.column_stack([beams[:, :2], np.cos(beams[:, 2]), np.sin(beams[:, 2])])
     for part in PARTS:
         rest = np.flatnonzero(~found)
         out = np.zeros(len(rest), np.bool_)
         mark_reachable(
-            cells[rest] + cell_m * part, beams, ring.half_angle, ring.reach_m, SIGHT_SLACK_M, scene.circles,
+            cells[rest] + cell_m * part, axes, ring.half_angle, ring.reach_m, SIGHT_SLACK_M, scene.circles,
             scene.segments, out,
         )  # fmt: skip
         found[rest] = out

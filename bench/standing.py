@@ -135,7 +135,7 @@ def acoustics_of(model: Reflection, seed: int) -> AcousticsConfig:
 
 
 def try_standing(
-    settings: Settings, seed: int, model: Reflection, stand_s: float, look: Look = no_look
+    settings: Settings, seed: int, model: Reflection, stand_s: float, look: Look = no_look, settle_s: float = 0.0
 ) -> StandTrial:  # fmt: skip
     """Drive through a room, stand, and return what became of what was sure.
 
@@ -151,13 +151,15 @@ def try_standing(
         How long the robot stands, s.
     look : callable
         Called with perception and the number of minutes stood, from 0 on.
+    settle_s : float
+        Time from the stop until what is sure counts as known, s. At the stop the last readings are not refined yet.
     """
     acoustics, ring = acoustics_of(model, seed), ring_of_room(seed)
     perception = Perception(ring, settings.models, settings.perception)
     known, lost, named = list[DetectedObject](), dict[int, int](), set[tuple[int, str]]()
     minute = -1
     for firing in Wandering(ring, seed, DRIVE_S, stand_s, acoustics=acoustics).firings():
-        if firing.robot_s > DRIVE_S + 60.0 * (minute + 1):
+        if firing.robot_s > DRIVE_S + settle_s + 60.0 * (minute + 1):
             minute += 1
             now = sure(perception)
             known = now if minute == 0 else known

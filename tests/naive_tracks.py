@@ -206,8 +206,8 @@ def place_readings(
 ) -> list[tuple[float, ...]]:  # fmt: skip
     """Return the new readings of this firing in the odometry's frame: x, y, axis, range, sensor.
 
-    Of those from one place the first, second, fourth and eighth are new. Three in turn that differ from the first one
-    begin a new series, and one more for each doubling of those before.
+    Of those from one place the first is new. Where the sensor began, and after three in turn that differ from the
+    first one, or one more for each doubling of those before, the first, second, fourth and eighth are.
     """
     turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
     new = []
@@ -231,8 +231,8 @@ def place_readings(
         elif old is not None and moved < 0.05 * FT and abs(q[4] - old[4]) <= half_box:
             continue
         else:
-            stands[i] = (1, 0)
-        if stands[i][0] == 1:
+            stands[i] = (1, 0) if old is None else (9, 0)
+        if stands[i][0] in (1, 9):
             last[i] = q
         new.append((*q, float(i)))
     return new

@@ -7,13 +7,18 @@ from typing import get_args
 
 import pytest
 
-from bench.standing import StandTrial, try_standing
+from bench.standing import StandTrial, ring_of_room, try_standing
 from config.load import load_settings
+from config.world import AcousticsConfig
 from perception.localization.room.expected_ranges import Reflection
+from perception.pipeline import Perception
+from tests.perception.wandering import Wandering
 
 SETTINGS = load_settings("room", ["perception.method=bayes"])
 MODELS = get_args(Reflection)
 pytestmark = [pytest.mark.compiled]
+SETTLED_S = 5.0
+"""After this every sensor has fired from where the robot stopped, and all readings are refined."""
 LOST_MAX = 0.02
 """Share of what was sure that may be lost within ten minutes: asked is nothing, 8 of 861 were measured."""
 
@@ -26,10 +31,29 @@ def losses(trial: StandTrial) -> list[str]:
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("seed", [2000, 2001, 2002])
 def test_nothing_sure_is_lost_while_the_robot_stands(model: Reflection, seed: int) -> None:
-    trial = try_standing(SETTINGS, seed, model, 150.0)
+    trial = try_standing(SETTINGS, seed, model, 150.0, settle_s=SETTLED_S)
     assert trial.known, "a drive through a room makes something sure"
     assert losses(trial) == []
     assert trial.named == set()
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("seed", [2004, 2008])
+def test_further_readings_of_an_unchanged_room_change_nothing(model: Reflection, seed: int) -> None:
+    """Without noise they repeat what the robot heard when it stopped, so that the map stays as it is, to the bit."""
+    ring = ring_of_room(seed)
+    perception = Perception(ring, SETTINGS.models, SETTINGS.perception)
+    before, compared = None, 0
+    for firing in Wandering(ring, seed, 30.0, 40.0, acoustics=AcousticsConfig(model=model)).firings():
+        perception.observe(firing)
+        while perception.can_refine and perception.refine():
+            pass
+        if firing.robot_s > 30.0 + SETTLED_S:
+            now = perception.labelled_objects()
+            assert now == (now if before is None else before), firing.robot_s
+            before, compared = now, compared + 1
+    assert before
+    assert compared > 100
 
 
 @pytest.mark.soak

@@ -22,7 +22,9 @@ CHANGED_MIN: Final = 3
 """So many readings in turn that differ from the first one say that the surroundings have changed: of drop-outs of
 10 % one in a thousand series is so long. Each doubling of the looks before them asks for one more."""
 LOOKS_MAX: Final = 8
-"""Readings from one place that can be evidence."""
+"""Readings from one place that can be evidence, of what is new there."""
+COUNTED: Final = LOOKS_MAX + 1
+"""Looks with which a sensor arrives at a place, so that its further ones there are no evidence."""
 
 
 @kernel
@@ -30,11 +32,12 @@ def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
     """Return whether a reading from the place of the sensor's last one is evidence; count it.
 
     The errors of readings from one place are not independent: what their mean is off by stays, however many they are.
-    So the first, second, fourth and eighth count, whatever they read, and no later one: after minutes they would
-    outweigh all that was heard on the way. If those that repeat the last range were left out instead, ranges that
-    vary by a count would outnumber silences, and the surroundings would seem to answer at any angle. When several in
-    turn are different, the surroundings have changed, and counting begins anew. Where two surfaces answer in turn,
-    long series come by chance; so the longer the first range was heard, the longer the series must be.
+    So a sensor that arrived here is evidence once: what was sure then stays, until the surroundings have changed, as
+    several readings in turn show that differ from the first one. Where two surfaces answer in turn, long series come
+    by chance; so the longer the first range was heard, the longer the series must be. After a change, and before the
+    sensor ever moved, nothing else is known: the first, second, fourth and eighth count, whatever they read. If those
+    that repeat the last range were left out instead, ranges that vary by a count would outnumber silences, and the
+    surroundings would seem to answer at any angle.
 
     Parameters
     ----------
@@ -95,7 +98,7 @@ def place_readings(
         elif is_near and abs(r - last.range_m) <= half_box:
             continue
         else:
-            sensor.looks = 1
+            sensor.looks = 1 if sensor.looks == 0 else COUNTED
             sensor.changed = 0
         q = scratch.fired[m]
         q.x = x
@@ -104,7 +107,7 @@ def place_readings(
         q.axis_y = uy
         q.range_m = r
         q.listener_x = q.listener_y = 0.0
-        if sensor.looks == 1:  # Later ones from there may be strays.
+        if sensor.looks == 1 or sensor.looks == COUNTED:  # Later ones from there may be strays.
             copy_reading(q, last)
         scratch.fired_sensors[m] = i
         scratch.explained_by[m] = UNEXPLAINED
