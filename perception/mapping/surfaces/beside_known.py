@@ -26,7 +26,7 @@ CORNER_REACH_M: Final = 0.25
 """Around a corner its echoes are shared among places that are as far from the robot."""
 STRAIGHT_M: Final = 1.0
 STRAIGHT_NAT: Final = 15.0
-"""Evidence for straight pieces of this length by which walls are expected; so much speaks against them before."""
+"""Evidence for straight pieces of this length by which walls are expected at all."""
 THIN_SHARE: Final = 0.25
 """A piece with less than this share of the usual echoes a metre is none."""
 EVIDENCE_MAX: Final = 30.0
@@ -57,14 +57,15 @@ def beside_known(
     free = is_free(rows, walls, bodies)
     is_piece = rows["number"] < 0
     length = np.hypot(rows["x2"] - rows["x1"], rows["y2"] - rows["y1"]) * is_piece
-    known_m = float(length @ (1.0 - free.mean(axis=1))) + UNKNOWN_M
-    prior = KNOWN_NAT * (1.0 - 2.0 * known_m / (float(length.sum()) + UNKNOWN_M))
     density = rows["echoes"] / np.maximum(length, PIECE_MIN_M)
-    usual = float(np.median(density[is_piece])) if is_piece.any() else 0.0
+    is_dense = density > THIN_SHARE * (float(np.median(density[is_piece])) if is_piece.any() else 0.0)
+    known_m = float(length @ (1.0 - free.mean(axis=1))) + UNKNOWN_M
+    known_share = known_m / (float(length.sum()) + UNKNOWN_M)
     # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls.
-    is_long = (length >= STRAIGHT_M) & free.all(axis=1) & (density > THIN_SHARE * usual)
-    prior += min(float(rows["evidence"][is_long].clip(0.0).sum()) - STRAIGHT_NAT, 0.0)
-    is_wall = is_piece & (rows["evidence"] + prior > 0.0) & (density > THIN_SHARE * usual)
+    is_long = (length >= STRAIGHT_M) & free.all(axis=1) & is_dense
+    straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
+    prior = KNOWN_NAT * (2.0 * straight_share * (1.0 - known_share) - 1.0)
+    is_wall = is_piece & (rows["evidence"] + prior > 0.0) & is_dense
     found = [
         _wall(row, begin, end, prior)
         for row, places in zip(rows[is_wall], free[is_wall], strict=True)
