@@ -38,7 +38,8 @@ def test_a_summary_that_cannot_be_written_is_refused_before_the_first_drive(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, what: list[str]
 ) -> None:
     for module in ("experiment", "budget"):
-        monkeypatch.setattr(f"runtime.cli.commands.{module}.prepare_kernels", lambda *_: pytest.fail("it went on"))
+        prepare = f"runtime.cli.commands.experiments.{module}.prepare_kernels"
+        monkeypatch.setattr(prepare, lambda *_: pytest.fail("it went on"))
     assert run_command(["experiment", *what, "--json", str(tmp_path / "no" / "x")]) == FAILED
     assert "cannot be written" in capsys.readouterr().err
 
