@@ -99,8 +99,11 @@ def decode(kind: type[P], data: bytes) -> P:
 
 @functools.cache
 def _validator(kind: type[Payload]) -> SchemaValidator:
-    """Return the validator of a payload type; the type's own one collects the errors of all items of a list."""
-    return SchemaValidator(_ending_at_first_error(kind.__pydantic_core_schema__))
+    """Return the validator of a payload type; the type's own one collects the errors of all items of a list.
+
+    Pydantic takes that one in place of any schema of the same type, unless it is asked not to.
+    """
+    return SchemaValidator(_ending_at_first_error(kind.__pydantic_core_schema__), _use_prebuilt=False)
 
 
 def _ending_at_first_error(schema: Any) -> Any:  # noqa: ANN401 - a tree of dictionaries, lists and leaves
