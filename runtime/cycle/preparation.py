@@ -31,6 +31,10 @@ class Preparation(Protocol):
     def progress(self) -> str:
         """How far it is, for the operator."""
 
+    @property
+    def is_over(self) -> asyncio.Event:
+        """Set once recognition runs, or its preparation has failed."""
+
     async def ring(self, settings: Settings) -> None:
         """Return when the ring can be heard and checked without compiling anything."""
 
@@ -90,9 +94,12 @@ class RunningPreparation:
         if self._preparation is None or self._task is None:
             return None
         if self._task.done():
-            self._preparation = None
-            self._task.result()
-            self._on_ready()
+            is_over, self._preparation = self._preparation.is_over, None
+            try:
+                self._task.result()
+                self._on_ready()
+            finally:
+                is_over.set()
             return None
         progress = self._preparation.progress
         if run_s - self._logged_run_s >= PROGRESS_PERIOD_S:

@@ -134,7 +134,7 @@ class KernelPreparation:
     progress : str
         How many kernels are compiled, and how long the rest will take, or how far loading is.
     is_over : asyncio.Event
-        Set when nothing is left to load, or loading has failed.
+        Set by the process once recognition runs with what is loaded, or loading has failed.
     """
 
     def __init__(self, parts: Sequence[str], host_clock: Callable[[], float] = time.monotonic) -> None:
@@ -171,12 +171,6 @@ class KernelPreparation:
         UserError
             They could not be compiled.
         """
-        try:
-            await self._load(settings)
-        finally:
-            self.is_over.set()
-
-    async def _load(self, settings: Settings) -> None:
         if uncompiled_parts(self._folder, self._all_parts):
             self._process = await start_child(WARM_UP, [",".join(self._all_parts), "whole"], pipes=False,
                                               low_priority=True)  # fmt: skip

@@ -70,7 +70,10 @@ export class SettingsFiles extends Panel {
   /** @param {number} number */
   async #show(number) {
     this.#at = number;
+    this.#held = null;
     byId("settings-file").value = String(number);
+    byId("settings-text").value = "";
+    byId("settings-text").readOnly = true; // what is typed before the text is here would be lost
     try {
       this.#hold(await this.connection.request({ type: "read_settings", file: number }));
     } catch (error) {

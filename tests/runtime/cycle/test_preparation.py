@@ -38,6 +38,7 @@ class Preparation:
         self._seconds = seconds
         self._error = error
         self.is_cancelled = False
+        self.is_over = asyncio.Event()
 
     async def ring(self, settings: Settings) -> None:
         self.has_ring = settings.ring == SETTINGS.ring
@@ -105,7 +106,8 @@ class Run:
 
 @pytest.mark.usefixtures("warm_kernels")  # it counts compilations
 def test_the_robot_drives_before_recognition_is_ready_and_goes_on_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = Run(monkeypatch, Preparation())
+    preparation = Preparation()
+    run = Run(monkeypatch, preparation)
     run.drive(6.0)
     before = run.unprepared
     assert before == run.cycles[: len(before)], "recognition begins once"
@@ -117,6 +119,7 @@ def test_the_robot_drives_before_recognition_is_ready_and_goes_on_with_it(monkey
     assert [record.cycle for record in run.cycles] == list(range(1, len(run.cycles) + 1))
     assert {record.segments for record in before} == {0}
     assert run.cycles[-1].segments > 0
+    assert preparation.is_over.is_set(), "what else is to be loaded has waited for it"
     assert (run.summary["mode"], run.summary["preparing"]) == ("DRIVE", None)
     assert run.summary["process"]["compilations"] == 0
 
