@@ -50,7 +50,7 @@ def measure(
     report
         Called with a line on what is running.
     """
-    rows, seeds = {}, tuple(seeds)
+    rows, seeds, settings = {}, tuple(seeds), settings.of_log()
     for model in models:
         trials = []
         for seed in seeds:

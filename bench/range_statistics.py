@@ -30,6 +30,8 @@ RING: Final = RingConfig(
     firing=FiringConfig(sets=(tuple(range(len(AXES_DEG))),)),
 )  # fmt: skip
 """The ring of the real drives."""
+POSE_COLUMNS: Final = 4
+"""Columns of a ring log before the ranges: time and pose."""
 STEP_M: Final = 0.08
 TURN_RAD: Final = math.radians(6.0)
 """Way and most turn between two firings, of real drives .06 and .1 m at the median, 6° and 8° at the 90 % point."""
@@ -99,20 +101,36 @@ def real_drive(folder: Path) -> dict[str, float]:
     UserError
         They cannot be read.
     """
+    ring, bearings = read_tables(folder, "ring.csv", "bearings.csv")
+    ranges_m = ring[:, POSE_COLUMNS:]
+    return statistics(ranges_m, np.isfinite(ranges_m) & np.isnan(bearings))
+
+
+def read_tables(folder: Path, *names: str) -> list[Floats]:
+    """Return the numbers of tables of a real drive, a row a firing; an empty cell is NaN.
+
+    Parameters
+    ----------
+    folder : Path
+        The drive's.
+    *names : str
+        The tables' files.
+
+    Raises
+    ------
+    UserError
+        They cannot be read.
+    """
     try:
-        ring, bearings = (_columns(folder / name) for name in ("ring.csv", "bearings.csv"))
-        names = [name for name in ring if name.startswith("r") and name[1:].isdigit()]
-        ranges_m = np.column_stack([ring[name] for name in names])
-        from_m = np.column_stack([bearings[f"b{name[1:]}"] for name in names])
-    except (OSError, ValueError, KeyError) as error:
-        raise UserError(f"{folder}: no drive with ring.csv and bearings.csv: {error}", WRONG_CALL) from error
-    return statistics(ranges_m, np.isfinite(ranges_m) & np.isnan(from_m))
+        return [_read_table(folder / name) for name in names]
+    except (OSError, ValueError) as error:
+        raise UserError(f"{folder}: no drive with {' and '.join(names)}: {error}", WRONG_CALL) from error
 
 
-def _columns(path: Path) -> dict[str, Floats]:
+def _read_table(path: Path) -> Floats:
     with path.open(encoding="ascii", newline="") as file:
-        rows = list(csv.DictReader(file))
-    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
+        _, *rows = csv.reader(file)
+    return np.array([[float(cell or "nan") for cell in row] for row in rows])
 
 
 def facing_ahead(poses: Floats, turn_rad: float) -> Floats:

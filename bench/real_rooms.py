@@ -8,29 +8,28 @@ angles radians.
 
 from __future__ import annotations
 
-import csv
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from config.errors import WRONG_CALL, UserError
+from bench.range_statistics import POSE_COLUMNS, read_tables
+from bench.trials.imperfect_trials import (
+    EXPLAINED_M,
+    ROUND,
+    away_from,
+    distances,
+    false_length,
+    reported_lines,
+)
+from bench.trials.wall_trials import Segment, reported_corners, reported_walls
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing, Floats, Pose
-from perception.kernel import Ints
-from perception.mapping.surfaces.surface_list import find_near
-from perception.pipeline import Perception
 from runtime.recording.ring_log_replay import FiringReplayer
 
-EXPLAINED_M: Final = 0.1
-"""An echo is explained by a surface within this."""
-FALSE_M: Final = 0.15
-"""A place of a surface is false if the laser saw nothing within this."""
-STEP_M: Final = 0.05
 ROUNDINGS: Final = ((1e-4, 1e-3, 1e-3), (1e-3, 1e-3, 1e-2), (1e-4, 1e-2, 1e-3))
 """Steps of poses (m and rad), ranges (m) and times (s) to which a drive is rounded, in turns."""
 Row = dict[str, float]
@@ -56,22 +55,6 @@ class RealDrive:
     points: Floats
 
 
-def read_table(path: Path) -> tuple[list[str], Floats]:
-    """Return the header and the numbers of a table; an empty cell is NaN.
-
-    Raises
-    ------
-    UserError
-        It cannot be read.
-    """
-    try:
-        with path.open(newline="") as file:
-            header, *rows = csv.reader(file)
-        return header, np.array([[float(cell or "nan") for cell in row] for row in rows])
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: {error}; a drive needs ring.csv, truth.csv, bearings.csv", WRONG_CALL) from error
-
-
 def read_drive(folder: Path) -> RealDrive:
     """Return the drive of a folder.
 
@@ -81,11 +64,9 @@ def read_drive(folder: Path) -> RealDrive:
         A file is missing or has no numbers.
     """
     settings = load_settings(None, robot=str(folder / "robot.toml")).of_log()
-    _, ring = read_table(folder / "ring.csv")
-    _, truth = read_table(folder / "truth.csv")
-    _, bearings = read_table(folder / "bearings.csv")
-    _, points = read_table(folder.parent / f"{folder.name.rsplit('-', 1)[0]}-points.csv")
-    times, ranges = ring[:, 0], ring[:, 4:]
+    ring, truth, bearings = read_tables(folder, "ring.csv", "truth.csv", "bearings.csv")
+    (points,) = read_tables(folder.parent, f"{folder.name.rsplit('-', 1)[0]}-points.csv")
+    times, ranges = ring[:, 0], ring[:, POSE_COLUMNS:]
     rows, columns = np.nonzero(np.isfinite(ranges) & np.isfinite(bearings))
     angles, heard = truth[rows, 2] + bearings[rows, columns], ranges[rows, columns]
     echoes = truth[rows, :2] + heard[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -112,47 +93,27 @@ def score(drive: RealDrive, firings: Iterable[Firing]) -> Row:
     replayer = FiringReplayer(drive.settings, firings)
     for _ in replayer:
         pass
-    walls, outlines, corners = surfaces(replayer.perception)
-    found = near(drive.echoes, np.concatenate([walls, np.hstack([corners, corners])]))
-    both = found | near(drive.echoes, outlines)
+    perception = replayer.perception
+    seen = (*perception.labelled_objects(), *perception.archived_objects())
+    walls, lines = reported_walls(seen), reported_lines(perception)
+    away = away_from(drive.echoes, walls, reported_corners(seen))
+
+    def to_surface(x: float, y: float) -> float:
+        return float(np.hypot(*(drive.points - (x, y)).T).min())
+
     return {
-        "echoes": len(found),
-        "explained": float(found.mean()),
-        "false": false_share(walls, drive.points),
-        "with outlines": float(both.mean()),
-        "outlines false": false_share(outlines, drive.points),
-        "drums": sum(one.model in {"drum", "semicircle"} for one in replayer.perception.objects()),
+        "echoes": len(away),
+        "explained": float((away < EXPLAINED_M).mean()),
+        "false": _share(false_length(walls, to_surface), walls),
+        "with outlines": float((np.minimum(away, distances(drive.echoes, lines)) < EXPLAINED_M).mean()),
+        "outlines false": _share(false_length(lines, to_surface), lines),
+        "drums": sum(one.model in ROUND for one in perception.objects()),
     }
 
 
-def surfaces(perception: Perception) -> tuple[Floats, Floats, Floats]:
-    """Return the ends of walls and of the parts of polylines, (n, 4), and the corners, (m, 2), m."""
-    seen = (*perception.labelled_objects(), *perception.archived_objects())
-    walls = [one.ends for one in seen if one.ends is not None]
-    corners = [(one.x, one.y) for one in seen if one.model in {"inside corner", "edge"}]
-    parts = [np.column_stack([one.points[:-1], one.points[1:]]) for one in perception.polylines()]
-    outlines = np.concatenate(parts) if parts else np.empty((0, 4))
-    return np.array(walls).reshape(-1, 4), outlines, np.array(corners).reshape(-1, 2)
-
-
-def near(points: Floats, ends: Floats, within: float = EXPLAINED_M) -> Ints:
-    """Return 1 for each point near one of some segments, else 0."""
-    found = np.zeros(len(points), np.int64)
-    find_near(np.ascontiguousarray(points), np.ascontiguousarray(ends), within, found)
-    return found
-
-
-def false_share(ends: Floats, points: Floats) -> float:
-    """Return the share of the length of segments with no point near; 0 without any."""
-    false_m, total_m = 0.0, 0.0
-    dots = np.hstack([points, points])
-    for x1, y1, x2, y2 in ends.tolist():
-        length = math.hypot(x2 - x1, y2 - y1)
-        shares = np.linspace(0.0, 1.0, max(2, int(length / STEP_M)))[:, None]
-        places = np.array([x1, y1]) + shares * np.array([x2 - x1, y2 - y1])
-        false_m += length * (1.0 - float(near(places, dots, FALSE_M).mean()))
-        total_m += length
-    return false_m / total_m if total_m > 0.0 else 0.0
+def _share(of_m: float, pieces: Sequence[Segment]) -> float:
+    """Return a length as a share of that of all pieces; 0 without any."""
+    return of_m / sum(piece.length_m for piece in pieces) if pieces else 0.0
 
 
 def measure(folders: Iterable[Path], roundings: int, report: Callable[[str], None]) -> dict[str, Row]:

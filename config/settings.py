@@ -197,12 +197,6 @@ class PerceptionConfig(Strict):
         """Whether surfaces of any shape are mapped."""
         return self.surfaces.map == "always" and self.method == "bayes"
 
-    def of_log(self) -> PerceptionConfig:
-        """Return the settings for a ring log, which has time for what is mapped from logs alone."""
-        if self.surfaces.map != "logs":
-            return self
-        return self.model_copy(update={"surfaces": SurfacesConfig(map="always", quanta_per_firing=QUANTA_MAX)})
-
 
 class GoalConfig(Strict):
     """`[goal]`: a place to which the robot drives once it is armed, instead of the configured legs."""
@@ -312,7 +306,10 @@ class Settings(RobotConfig):
 
     def of_log(self) -> Settings:
         """Return the settings for a ring log, which has time for what is mapped from logs alone."""
-        return self.model_copy(update={"perception": self.perception.of_log()})
+        if self.perception.surfaces.map != "logs":
+            return self
+        surfaces = SurfacesConfig(map="always", quanta_per_firing=QUANTA_MAX)
+        return self.model_copy(update={"perception": self.perception.model_copy(update={"surfaces": surfaces})})
 
     @property
     def places_frame(self) -> Frame:

@@ -7,7 +7,7 @@ no surface near. Both are measured as on real drives with a laser's truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -17,6 +17,7 @@ import numpy as np
 from bench.trials.furnished_rooms import DRUM_RADIUS_M, FurnishedRoom
 from bench.trials.imperfect_rooms import drive_through
 from bench.trials.wall_trials import (
+    Corner,
     Segment,
     compare,
     compare_corners,
@@ -28,9 +29,10 @@ from bench.trials.wall_trials import (
 from config.settings import Settings
 from config.units import FOOT_M
 from drivers.emulator.acoustics import clearance
-from drivers.emulator.scene import Scene, compile_scene
+from drivers.emulator.scene import compile_scene
 from drivers.firing_pattern import firing_pattern
 from drivers.messages import Floats
+from perception.pipeline import Perception
 from runtime.simulation.evaluation import match_drums
 
 DRIVE_M: Final = 40.0
@@ -105,13 +107,11 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
     rows, false = match_drums(room.world.model_copy(update={"drum": tuple(drums)}), said)
     walls, corners = reported_walls(seen), reported_corners(seen)
     whole = compare(heard.walls, heard.answered, walls, compare_corners(heard.corners, heard.echoes, corners))
-    lines = [
-        Segment(a, b) for one in perception.polylines() for a, b in pairwise(one.points) if math.dist(a, b) > 0.0
-    ]
-    places = np.array([[it.x, it.y] for it in corners]).reshape(-1, 2)
-    away = distances(heard.points, walls)
-    if len(places):
-        away = np.minimum(away, np.hypot(*(heard.points[:, None] - places[None]).transpose(2, 0, 1)).min(axis=1))
+    lines, away = reported_lines(perception), away_from(heard.points, walls, corners)
+
+    def to_surface(x: float, y: float) -> float:
+        return clearance(x, y, scene.circles, scene.segments)
+
     with_lines = np.minimum(away, distances(heard.points, lines))
     return ImperfectTrial(
         drums=len(drums),
@@ -121,11 +121,11 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
         walls_answered_m=whole.answered_m,
         walls_found_m=whole.found_m,
         walls_m=sum(it.length_m for it in walls),
-        walls_false_m=false_length(walls, scene),
+        walls_false_m=false_length(walls, to_surface),
         corners=len(corners),
-        corners_false=sum(clearance(x, y, scene.circles, scene.segments) > NEAR_M for x, y in places.tolist()),
+        corners_false=sum(to_surface(it.x, it.y) > NEAR_M for it in corners),
         lines_m=sum(it.length_m for it in lines),
-        lines_false_m=false_length(lines, scene),
+        lines_false_m=false_length(lines, to_surface),
         echoes=len(heard.points),
         explained=int((away < EXPLAINED_M).sum()),
         explained_with_lines=int((with_lines < EXPLAINED_M).sum()),
@@ -140,13 +140,34 @@ def distances(points: Floats, pieces: Sequence[Segment]) -> Floats:
     return away
 
 
-def false_length(pieces: Sequence[Segment], scene: Scene) -> float:
-    """Return the length of pieces with no surface near, m."""
+def reported_lines(perception: Perception) -> list[Segment]:
+    """Return the pieces of the polylines."""
+    return [Segment(a, b) for one in perception.polylines() for a, b in pairwise(one.points) if math.dist(a, b) > 0.0]
+
+
+def away_from(points: Floats, walls: Sequence[Segment], corners: Sequence[Corner]) -> Floats:
+    """Return how far points, shape (n, 2), are from the nearest wall or corner, m; +inf without any."""
+    away = distances(points, walls)
+    for corner in corners:
+        away = np.minimum(away, np.hypot(*(points - (corner.x, corner.y)).T))
+    return away
+
+
+def false_length(pieces: Sequence[Segment], to_surface: Callable[[float, float], float]) -> float:
+    """Return the length of pieces with no surface near, m.
+
+    Parameters
+    ----------
+    pieces : sequence of Segment
+        What is reported.
+    to_surface : callable
+        Returns the distance of a place x, y from the nearest surface, m.
+    """
     false_m = 0.0
     for piece in pieces:
         shares = np.linspace(0.0, 1.0, max(2, int(piece.length_m / PIECE_M)))
         along = piece.begin + shares[:, None] * (piece.end - piece.begin)
-        far = [clearance(x, y, scene.circles, scene.segments) > NEAR_M for x, y in along.tolist()]
+        far = [to_surface(x, y) > NEAR_M for x, y in along.tolist()]
         false_m += piece.length_m * float(np.mean(far))
     return false_m
 

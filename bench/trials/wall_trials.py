@@ -255,6 +255,7 @@ def recognise(settings: Settings, heard: Heard) -> Perception:
         perception.observe(firing)
         while perception.can_refine and perception.refine():
             pass
+    perception.surfaces.finish()
     return perception
 
 

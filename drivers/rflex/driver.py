@@ -326,11 +326,7 @@ class RflexDriver(Session[Measurements]):
             self._state, self._problem = LineState.DOWN, wrong
             return
         radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
-        name, count, deadman_s = (
-            config.rflex.name,
-            len(config.ring.mounts),
-            config.rflex.fail_safe_s,
-        )
+        name, count, deadman_s = config.rflex.name, len(config.ring.mounts), config.rflex.fail_safe_s
         self._identity = Identity(name, count, radius_m, deadman_s, REPORT_PERIOD_S, self._boots)
         self._note_once(diagnostics.fail_safe(config.rflex.fail_safe_s))
         if config.body.synchro:

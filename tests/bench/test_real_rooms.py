@@ -6,10 +6,9 @@ import csv
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from bench.real_rooms import false_share, measure, near, read_drive, rounded
+from bench.real_rooms import measure, read_drive, rounded
 from config.errors import UserError
 
 pytestmark = pytest.mark.compiled
@@ -64,13 +63,6 @@ def test_rounded_numbers(folder: Path) -> None:
         assert firing.ranges_m[0] == pytest.approx(0.9)
         assert math.isinf(firing.ranges_m[1])
         assert firing.robot_s == round(firing.robot_s)
-
-
-def test_shares() -> None:
-    walls = np.array([[0.0, 0.0, 1.0, 0.0], [5.0, 5.0, 5.0, 6.0]])
-    assert false_share(walls, np.column_stack([np.linspace(0.0, 1.0, 50), np.zeros(50)])) == pytest.approx(0.5)
-    assert false_share(np.empty((0, 4)), np.zeros((1, 2))) == 0.0
-    assert near(np.array([[0.5, 0.05], [0.5, 0.2]]), walls).tolist() == [1, 0]
 
 
 def test_a_folder_without_a_drive_is_an_error(tmp_path: Path) -> None:

@@ -149,6 +149,19 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
 
 
 @kernel
+def off_axis(k: int) -> float:
+    """Return how far the place k on an arc is from the beam's axis, as a share of half the opening: −1 to 1."""
+    return (2.0 * k + 1.0) / SAMPLES - 1.0
+
+
+@kernel
+def place_on_arc(q: KeptReading, k: int, half: float) -> tuple[float, float]:
+    """Return the place k on a reading's arc from the sensor, m."""
+    angle = q.axis + off_axis(k) * half
+    return q.range_m * math.cos(angle), q.range_m * math.sin(angle)
+
+
+@kernel
 def share_echo(cells: CellCounts, q: KeptReading, half: float) -> None:
     """Share an echo among the places on its arc, each as the map says that it answers.
 
@@ -162,13 +175,12 @@ def share_echo(cells: CellCounts, q: KeptReading, half: float) -> None:
     """
     total = OUTLIER
     for k in range(SAMPLES):
-        off = (2.0 * k + 1.0) / SAMPLES - 1.0
-        dx, dy = q.range_m * math.cos(q.axis + off * half), q.range_m * math.sin(q.axis + off * half)
+        dx, dy = place_on_arc(q, k, half)
         i, j = cell_of(q.x + dx), cell_of(q.y + dy)
         cells.likelihoods[k] = 0.0
         if i >= 0 and j >= 0:
             p = answer_probability(cells, i, j, direction_of(dx, dy))
-            cells.likelihoods[k] = p * (1.0 - AXIS_LOSS * off * off)
+            cells.likelihoods[k] = p * (1.0 - AXIS_LOSS * off_axis(k) * off_axis(k))
         total += cells.likelihoods[k]
     for w in range(WORDS):
         word = 0
@@ -191,8 +203,7 @@ def enter_hits(cells: CellCounts, q: KeptReading, half: float, sign: int) -> Non
         share = sign * share_of(q, k)
         if share == 0:
             continue
-        off = (2.0 * k + 1.0) / SAMPLES - 1.0
-        dx, dy = q.range_m * math.cos(q.axis + off * half), q.range_m * math.sin(q.axis + off * half)
+        dx, dy = place_on_arc(q, k, half)
         i, j = cell_of(q.x + dx), cell_of(q.y + dy)
         if i >= 0 and j >= 0:
             cells.hits[i, j, direction_of(dx, dy)] += share

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import bounds
 from perception.kernel import Floats, kernel
-from perception.mapping.surfaces.cells import enter_readings, make_again, share_again
+from perception.mapping.surfaces.cells import RIM, enter_readings, make_again, share_again
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
@@ -231,8 +231,8 @@ class LocalMapSearch:
             room.swept, room.phase = room.entered, CAPTURE
             return False
         if room.phase == CAPTURE:
-            capture(room, c, 2 + at, min(2 + at + ROWS, CELLS - 2))
-            if self._advance(ROWS, CELLS - 4):
+            capture(room, c, RIM + at, min(RIM + at + ROWS, CELLS - RIM))
+            if self._advance(ROWS, CELLS - 2 * RIM):
                 self._order()
         elif room.phase == GROW:
             if grow_all(room, c, TRIED) < TRIED:
@@ -280,7 +280,7 @@ class LocalMapSearch:
     def pieces(self) -> NDArray[Any]:
         """Return the pieces that the last search has found, as records of `Piece`."""
         room = self.local[0]
-        return room["pieces"][: int(room["piece_count"])].copy()  # type: ignore[no-any-return]  # numpy: Any
+        return room["pieces"][: int(room["piece_count"])]  # type: ignore[no-any-return]  # numpy types a field as Any
 
     def chains(self) -> list[NDArray[Any]]:
         """Return the cells of each polyline that the last search has found, as records of `SurfaceCell`."""

@@ -6,9 +6,9 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
-from perception.mapping.surfaces.cells import cell_of, share_of
+from perception.mapping.surfaces.cells import cell_of, place_on_arc, share_of
 from perception.mapping.surfaces.parameters import REACH_M, SAMPLES, WHOLE
-from perception.mapping.surfaces.records import FREE, CellCounts, KeptReading, LocalMap, Piece
+from perception.mapping.surfaces.records import FREE, CellCounts, KeptReading, LocalMap
 
 OWN_SHARE_MIN: Final = 0.3
 """An echo is from a piece if so much of it is shared to the piece's cells."""
@@ -40,10 +40,10 @@ def locate(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
     for n in range(SAMPLES):
         share = share_of(q, n)
         if share > 0 and owner_at(room, counts, q, n, half) == piece:
-            angle = q.axis + ((2.0 * n + 1.0) / SAMPLES - 1.0) * half
+            dx, dy = place_on_arc(q, n, half)
             total += share
-            x += share * (q.x + q.range_m * math.cos(angle))
-            y += share * (q.y + q.range_m * math.sin(angle))
+            x += share * (q.x + dx)
+            y += share * (q.y + dy)
     if total >= OWN_SHARE_MIN * WHOLE:
         point.x, point.y, point.piece = x / total, y / total, piece
 
@@ -51,9 +51,8 @@ def locate(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
 @kernel
 def owner_at(room: LocalMap, counts: CellCounts, q: KeptReading, n: int, half: float) -> int:
     """Return the owner of the cell at a place on a reading's arc."""
-    angle = q.axis + ((2.0 * n + 1.0) / SAMPLES - 1.0) * half
-    i = cell_of(q.x + q.range_m * math.cos(angle))
-    j = cell_of(q.y + q.range_m * math.sin(angle))
+    dx, dy = place_on_arc(q, n, half)
+    i, j = cell_of(q.x + dx), cell_of(q.y + dy)
     if i < 0 or j < 0 or counts.index[i, j] == 0:
         return FREE
     return int(room.cells[counts.index[i, j] - 1].owner)
@@ -148,7 +147,7 @@ def fit_circle(room: LocalMap, number: int, radius: float) -> float:
 
 @kernel
 def judge(room: LocalMap, number: int, radii: Floats) -> None:
-    """Fit a piece and write its evidence: how much better its line fits than a circle of one of the models.
+    """Fit a piece and write its evidence: how much better its line fits than any of some circles.
 
     Parameters
     ----------
@@ -157,15 +156,14 @@ def judge(room: LocalMap, number: int, radii: Floats) -> None:
     number : int
         The piece's.
     radii : (k,) float
-        Radii of the models, m.
+        Radii of the circles, m.
     """
-    piece: Piece = room.pieces[number]
+    piece = room.pieces[number]
     line = fit_line(room, number)
     if piece.echoes < 3.0:
         piece.evidence = -1.0
         return
-    # Without round models the alternative is that nothing is there: an echo that fits is worth one of nat.
-    circle = line + 2.0 * SIGMA_MIN_M**2 * piece.echoes * ECHOES_A_PLACE if len(radii) == 0 else math.inf
+    circle = math.inf
     for k in range(len(radii)):
         circle = min(circle, fit_circle(room, number, radii[k]))
     variance = max(min(line, circle) / piece.echoes, SIGMA_MIN_M**2)

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from perception.kernel import kernel
-from perception.mapping.surfaces.cells import cell_of, strength_of
+from perception.mapping.surfaces.cells import RIM, cell_of, strength_of
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
@@ -47,7 +47,7 @@ def offset_of(at: int) -> float:
 def capture(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
     """Append the occupied cells of some rows to the map's; those that find no room are left out."""
     for i in range(begin, end):
-        for j in range(2, CELLS - 2):
+        for j in range(RIM, CELLS - RIM):
             counts.index[i, j] = 0
             if counts.all_hits[i, j] == 0 or room.cell_count >= SURFACE_CELLS_MAX:
                 continue

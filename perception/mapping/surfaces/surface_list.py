@@ -106,26 +106,16 @@ class SurfaceList:
         self.numbered = 0
 
     @property
-    def live(self) -> NDArray[Any]:
-        """The surfaces of the present local map."""
-        return self._of(1)
-
-    @property
     def left_behind(self) -> NDArray[Any]:
-        """The others."""
-        return self._of(0)
-
-    def _of(self, is_live: int) -> NDArray[Any]:
-        return np.asarray(self.archived_rows[self.archived_rows["is_live"] == is_live])
+        """Those that are not of the present local map."""
+        return np.asarray(self.archived_rows[self.archived_rows["is_live"] == 0])
 
     def replace_live(self, rows: NDArray[Any]) -> None:
         """Replace those of the present local map; what they show anew is no longer among those left behind."""
         behind = self.left_behind
-        shown = is_covered(rows, behind)
-        # What is as long as before stays as it is: a part that is heard again says less than the whole.
         behind = behind[~is_covered(behind, rows)]
-        fresh = rows[~(shown & is_covered(rows, behind))]
-        self.archived_rows = np.concatenate([behind, fresh])
+        # A part of what stays says less than the whole.
+        self.archived_rows = np.concatenate([behind, rows[~is_covered(rows, behind)]])
 
     def leave(self) -> None:
         """Leave all behind: another local map begins."""

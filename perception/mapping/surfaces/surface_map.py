@@ -18,7 +18,8 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import SurfacesConfig
 from drivers.messages import Firing
-from perception.bounds import bounds
+from perception.bayes.inference.kernel_settings import circle_models
+from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.mapping.no_surfaces import NoSurfaces
@@ -31,9 +32,6 @@ from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
 HALF_ANGLE_MAX: Final = math.radians(45.0)
-CELL_SIGMA_M: Final = CELL_M / math.sqrt(12.0)
-RIVAL_RADII_M: Final = (0.107, 0.671)
-"""Radii of a post and of a barrel, as the Bayesian method compares them."""
 
 
 class SurfaceMap(NoSurfaces):
@@ -50,7 +48,6 @@ class SurfaceMap(NoSurfaces):
     """
 
     SCRATCH: Final = ("_known", "_report")
-    BOUNDS: Final = bounds()
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: SurfacesConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
@@ -133,9 +130,7 @@ class SurfaceMap(NoSurfaces):
         self._list.numbered += 1
         rows["number"] = self._list.numbered
         rows["x1"], rows["x2"], rows["y1"], rows["y2"] = xs[:-1], xs[1:], ys[:-1], ys[1:]
-        rows["variance_across"] = CELL_SIGMA_M**2
         rows["echoes"] = float(cells["strength"].mean())
-        rows["evidence"] = rows["echoes"]
         return rows
 
     def report(
@@ -177,5 +172,5 @@ class SurfaceMap(NoSurfaces):
 
 def round_radii(models: Sequence[ModelConfig]) -> Floats:
     """Return the radii of the round models, and of what is round besides, m."""
-    radii = {one.arc_radius_m for one in models if one.arc_radius_m is not None}
-    return np.array(sorted({*RIVAL_RADII_M, *radii}), np.float64)
+    rivals = [radius for radius in RIVAL_RADII_M if radius > 0.0]
+    return np.array(sorted({*rivals, *circle_models(models)[0]}))

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from bench.trials.imperfect_rooms import imperfect_room
-from bench.trials.imperfect_trials import ImperfectTrial, distances, false_length, figures, try_room
-from bench.trials.wall_trials import Segment
+from bench.trials.imperfect_trials import ImperfectTrial, away_from, distances, false_length, figures, try_room
+from bench.trials.wall_trials import Corner, Segment
 from config.load import load_settings
 from config.world import WallConfig, WorldConfig
+from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
 
 
@@ -19,9 +20,13 @@ def test_length_is_false_where_no_surface_is_near() -> None:
     scene = compile_scene(WorldConfig(wall=(WallConfig(x1_m=0.0, y1_m=0.0, x2_m=2.0, y2_m=0.0, bend_m=0.03),)))
     right = Segment(np.array([0.0, 0.1]), np.array([2.0, 0.1]))
     beyond = Segment(np.array([1.0, 0.0]), np.array([3.15, 0.0]))
-    assert false_length([right], scene) == 0.0
-    assert false_length([right, beyond], scene) == pytest.approx(1.0, abs=0.06)
-    assert false_length([], scene) == 0.0
+
+    def to_surface(x: float, y: float) -> float:
+        return clearance(x, y, scene.circles, scene.segments)
+
+    assert false_length([right], to_surface) == 0.0
+    assert false_length([right, beyond], to_surface) == pytest.approx(1.0, abs=0.06)
+    assert false_length([], to_surface) == 0.0
 
 
 def test_points_are_as_far_as_the_nearest_piece() -> None:
@@ -31,6 +36,9 @@ def test_points_are_as_far_as_the_nearest_piece() -> None:
     ]
     assert distances(np.array([[0.5, 0.3], [2.0, 2.0]]), pieces).tolist() == pytest.approx([0.3, 1.0])
     assert distances(np.array([[0.5, 0.3]]), []).tolist() == [math.inf]
+    corners = [Corner(3.0, 2.0, is_edge=True)]
+    assert away_from(np.array([[0.5, 0.3], [3.0, 1.5]]), pieces, corners).tolist() == pytest.approx([0.3, 0.5])
+    assert away_from(np.array([[3.0, 1.5]]), [], []).tolist() == [math.inf]
 
 
 def test_figures_are_shares_of_all_drives() -> None:

@@ -40,10 +40,11 @@ def test_a_surface_is_covered_by_a_longer_one_only() -> None:
 def test_what_is_left_behind_stays_until_it_is_seen_anew() -> None:
     listed = SurfaceList()
     listed.replace_live(rows((0.0, 0.0, 3.0, 0.0), (5.0, 0.0, 5.0, 2.0)))
-    assert len(listed.live) == 2
+    assert len(listed.archived_rows) == 2
     listed.leave()
     listed.replace_live(rows((1.0, 0.02, 1.4, 0.02), (4.9, -0.1, 5.05, 2.2)))
     assert listed.left_behind["x2"].tolist() == [3.0]  # a part of it that is heard again says less
-    assert listed.live["x1"].tolist() == [4.9]  # this one shows the second wall whole
+    live = listed.archived_rows[listed.archived_rows["is_live"] == 1]
+    assert live["x1"].tolist() == [4.9]  # this one shows the second wall whole
     listed.clear()
     assert len(listed.archived_rows) == 0

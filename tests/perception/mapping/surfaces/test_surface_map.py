@@ -35,7 +35,7 @@ def perception_settings() -> Settings:
             "range_max_m": 5.0,
         }
     )
-    return loaded.model_copy(update={"ring": ring, "models": (), "perception": loaded.perception.of_log()})
+    return loaded.model_copy(update={"ring": ring, "models": ()}).of_log()
 
 
 def hear(pose: Pose) -> np.ndarray:
@@ -136,7 +136,7 @@ def test_a_robot_that_goes_away_begins_another_local_map_and_keeps_what_it_found
     perception.surfaces.finish()
     surfaces = perception.surfaces
     assert isinstance(surfaces, SurfaceMap)
-    before = len(surfaces._list.live)
+    before = len(surfaces._list.archived_rows)
     silent = np.full(SIDES, math.inf)
     run(perception, [Firing(20.0 + k, Pose(0.5 * k, 0.0, 0.0), 0.0, silent) for k in range(40)])
     assert before > 0
@@ -147,7 +147,7 @@ def test_a_robot_that_goes_away_begins_another_local_map_and_keeps_what_it_found
 def test_nothing_is_mapped_in_a_run_unless_the_settings_say_so() -> None:
     settings = load_settings()
     assert Perception(settings.ring, settings.models, settings.perception).polylines() == ()
-    made = Perception(settings.ring, settings.models, settings.perception.of_log())
+    made = Perception(settings.ring, settings.models, settings.of_log().perception)
     assert isinstance(made.surfaces, SurfaceMap)
     made.observe(Firing(0.0, Pose(math.nan, 0.0, 0.0), 0.0, np.full(len(settings.ring.mounts), 1.0)))
     assert made.polylines() == ()
