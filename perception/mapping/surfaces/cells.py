@@ -36,7 +36,7 @@ from perception.mapping.surfaces.parameters import (
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import WORDS, CellCounts, KeptReading
+from perception.mapping.surfaces.records import WORDS, CellCounts, KeptReading, LocalMap
 from perception.records import Records
 
 BLUR: Final = 16.0
@@ -49,6 +49,8 @@ LEAST_READINGS: Final = 0.5
 AXIS_LOSS: Final = 0.5
 """At the beam's edge an echo or a pass counts half, less with the square of the angle."""
 DIRECTION_RAD: Final = 2.0 * math.pi / DIRECTIONS
+EDGE_MIN: Final = 1e-6
+"""An edge of a beam that goes along a row within this (cosine) does not bound the beam's part of that row."""
 RIM: Final = 2
 """Cells at the map's rim that are not used, so that each cell has neighbours."""
 
@@ -61,10 +63,9 @@ def cell_of(offset: float) -> int:
 
 
 @kernel
-def direction_of(dx: float, dy: float) -> int:
-    """Return the looking direction of a vector from the sensor to a cell."""
-    turns = math.atan2(dy, dx) / DIRECTION_RAD
-    return math.floor(turns) % DIRECTIONS
+def direction_of(angle: float) -> int:
+    """Return the looking direction in which a sensor sees along an angle, rad."""
+    return math.floor(angle / DIRECTION_RAD) % DIRECTIONS
 
 
 @kernel
@@ -79,15 +80,15 @@ def answer_probability(cells: CellCounts, i: int, j: int, b: int) -> float:
         Row and column, not in the rim, and the direction.
     """
     hits, every = cells.hits, cells.all_hits
-    own = 4.0 * hits[i, j, b] + 2.0 * (hits[i - 1, j, b] + hits[i + 1, j, b] + hits[i, j - 1, b] + hits[i, j + 1, b])
-    own += hits[i - 1, j - 1, b] + hits[i - 1, j + 1, b] + hits[i + 1, j - 1, b] + hits[i + 1, j + 1, b]
-    total = 4.0 * every[i, j] + 2.0 * (every[i - 1, j] + every[i + 1, j] + every[i, j - 1] + every[i, j + 1])
-    total += every[i - 1, j - 1] + every[i - 1, j + 1] + every[i + 1, j - 1] + every[i + 1, j + 1]
-    own *= HITS
-    total *= HITS
+    beside = hits[b, i - 1, j] + hits[b, i + 1, j] + hits[b, i, j - 1] + hits[b, i, j + 1]
+    across = hits[b, i - 1, j - 1] + hits[b, i - 1, j + 1] + hits[b, i + 1, j - 1] + hits[b, i + 1, j + 1]
+    own = HITS * (4 * hits[b, i, j] + 2 * beside + across)
+    beside = every[i - 1, j] + every[i + 1, j] + every[i, j - 1] + every[i, j + 1]
+    across = every[i - 1, j - 1] + every[i - 1, j + 1] + every[i + 1, j - 1] + every[i + 1, j + 1]
+    total = HITS * (4 * every[i, j] + 2 * beside + across)
     prior = (total + LEAST_HITS) / (total + cells.all_passes[i >> 1, j >> 1] / WHOLE_PASS + LEAST_READINGS)
     return float(
-        (own + PRIOR_READINGS * prior) / (own + cells.passes[i >> 1, j >> 1, b] / WHOLE_PASS + PRIOR_READINGS)
+        (own + PRIOR_READINGS * prior) / (own + cells.passes[b, i >> 1, j >> 1] / WHOLE_PASS + PRIOR_READINGS)
     )
 
 
@@ -110,12 +111,12 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
     if not size < far:
         return
     ux, uy = math.cos(axis), math.sin(axis)
-    low_x, high_x, low_y, high_y = x, x, y, y
-    for k in range(-2, 3):
-        px = x + far * math.cos(axis + 0.5 * k * half)
-        py = y + far * math.sin(axis + 0.5 * k * half)
-        low_x, high_x = min(low_x, px), max(high_x, px)
-        low_y, high_y = min(low_y, py), max(high_y, py)
+    # The beam lies to the left of its right edge and to the right of its left edge.
+    right_x, right_y = math.cos(axis - half), math.sin(axis - half)
+    left_x, left_y = math.cos(axis + half), math.sin(axis + half)
+    low_x, high_x = min(0.0, far * right_x, far * left_x), max(0.0, far * right_x, far * left_x)
+    if abs(math.sin(axis)) < math.sin(half):  # the arc bulges along x
+        low_x, high_x = (low_x, far) if ux > 0.0 else (-far, high_x)
     # A beam of up to ±45° holds at most three borders between looking directions.
     first = math.floor((axis - half) / DIRECTION_RAD)
     borders = math.floor((axis + half) / DIRECTION_RAD) - first
@@ -123,11 +124,24 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
     c2, s2 = math.cos((first + 2) * DIRECTION_RAD), math.sin((first + 2) * DIRECTION_RAD)
     c3, s3 = math.cos((first + 3) * DIRECTION_RAD), math.sin((first + 3) * DIRECTION_RAD)
     ends = CELLS // 2
-    begin_i, end_i = max(1, int(low_x / size + 0.5 * ends)), min(ends - 1, int(high_x / size + 0.5 * ends) + 1)
-    begin_j, end_j = max(1, int(low_y / size + 0.5 * ends)), min(ends - 1, int(high_y / size + 0.5 * ends) + 1)
+    begin_i = max(1, math.floor((x + low_x) / size) + ends // 2)
+    end_i = min(ends - 1, math.floor((x + high_x) / size) + ends // 2 + 1)
     tangent = 1.0 / math.tan(half)
     for i in range(begin_i, end_i):
         dx = (i + 0.5 - 0.5 * ends) * size - x
+        reach = math.sqrt(max(far * far - dx * dx, 0.0))
+        low_y, high_y = -reach, reach
+        if right_x > EDGE_MIN:
+            low_y = max(low_y, dx * right_y / right_x)
+        elif right_x < -EDGE_MIN:
+            high_y = min(high_y, dx * right_y / right_x)
+        if left_x > EDGE_MIN:
+            high_y = min(high_y, dx * left_y / left_x)
+        elif left_x < -EDGE_MIN:
+            low_y = max(low_y, dx * left_y / left_x)
+        # A cell more at each end, for rounding: each is tested.
+        begin_j = max(1, math.floor((y + low_y) / size) + ends // 2 - 1)
+        end_j = min(ends - 1, math.floor((y + high_y) / size) + ends // 2 + 2)
         for j in range(begin_j, end_j):
             dy = (j + 0.5 - 0.5 * ends) * size - y
             along = dx * ux + dy * uy
@@ -144,7 +158,7 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
             if borders > 2 and c3 * dy - s3 * dx > 0.0:
                 b += 1
             weight = sign * int(WHOLE_PASS * (1.0 - AXIS_LOSS * off * off) + 0.5)
-            cells.passes[i, j, b % DIRECTIONS] += weight
+            cells.passes[b % DIRECTIONS, i, j] += weight
             cells.all_passes[i, j] += weight
 
 
@@ -155,31 +169,49 @@ def off_axis(k: int) -> float:
 
 
 @kernel
-def place_on_arc(q: KeptReading, k: int, half: float) -> tuple[float, float]:
-    """Return the place k on a reading's arc from the sensor, m."""
-    angle = q.axis + off_axis(k) * half
-    return q.range_m * math.cos(angle), q.range_m * math.sin(angle)
+def lay_arc(cells: CellCounts, q: KeptReading, half: float) -> None:
+    """Write the places on a reading's arc into `cells.arc`: offsets from the map's centre, cells and directions.
+
+    Parameters
+    ----------
+    cells, q
+        The cells, whose `arc` is overwritten, and the reading, an echo.
+    half : float
+        As for `enter_passes`.
+    """
+    step = 2.0 * half / SAMPLES
+    first = q.axis + off_axis(0) * half
+    turn_c, turn_s = math.cos(step), math.sin(step)
+    c, s = math.cos(first), math.sin(first)
+    for k in range(SAMPLES):
+        place = cells.arc[k]
+        place.x, place.y = q.x + q.range_m * c, q.y + q.range_m * s
+        c, s = turn_c * c - turn_s * s, turn_s * c + turn_c * s
+        place.i, place.j = cell_of(place.x), cell_of(place.y)
+        if place.j < 0:
+            place.i = -1
+        place.b = direction_of(first + k * step)
 
 
 @kernel
-def share_echo(cells: CellCounts, q: KeptReading, half: float) -> None:
-    """Share an echo among the places on its arc, each as the map says that it answers.
+def share_echo(cells: CellCounts, q: KeptReading) -> None:
+    """Share an echo among the places on its arc, which was laid, each as the map says that it answers.
 
     Parameters
     ----------
     cells, q
         The cells without this echo, and the reading; its shares are overwritten. They sum up to less than a whole
         echo, as that may come from nowhere.
-    half : float
-        As for `enter_passes`.
     """
     total = OUTLIER
+    p = 0.0
     for k in range(SAMPLES):
-        dx, dy = place_on_arc(q, k, half)
-        i, j = cell_of(q.x + dx), cell_of(q.y + dy)
+        at = cells.arc[k]
         cells.likelihoods[k] = 0.0
-        if i >= 0 and j >= 0:
-            p = answer_probability(cells, i, j, direction_of(dx, dy))
+        if at.i >= 0:
+            before = cells.arc[max(k - 1, 0)]
+            if k == 0 or at.i != before.i or at.j != before.j or at.b != before.b:
+                p = answer_probability(cells, at.i, at.j, at.b)
             cells.likelihoods[k] = p * (1.0 - AXIS_LOSS * off_axis(k) * off_axis(k))
         total += cells.likelihoods[k]
     for w in range(WORDS):
@@ -197,17 +229,19 @@ def share_of(q: KeptReading, k: int) -> int:
 
 
 @kernel
-def enter_hits(cells: CellCounts, q: KeptReading, half: float, sign: int) -> None:
-    """Add an echo to the cells by its shares, or take it away; the parameters as for `enter_passes`."""
-    for k in range(SAMPLES):
-        share = sign * share_of(q, k)
-        if share == 0:
-            continue
-        dx, dy = place_on_arc(q, k, half)
-        i, j = cell_of(q.x + dx), cell_of(q.y + dy)
-        if i >= 0 and j >= 0:
-            cells.hits[i, j, direction_of(dx, dy)] += share
-            cells.all_hits[i, j] += share
+def enter_hits(cells: CellCounts, q: KeptReading, sign: int) -> None:
+    """Add an echo, whose arc was laid, to the cells by its shares (sign 1), or take it away (−1)."""
+    for w in range(WORDS):
+        word = q.shares[w]
+        k = w * SHARES_A_WORD
+        while word != 0:
+            share = word & WHOLE
+            at = cells.arc[k]
+            if share != 0 and at.i >= 0:
+                cells.hits[at.b, at.i, at.j] += sign * share
+                cells.all_hits[at.i, at.j] += sign * share
+            word >>= SHARE_BITS
+            k += 1
 
 
 @kernel
@@ -226,8 +260,9 @@ def enter_readings(cells: CellCounts, readings: Records[KeptReading], begin: int
     for k in range(begin, end):
         enter_passes(cells, readings[k], half, 1)
         if readings[k].range_m <= REACH_M:
-            share_echo(cells, readings[k], half)
-            enter_hits(cells, readings[k], half, 1)
+            lay_arc(cells, readings[k], half)
+            share_echo(cells, readings[k])
+            enter_hits(cells, readings[k], 1)
 
 
 @kernel
@@ -235,18 +270,21 @@ def share_again(cells: CellCounts, readings: Records[KeptReading], begin: int, e
     """Share echoes again that were entered before, by what the map says now; parameters as for `enter_readings`."""
     for k in range(begin, end):
         if readings[k].range_m <= REACH_M:
-            enter_hits(cells, readings[k], half, -1)
-            share_echo(cells, readings[k], half)
-            enter_hits(cells, readings[k], half, 1)
+            lay_arc(cells, readings[k], half)
+            enter_hits(cells, readings[k], -1)
+            share_echo(cells, readings[k])
+            enter_hits(cells, readings[k], 1)
 
 
 @kernel
-def make_again(cells: CellCounts, readings: Records[KeptReading], count: int, half: float) -> None:
-    """Enter readings whose shares are known into empty cells; the parameters as for `enter_readings`."""
-    for k in range(count):
-        enter_passes(cells, readings[k], half, 1)
-        if readings[k].range_m <= REACH_M:
-            enter_hits(cells, readings[k], half, 1)
+def make_again(rooms: Records[LocalMap], every: Records[CellCounts], half: float) -> None:
+    """Enter the readings of a map that had been entered, whose shares are known, into empty cells."""
+    room, cells = rooms[0], every[0]
+    for k in range(room.entered):
+        enter_passes(cells, room.readings[k], half, 1)
+        if room.readings[k].range_m <= REACH_M:
+            lay_arc(cells, room.readings[k], half)
+            enter_hits(cells, room.readings[k], 1)
 
 
 @kernel
@@ -271,7 +309,7 @@ def strength_of(cells: CellCounts, i: int, j: int) -> float:
         heard = 0
         for di in range(-1, 2):
             for dj in range(-1, 2):
-                heard += cells.hits[i + di, j + dj, b]
+                heard += cells.hits[b, i + di, j + dj]
         strength += min(heard / WHOLE, 1.0) + STRENGTH_SHARE * heard / WHOLE
         is_answering = is_answering or (heard > 0 and answer_probability(cells, i, j, b) > ANSWER_MIN)
     return strength * math.sqrt(min(own, 1.0)) if is_answering else 0.0

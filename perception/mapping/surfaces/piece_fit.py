@@ -6,9 +6,10 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
-from perception.mapping.surfaces.cells import cell_of, place_on_arc, share_of
+from perception.mapping.surfaces.cells import lay_arc, share_of
 from perception.mapping.surfaces.parameters import REACH_M, SAMPLES, WHOLE
-from perception.mapping.surfaces.records import FREE, CellCounts, KeptReading, LocalMap
+from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
+from perception.records import Records
 
 OWN_SHARE_MIN: Final = 0.3
 """An echo is from a piece if so much of it is shared to the piece's cells."""
@@ -27,11 +28,12 @@ def locate(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
     point.piece = FREE
     if q.range_m > REACH_M:
         return
+    lay_arc(counts, q, half)
     most, piece = 0, FREE
     for n in range(SAMPLES):
         share = share_of(q, n)
         if share > most:
-            owner = owner_at(room, counts, q, n, half)
+            owner = owner_at(room, counts, n)
             if owner >= 0:
                 most, piece = share, owner
     if piece < 0:
@@ -39,23 +41,21 @@ def locate(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
     total, x, y = 0.0, 0.0, 0.0
     for n in range(SAMPLES):
         share = share_of(q, n)
-        if share > 0 and owner_at(room, counts, q, n, half) == piece:
-            dx, dy = place_on_arc(q, n, half)
+        if share > 0 and owner_at(room, counts, n) == piece:
             total += share
-            x += share * (q.x + dx)
-            y += share * (q.y + dy)
+            x += share * counts.arc[n].x
+            y += share * counts.arc[n].y
     if total >= OWN_SHARE_MIN * WHOLE:
         point.x, point.y, point.piece = x / total, y / total, piece
 
 
 @kernel
-def owner_at(room: LocalMap, counts: CellCounts, q: KeptReading, n: int, half: float) -> int:
-    """Return the owner of the cell at a place on a reading's arc."""
-    dx, dy = place_on_arc(q, n, half)
-    i, j = cell_of(q.x + dx), cell_of(q.y + dy)
-    if i < 0 or j < 0 or counts.index[i, j] == 0:
+def owner_at(room: LocalMap, counts: CellCounts, n: int) -> int:
+    """Return the owner of the cell at a place on the arc that was laid."""
+    at = counts.arc[n]
+    if at.i < 0 or counts.index[at.i, at.j] == 0:
         return FREE
-    return int(room.cells[counts.index[i, j] - 1].owner)
+    return int(room.cells[counts.index[at.i, at.j] - 1].owner)
 
 
 @kernel
@@ -66,6 +66,24 @@ def locate_all(room: LocalMap, counts: CellCounts, begin: int, end: int, half: f
 
 
 @kernel
+def group_echoes(rooms: Records[LocalMap], every: Records[CellCounts]) -> None:
+    """Write which echoes came from each piece n: `counts.grouped` from `begins[n]` to `begins[n + 1]`."""
+    room, counts = rooms[0], every[0]
+    begins = counts.begins
+    begins[:] = 0
+    for k in range(room.swept):
+        if room.points[k].piece >= 0:
+            begins[room.points[k].piece + 2] += 1
+    for n in range(2, len(begins)):
+        begins[n] += begins[n - 1]
+    for k in range(room.swept):
+        piece = room.points[k].piece
+        if piece >= 0:
+            counts.grouped[begins[piece + 1]] = k
+            begins[piece + 1] += 1
+
+
+@kernel
 def robust(error: float) -> tuple[float, float]:
     """Return the weight of an error (m) and what it adds to the sum of squares, m²."""
     share = 1.0 / (1.0 + error * error / (SCALE_M * SCALE_M))
@@ -73,15 +91,14 @@ def robust(error: float) -> tuple[float, float]:
 
 
 @kernel
-def fit_line(room: LocalMap, number: int) -> float:
+def fit_line(room: LocalMap, counts: CellCounts, number: int) -> float:
     """Fit a piece's line to its echoes, by robust least squares; return the sum of squares, m²."""
     piece = room.pieces[number]
     total = 0.0
     for _ in range(ROUNDS):
         w0, wu, wuu, wv, wuv, total, echoes = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(room.swept):
-            if room.points[k].piece != number:
-                continue
+        for at in range(counts.begins[number], counts.begins[number + 1]):
+            k = counts.grouped[at]
             dx, dy = room.points[k].x - piece.x, room.points[k].y - piece.y
             u, v = dx * piece.ux + dy * piece.uy, dy * piece.ux - dx * piece.uy
             weight, square = robust(v)
@@ -110,22 +127,20 @@ def fit_line(room: LocalMap, number: int) -> float:
 
 
 @kernel
-def fit_circle(room: LocalMap, number: int, radius: float) -> float:
+def fit_circle(room: LocalMap, counts: CellCounts, number: int, radius: float) -> float:
     """Return the sum of squares (m²) of a circle of this radius at its best place, behind a piece's echoes."""
     piece = room.pieces[number]
     side = 0.0
-    for k in range(room.swept):
-        if room.points[k].piece == number:
-            q = room.readings[k]
-            side += 1.0 if (q.y - piece.y) * piece.ux - (q.x - piece.x) * piece.uy < 0.0 else -1.0
+    for at in range(counts.begins[number], counts.begins[number + 1]):
+        q = room.readings[counts.grouped[at]]
+        side += 1.0 if (q.y - piece.y) * piece.ux - (q.x - piece.x) * piece.uy < 0.0 else -1.0
     way = radius if side > 0.0 else -radius
     x, y = piece.x - way * piece.uy, piece.y + way * piece.ux
     total = 0.0
     for _ in range(ROUNDS):
         xx, xy, yy, ex, ey, total = 1e-9, 0.0, 1e-9, 0.0, 0.0, 0.0
-        for k in range(room.swept):
-            if room.points[k].piece != number:
-                continue
+        for at in range(counts.begins[number], counts.begins[number + 1]):
+            k = counts.grouped[at]
             dx, dy = room.points[k].x - x, room.points[k].y - y
             away = max(math.hypot(dx, dy), 1e-6)
             error = away - radius
@@ -146,25 +161,25 @@ def fit_circle(room: LocalMap, number: int, radius: float) -> float:
 
 
 @kernel
-def judge(room: LocalMap, number: int, radii: Floats) -> None:
+def judge(room: LocalMap, counts: CellCounts, number: int, radii: Floats) -> None:
     """Fit a piece and write its evidence: how much better its line fits than any of some circles.
 
     Parameters
     ----------
-    room : LocalMap
-        Updated.
+    room, counts
+        The map, updated, and its counts, with its echoes grouped.
     number : int
         The piece's.
     radii : (k,) float
         Radii of the circles, m.
     """
     piece = room.pieces[number]
-    line = fit_line(room, number)
+    line = fit_line(room, counts, number)
     if piece.echoes < 3.0:
         piece.evidence = -1.0
         return
     circle = math.inf
     for k in range(len(radii)):
-        circle = min(circle, fit_circle(room, number, radii[k]))
+        circle = min(circle, fit_circle(room, counts, number, radii[k]))
     variance = max(min(line, circle) / piece.echoes, SIGMA_MIN_M**2)
     piece.evidence = (circle - line) / (2.0 * variance * ECHOES_A_PLACE)

@@ -129,14 +129,26 @@ class LocalMap(Record):
     """… the cells of each polyline in order, one more than the cell's number, and 0 at its end."""
 
 
+class ArcPlace(Record):
+    """A place on the arc of an echo."""
+
+    x: float
+    y: float
+    i: int
+    """Row and column of its cell; a row below 0 outside the map."""
+    j: int
+    b: int
+    """The looking direction."""
+
+
 class CellCounts(Record):
     """The cells, made from the readings and their shares; and scratch."""
 
-    hits: Annotated[Ints, CELLS, CELLS, DIRECTIONS]
+    hits: Annotated[Ints, DIRECTIONS, CELLS, CELLS]
     """Echoes from each cell by looking direction, in parts of `WHOLE`."""
     all_hits: Annotated[Ints, CELLS, CELLS]
     """The same for all directions together."""
-    passes: Annotated[Ints, CELLS // 2, CELLS // 2, DIRECTIONS]
+    passes: Annotated[Ints, DIRECTIONS, CELLS // 2, CELLS // 2]
     """Ranges that went on, in parts of `WHOLE_PASS`."""
     all_passes: Annotated[Ints, CELLS // 2, CELLS // 2]
     index: Annotated[Ints, CELLS, CELLS]
@@ -147,8 +159,13 @@ class CellCounts(Record):
     """Walks so far."""
     order: Annotated[Ints, SURFACE_CELLS_MAX]
     """The occupied cells, the strongest first."""
+    arc: Annotated[Records[ArcPlace], SAMPLES]
     likelihoods: Annotated[Floats, SAMPLES]
     near: Annotated[Ints, 441]
+    begins: Annotated[Ints, PIECES_MAX + 2]
+    """Where the echoes of each piece begin in `grouped`: …"""
+    grouped: Annotated[Ints, READINGS_MAX]
+    """… numbers of readings, in their order."""
     sums: Annotated[Floats, 12]
     chain: Annotated[Ints, CHAIN_MAX]
     """The cells of a polyline."""

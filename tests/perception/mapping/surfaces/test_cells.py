@@ -19,8 +19,8 @@ from perception.mapping.surfaces.parameters import (
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import CellCounts, KeptReading
-from perception.records import Records, records, zeros
+from perception.mapping.surfaces.records import CellCounts, KeptReading, LocalMap
+from perception.records import Records, array_of, records, zeros
 
 pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)
@@ -58,7 +58,7 @@ def test_passes_are_the_cells_of_the_beam_before_the_range(half_deg: float, rang
         weight = (WHOLE_PASS * (1.0 - 0.5 * share**2) + 0.5).astype(int)
         rows, columns = inside.nonzero()
         np.add.at(expected, (rows, columns, direction[inside]), weight[inside])
-    np.testing.assert_array_equal(counts["passes"][0], expected)
+    np.testing.assert_array_equal(counts["passes"][0].transpose(1, 2, 0), expected)
     np.testing.assert_array_equal(counts["all_passes"][0], expected.sum(axis=2))
 
 
@@ -77,7 +77,8 @@ def test_an_echo_is_shared_as_the_map_says() -> None:
     cells.enter_readings(view, readings, 0, 299, HALF)
     q = readings[299]
     q.range_m = 2.0
-    hits, passes = counts["hits"][0] / WHOLE, counts["passes"][0] / WHOLE_PASS
+    hits, passes = (counts[name][0].transpose(1, 2, 0) for name in ("hits", "passes"))
+    hits, passes = hits / WHOLE, passes / WHOLE_PASS
     likelihoods = []
     for k in range(SAMPLES):
         off = (2 * k + 1) / SAMPLES - 1
@@ -85,25 +86,30 @@ def test_an_echo_is_shared_as_the_map_says() -> None:
         i, j = (math.floor(v / CELL_M) + CELLS // 2 for v in (q.x + dx, q.y + dy))
         b = math.floor(math.atan2(dy, dx) / (2 * math.pi / DIRECTIONS)) % DIRECTIONS
         likelihoods.append(naive_probability(hits, passes, i, j, b) * (1 - 0.5 * off**2))
-    cells.share_echo(view, q, HALF)
+    cells.lay_arc(view, q, HALF)
+    cells.share_echo(view, q)
     expected = np.array(likelihoods) / (sum(likelihoods) + 0.005)
     shares = np.array([cells.share_of(q, k) for k in range(SAMPLES)]) / WHOLE
     np.testing.assert_allclose(shares, expected, atol=0.51 / WHOLE)
 
 
 def test_what_a_reading_has_put_there_can_be_taken_away_and_made_again() -> None:
-    counts, readings = zeros(CellCounts, 1), some(200)
-    view = records(CellCounts, counts)[0]
+    counts, local = zeros(CellCounts, 1), zeros(LocalMap, 1)
+    local["readings"][0, :200] = array_of(some(200))
+    local["entered"] = 200
+    view, rooms = records(CellCounts, counts)[0], records(LocalMap, local)
+    readings = rooms[0].readings
     cells.enter_readings(view, readings, 0, 200, HALF)
     cells.share_again(view, readings, 0, 200, HALF)
     again = zeros(CellCounts, 1)
-    cells.make_again(records(CellCounts, again)[0], readings, 200, HALF)
+    cells.make_again(rooms, records(CellCounts, again), HALF)
     for name in COUNTS:
         np.testing.assert_array_equal(again[name], counts[name])
     for k in range(200):
         cells.enter_passes(view, readings[k], HALF, -1)
         if readings[k].range_m <= REACH_M:
-            cells.enter_hits(view, readings[k], HALF, -1)
+            cells.lay_arc(view, readings[k], HALF)
+            cells.enter_hits(view, readings[k], -1)
     assert not any(counts[name].any() for name in COUNTS)
 
 
@@ -117,7 +123,7 @@ def test_echoes_of_several_directions_speak_for_a_cell_more_than_many_of_one() -
     counts = zeros(CellCounts, 1)
     view = records(CellCounts, counts)[0]
     for b, at in ((0, 100), (1, 100), (2, 100), (0, 200)):
-        counts["hits"][0, at, at, b] += 3 * WHOLE if at == 200 else WHOLE
+        counts["hits"][0, b, at, at] += 3 * WHOLE if at == 200 else WHOLE
         counts["all_hits"][0, at, at] += 3 * WHOLE if at == 200 else WHOLE
     assert cells.strength_of(view, 100, 100) > 2.0 * cells.strength_of(view, 200, 200) > 0.0
     assert cells.strength_of(view, 300, 300) == 0.0

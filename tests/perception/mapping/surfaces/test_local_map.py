@@ -1,4 +1,4 @@
-"""The readings of a local map: which are kept, and when another map begins."""
+"""The readings of a local map, and when another map begins."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
-from perception.mapping.surfaces.local_map import SILENCE, LocalMapSearch
-from perception.mapping.surfaces.parameters import LEFT_M, LEFT_MAX_M, READINGS_MAX, SPACING_M
+from perception.mapping.surfaces.local_map import LocalMapSearch
+from perception.mapping.surfaces.parameters import LEFT_M, LEFT_MAX_M, READINGS_MAX
 
 pytestmark = pytest.mark.compiled
 MOUNTS = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 1.5]])
@@ -21,19 +21,6 @@ def search() -> LocalMapSearch:
 
 def fire(at: LocalMapSearch, x: float, y: float = 0.0, ranges: tuple[float, ...] = (2.0, math.inf)) -> None:
     at.keep(Firing(0.0, Pose(x, y, 0.0), 0.0, np.array(ranges)), MOUNTS)
-
-
-def test_a_sensor_that_has_moved_is_kept() -> None:
-    ours = search()
-    fire(ours, 1.0)
-    fire(ours, 1.0 + 0.5 * SPACING_M)
-    assert ours.room[0].count == 2
-    fire(ours, 1.0 + 1.1 * SPACING_M, ranges=(math.nan, 1.0))
-    assert ours.room[0].count == 3
-    readings = ours.local["readings"][0, :3]
-    np.testing.assert_allclose(readings["x"], [0.1, 0.0, 1.1 * SPACING_M])
-    np.testing.assert_allclose(readings["range_m"], [2.0, SILENCE, 1.0])
-    assert ours.centre == (1.0, 0.0)
 
 
 def test_another_map_begins_with_the_readings_from_around_its_centre() -> None:

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from perception.mapping.surfaces.parameters import READINGS_MAX
-from perception.mapping.surfaces.piece_fit import judge
-from perception.mapping.surfaces.records import FREE, LocalMap
+from perception.mapping.surfaces.piece_fit import group_echoes, judge
+from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
 from perception.records import records, zeros
 
 pytestmark = pytest.mark.compiled
@@ -32,7 +32,9 @@ def judged(points: NDArray[Any], sensors: NDArray[Any], sigma_m: float) -> NDArr
     piece = local["pieces"][0, 0]
     piece["x"], piece["y"] = noisy.mean(axis=0)
     piece["ux"], piece["low"], piece["high"] = 1.0, -0.5, 0.5
-    judge(records(LocalMap, local)[0], 0, RADII)
+    room, counts = records(LocalMap, local), records(CellCounts, zeros(CellCounts, 1))
+    group_echoes(room, counts)
+    judge(room[0], counts[0], 0, RADII)
     return local["pieces"][0, 0]  # type: ignore[no-any-return]  # numpy types a field as Any
 
 

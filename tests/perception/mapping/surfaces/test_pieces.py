@@ -23,7 +23,7 @@ def mapped(points: NDArray[Any], echoes: float = 3.0) -> tuple[Records[LocalMap]
     for x, y in points:
         i, j = math.floor(x / CELL_M) + CELLS // 2, math.floor(y / CELL_M) + CELLS // 2
         for b in range(DIRECTIONS // 2):
-            counts["hits"][0, i, j, b] = int(echoes * WHOLE / 3)
+            counts["hits"][0, b, i, j] = int(echoes * WHOLE / 3)
         counts["all_hits"][0, i, j] = int(echoes * WHOLE / 3) * (DIRECTIONS // 2)
     room, seen = records(LocalMap, local), records(CellCounts, counts)
     capture(room[0], seen[0], 2, CELLS - 2)

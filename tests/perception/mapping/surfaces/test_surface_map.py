@@ -10,6 +10,7 @@ import pytest
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing, Pose
+from perception.mapping.surfaces.quantum import search_is_due
 from perception.mapping.surfaces.surface_map import SurfaceMap
 from perception.pipeline import Perception
 
@@ -99,7 +100,7 @@ def test_a_robot_that_stands_adds_nothing(driven: Perception) -> None:
     for _ in range(5):
         driven.observe(firing)
     assert search.room[0].count <= before + SIDES
-    assert not search._search_is_due
+    assert not search_is_due(search.room)
 
 
 def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
