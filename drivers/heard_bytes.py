@@ -22,6 +22,10 @@ Of random bytes, as at a wrong speed of the line, 4 % do; of a boot message with
 _TEXT_MIN: Final = 8
 """Fewest bytes that are judged."""
 _RUN: Final = re.compile(rb"[\r\n]*[\t\x20-\x7e]{6,}[\r\n]*")
+_PRINTABLE_SHARE: Final = 0.9
+_PRINTABLE_MIN: Final = 24
+"""So many characters of UTF-8 are text, too, if this share of them is printable: short lines, as of numbers, and other
+alphabets. Of random bytes 38 % are."""
 _QUOTED_MAX: Final = 60
 """Longest quotation, characters."""
 _ECHO_MIN: Final = 6
@@ -69,16 +73,29 @@ class HeardBytes:
                 "what this program sends comes back; the other end echoes it, as a loopback, a terminal or a modem "
                 "does: give the robot's own port"
             )
-        runs = _RUN.findall(data)
-        if len(data) < _TEXT_MIN or sum(map(len, runs)) < _TEXT_SHARE * len(data):
+        line = _last_line(data)
+        if line is None:
             return self._stranger
         return (
-            f"a device sends text, as {_quoted(runs[-1])}; it is not the robot, or the robot runs another firmware: "
+            f"a device sends text, as {_quoted(line)}; it is not the robot, or the robot runs another firmware: "
             f"give the robot's own port, or install its firmware"
         )
 
 
-def _quoted(data: bytes) -> str:
+def _last_line(data: bytes) -> str | None:
+    """Return the last whole line, or the rest, of bytes that are text; None if they are not."""
+    runs = _RUN.findall(data)
+    if len(data) >= _TEXT_MIN and sum(map(len, runs)) >= _TEXT_SHARE * len(data):
+        return str(runs[-1].decode("ascii").strip())
+    text = data.decode(errors="replace")
+    printable = sum(c in "\t\r\n" or (c.isprintable() and c != "\ufffd") for c in text)
+    if printable < _PRINTABLE_MIN or printable < _PRINTABLE_SHARE * len(text):
+        return None
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return lines[-2 if len(lines) > 1 and text[-1] not in "\r\n" else -1] if lines else None
+
+
+def _quoted(line: str) -> str:
     """Return printable text in quotation marks, cut to a length that fits into a message."""
-    text = one_line(data.decode("ascii").strip().replace("\t", " "))
+    text = one_line(line.replace("\t", " "))
     return f"'{text if len(text) <= _QUOTED_MAX else text[: _QUOTED_MAX - 1] + '…'}'"

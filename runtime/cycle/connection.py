@@ -56,12 +56,11 @@ class Connection(NamedTuple):
             lost = None if link.is_open else link.last_error
             waited_max_s = ANSWER_TIMEOUT_S if driver.state is LineState.DOWN else CONNECT_MAX_S
             if run_s - begin_run_s > waited_max_s or lost is not None:
-                await link.stop()
                 no_answer = f"no robot answers on {link.config.port}; check its power and link.baud"
                 text = lost or driver.problem or no_answer
-                raise UserError(
-                    self.line_messages.problem(LineState.CLOSED if lost else driver.state, text) or text, FAILED
-                )
+                reason = self.line_messages.problem(LineState.CLOSED if lost else driver.state, text)
+                await link.stop()
+                raise UserError(reason or text, FAILED)
             await asyncio.sleep(POLL_S)
 
     async def shut_down(self) -> bool:

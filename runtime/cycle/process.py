@@ -141,7 +141,7 @@ class RobotProcess:
         self._is_request_valid = always_valid
         self._edits: list[Edit] = []
         self._drive_inputs = DriveInputs()
-        self._arm_when_ready = False
+        self._arm_when_ready = self._is_connected = False
         self._footprint: Footprint | None = None
         self._stop = asyncio.Event()
 
@@ -210,6 +210,7 @@ class RobotProcess:
         with self.health.catching_unhandled_errors():
             await self._preparation.start(self._settings)
             await self._connection.connect(self._stop.is_set)
+            self._is_connected = True
             self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             link_task = asyncio.create_task(self._link.run(), name="link")
             self.health.watch_task("link", link_task)
@@ -372,7 +373,7 @@ class RobotProcess:
 
     def _on_closed(self, reason: str) -> None:
         self._driver.line_closed()
-        if not self._stop.is_set():
+        if self._is_connected and not self._stop.is_set():
             self._line_log.lost(reason, self._clock())
 
     async def _shut_down(self, link_task: asyncio.Task[None]) -> None:

@@ -32,6 +32,28 @@ def test_neither_noise_nor_short_words_are_text(seed: int) -> None:
     assert heard().stranger is None
 
 
+@pytest.mark.parametrize(
+    ("sent", "quoted"),
+    [
+        (b"23\r\n", "23"),
+        (b"1.25\n", "1.25"),
+        ("Gerät bereit: 20 °C ✓\r\n".encode(), "Gerät bereit: 20 °C ✓"),
+        ("设备已准备好\n".encode(), "设备已准备好"),
+    ],
+)
+def test_short_lines_and_other_alphabets_are_text_however_they_are_cut(sent: bytes, quoted: str) -> None:
+    stream = sent * 40
+    for begin in range(len(sent)):
+        for end in range(len(stream) - len(sent), len(stream)):
+            assert f"as '{quoted}'" in (heard(stream[begin:end]).stranger or "")
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_few_random_bytes_are_no_text(seed: int) -> None:
+    rng = random.Random(seed)
+    assert heard(rng.randbytes(rng.randrange(1, 64))).stranger is None
+
+
 def test_what_was_found_out_outlasts_a_change_of_speed_but_not_another_line() -> None:
     bytes_ = heard(b"GPS ready\r\n")
     bytes_.begin_speed()

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import structlog
 
+from config.errors import UserError
 from drivers import line_diagnostics
 from drivers.arcos import diagnostics as arcos
 from drivers.denning import diagnostics as denning
@@ -88,6 +89,16 @@ def test_a_pseudo_terminal_leads_to_a_program(tmp_path: Path) -> None:
     port.symlink_to("/dev/pts/12345")
     assert f"the program at the other end of {port}" in (messages_on(str(port)).problem(LineState.CLOSED, None) or "")
     assert messages_on("/dev/ttyUSB0") is messages_on(None) is ROBOT_LINE
+
+
+def test_a_program_that_does_not_answer_at_the_start_has_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The line is open until this program gives up, and that it is closed then is no loss."""
+    log, silent = Events(), (Mute(kind="mute", at_s=0.0, duration_s=600.0),)
+    with in_virtual_time(monkeypatch, faults=silent) as (loop, settings, *_):
+        process = RobotProcess(settings, log.log, clock=loop.time, line_messages=EMULATOR)
+        with pytest.raises(UserError, match=r"^no answer to \d HELLO .* received; the emulator is stopped or late"):
+            loop.run_until_complete(process.run(arm=True, seconds=2.0))
+    assert not [event for event in log.events if event["event"] == "line lost"]
 
 
 @pytest.mark.promise("P31")

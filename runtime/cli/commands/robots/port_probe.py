@@ -75,7 +75,7 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     robots
         Robots by the names by which they are run.
     """
-    said, best = list[str](), (0, Finding(None, ()))
+    said, best = dict[str, list[str]](), (0, Finding(None, ()))  # what was said as which robots
     strangers = list[str]()
     for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
         for name, config in family:
@@ -88,7 +88,7 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
             if answer.stranger is not None:
                 strangers.append(answer.stranger)
             if answer.problem is not None:
-                said.append(f"as {name}: {answer.problem}" if answer.has_answered else answer.problem)
+                said.setdefault(answer.problem, []).extend([name] if answer.has_answered else ())
             if not answer.has_answered:
                 break
         if best[1].robot is not None:
@@ -96,7 +96,8 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
         if said and not answer.has_answered and answer.problem is not None:
             break  # the port cannot be opened
     known = [stranger for stranger in strangers if stranger != NO_FRAME]
-    return Finding(None, tuple(said or (known or strangers or [NOTHING])[:1]))
+    lines = [f"as {', '.join(names)}: {text}" if names else text for text, names in said.items()]
+    return Finding(None, tuple(lines or (known or strangers or [NOTHING])[:1]))
 
 
 def run_it(port: str, robot: str) -> str:
