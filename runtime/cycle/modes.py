@@ -166,7 +166,8 @@ def advance(
     if inputs.line is not LineState.READY:
         if state.mode is Mode.SAFE_STOP:
             return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs))
-        return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem, arming_run_s=None)
+        lost = LINE_REASONS[inputs.line] if state.mode is Mode.READY else None
+        return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem or lost, arming_run_s=None)
     if state.mode is Mode.SAFE_STOP and state.reason is not None and state.reason.startswith(WAITING):
         state = replace(state, reason=f"{RESTORED} (what was wrong: {state.reason.removeprefix(WAITING)})")
     if state.mode is Mode.CONNECTING:

@@ -23,12 +23,18 @@ NOISE_S: Final = 5.0
 NOISE_MIN: Final = 10
 NOISE_SHARE: Final = 0.05
 """A line with so many corrupt frames, and such a share of all, is noisy: a good one has none but where it begins."""
+FRAMES_MAX_PER_S: Final = 2000.0
+"""More valid frames than any robot sends, 1/s: a full line of 115,200 baud carries 1,280 of the shortest."""
 EVENTS: Final = ("line lost", "line down", "line back", "line flooded")
 NO_REASON: Final = "the robot is not ready"
 
 CORRUPT: Final = (
     "{:.0%} of the frames are corrupt, {:.0f} a second; noise on the line: check its cable and shield, and that "
     "nothing else sends on it"
+)
+TOO_MANY: Final = (
+    "the line brings {:.0f} valid frames a second, many times what a robot sends; its firmware is faulty, or another "
+    "device sends on the line: restart the robot, and check what else is connected"
 )
 ANOTHER: Final = (
     "another robot answers on this port: '{}' in place of '{}'; likely it took the port's name: check that it is the "
@@ -57,7 +63,7 @@ class LineLog:
         self._robot: str | None = None
         self._counts = LinkCounts()
         self._counted_s: float | None = None
-        self._is_noisy = False
+        self._is_noisy = self._is_crowded = False
 
     def lost(self, reason: str, run_s: float) -> None:
         """Log that the line was closed."""
@@ -111,6 +117,9 @@ class LineLog:
         if self._is_noisy and not was_noisy:
             text = CORRUPT.format(bad / (bad + good), bad / (run_s - since_s))
             self._log.warning(self._messages.message(text))
+        was_crowded, self._is_crowded = self._is_crowded, good > FRAMES_MAX_PER_S * (run_s - since_s)
+        if self._is_crowded and not was_crowded:
+            self._log.warning(self._messages.message(TOO_MANY.format(good / (run_s - since_s))))
 
     def _say(self, event: str, run_s: float, **values: object) -> None:
         """Log an event, or count it if there were many of its kind."""

@@ -34,7 +34,7 @@ class ModeLog:
     Attributes
     ----------
     stop_reasons
-        Of the newest stops, in order.
+        Of the newest stops, and of lines that were lost before a drive, in order.
     hold_reasons
         Why the robot held in DRIVE for `HELD_S` or more, in order.
     """
@@ -65,7 +65,7 @@ class ModeLog:
     def entered(self, state: State, run_s: float) -> None:
         """Log the mode that was entered at `run_s`."""
         mode = state.mode
-        if mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and mode.reason is not None:
+        if mode.mode in {Mode.SAFE_STOP, Mode.FAULT, Mode.CONNECTING} and mode.reason is not None:
             self.stop_reasons.append(mode.reason)
             del self.stop_reasons[:-STOP_REASONS_MAX]
         self._notifier.status(mode.mode.value if mode.reason is None else f"{mode.mode.value}: {mode.reason}")

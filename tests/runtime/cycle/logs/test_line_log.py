@@ -120,3 +120,12 @@ def test_a_fifth_of_corrupt_frames_is_one_line_with_the_rate() -> None:
     run_noisy(case, 20.0, 5, 0)
     run_noisy(case, 20.0, 4, 1)
     assert len(case.events) == 2, "once more after it was good"
+
+
+def test_a_flood_of_valid_frames_that_disturbs_no_cycle_is_one_line_with_the_rate() -> None:
+    case = Case()
+    run_noisy(case, 60.0, 60, 0)
+    assert not case.events, "a full line of 115,200 baud"
+    run_noisy(case, 60.0, 300, 0)
+    (line,) = case.events
+    assert "brings 6000 valid frames a second" in line["event"]
