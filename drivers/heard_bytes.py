@@ -24,8 +24,10 @@ _TEXT_MIN: Final = 8
 _RUN: Final = re.compile(rb"[\r\n]*[\t\x20-\x7e]{6,}[\r\n]*")
 _PRINTABLE_SHARE: Final = 0.9
 _PRINTABLE_MIN: Final = 24
-"""So many characters of UTF-8 are text, too, if this share of them is printable: short lines, as of numbers, and other
-alphabets. Of random bytes 38 % are."""
+"""So many characters are text, too, if this share of them is printable: short lines, as of numbers, other alphabets.
+
+Of random bytes 38 % are.
+"""
 _QUOTED_MAX: Final = 60
 """Longest quotation, characters."""
 _ECHO_MIN: Final = 6
