@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from perception.detected_object import DetectedObject, wall_between
 from perception.kernel import Floats
 from perception.mapping.surfaces.parameters import AGREES_M, KNOWN_NAT, PIECE_MIN_M, UNKNOWN_M
-from perception.mapping.surfaces.surface_list import find_near, places_on
+from perception.mapping.surfaces.surface_list import ENDS, find_near, places_on
 from perception.polyline import Polyline
 
 PLACES: Final = 16
@@ -31,14 +31,15 @@ THIN_SHARE: Final = 0.25
 """A piece with less than this share of the usual echoes a metre is none."""
 EVIDENCE_MAX: Final = 30.0
 """Greatest log odds that are reported, nat."""
+WALL_FIELDS: Final = (*ENDS, "variance_across", "variance_turn", "echoes", "evidence")
 Runs = list[tuple[float, float]]
 """Parts of a piece, from 0 to 1."""
 
 
-def beside_known(
+def free_of_known(
     rows: NDArray[Any], known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]
-) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
-    """Return the walls and the polylines that lie along no known wall and not on an object.
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Return which places along surfaces lie along no known wall and not on an object, shape (n, PLACES).
 
     Parameters
     ----------
@@ -49,12 +50,26 @@ def beside_known(
     reach_m : mapping
         Radius within which each model's outline lies, m.
     """
-    if not len(rows):
-        return (), ()
     walls = np.array([one.ends for one in known if one.ends is not None]).reshape(-1, 4)
     reach_m = {**reach_m, **dict.fromkeys(CORNERS, CORNER_REACH_M)}
     bodies = np.array([(one.x, one.y, reach_m[one.model]) for one in known if one.model in reach_m]).reshape(-1, 3)
-    free = is_free(rows, walls, bodies)
+    return is_free(rows, walls, bodies)
+
+
+def beside_known(
+    rows: NDArray[Any], free: NDArray[np.bool_]
+) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
+    """Return the walls and the polylines in what is free.
+
+    Parameters
+    ----------
+    rows : (n,) record of Surface
+        The surfaces.
+    free : (n, PLACES) bool
+        Which places along them are free of what the method knows.
+    """
+    if not len(rows):
+        return (), ()
     is_piece = rows["number"] < 0
     length = np.hypot(rows["x2"] - rows["x1"], rows["y2"] - rows["y1"]) * is_piece
     density = rows["echoes"] / np.maximum(length, PIECE_MIN_M)
@@ -66,11 +81,13 @@ def beside_known(
     straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
     prior = KNOWN_NAT * (2.0 * straight_share * (1.0 - known_share) - 1.0)
     is_wall = is_piece & (rows["evidence"] + prior > 0.0) & is_dense
+    straight, places = rows[is_wall], free[is_wall]
+    numbers = zip(*(straight[name].tolist() for name in WALL_FIELDS), strict=True)
     found = [
-        _wall(row, begin, end, prior)
-        for row, places in zip(rows[is_wall], free[is_wall], strict=True)
-        for begin, end in _runs(places)
-        if (end - begin) * math.hypot(float(row["x2"] - row["x1"]), float(row["y2"] - row["y1"])) >= PIECE_MIN_M
+        _wall(wall, begin, end, prior)
+        for wall, length_m, runs in zip(numbers, length[is_wall].tolist(), map(_runs, places), strict=True)
+        for begin, end in runs
+        if (end - begin) * length_m >= PIECE_MIN_M
     ]
     rest = ~is_wall & free.any(axis=1)
     return tuple(found), tuple(_polylines(rows[rest]))
@@ -103,14 +120,13 @@ def _runs(free: NDArray[np.bool_]) -> Runs:
     return [(begin / PLACES, end / PLACES) for begin, end in borders.reshape(-1, 2).tolist()]
 
 
-def _wall(row: NDArray[Any], begin: float, end: float, prior: float) -> DetectedObject:
-    """Return a part of a piece as a wall, as sure as the whole."""
-    x, y = float(row["x1"]), float(row["y1"])
-    dx, dy = float(row["x2"]) - x, float(row["y2"]) - y
+def _wall(wall: tuple[float, ...], begin: float, end: float, prior: float) -> DetectedObject:
+    """Return a part of a piece, the values of `WALL_FIELDS`, as a wall, as sure as the whole."""
+    x, y, x2, y2, variance_across, variance_turn, echoes, evidence = wall
+    dx, dy = x2 - x, y2 - y
     return wall_between(
         (x + begin * dx, y + begin * dy, x + end * dx, y + end * dy),
-        float(row["variance_across"]), float(row["variance_turn"]), round((end - begin) * float(row["echoes"])),
-        min(float(row["evidence"]) + prior, EVIDENCE_MAX),
+        variance_across, variance_turn, round((end - begin) * echoes), min(evidence + prior, EVIDENCE_MAX),
     )  # fmt: skip
 
 
@@ -118,10 +134,12 @@ def _polylines(rows: NDArray[Any]) -> Iterator[Polyline]:
     """Yield the polylines of rows, which follow each other in order; a piece that is no wall is one, too."""
     if not len(rows):
         return
-    is_next = (
-        (np.diff(rows["number"]) == 0) & (rows["x2"][:-1] == rows["x1"][1:]) & (rows["y2"][:-1] == rows["y1"][1:])
-    )
-    for part in np.split(rows, np.flatnonzero(~is_next) + 1):
-        xs, ys = (np.append(part[f"{way}1"], part[f"{way}2"][-1]) for way in "xy")
-        probability = -math.expm1(-max(float(part["echoes"].mean()), 0.0))
-        yield Polyline(abs(int(part["number"][0])), np.column_stack([xs, ys]), probability)
+    firsts, lasts = (np.column_stack([rows[f"x{end}"], rows[f"y{end}"]]) for end in "12")
+    is_next = (np.diff(rows["number"]) == 0) & (lasts[:-1] == firsts[1:]).all(axis=1)
+    begins = np.flatnonzero(np.concatenate([[True], ~is_next]))
+    ends = np.append(begins[1:], len(rows))
+    echoes = np.add.reduceat(rows["echoes"], begins) / (ends - begins)
+    numbers = np.abs(rows["number"][begins])
+    for begin, end, number, mean in zip(*(a.tolist() for a in (begins, ends, numbers, echoes)), strict=True):
+        points = np.concatenate([firsts[begin:end], lasts[end - 1 : end]])
+        yield Polyline(number, points, -math.expm1(-max(mean, 0.0)))

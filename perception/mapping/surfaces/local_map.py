@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.bounds import bounds
-from perception.kernel import Floats
+from perception.kernel import Floats, Ints
 from perception.mapping.surfaces.cells import make_again
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, REACH_M, READINGS_KEPT
 from perception.mapping.surfaces.piece_fit import group_echoes
@@ -143,12 +143,12 @@ class LocalMapSearch:
         room = self.local[0]
         return room["pieces"][: int(room["piece_count"])]  # type: ignore[no-any-return]  # numpy types a field as Any
 
-    def chains(self) -> list[NDArray[Any]]:
-        """Return the cells of each polyline that the last search has found, as records of `SurfaceCell`."""
+    def chains(self) -> tuple[NDArray[Any], Ints]:
+        """Return the cells of the last search's polylines, as records of `SurfaceCell`, and each one's number."""
         room = self.local[0]
         numbers = room["chains"][: int(room["chained"])]
-        ends = np.flatnonzero(numbers == 0)
-        return [room["cells"][part[part > 0] - 1] for part in np.split(numbers, ends + 1) if (part > 0).any()]
+        is_cell = numbers > 0
+        return room["cells"][numbers[is_cell] - 1], np.cumsum(~is_cell)[is_cell]
 
     def drop_caches(self) -> None:
         """Make the cells again after the memory was overwritten."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.kernel import kernel
+from perception.kernel import Floats, kernel, loop_kernel
 from perception.mapping.surfaces.cells import RIM, cell_of, strength_of
 from perception.mapping.surfaces.parameters import (
     CELL_M,
@@ -19,11 +19,9 @@ from perception.mapping.surfaces.parameters import (
     SURFACE_CELLS_MAX,
     TAKEN_M,
 )
-from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap, Piece, SurfaceCell
+from perception.mapping.surfaces.records import ANGLES, FREE, CellCounts, LocalMap, Piece, SurfaceCell
 from perception.records import Records
 
-ANGLES: Final = 36
-"""Directions that are tried through a seed: 5° apart, and the fit does the rest."""
 SEED_CELLS: Final = 10
 """Cells around a seed among which its direction is sought: half a metre."""
 STRONG: Final = 4.0
@@ -32,6 +30,8 @@ TAKEN_WEIGHT: Final = 0.3
 """Weight of the cells of other pieces in that search: lines cross."""
 REACHES_M: Final = (0.5, 1.0, 2.0, 6.0, 13.0, 13.0)
 """How far a line is followed in each round of fitting; the last one is not fitted again."""
+SAME_M: Final = 1e-9
+"""A line that a fit has moved and turned (m, rad) by less is the same but for rounding."""
 STEP_M: Final = 0.7 * CELL_M
 OFFSETS: Final = 2
 """Steps to each side of the line in which cells are looked for."""
@@ -66,7 +66,7 @@ def walk(
     """Follow a line through occupied cells to both sides, as far as no gap is too wide, and sum them.
 
     `counts.sums` is overwritten: weight, its sums of x, y, xx, xy, yy about the line's point, cells, cells without an
-    owner, the ends, and the share of the steps that met a cell.
+    owner, the ends, the share of the steps that met a cell, and 1 if the reach has ended it.
 
     Parameters
     ----------
@@ -121,8 +121,31 @@ def walk(
                 steps += since
                 since = 0
             t += STEP_M
+        if t > reach:
+            sums[11] = 1.0
     sums[8], sums[9] = low, high
     sums[10] = met_steps / max(steps, 1)
+
+
+@loop_kernel
+def add_cell(scores: Floats, ux: Floats, uy: Floats, i: float, j: float, weight: float) -> None:
+    """Add a cell's weight to the directions of the lines through a seed that are near it.
+
+    Parameters
+    ----------
+    scores : (ANGLES,) float
+        Updated.
+    ux, uy : (ANGLES,) float
+        The directions, in widths of a line by cell.
+    i, j : float
+        The cell's place from the seed, cells.
+    weight : float
+        Where a line meets its middle.
+    """
+    for a in range(ANGLES):
+        off = j * ux[a] - i * uy[a]
+        near = 1.0 - off * off
+        scores[a] += weight * (near if near > 0.0 else 0.0)
 
 
 @kernel
@@ -135,20 +158,20 @@ def best_direction(cells: Records[SurfaceCell], counts: CellCounts, seed: int) -
             if counts.index[i, j] != 0:
                 counts.near[count] = counts.index[i, j] - 1
                 count += 1
-    best, direction = -1.0, 0.0
+    scores = counts.scores
+    scores[:] = 0.0
     for a in range(ANGLES):
         angle = math.pi * a / ANGLES
-        ux, uy = math.cos(angle), math.sin(angle)
-        score = 0.0
-        for k in range(count):
-            cell = cells[counts.near[k]]
-            off = ((cell.j - j0) * ux - (cell.i - i0) * uy) * CELL_M / OFF_LINE_M
-            if abs(off) < 1.0:
-                weight = 1.0 if cell.owner == FREE else TAKEN_WEIGHT
-                score += min(cell.strength, STRONG) * weight * (1.0 - off * off)
-        if score > best:
-            best, direction = score, angle
-    return direction
+        counts.ux[a], counts.uy[a] = math.cos(angle) * CELL_M / OFF_LINE_M, math.sin(angle) * CELL_M / OFF_LINE_M
+    for k in range(count):
+        cell = cells[counts.near[k]]
+        weight = min(cell.strength, STRONG) * (1.0 if cell.owner == FREE else TAKEN_WEIGHT)
+        add_cell(scores, counts.ux, counts.uy, cell.i - i0, cell.j - j0, weight)
+    best = 0
+    for a in range(1, ANGLES):
+        if scores[a] > scores[best]:
+            best = a
+    return math.pi * best / ANGLES
 
 
 @kernel
@@ -177,7 +200,11 @@ def grow(room: LocalMap, counts: CellCounts, seed: int) -> bool:
             mx, my = sums[1] / sums[0], sums[2] / sums[0]
             xx, xy, yy = sums[3] / sums[0] - mx * mx, sums[4] / sums[0] - mx * my, sums[5] / sums[0] - my * my
             turn = 0.5 * math.atan2(2.0 * xy, xx - yy)
-            piece.x, piece.y, piece.ux, piece.uy = piece.x + mx, piece.y + my, math.cos(turn), math.sin(turn)
+            ux, uy = math.cos(turn), math.sin(turn)
+            moved = max(abs(mx), abs(my), abs(ux * piece.uy - uy * piece.ux))
+            piece.x, piece.y, piece.ux, piece.uy = piece.x + mx, piece.y + my, ux, uy
+            if moved < SAME_M and sums[11] == 0.0:  # the same cells would be met again
+                break
     piece.low, piece.high = sums[8] - 0.5 * CELL_M, sums[9] + 0.5 * CELL_M
     is_long = piece.high - piece.low >= PIECE_MIN_M
     if not is_long or sums[10] < COVERED_MIN or sums[7] < 0.5 * sums[6]:

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from config.robot import SENSORS_MAX
 from config.settings import QUANTA_MAX
 from perception.bounds import FLAG, PLACE, Bound, Count, Finite, Place, up_to
@@ -25,9 +28,13 @@ from perception.records import Record, Records
 WORDS: Final = SAMPLES // SHARES_A_WORD
 ANY: Final = Bound(-(2**63), 2**63 - 1)
 """Of shares packed into a word."""
+Narrow = NDArray[np.int32]
+"""Counts of all readings fit, and twice as many of them fit into the processor's caches."""
 CHAIN_MAX: Final = 64
 NODES_MAX: Final = 4096
 """Points of a polyline, at most."""
+ANGLES: Final = 36
+"""Directions that are tried through a seed: 5° apart, and the fit does the rest."""
 FREE: Final = -1
 NODE: Final = -2
 """Owners of a cell that are no piece: none yet, and a polyline."""
@@ -144,14 +151,14 @@ class ArcPlace(Record):
 class CellCounts(Record):
     """The cells, made from the readings and their shares; and scratch."""
 
-    hits: Annotated[Ints, DIRECTIONS, CELLS, CELLS]
+    hits: Annotated[Narrow, DIRECTIONS, CELLS, CELLS]
     """Echoes from each cell by looking direction, in parts of `WHOLE`."""
-    all_hits: Annotated[Ints, CELLS, CELLS]
+    all_hits: Annotated[Narrow, CELLS, CELLS]
     """The same for all directions together."""
-    passes: Annotated[Ints, DIRECTIONS, CELLS // 2, CELLS // 2]
+    passes: Annotated[Narrow, DIRECTIONS, CELLS // 2, CELLS // 2]
     """Ranges that went on, in parts of `WHOLE_PASS`."""
-    all_passes: Annotated[Ints, CELLS // 2, CELLS // 2]
-    index: Annotated[Ints, CELLS, CELLS]
+    all_passes: Annotated[Narrow, CELLS // 2, CELLS // 2]
+    index: Annotated[NDArray[np.int16], CELLS, CELLS]
     """One more than the number of the occupied cell at each place, 0 where there is none."""
     marks: Annotated[Ints, SURFACE_CELLS_MAX]
     """The last walk that met each occupied cell."""
@@ -162,6 +169,9 @@ class CellCounts(Record):
     arc: Annotated[Records[ArcPlace], SAMPLES]
     likelihoods: Annotated[Floats, SAMPLES]
     near: Annotated[Ints, 441]
+    ux: Annotated[Floats, ANGLES]
+    uy: Annotated[Floats, ANGLES]
+    scores: Annotated[Floats, ANGLES]
     begins: Annotated[Ints, PIECES_MAX + 2]
     """Where the echoes of each piece begin in `grouped`: …"""
     grouped: Annotated[Ints, READINGS_MAX]

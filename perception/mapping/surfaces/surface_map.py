@@ -23,7 +23,7 @@ from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.mapping.no_surfaces import NoSurfaces
-from perception.mapping.surfaces.beside_known import beside_known
+from perception.mapping.surfaces.beside_known import beside_known, free_of_known
 from perception.mapping.surfaces.local_map import LocalMapSearch
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_MIN_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
@@ -47,7 +47,7 @@ class SurfaceMap(NoSurfaces):
         The settings.
     """
 
-    SCRATCH: Final = ("_known", "_report")
+    SCRATCH: Final = ("_known", "_free", "_report")
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: SurfacesConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
@@ -60,6 +60,7 @@ class SurfaceMap(NoSurfaces):
 
     def _forget_derived(self) -> None:
         self._known: tuple[DetectedObject, ...] = ()
+        self._free = np.zeros((0, 0), np.bool_)
         self._report: tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]] | None = None
 
     @property
@@ -114,23 +115,33 @@ class SurfaceMap(NoSurfaces):
         rows["echoes"], rows["evidence"] = pieces["echoes"], pieces["evidence"]
         rows["number"] = -(self._list.numbered + 1 + np.arange(len(rows)))
         self._list.numbered += len(rows)
-        parts = [rows, *(self._polyline_rows(cells) for cells in self._search.chains())]
-        found = np.concatenate(parts)
+        found = np.concatenate([rows, self._polyline_rows()])
         found["is_live"] = 1
         return found
 
-    def _polyline_rows(self, cells: NDArray[Any]) -> NDArray[Any]:
-        """Return the parts of a polyline through the middles of cells, as records of `Surface`."""
+    def _polyline_rows(self) -> NDArray[Any]:
+        """Return the parts of the polylines through the middles of cells, as records of `Surface`."""
+        cells, of = self._search.chains()
+        if not len(cells):
+            return zeros(Surface, 0)
         x, y = self._search.centre
         xs = x + (cells["i"] + 0.5 - 0.5 * CELLS) * CELL_M
         ys = y + (cells["j"] + 0.5 - 0.5 * CELLS) * CELL_M
-        if len(cells) == 1:  # the cell's own extent
-            xs, ys = np.array([xs[0] - 0.5 * CELL_M, xs[0] + 0.5 * CELL_M]), np.repeat(ys, 2)
-        rows = zeros(Surface, len(xs) - 1)
-        self._list.numbered += 1
-        rows["number"] = self._list.numbered
-        rows["x1"], rows["x2"], rows["y1"], rows["y2"] = xs[:-1], xs[1:], ys[:-1], ys[1:]
-        rows["echoes"] = float(cells["strength"].mean())
+        count = np.bincount(of)
+        is_alone = count[of] == 1
+        begin = np.flatnonzero(np.append(of[1:] == of[:-1], False) | is_alone)
+        half_cell = 0.5 * CELL_M * is_alone[begin]  # one cell has its own extent
+        end = begin + ~is_alone[begin]
+        rows = zeros(Surface, len(begin))
+        rows["number"] = self._list.numbered + 1 + of[begin]
+        self._list.numbered += len(count)
+        rows["x1"], rows["x2"], rows["y1"], rows["y2"] = (
+            xs[begin] - half_cell,
+            xs[end] + half_cell,
+            ys[begin],
+            ys[end],
+        )
+        rows["echoes"] = (np.bincount(of, cells["strength"]) / np.maximum(count, 1))[of[begin]]
         return rows
 
     def report(
@@ -145,7 +156,11 @@ class SurfaceMap(NoSurfaces):
         """
         objects = known()
         if self._report is None or objects != self._known:
-            self._known, self._report = objects, beside_known(self._list.archived_rows, objects, self._reach_m)
+            rows = self._list.archived_rows
+            free = free_of_known(rows, objects, self._reach_m)
+            if self._report is None or not np.array_equal(free, self._free):
+                self._free, self._report = free, beside_known(rows, free)
+            self._known = objects
         return self._report
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from perception.detected_object import DetectedObject, wall_between
-from perception.mapping.surfaces.beside_known import beside_known
+from perception.mapping.surfaces.beside_known import beside_known, free_of_known
 from perception.mapping.surfaces.surface_list import ENDS, Surface
+from perception.polyline import Polyline
 from perception.records import zeros
 
 
@@ -35,8 +36,14 @@ def known_wall(x1: float, y1: float, x2: float, y2: float) -> DetectedObject:
     return wall_between((x1, y1, x2, y2), 1e-6, 1e-6, 50, 9.0, 7)
 
 
+def report(
+    surfaces: np.ndarray, known: tuple[DetectedObject, ...], reach_m: dict[str, float]
+) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
+    return beside_known(surfaces, free_of_known(surfaces, known, reach_m))
+
+
 def test_pieces_in_a_room_that_the_method_does_not_know_are_walls() -> None:
-    walls, polylines = beside_known(room(), (), {})
+    walls, polylines = report(room(), (), {})
     assert sorted(round(np.hypot(w.ends[2] - w.ends[0], w.ends[3] - w.ends[1])) for w in walls if w.ends) == [
         6,
         6,
@@ -50,7 +57,7 @@ def test_pieces_in_a_room_that_the_method_does_not_know_are_walls() -> None:
 def test_what_a_known_wall_or_object_covers_is_left_out() -> None:
     surfaces = room()
     drum = DetectedObject("drum", 8.0, 3.0, 0.0, 0.01, 9, 1.0)
-    walls, _ = beside_known(surfaces, (known_wall(0.0, 0.03, 4.0, 0.03), drum), {"drum": 0.3})
+    walls, _ = report(surfaces, (known_wall(0.0, 0.03, 4.0, 0.03), drum), {"drum": 0.3})
     ends = np.array([w.ends for w in walls])
     assert not ((ends[:, 1] == 0.0) & (ends[:, 0] < 3.5) & (ends[:, 2] < 4.5)).any()
     beside = ends[(ends[:, 0] == 8.0) & (ends[:, 2] == 8.0)]
@@ -62,7 +69,7 @@ def test_where_the_method_explains_the_place_pieces_are_outlines() -> None:
     """A shelf in a room of walls that are known: nothing says that it is a wall."""
     known = tuple(known_wall(*row) for row in zip(*(room()[name] for name in ENDS), strict=True))
     surfaces = np.concatenate([room(), pieces((2.0, 2.0, 2.6, 2.0), evidence=1.0)])
-    walls, polylines = beside_known(surfaces, known, {})
+    walls, polylines = report(surfaces, known, {})
     assert walls == ()
     assert [line.points.tolist() for line in polylines] == [[[2.0, 2.0], [2.6, 2.0]]]
 
@@ -76,20 +83,20 @@ def test_pieces_of_round_bodies_alone_are_no_walls(radius: float) -> None:
         for x in range(0, 40, 2)
         for a, b in itertools.pairwise(turns)
     ]
-    walls, polylines = beside_known(pieces(*ends, evidence=2.0), (), {})
+    walls, polylines = report(pieces(*ends, evidence=2.0), (), {})
     assert walls == ()
     assert len(polylines) > 100
 
 
 def test_a_piece_with_few_echoes_beside_the_others_is_no_wall() -> None:
     surfaces = np.concatenate([room(), pieces((2.0, 2.0, 4.0, 2.0), echoes=10.0)])
-    assert len(beside_known(surfaces, (), {})[0]) == 4
+    assert len(report(surfaces, (), {})[0]) == 4
 
 
 def test_a_polyline_keeps_its_points_in_order() -> None:
     parts = pieces((0.0, 0.0, 0.1, 0.1), (0.1, 0.1, 0.2, 0.1), (0.5, 0.5, 0.55, 0.5))
     parts["number"], parts["echoes"] = [4, 4, 5], 2.0
-    _, polylines = beside_known(parts, (), {})
+    _, polylines = report(parts, (), {})
     assert [(line.number, line.points.tolist()) for line in polylines] == [
         (4, [[0.0, 0.0], [0.1, 0.1], [0.2, 0.1]]),
         (5, [[0.5, 0.5], [0.55, 0.5]]),

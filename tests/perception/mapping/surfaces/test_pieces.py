@@ -9,9 +9,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, WHOLE
-from perception.mapping.surfaces.pieces import capture, grow_all, offset_of
-from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, WHOLE
+from perception.mapping.surfaces.pieces import (
+    SEED_CELLS,
+    STRONG,
+    TAKEN_WEIGHT,
+    best_direction,
+    capture,
+    grow_all,
+    offset_of,
+)
+from perception.mapping.surfaces.records import ANGLES, FREE, CellCounts, LocalMap
 from perception.records import Records, records, zeros
 
 pytestmark = pytest.mark.compiled
@@ -75,6 +83,30 @@ def test_a_few_cells_are_no_piece() -> None:
     grow_all(room[0], records(CellCounts, counts)[0], 100)
     assert local["piece_count"][0] == 0
     assert (local["cells"]["owner"][0, : int(local["cell_count"][0])] == FREE).all()
+
+
+def test_the_direction_through_a_seed_meets_most_cells() -> None:
+    """As a loop over the directions has it."""
+    rng = np.random.default_rng(3)
+    room, local, counts = mapped(np.concatenate([line(-0.4, -0.2, 0.4, 0.3), rng.uniform(-0.45, 0.45, (30, 2))]))
+    count = int(local["cell_count"][0])
+    cells = local["cells"][0, :count]
+    cells["owner"][::3] = 0
+    for seed in range(0, count, 5):
+        scores = []
+        for a in range(ANGLES):
+            angle = math.pi * a / ANGLES
+            near = (
+                np.maximum(np.abs(cells["i"] - cells["i"][seed]), np.abs(cells["j"] - cells["j"][seed])) <= SEED_CELLS
+            )
+            across = (cells["j"] - cells["j"][seed]) * math.cos(angle) - (cells["i"] - cells["i"][seed]) * math.sin(
+                angle
+            )
+            share = np.maximum(1.0 - (across * CELL_M / OFF_LINE_M) ** 2, 0.0)
+            weight = np.minimum(cells["strength"], STRONG) * np.where(cells["owner"] == FREE, 1.0, TAKEN_WEIGHT)
+            scores.append(float((near * weight * share).sum()))
+        found = best_direction(room[0].cells, records(CellCounts, counts)[0], seed)
+        assert scores[round(found * ANGLES / math.pi)] == pytest.approx(max(scores), rel=1e-9)
 
 
 def test_places_of_cells() -> None:

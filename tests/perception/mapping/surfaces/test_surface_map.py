@@ -10,9 +10,11 @@ import pytest
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing, Pose
+from perception.detected_object import DetectedObject, wall_between
 from perception.mapping.surfaces.quantum import search_is_due
 from perception.mapping.surfaces.surface_map import SurfaceMap
 from perception.pipeline import Perception
+from perception.polyline import Polyline
 
 pytestmark = pytest.mark.compiled
 
@@ -101,6 +103,22 @@ def test_a_robot_that_stands_adds_nothing(driven: Perception) -> None:
         driven.observe(firing)
     assert search.room[0].count <= before + SIDES
     assert not search_is_due(search.room)
+
+
+def test_a_report_changes_only_with_what_is_free(driven: Perception) -> None:
+    """A known wall that moves by a millimetre covers the same: the report is not made again."""
+    surfaces = driven.surfaces
+    assert isinstance(surfaces, SurfaceMap)
+
+    def beside(*known: DetectedObject) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:
+        return surfaces.report(lambda: known)
+
+    without = beside()
+    one, other = (wall_between((-3.0, -2.0 + off, 3.0, -2.0 + off), 1e-4, 1e-4, 50, 9.0) for off in (0.0, 0.001))
+    covered = beside(one)
+    assert len(covered[0]) < len(without[0])
+    assert beside(other) is covered
+    assert [wall.ends for wall in beside()[0]] == [wall.ends for wall in without[0]]
 
 
 def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
