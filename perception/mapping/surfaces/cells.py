@@ -36,7 +36,7 @@ from perception.mapping.surfaces.parameters import (
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import WORDS, CellCounts, KeptReading, LocalMap
+from perception.mapping.surfaces.records import BLOCK, WORDS, CellCounts, KeptReading, LocalMap
 from perception.records import Records
 
 BLUR: Final = 16.0
@@ -49,8 +49,10 @@ LEAST_READINGS: Final = 0.5
 AXIS_LOSS: Final = 0.5
 """At the beam's edge an echo or a pass counts half, less with the square of the angle."""
 DIRECTION_RAD: Final = 2.0 * math.pi / DIRECTIONS
-EDGE_MIN: Final = 1e-6
-"""An edge of a beam that goes along a row within this (cosine) does not bound the beam's part of that row."""
+EDGE_MIN: Final = 1e-9
+"""An edge of a beam that goes along the rows is turned by so much, rad."""
+BORDER_COS: Final = math.cos(DIRECTION_RAD)
+BORDER_SIN: Final = math.sin(DIRECTION_RAD)
 RIM: Final = 2
 """Cells at the map's rim that are not used, so that each cell has neighbours."""
 
@@ -60,12 +62,6 @@ def cell_of(offset: float) -> int:
     """Return the row or column of a place, its offset from the map's centre in m; −1 outside."""
     at = math.floor(offset / CELL_M) + CELLS // 2
     return int(at) if RIM <= at < CELLS - RIM else -1
-
-
-@kernel
-def direction_of(angle: float) -> int:
-    """Return the looking direction in which a sensor sees along an angle, rad."""
-    return math.floor(angle / DIRECTION_RAD) % DIRECTIONS
 
 
 @kernel
@@ -111,45 +107,47 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
     if not size < far:
         return
     ux, uy = math.cos(axis), math.sin(axis)
+    c, s = math.cos(half), math.sin(half)
     # The beam lies to the left of its right edge and to the right of its left edge.
-    right_x, right_y = math.cos(axis - half), math.sin(axis - half)
-    left_x, left_y = math.cos(axis + half), math.sin(axis + half)
+    right_x, right_y, left_x, left_y = ux * c + uy * s, uy * c - ux * s, ux * c - uy * s, uy * c + ux * s
     low_x, high_x = min(0.0, far * right_x, far * left_x), max(0.0, far * right_x, far * left_x)
-    if abs(math.sin(axis)) < math.sin(half):  # the arc bulges along x
+    if abs(uy) < s:  # the arc bulges along x
         low_x, high_x = (low_x, far) if ux > 0.0 else (-far, high_x)
+    right_x, left_x = away_from_zero(right_x), away_from_zero(left_x)
+    right, left = right_y / right_x, left_y / left_x
     # A beam of up to ±45° holds at most three borders between looking directions.
     first = math.floor((axis - half) / DIRECTION_RAD)
     borders = math.floor((axis + half) / DIRECTION_RAD) - first
     c1, s1 = math.cos((first + 1) * DIRECTION_RAD), math.sin((first + 1) * DIRECTION_RAD)
-    c2, s2 = math.cos((first + 2) * DIRECTION_RAD), math.sin((first + 2) * DIRECTION_RAD)
-    c3, s3 = math.cos((first + 3) * DIRECTION_RAD), math.sin((first + 3) * DIRECTION_RAD)
+    c2, s2 = c1 * BORDER_COS - s1 * BORDER_SIN, s1 * BORDER_COS + c1 * BORDER_SIN
+    c3, s3 = c2 * BORDER_COS - s2 * BORDER_SIN, s2 * BORDER_COS + c2 * BORDER_SIN
     ends = CELLS // 2
     begin_i = max(1, math.floor((x + low_x) / size) + ends // 2)
     end_i = min(ends - 1, math.floor((x + high_x) / size) + ends // 2 + 1)
-    tangent = 1.0 / math.tan(half)
+    tangent = c / s
     for i in range(begin_i, end_i):
         dx = (i + 0.5 - 0.5 * ends) * size - x
-        reach = math.sqrt(max(far * far - dx * dx, 0.0))
-        low_y, high_y = -reach, reach
-        if right_x > EDGE_MIN:
-            low_y = max(low_y, dx * right_y / right_x)
-        elif right_x < -EDGE_MIN:
-            high_y = min(high_y, dx * right_y / right_x)
-        if left_x > EDGE_MIN:
-            high_y = min(high_y, dx * left_y / left_x)
-        elif left_x < -EDGE_MIN:
-            low_y = max(low_y, dx * left_y / left_x)
-        # A cell more at each end, for rounding: each is tested.
-        begin_j = max(1, math.floor((y + low_y) / size) + ends // 2 - 1)
-        end_j = min(ends - 1, math.floor((y + high_y) / size) + ends // 2 + 2)
+        if dx * dx > far * far:
+            continue
+        # The middles of a row's cells in the beam lie between its edges and within its reach.
+        high_y = math.sqrt(far * far - dx * dx)
+        low_y = -high_y
+        if right_x > 0.0:
+            low_y = max(low_y, dx * right)
+        else:
+            high_y = min(high_y, dx * right)
+        if left_x > 0.0:
+            high_y = min(high_y, dx * left)
+        else:
+            low_y = max(low_y, dx * left)
+        begin_j = max(1, math.ceil((y + low_y) / size - 0.5) + ends // 2)
+        end_j = min(ends - 1, math.floor((y + high_y) / size - 0.5) + ends // 2 + 1)
         for j in range(begin_j, end_j):
             dy = (j + 0.5 - 0.5 * ends) * size - y
             along = dx * ux + dy * uy
-            if along <= 0.0 or dx * dx + dy * dy > far * far:
+            if along <= 0.0:  # the sensor's own place
                 continue
             off = (dy * ux - dx * uy) / along * tangent
-            if off * off >= 1.0:
-                continue
             b = first
             if borders > 0 and c1 * dy - s1 * dx > 0.0:
                 b += 1
@@ -160,6 +158,14 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
             weight = sign * int(WHOLE_PASS * (1.0 - AXIS_LOSS * off * off) + 0.5)
             cells.passes[b % DIRECTIONS, i, j] += weight
             cells.all_passes[i, j] += weight
+
+
+@kernel
+def away_from_zero(x: float) -> float:
+    """Return a divisor: a number, or one of the same sign near it that is not so small."""
+    if abs(x) >= EDGE_MIN:
+        return x
+    return EDGE_MIN if x >= 0.0 else -EDGE_MIN
 
 
 @kernel
@@ -183,14 +189,18 @@ def lay_arc(cells: CellCounts, q: KeptReading, half: float) -> None:
     first = q.axis + off_axis(0) * half
     turn_c, turn_s = math.cos(step), math.sin(step)
     c, s = math.cos(first), math.sin(first)
+    turns = math.floor(first / DIRECTION_RAD)
+    b, border = turns % DIRECTIONS, (turns + 1) * DIRECTION_RAD
     for k in range(SAMPLES):
+        if first + k * step >= border:
+            b, border = (b + 1) % DIRECTIONS, border + DIRECTION_RAD
         place = cells.arc[k]
         place.x, place.y = q.x + q.range_m * c, q.y + q.range_m * s
         c, s = turn_c * c - turn_s * s, turn_s * c + turn_c * s
         place.i, place.j = cell_of(place.x), cell_of(place.y)
         if place.j < 0:
             place.i = -1
-        place.b = direction_of(first + k * step)
+        place.b = b
 
 
 @kernel
@@ -240,12 +250,15 @@ def enter_hits(cells: CellCounts, q: KeptReading, sign: int) -> None:
             if share != 0 and at.i >= 0:
                 cells.hits[at.b, at.i, at.j] += sign * share
                 cells.all_hits[at.i, at.j] += sign * share
+                cells.block_hits[at.i // BLOCK, at.j // BLOCK] += sign * share
             word >>= SHARE_BITS
             k += 1
 
 
 @kernel
-def enter_readings(cells: CellCounts, readings: Records[KeptReading], begin: int, end: int, half: float) -> None:
+def enter_readings(
+    cells: CellCounts, readings: Records[KeptReading], begin: int, end: int, shared: int, half: float
+) -> None:  # fmt: skip
     """Enter readings, and share their echoes.
 
     Parameters
@@ -254,6 +267,8 @@ def enter_readings(cells: CellCounts, readings: Records[KeptReading], begin: int
         Updated.
     begin, end : int
         Which readings.
+    shared : int
+        So many of all readings keep the shares that they have.
     half : float
         As for `enter_passes`.
     """
@@ -261,7 +276,8 @@ def enter_readings(cells: CellCounts, readings: Records[KeptReading], begin: int
         enter_passes(cells, readings[k], half, 1)
         if readings[k].range_m <= REACH_M:
             lay_arc(cells, readings[k], half)
-            share_echo(cells, readings[k])
+            if k >= shared:
+                share_echo(cells, readings[k])
             enter_hits(cells, readings[k], 1)
 
 
@@ -279,12 +295,38 @@ def share_again(cells: CellCounts, readings: Records[KeptReading], begin: int, e
 @kernel
 def make_again(rooms: Records[LocalMap], every: Records[CellCounts], half: float) -> None:
     """Enter the readings of a map that had been entered, whose shares are known, into empty cells."""
-    room, cells = rooms[0], every[0]
-    for k in range(room.entered):
-        enter_passes(cells, room.readings[k], half, 1)
-        if room.readings[k].range_m <= REACH_M:
-            lay_arc(cells, room.readings[k], half)
-            enter_hits(cells, room.readings[k], 1)
+    enter_readings(every[0], rooms[0].readings, 0, rooms[0].entered, rooms[0].entered, half)
+
+
+@kernel
+def clear_cells(every: Records[CellCounts]) -> None:
+    """Set to 0 what readings have put into cells: only where they have, which is a small part."""
+    cells = every[0]
+    for bi in range(CELLS // BLOCK):
+        for bj in range(CELLS // BLOCK):
+            if cells.block_hits[bi, bj] == 0:
+                continue
+            cells.block_hits[bi, bj] = 0
+            for i in range(bi * BLOCK, (bi + 1) * BLOCK):
+                cells.all_hits[i, bj * BLOCK : (bj + 1) * BLOCK] = 0
+                for b in range(DIRECTIONS):
+                    cells.hits[b, i, bj * BLOCK : (bj + 1) * BLOCK] = 0
+    for i in range(CELLS // 2):
+        for bj in range(CELLS // 2 // BLOCK):
+            begin, end = bj * BLOCK, (bj + 1) * BLOCK
+            if cells.all_passes[i, begin:end].any():
+                cells.all_passes[i, begin:end] = 0
+                for b in range(DIRECTIONS):
+                    cells.passes[b, i, begin:end] = 0
+
+
+@kernel
+def greatest_strength(cells: CellCounts, i: int, j: int) -> float:
+    """Return what `strength_of` a cell cannot exceed; it is quick."""
+    every, near = cells.all_hits, 0
+    for di in range(-1, 2):
+        near += every[i + di, j - 1] + every[i + di, j] + every[i + di, j + 1]
+    return (1.0 + STRENGTH_SHARE) * near / WHOLE * math.sqrt(min(every[i, j] / WHOLE, 1.0))
 
 
 @kernel

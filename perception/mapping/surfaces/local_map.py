@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import bounds
 from perception.kernel import Floats, Ints
-from perception.mapping.surfaces.cells import make_again
+from perception.mapping.surfaces.cells import clear_cells, make_again
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, REACH_M, READINGS_KEPT
 from perception.mapping.surfaces.piece_fit import group_echoes
 from perception.mapping.surfaces.quantum import (
@@ -61,7 +61,7 @@ class LocalMapSearch:
         self._clear_counts()
 
     def _clear_counts(self) -> None:
-        # Memory that was never written costs nothing, and new memory less than to overwrite the old.
+        # Memory that was never written costs nothing.
         self._counts = zeros(CellCounts, 1)
         self._c = records(CellCounts, self._counts)
 
@@ -95,21 +95,22 @@ class LocalMapSearch:
 
     def begin_at(self, x: float, y: float) -> None:
         """Begin another local map with a centre at a place (m), and the newest readings from around it."""
+        end_search(self.room, self._c)
         room, half = self.local[0], 0.5 * CELLS * CELL_M - REACH_M
-        readings = room["readings"][: int(room["count"])]
+        count, entered = int(room["count"]), int(room["entered"])
         dx, dy = float(room["centre_x"]) - x, float(room["centre_y"]) - y
-        is_near = (np.abs(readings["x"] + dx) < half) & (np.abs(readings["y"] + dy) < half)
-        kept = readings[is_near][-READINGS_KEPT:].copy()
-        kept["x"] += dx
-        kept["y"] += dy
-        room["readings"].view(np.uint8)[...] = 0
-        room["readings"][: len(kept)] = kept
-        room["count"] = len(kept)
-        room["centre_x"], room["centre_y"] = x, y
-        end_search(self.room)
+        readings = room["readings"][:count]
+        kept = np.flatnonzero((np.abs(readings["x"] + dx) < half) & (np.abs(readings["y"] + dy) < half))
+        kept = kept[-READINGS_KEPT:]
+        readings[: len(kept)] = readings[kept]
+        readings[len(kept) :].view(np.uint8)[...] = 0
+        readings["x"][: len(kept)] += dx
+        readings["y"][: len(kept)] += dy
         for name in ("entered", "revisited", "owed", "swept", "is_left"):
             room[name] = 0
-        self._clear_counts()
+        room["count"], room["carried"] = len(kept), np.count_nonzero(kept < entered)
+        room["centre_x"], room["centre_y"] = x, y
+        clear_cells(self._c)
 
     def refine(self) -> bool:
         """Do one quantum; return whether it ended a search, whose surfaces are there until the next quantum."""

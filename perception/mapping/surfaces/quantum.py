@@ -29,7 +29,7 @@ from perception.records import Records
 SILENCE: Final = 1e6
 """Range of silence, m."""
 ENTERED: Final = 8
-SHARED: Final = 32
+SHARED: Final = 48
 ROWS: Final = 32
 TRIED: Final = 2
 LOCATED: Final = 256
@@ -144,7 +144,7 @@ def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float
     room, counts = rooms[0], every[0]
     at = room.at
     if room.phase == IDLE:
-        enter_or_share(rooms, counts, half)
+        enter_or_share(rooms, every, half)
     elif room.phase == CAPTURE:
         capture(room, counts, RIM + at, min(RIM + at + ROWS, CELLS - RIM))
         if advance(room, ROWS, CELLS - 2 * RIM):
@@ -175,22 +175,22 @@ def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float
 
 
 @kernel
-def enter_or_share(rooms: Records[LocalMap], counts: CellCounts, half: float) -> None:
+def enter_or_share(rooms: Records[LocalMap], every: Records[CellCounts], half: float) -> None:
     """Enter readings, share earlier echoes again, or where neither is left begin a search."""
-    room = rooms[0]
+    room, counts = rooms[0], every[0]
     if room.entered < room.count:
         end = min(room.entered + ENTERED, room.count)
-        enter_readings(counts, room.readings, room.entered, end, half)
-        room.owed += REVISITS * (end - room.entered)
+        enter_readings(counts, room.readings, room.entered, end, room.carried, half)
+        room.owed += REVISITS * max(end - max(room.entered, room.carried), 0)
         room.entered = end
     elif room.owed > 0:
         begin = room.revisited if room.revisited < room.entered else 0
-        end = min(begin + SHARED, room.entered)
+        end = min(begin + min(SHARED, room.owed), room.entered)
         share_again(counts, room.readings, begin, end, half)
         room.revisited = end
-        room.owed = max(0, room.owed - SHARED)
+        room.owed = room.owed - (end - begin) if end > begin else 0
     else:
-        end_search(rooms)
+        end_search(rooms, every)
         room.swept, room.phase = room.entered, CAPTURE
 
 
@@ -205,11 +205,12 @@ def advance(room: LocalMap, by: int, end: int) -> bool:
 
 
 @kernel
-def end_search(rooms: Records[LocalMap]) -> None:
+def end_search(rooms: Records[LocalMap], every: Records[CellCounts]) -> None:
     """Forget what the last search has found: a keyframe holds nothing that is over."""
-    room = rooms[0]
+    room, counts = rooms[0], every[0]
     for k in range(room.cell_count):
         cell = room.cells[k]
+        counts.index[cell.i, cell.j] = 0
         cell.i, cell.j, cell.strength, cell.owner = 0, 0, 0.0, 0
     for k in range(min(room.piece_count + 1, len(room.pieces))):  # and one that did not grow
         piece = room.pieces[k]

@@ -30,6 +30,8 @@ ANY: Final = Bound(-(2**63), 2**63 - 1)
 """Of shares packed into a word."""
 Narrow = NDArray[np.int32]
 """Counts of all readings fit, and twice as many of them fit into the processor's caches."""
+BLOCK: Final = 16
+"""Cells along the edge of a block: where nothing was heard, none of its cells is looked at."""
 CHAIN_MAX: Final = 64
 NODES_MAX: Final = 4096
 """Points of a polyline, at most."""
@@ -109,6 +111,8 @@ class LocalMap(Record):
     """The next of them that is shared again, …"""
     owed: Count
     """… and how many are."""
+    carried: Annotated[int, up_to(READINGS_MAX)]
+    """Of its readings, the first ones, so many were shared in the last map and keep what they said there."""
     swept: Annotated[int, up_to(READINGS_MAX)]
     """Readings that were entered when pieces were sought last."""
     is_left: Annotated[int, FLAG]
@@ -154,7 +158,9 @@ class CellCounts(Record):
     hits: Annotated[Narrow, DIRECTIONS, CELLS, CELLS]
     """Echoes from each cell by looking direction, in parts of `WHOLE`."""
     all_hits: Annotated[Narrow, CELLS, CELLS]
-    """The same for all directions together."""
+    """The same for all directions together, …"""
+    block_hits: Annotated[Narrow, CELLS // BLOCK, CELLS // BLOCK]
+    """… and for blocks of cells."""
     passes: Annotated[Narrow, DIRECTIONS, CELLS // 2, CELLS // 2]
     """Ranges that went on, in parts of `WHOLE_PASS`."""
     all_passes: Annotated[Narrow, CELLS // 2, CELLS // 2]

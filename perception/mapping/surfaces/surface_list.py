@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Final
 
 import numpy as np
@@ -34,6 +35,8 @@ class Surface(Record):
 
 
 ENDS: Final = ("x1", "y1", "x2", "y2")
+GROUP: Final = 16
+"""Points that follow each other lie near each other: so many are compared with a segment at once."""
 PLACES: Final = 5
 """Places along a surface that are compared with others."""
 
@@ -58,20 +61,29 @@ def find_near(points: Floats, ends: Floats, within: float, found: Ints) -> None:
     found : (n,) int
         Updated.
     """
-    for k in range(len(ends)):
-        ax, ay = ends[k, 0], ends[k, 1]
-        bx, by = ends[k, 2] - ax, ends[k, 3] - ay
-        squared = max(bx * bx + by * by, 1e-12)
-        low_x, high_x = min(ax, ends[k, 2]) - within, max(ax, ends[k, 2]) + within
-        low_y, high_y = min(ay, ends[k, 3]) - within, max(ay, ends[k, 3]) + within
-        for n in range(len(points)):
-            x, y = points[n, 0], points[n, 1]
-            if found[n] == 1 or not (low_x <= x <= high_x and low_y <= y <= high_y):
+    for begin in range(0, len(points), GROUP):
+        end = min(begin + GROUP, len(points))
+        low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
+        for n in range(begin, end):
+            low_x, high_x = min(low_x, points[n, 0] - within), max(high_x, points[n, 0] + within)
+            low_y, high_y = min(low_y, points[n, 1] - within), max(high_y, points[n, 1] + within)
+        for k in range(len(ends)):
+            ax, ay = ends[k, 0], ends[k, 1]
+            bx, by = ends[k, 2] - ax, ends[k, 3] - ay
+            if (
+                max(ax, ax + bx) < low_x
+                or min(ax, ax + bx) > high_x
+                or max(ay, ay + by) < low_y
+                or min(ay, ay + by) > high_y
+            ):
                 continue
-            t = min(max(((x - ax) * bx + (y - ay) * by) / squared, 0.0), 1.0)
-            dx, dy = x - ax - t * bx, y - ay - t * by
-            if dx * dx + dy * dy < within * within:
-                found[n] = 1
+            squared = max(bx * bx + by * by, 1e-12)
+            for n in range(begin, end):
+                x, y = points[n, 0] - ax, points[n, 1] - ay
+                t = min(max((x * bx + y * by) / squared, 0.0), 1.0)
+                dx, dy = x - t * bx, y - t * by
+                if dx * dx + dy * dy < within * within:
+                    found[n] = 1
 
 
 def places_on(rows: NDArray[Any], count: int) -> Floats:

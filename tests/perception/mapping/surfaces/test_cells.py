@@ -19,7 +19,7 @@ from perception.mapping.surfaces.parameters import (
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import CellCounts, KeptReading, LocalMap
+from perception.mapping.surfaces.records import BLOCK, CellCounts, KeptReading, LocalMap
 from perception.records import Records, array_of, records, zeros
 
 pytestmark = pytest.mark.compiled
@@ -74,7 +74,7 @@ def naive_probability(hits: np.ndarray, passes: np.ndarray, i: int, j: int, b: i
 def test_an_echo_is_shared_as_the_map_says() -> None:
     counts, readings = zeros(CellCounts, 1), some(300)
     view = records(CellCounts, counts)[0]
-    cells.enter_readings(view, readings, 0, 299, HALF)
+    cells.enter_readings(view, readings, 0, 299, 0, HALF)
     q = readings[299]
     q.range_m = 2.0
     hits, passes = (counts[name][0].transpose(1, 2, 0) for name in ("hits", "passes"))
@@ -99,7 +99,7 @@ def test_what_a_reading_has_put_there_can_be_taken_away_and_made_again() -> None
     local["entered"] = 200
     view, rooms = records(CellCounts, counts)[0], records(LocalMap, local)
     readings = rooms[0].readings
-    cells.enter_readings(view, readings, 0, 200, HALF)
+    cells.enter_readings(view, readings, 0, 200, 0, HALF)
     cells.share_again(view, readings, 0, 200, HALF)
     again = zeros(CellCounts, 1)
     cells.make_again(rooms, records(CellCounts, again), HALF)
@@ -111,6 +111,34 @@ def test_what_a_reading_has_put_there_can_be_taken_away_and_made_again() -> None
             cells.lay_arc(view, readings[k], HALF)
             cells.enter_hits(view, readings[k], -1)
     assert not any(counts[name].any() for name in COUNTS)
+
+
+def test_readings_that_are_carried_over_keep_their_shares() -> None:
+    array = zeros(KeptReading, 200)
+    array[...] = array_of(some(200))
+    array["shares"][:, 0] = 100  # the whole echo at the first place
+    cells.enter_readings(records(CellCounts, zeros(CellCounts, 1))[0], records(KeptReading, array), 0, 200, 150, HALF)
+    is_echo = array["range_m"] <= REACH_M
+    assert (array["shares"][:150] == (100, 0, 0)).all()
+    assert (array["shares"][150:][is_echo[150:]] != (100, 0, 0)).any(axis=1).all()
+
+
+def test_a_bound_of_strength_and_the_hits_of_blocks() -> None:
+    counts = zeros(CellCounts, 1)
+    view = records(CellCounts, counts)[0]
+    cells.enter_readings(view, some(2000), 0, 2000, 0, HALF)
+    every = counts["all_hits"][0]
+    blocks = every.reshape(CELLS // BLOCK, BLOCK, CELLS // BLOCK, BLOCK).sum(axis=(1, 3))
+    np.testing.assert_array_equal(counts["block_hits"][0], blocks)
+    rows, columns = every.nonzero()
+    strengths = [
+        (cells.strength_of(view, i, j), cells.greatest_strength(view, i, j))
+        for i, j in zip(rows, columns, strict=True)
+    ]
+    assert all(strength <= most + 1e-12 for strength, most in strengths)
+    assert sum(strength > 0.0 for strength, _ in strengths) > 100
+    cells.clear_cells(records(CellCounts, counts))
+    assert not any(counts[name].any() for name in (*COUNTS, "block_hits"))
 
 
 def test_a_place_outside_the_map_has_no_cell() -> None:

@@ -19,7 +19,7 @@ from perception.mapping.surfaces.pieces import (
     grow_all,
     offset_of,
 )
-from perception.mapping.surfaces.records import ANGLES, FREE, CellCounts, LocalMap
+from perception.mapping.surfaces.records import ANGLES, BLOCK, FREE, CellCounts, LocalMap
 from perception.records import Records, records, zeros
 
 pytestmark = pytest.mark.compiled
@@ -33,6 +33,7 @@ def mapped(points: NDArray[Any], echoes: float = 3.0) -> tuple[Records[LocalMap]
         for b in range(DIRECTIONS // 2):
             counts["hits"][0, b, i, j] = int(echoes * WHOLE / 3)
         counts["all_hits"][0, i, j] = int(echoes * WHOLE / 3) * (DIRECTIONS // 2)
+        counts["block_hits"][0, i // BLOCK, j // BLOCK] = 1
     room, seen = records(LocalMap, local), records(CellCounts, counts)
     capture(room[0], seen[0], 2, CELLS - 2)
     count = int(local["cell_count"][0])
