@@ -44,14 +44,20 @@ class EscapingConsole(Console):
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401 - as rich's
         """Print as rich does, but no column of a table narrower than its longest word: rich would cut numbers.
 
-        The terminal wraps the lines of a table that does not fit. Without a terminal a table has its own width.
+        On a terminal that is too narrow a table has no lines; if that does not suffice, the terminal wraps it. Without
+        a terminal a table has its own width.
         """
         wide = self.options.update(max_width=WIDTH_MAX)
-        tables = [each for each in objects if isinstance(each, Table)]
-        for column in (column for table in tables for column in table.columns):
-            cells = (Measurement.get(self, wide, cell) for cell in (column.header, *column.cells))
-            column.min_width = max(cell.minimum if self.is_terminal else cell.maximum for cell in cells)
-        if tables:
+        for table in (each for each in objects if isinstance(each, Table)):
+            for column in table.columns:
+                cells = [Measurement.get(self, wide, cell) for cell in (column.header, *column.cells)]
+                is_whole = column.no_wrap or not self.is_terminal
+                column.min_width = max(cell.maximum if is_whole else cell.minimum for cell in cells)
+            if self.is_terminal and Measurement.get(self, wide, table).minimum > self.width:
+                table.box, table.padding, table.pad_edge = None, (0, 1, 0, 0), False
+            least = Measurement.get(self, wide, table).minimum
+            if least > self.width:
+                table.width = least  # or rich takes the whole width of a column
             options["crop"] = False
         super().print(*objects, **options)
 

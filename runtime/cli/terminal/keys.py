@@ -24,6 +24,7 @@ def keys(
     on_request: Callable[[Request], None],
     on_quit: Callable[[], None],
     on_other: Callable[[str], None] = lambda _key: None,
+    on_return: Callable[[], None] = lambda: None,
 ) -> Iterator[None]:
     """Read single keys from the terminal during the block, if there is one.
 
@@ -35,6 +36,8 @@ def keys(
         Called for q, and when the terminal is gone.
     on_other : callable
         Called with any other key.
+    on_return : callable
+        Called when the program is continued in the foreground, where the shell has written meanwhile.
     """
     if not sys.stdin.isatty():
         yield
@@ -65,6 +68,7 @@ def keys(
         # A process in the background may not change the terminal; fg continues it once more.
         if os.tcgetpgrp(fd) == os.getpgrp():
             tty.setcbreak(fd, termios.TCSANOW)  # which keeps a key that was pressed meanwhile
+            on_return()
 
     tty.setcbreak(fd)
     loop.add_reader(fd, read)

@@ -142,7 +142,7 @@ class Picture:
             plan = [*list(drawn.split())[: left - 1], Text(LEGEND, style="dim")]
         lines = [line for part in (*parts, plan, objects, counts) for line in part]
         for line in lines:
-            line.truncate(width, overflow="ellipsis")
+            shorten(line, width)
         return Text("\n", no_wrap=True).join(lines)
 
     def _head(self, snapshot: Snapshot, width: int) -> list[Text]:
@@ -213,6 +213,17 @@ class Picture:
             near = 0.0 if not np.isfinite(r) else 1.0 - min(float(r) / self._reach_m, 1.0)
             bars.append("·" if not np.isfinite(r) else BARS[max(1, round(near * (len(BARS) - 1)))])
         return "".join(bars)
+
+
+def shorten(line: Text, width: int) -> None:
+    """Cut a line that is wider than the terminal, but not within a number: 2.13 would read as 2."""
+    if line.cell_len <= width:
+        return
+    line.truncate(width - 1)
+    last = line.plain.rpartition(" ")[2]
+    if any(c.isdigit() for c in last) and last != line.plain:
+        line.right_crop(len(last))
+    line.append("…")
 
 
 def map_text(counts: MapCounts) -> str:

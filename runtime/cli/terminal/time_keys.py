@@ -1,15 +1,36 @@
-"""Time control by two keys of the terminal: p pauses and resumes the emulated run, s steps by one cycle."""
+"""Time control by two keys of the terminal: p pauses and resumes the emulated run, s steps by one cycle.
+
+While it is paused, the other keys take effect with the next cycle, and the terminal says so.
+"""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+
+from runtime.cycle.inputs import Request
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from runtime.timing.time_control import TimeControl
+
+
+WAITS: Final = " waits for the next cycle, because the run is paused: p resumes, s steps"
+
+
+def noting_what_waits(
+    on_request: Callable[[Request], None], control: TimeControl, show: Callable[[str], None]
+) -> Callable[[Request], None]:
+    """Return what passes a request on, and says that it has to wait while the run is paused."""
+
+    def on_key(request: Request) -> None:
+        on_request(request)
+        if control.is_paused:
+            show(request.value.upper() + WAITS)
+
+    return on_key
 
 
 class TimeKeys:

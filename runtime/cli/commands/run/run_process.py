@@ -91,7 +91,7 @@ async def run_process(
         Reads the settings again.
     """
     from runtime.cli.terminal.keys import keys
-    from runtime.cli.terminal.time_keys import TimeKeys
+    from runtime.cli.terminal.time_keys import TimeKeys, noting_what_waits
     from runtime.cli.terminal.view import after_each_cycle
     from runtime.cycle.callbacks import VIEW
     from runtime.cycle.process import RobotProcess
@@ -153,7 +153,8 @@ async def run_process(
         if view is not None:
             view.is_paused = lambda: control.is_paused
             clock.on_change(view.draw_again)
-            stack.enter_context(keys(process.request, process.stop, TimeKeys(control, log).press))
+            on_request = noting_what_waits(process.request, control, view.print)
+            stack.enter_context(keys(on_request, process.stop, TimeKeys(control, log).press, view.draw_again))
             process.health.watch("view", view.probe)
         for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)

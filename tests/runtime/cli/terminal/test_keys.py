@@ -50,11 +50,13 @@ async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
     line_mode, is_in_front = termios.tcgetattr(fd), False
     monkeypatch.setattr(os, "tcgetpgrp", lambda _fd: os.getpgrp() if is_in_front else -1)
     asked: list[Request] = []
-    with keys(asked.append, lambda: None):
+    returns: list[None] = []
+    with keys(asked.append, lambda: None, on_return=lambda: returns.append(None)):
         termios.tcsetattr(fd, termios.TCSANOW, line_mode)
         os.kill(os.getpid(), signal.SIGCONT)
         await asyncio.sleep(0.05)
         assert termios.tcgetattr(fd)[3] & termios.ICANON
+        assert not returns
         is_in_front = True
         os.kill(os.getpid(), signal.SIGCONT)
         os.write(keyboard, b" ")
@@ -62,6 +64,7 @@ async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
             while not asked:
                 await asyncio.sleep(0.01)
     assert asked == [Request.HALT]
+    assert returns
     assert termios.tcgetattr(fd) == line_mode
 
 

@@ -111,6 +111,15 @@ def test_what_a_person_needs_fits_the_terminal(size: tuple[int, int]) -> None:
         assert ("→" in text) == (height > 24 or "have no room" not in text)
 
 
+@pytest.mark.parametrize("width", range(22, 80, 3))
+def test_no_number_is_cut(width: int) -> None:
+    whole = {piece for line in printed(BUSY, 250, 60, URL).split("\n") for piece in line.split()}
+    for line in printed(BUSY, width, 60, URL).split("\n"):
+        cut, ellipsis, _ = line.partition("…")
+        last = cut.split()[-1:] if ellipsis and not cut.endswith(" ") else []
+        assert all(piece in whole or not any(map(str.isdigit, piece)) for piece in last), line
+
+
 @pytest.mark.parametrize("size", [(0, 0), (1, 1), (20, 5), (5, 20), (80, 2)])
 def test_no_size_is_too_small(size: tuple[int, int]) -> None:
     width, height = size

@@ -7,7 +7,8 @@ import asyncio
 from structlog import get_logger
 from structlog.testing import capture_logs
 
-from runtime.cli.terminal.time_keys import TimeKeys
+from runtime.cli.terminal.time_keys import TimeKeys, noting_what_waits
+from runtime.cycle.inputs import Request
 from runtime.timing.time_control import REAL_ROBOT, NoTimeControl
 
 
@@ -53,6 +54,18 @@ async def test_keys_control_time_one_after_the_other() -> None:
         keys.press("p")
         await settle()
     assert control.asked == ["pause", "step", "step", "resume", "pause", "resume"]
+
+
+async def test_a_key_that_waits_for_the_end_of_a_pause_says_so() -> None:
+    control, passed, lines = Control(), list[Request](), list[str]()
+    on_key = noting_what_waits(passed.append, control, lines.append)
+    on_key(Request.HALT)
+    assert lines == []
+    control.is_paused = True
+    on_key(Request.HALT)
+    on_key(Request.ARM)
+    assert passed == [Request.HALT, Request.HALT, Request.ARM]
+    assert [line.split()[0] for line in lines] == ["HALT", "ARM"]
 
 
 async def test_a_refusal_is_logged() -> None:
