@@ -162,9 +162,9 @@ def make_runs(
         compile_kernels(left, console)
     workers = min(workers, len(left))
     with (
-        keeping_what_is_done(folder, console),
         connected(scheduler, workers, folder / LOG) as pool,
         progress(console, "running", len(left)) as step,
+        keeping_what_is_done(folder, console),
     ):
         lines = ProgressLines(console, len(left), time.monotonic)
 
@@ -179,7 +179,7 @@ def make_runs(
 
 @contextlib.contextmanager
 def keeping_what_is_done(folder: Path, console: Console) -> Iterator[None]:
-    """Say at an interrupt that the finished runs are kept.
+    """Say at an interrupt, at once, that the finished runs are kept; the workers may take a while to end.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def keeping_what_is_done(folder: Path, console: Console) -> Iterator[None]:
     """
     try:
         yield
-    except KeyboardInterrupt:
+    except SystemExit:  # of `runtime.cli.start_signals`
         text = f"interrupted: what is done is kept in {folder}; the same call goes on from there"
         console.print(text, soft_wrap=True)
         raise

@@ -141,9 +141,9 @@ def run_maker(
 
     rows, prepared = RowFolder(folder), set[str]()
     with (
-        keeping_what_is_done(folder, console),
         connected(scheduler, workers, folder / LOG) as pool,
         progress(console, "tuning", total) as step,
+        keeping_what_is_done(folder, console),
     ):
         lines = ProgressLines(console, total, time.monotonic)
 

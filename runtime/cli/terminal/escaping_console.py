@@ -44,8 +44,8 @@ class EscapingConsole(Console):
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401 - as rich's
         """Print as rich does, but no column of a table narrower than its longest word: rich would cut numbers.
 
-        On a terminal that is too narrow a table has no lines; if that does not suffice, the terminal wraps it. Without
-        a terminal a table has its own width.
+        On a terminal that is too narrow a table has no lines; if that does not suffice, the terminal wraps it.
+        Without a terminal a table has its own width.
         """
         wide = self.options.update(max_width=WIDTH_MAX)
         for table in (each for each in objects if isinstance(each, Table)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ from runtime.batch.dispatch import Done
 from runtime.batch.runs import Run
 from runtime.cli.app import run_command
 from runtime.cli.commands.sweep import ProgressLines
+from runtime.cli.start_signals import ending_in_order
 from runtime.support.file_lock import file_lock
 
 STUDY = """
@@ -44,7 +46,7 @@ class LocalPool:
 
     def next_done(self) -> Done:
         if self.left == 0:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
         self.left -= 1
         run, attempt = self._runs.pop()
         if run.seed == self.broken_seed:
@@ -79,7 +81,7 @@ def sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sweep:
 
 def test_a_sweep_that_was_stopped_makes_only_what_is_left(sweep: Sweep, capsys: pytest.CaptureFixture[str]) -> None:
     first, second, third = LocalPool(4), LocalPool(99), LocalPool(0)
-    with pytest.raises(SystemExit):
+    with ending_in_order(), pytest.raises(SystemExit):
         sweep(first)
     assert sweep(second) == DONE
     out, err = capsys.readouterr()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from runtime.batch.dispatch import Done
 from runtime.batch.runs import Run
 from runtime.batch.search import Asked
 from runtime.cli.app import run_command
+from runtime.cli.start_signals import ending_in_order
 
 SURE = "perception.bayes.report_probability"
 STUDY = f"""
@@ -58,7 +60,7 @@ class Pool:
 
     def next_done(self) -> Done:
         if self.left == 0:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
         self.left -= 1
         run, attempt = self._runs.pop()
         at = run.varied.get(SURE, 0.95)
@@ -104,7 +106,7 @@ def test_the_changes_and_what_they_bring_are_written(tune: Tune, capsys: pytest.
 
 def test_a_search_that_was_stopped_makes_only_what_is_left(tune: Tune) -> None:
     stopped, second, third = Pool(7), Pool(), Pool(0)
-    with pytest.raises(SystemExit):
+    with ending_in_order(), pytest.raises(SystemExit):
         tune(stopped)
     assert tune(second) == DONE
     assert 999 - second.left == 3 * 4 + 2 * 3 - 7, "the present and three values by three seeds, and the held out"
