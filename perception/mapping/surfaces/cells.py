@@ -299,25 +299,22 @@ def make_again(rooms: Records[LocalMap], every: Records[CellCounts], half: float
 
 
 @kernel
-def clear_cells(every: Records[CellCounts]) -> None:
-    """Set to 0 what readings have put into cells: only where they have, which is a small part."""
-    cells = every[0]
-    for bi in range(CELLS // BLOCK):
+def clear_cells(cells: CellCounts, begin: int, end: int) -> None:
+    """Set what readings have put into some rows of blocks to 0: only where they have, which is a small part."""
+    half = BLOCK // 2
+    for bi in range(begin, end):
         for bj in range(CELLS // BLOCK):
-            if cells.block_hits[bi, bj] == 0:
-                continue
-            cells.block_hits[bi, bj] = 0
-            for i in range(bi * BLOCK, (bi + 1) * BLOCK):
-                cells.all_hits[i, bj * BLOCK : (bj + 1) * BLOCK] = 0
-                for b in range(DIRECTIONS):
-                    cells.hits[b, i, bj * BLOCK : (bj + 1) * BLOCK] = 0
-    for i in range(CELLS // 2):
-        for bj in range(CELLS // 2 // BLOCK):
-            begin, end = bj * BLOCK, (bj + 1) * BLOCK
-            if cells.all_passes[i, begin:end].any():
-                cells.all_passes[i, begin:end] = 0
-                for b in range(DIRECTIONS):
-                    cells.passes[b, i, begin:end] = 0
+            if cells.block_hits[bi, bj] != 0:
+                cells.block_hits[bi, bj] = 0
+                for i in range(bi * BLOCK, (bi + 1) * BLOCK):
+                    cells.all_hits[i, bj * BLOCK : (bj + 1) * BLOCK] = 0
+                    for b in range(DIRECTIONS):
+                        cells.hits[b, i, bj * BLOCK : (bj + 1) * BLOCK] = 0
+            for i in range(bi * half, (bi + 1) * half):
+                if cells.all_passes[i, bj * half : (bj + 1) * half].any():
+                    cells.all_passes[i, bj * half : (bj + 1) * half] = 0
+                    for b in range(DIRECTIONS):
+                        cells.passes[b, i, bj * half : (bj + 1) * half] = 0
 
 
 @kernel
@@ -339,10 +336,9 @@ def strength_of(cells: CellCounts, i: int, j: int) -> float:
     if own <= OWN_HITS_MIN:
         return 0.0
     most = 0
-    for di in range(-TAIL_CELLS, TAIL_CELLS + 1):
-        for dj in range(-TAIL_CELLS, TAIL_CELLS + 1):
-            if 0 <= i + di < CELLS and 0 <= j + dj < CELLS:
-                most = max(most, cells.all_hits[i + di, j + dj])
+    for row in range(max(0, i - TAIL_CELLS), min(CELLS, i + TAIL_CELLS + 1)):
+        for column in range(max(0, j - TAIL_CELLS), min(CELLS, j + TAIL_CELLS + 1)):
+            most = max(most, cells.all_hits[row, column])
     if cells.all_hits[i, j] < TAIL_SHARE * most:
         return 0.0
     strength = 0.0

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import bounds
 from perception.kernel import Floats, Ints
-from perception.mapping.surfaces.cells import clear_cells, make_again
+from perception.mapping.surfaces.cells import make_again
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, REACH_M, READINGS_KEPT
 from perception.mapping.surfaces.piece_fit import group_echoes
+from perception.mapping.surfaces.pieces import order_cells
 from perception.mapping.surfaces.quantum import (
     CAPTURE,
-    CAPTURED,
-    FOUND,
+    CLEAR,
     IDLE,
     LOCATE,
     do_quantum,
@@ -32,8 +32,6 @@ from perception.mapping.surfaces.quantum import (
 )
 from perception.mapping.surfaces.records import CellCounts, LocalMap
 from perception.records import records, zeros
-
-STRENGTH_STEPS: Final = 256.0
 
 
 class LocalMapSearch:
@@ -110,14 +108,11 @@ class LocalMapSearch:
             room[name] = 0
         room["count"], room["carried"] = len(kept), np.count_nonzero(kept < entered)
         room["centre_x"], room["centre_y"] = x, y
-        clear_cells(self._c)
+        room["phase"] = CLEAR
 
     def refine(self) -> bool:
         """Do one quantum; return whether it ended a search, whose surfaces are there until the next quantum."""
-        done = do_quantum(self.room, self._c, self._half, self.radii)
-        if done == CAPTURED:
-            self._order()
-        return done == FOUND
+        return do_quantum(self.room, self._c, self._half, self.radii)
 
     def finish(self) -> bool:
         """Enter everything that was kept and search once more; return whether there was anything new."""
@@ -131,13 +126,6 @@ class LocalMapSearch:
         while not self.refine():
             pass
         return True
-
-    def _order(self) -> None:
-        """Put the occupied cells in order, the strongest first."""
-        count = int(self.local["cell_count"][0])
-        strengths = self.local["cells"]["strength"][0, :count]
-        steps = np.minimum(strengths * STRENGTH_STEPS, np.iinfo(np.uint16).max).astype(np.uint16)
-        self._counts["order"][0, :count] = np.argsort(np.iinfo(np.uint16).max - steps, kind="stable")
 
     def pieces(self) -> NDArray[Any]:
         """Return the pieces that the last search has found, as records of `Piece`."""
@@ -158,9 +146,9 @@ class LocalMapSearch:
         room = self.local[0]
         cells = room["cells"][: int(room["cell_count"])]
         self._counts["index"][0, cells["i"], cells["j"]] = np.arange(1, len(cells) + 1)
-        if room["phase"] > CAPTURE:
-            self._order()
-        if room["phase"] > LOCATE:
+        if CAPTURE < room["phase"] < CLEAR:
+            order_cells(self.room, self._c)
+        if LOCATE < room["phase"] < CLEAR:
             group_echoes(self.room, self._c)
 
     def clear(self) -> None:

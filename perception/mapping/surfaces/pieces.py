@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.kernel import Floats, kernel, loop_kernel
+from perception.kernel import Floats, Ints, kernel, loop_kernel
 from perception.mapping.surfaces.cells import RIM, cell_of, greatest_strength, strength_of
 from perception.mapping.surfaces.parameters import (
     CELL_M,
@@ -19,11 +19,14 @@ from perception.mapping.surfaces.parameters import (
     SURFACE_CELLS_MAX,
     TAKEN_M,
 )
-from perception.mapping.surfaces.records import ANGLES, BLOCK, FREE, CellCounts, LocalMap, Piece, SurfaceCell
+from perception.mapping.surfaces.records import ANGLES, BLOCK, DIGITS, FREE, CellCounts, LocalMap, Piece, SurfaceCell
 from perception.records import Records
 
+ROW_PARTS: Final = CELLS * CELLS // BLOCK
+"""Parts of rows, as long as a block."""
 SEED_CELLS: Final = 10
 """Cells around a seed among which its direction is sought: half a metre."""
+STRENGTH_STEPS: Final = 256.0
 STRONG: Final = 4.0
 """Greatest strength of a cell as a weight."""
 TAKEN_WEIGHT: Final = 0.3
@@ -32,6 +35,8 @@ REACHES_M: Final = (0.5, 1.0, 2.0, 6.0, 13.0, 13.0)
 """How far a line is followed in each round of fitting; the last one is not fitted again."""
 FREE_SHARE_MIN: Final = 0.25
 """A line whose cells are nearly all taken is not followed on. Drives: the same pieces in two thirds of the time."""
+DIRECTION_STEPS: Final = 60
+"""Steps along a line that take as long as to find a direction."""
 SAME_M: Final = 1e-9
 """A line that a fit has moved and turned (m, rad) by less is the same but for rounding."""
 STEP_M: Final = 0.7 * CELL_M
@@ -46,24 +51,82 @@ def offset_of(at: int) -> float:
 
 
 @kernel
-def capture(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
-    """Append the occupied cells of some rows to the map's; those that find no room are left out.
+def capture(room: LocalMap, counts: CellCounts, begin: int, most: int) -> int:
+    """Append occupied cells to the map's, row by row; return how many parts of rows were looked at.
 
-    Their places in `counts.index` are written; it was 0 everywhere.
+    Cells that find no room are left out. Their places in `counts.index` are written; it was 0 everywhere.
+
+    Parameters
+    ----------
+    room, counts
+        The map, updated, and its counts.
+    begin, most : int
+        The first of the `ROW_PARTS`, and after how many cells whose strength was computed the last one follows.
     """
-    for i in range(begin, end):
-        for block in range(CELLS // BLOCK):
-            if counts.block_hits[i // BLOCK, block] == 0:
+    at, computed = begin, 0
+    while at < ROW_PARTS and computed < most:
+        i, j = at // (CELLS // BLOCK), at % (CELLS // BLOCK) * BLOCK
+        at += 1
+        if counts.block_hits[i // BLOCK, j // BLOCK] == 0 or not RIM <= i < CELLS - RIM:
+            continue
+        for column in range(max(j, RIM), min(j + BLOCK, CELLS - RIM)):
+            if greatest_strength(counts, i, column) <= STRENGTH_MIN or room.cell_count >= SURFACE_CELLS_MAX:
                 continue
-            for j in range(max(block * BLOCK, RIM), min((block + 1) * BLOCK, CELLS - RIM)):
-                if greatest_strength(counts, i, j) <= STRENGTH_MIN or room.cell_count >= SURFACE_CELLS_MAX:
-                    continue
-                strength = strength_of(counts, i, j)
-                if strength > STRENGTH_MIN:
-                    cell = room.cells[room.cell_count]
-                    cell.i, cell.j, cell.strength, cell.owner = i, j, strength, FREE
-                    room.cell_count += 1
-                    counts.index[i, j] = room.cell_count
+            computed += 1
+            strength = strength_of(counts, i, column)
+            if strength > STRENGTH_MIN:
+                cell = room.cells[room.cell_count]
+                cell.i, cell.j, cell.strength, cell.owner = i, column, strength, FREE
+                room.cell_count += 1
+                counts.index[i, column] = room.cell_count
+    return at - begin
+
+
+@kernel
+def order_cells(rooms: Records[LocalMap], every: Records[CellCounts]) -> None:
+    """Write the order of the occupied cells, the strongest first; equal ones stay in the order of their rows.
+
+    Strengths count in whole steps of 1 / `STRENGTH_STEPS`, a number of two digits: the order by the lower one, then
+    by the upper one (radix sort).
+    """
+    room, counts = rooms[0], every[0]
+    for k in range(room.cell_count):
+        counts.order[k] = k
+    sort_by_digit(room, counts.order, counts.unsorted, counts.digits, 1)
+    sort_by_digit(room, counts.unsorted, counts.order, counts.digits, DIGITS)
+
+
+@kernel
+def sort_by_digit(room: LocalMap, source: Ints, target: Ints, begins: Ints, unit: int) -> None:
+    """Write the numbers of cells into `target`, those with a greater digit first, else as in `source`.
+
+    Parameters
+    ----------
+    room : LocalMap
+        The cells.
+    source, target : (n,) int
+        Their numbers; the second is overwritten.
+    begins : (DIGITS + 1,) int
+        Overwritten.
+    unit : int
+        The digit's place: 1 or `DIGITS`.
+    """
+    begins[:] = 0
+    for k in range(room.cell_count):
+        begins[rank_of(room.cells[source[k]].strength, unit) + 1] += 1
+    for digit in range(DIGITS):
+        begins[digit + 1] += begins[digit]
+    for k in range(room.cell_count):
+        rank = rank_of(room.cells[source[k]].strength, unit)
+        target[begins[rank]] = source[k]
+        begins[rank] += 1
+
+
+@kernel
+def rank_of(strength: float, unit: int) -> int:
+    """Return 0 for the greatest value of a digit of a strength, and `DIGITS` − 1 for 0."""
+    steps = int(min(strength * STRENGTH_STEPS, DIGITS * DIGITS - 1.0))
+    return DIGITS - 1 - steps // unit % DIGITS
 
 
 @kernel
@@ -122,6 +185,7 @@ def walk(
                 along = dx * ux + dy * uy
                 low, high = min(low, along), max(high, along)
             since += 1
+            counts.steps += 1
             if is_met:
                 last = t
                 met_steps += 1
@@ -245,21 +309,23 @@ def take(room: LocalMap, counts: CellCounts, number: int) -> None:
 
 
 @kernel
-def grow_all(room: LocalMap, counts: CellCounts, most: int) -> int:
-    """Grow pieces from the strongest free cells; return how many were tried, fewer than `most` at the end.
+def grow_all(room: LocalMap, counts: CellCounts, most: int) -> bool:
+    """Grow pieces from the strongest free cells; return whether all were tried.
 
     Parameters
     ----------
     room, counts
         The map, updated: `room.at` is the next cell in order.
     most : int
-        Cells that are tried, at most.
+        Steps along lines, after which no other cell is tried; to find a cell's direction counts as `DIRECTION_STEPS`.
     """
-    tried = 0
-    while tried < most and room.at < room.cell_count and room.piece_count < len(room.pieces):
+    counts.steps = 0
+    while room.at < room.cell_count and room.piece_count < len(room.pieces):
+        if counts.steps >= most:
+            return False
         seed = counts.order[room.at]
         room.at += 1
         if room.cells[seed].owner == FREE:
-            tried += 1
+            counts.steps += DIRECTION_STEPS
             grow(room, counts, seed)
-    return tried
+    return True

@@ -9,7 +9,7 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
-from perception.mapping.surfaces.cells import RIM, enter_readings, share_again
+from perception.mapping.surfaces.cells import clear_cells, enter_readings, share_again
 from perception.mapping.surfaces.parameters import (
     CELLS,
     LAST_REVISITS,
@@ -21,22 +21,23 @@ from perception.mapping.surfaces.parameters import (
     SPACING_RAD,
 )
 from perception.mapping.surfaces.piece_fit import group_echoes, judge, locate_all
-from perception.mapping.surfaces.pieces import capture, grow_all
+from perception.mapping.surfaces.pieces import ROW_PARTS, capture, grow_all, order_cells
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes
-from perception.mapping.surfaces.records import CellCounts, LocalMap
+from perception.mapping.surfaces.records import BLOCK, CellCounts, LocalMap
 from perception.records import Records
 
 SILENCE: Final = 1e6
 """Range of silence, m."""
-ENTERED: Final = 8
+ENTERED: Final = 16
 SHARED: Final = 48
-ROWS: Final = 32
-TRIED: Final = 2
-LOCATED: Final = 256
+STRENGTHS: Final = 64
+STEPS: Final = 600
+LOCATED: Final = 128
 JUDGED: Final = 64
-ORDERED: Final = 512
-"""What a quantum does of each step, a twentieth of a millisecond: readings, readings, rows, seeds, readings, echoes
-(of whole pieces), cells."""
+ORDERED: Final = 1024
+CLEARED: Final = 2
+"""What a quantum does of each step, a twentieth of a millisecond: readings, readings, strengths of cells (in
+parts of rows), steps along lines (of whole pieces), readings, echoes (of whole pieces), cells, rows of blocks."""
 IDLE: Final = 0
 CAPTURE: Final = 1
 GROW: Final = 2
@@ -44,14 +45,12 @@ LOCATE: Final = 3
 JUDGE: Final = 4
 CHOOSE: Final = 5
 CHAIN: Final = 6
-"""Steps of a search, in their order."""
+"""Steps of a search, in their order, …"""
+CLEAR: Final = 7
+"""… and one at the start of another map: the cells of the last one are cleared."""
 SEARCH_READINGS_MIN: Final = 64
 SEARCH_SHARE: Final = 5
 """A search begins after so many new readings, or so large a part of all as one in this."""
-WORKED: Final = 0
-CAPTURED: Final = 1
-FOUND: Final = 2
-"""What a quantum has done: a part of a step, the last of the cells that a search sees, or the last of a search."""
 
 
 @kernel
@@ -129,8 +128,8 @@ def has_left(rooms: Records[LocalMap], x: float, y: float) -> bool:
 
 
 @kernel
-def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float, radii: Floats) -> int:
-    """Do one quantum; return `WORKED`, `CAPTURED` or `FOUND`.
+def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float, radii: Floats) -> bool:
+    """Do one quantum; return whether it ended a search.
 
     Parameters
     ----------
@@ -146,11 +145,10 @@ def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float
     if room.phase == IDLE:
         enter_or_share(rooms, every, half)
     elif room.phase == CAPTURE:
-        capture(room, counts, RIM + at, min(RIM + at + ROWS, CELLS - RIM))
-        if advance(room, ROWS, CELLS - 2 * RIM):
-            return CAPTURED
+        if advance(room, capture(room, counts, at, STRENGTHS), ROW_PARTS):
+            order_cells(rooms, every)
     elif room.phase == GROW:
-        if grow_all(room, counts, TRIED) < TRIED:
+        if grow_all(room, counts, STEPS):
             room.phase, room.at = LOCATE, 0
     elif room.phase == LOCATE:
         locate_all(room, counts, at, min(at + LOCATED, room.swept), half)
@@ -166,12 +164,16 @@ def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float
     elif room.phase == CHOOSE:
         choose_nodes(room, counts, at, min(at + ORDERED, room.cell_count))
         advance(room, ORDERED, room.cell_count)
+    elif room.phase == CLEAR:
+        clear_cells(counts, at, at + CLEARED)
+        if advance(room, CLEARED, CELLS // BLOCK):
+            room.phase = IDLE
     else:
         chain_all(room, counts, at, min(at + ORDERED, room.cell_count))
         if advance(room, ORDERED, room.cell_count):
             room.phase = IDLE
-            return FOUND
-    return WORKED
+            return True
+    return False
 
 
 @kernel

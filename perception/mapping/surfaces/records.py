@@ -37,6 +37,8 @@ NODES_MAX: Final = 4096
 """Points of a polyline, at most."""
 ANGLES: Final = 36
 """Directions that are tried through a seed: 5° apart, and the fit does the rest."""
+DIGITS: Final = 256
+"""Values of each of two digits by which cells are put in order."""
 FREE: Final = -1
 NODE: Final = -2
 """Owners of a cell that are no piece: none yet, and a polyline."""
@@ -117,8 +119,8 @@ class LocalMap(Record):
     """Readings that were entered when pieces were sought last."""
     is_left: Annotated[int, FLAG]
     """Whether the robot needs another map, once this one was searched with the last readings."""
-    phase: Annotated[int, up_to(6)]
-    """The step of the search for pieces; see `surface_map`."""
+    phase: Annotated[int, up_to(7)]
+    """The step of the search for pieces; see `quantum`."""
     at: Count
     """How far that step is."""
     left: Annotated[int, up_to(QUANTA_MAX)]
@@ -170,8 +172,12 @@ class CellCounts(Record):
     """The last walk that met each occupied cell."""
     walks: int
     """Walks so far."""
+    steps: int
+    """Steps of the walks of a quantum."""
     order: Annotated[Ints, SURFACE_CELLS_MAX]
     """The occupied cells, the strongest first."""
+    unsorted: Annotated[Ints, SURFACE_CELLS_MAX]
+    digits: Annotated[Ints, DIGITS + 1]
     arc: Annotated[Records[ArcPlace], SAMPLES]
     likelihoods: Annotated[Floats, SAMPLES]
     near: Annotated[Ints, 441]

@@ -137,7 +137,7 @@ def test_a_bound_of_strength_and_the_hits_of_blocks() -> None:
     ]
     assert all(strength <= most + 1e-12 for strength, most in strengths)
     assert sum(strength > 0.0 for strength, _ in strengths) > 100
-    cells.clear_cells(records(CellCounts, counts))
+    cells.clear_cells(view, 0, CELLS // BLOCK)
     assert not any(counts[name].any() for name in (*COUNTS, "block_hits"))
 
 

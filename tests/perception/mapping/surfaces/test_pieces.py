@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, WHOLE
 from perception.mapping.surfaces.pieces import (
+    ROW_PARTS,
     SEED_CELLS,
     STRONG,
     TAKEN_WEIGHT,
@@ -18,6 +19,7 @@ from perception.mapping.surfaces.pieces import (
     capture,
     grow_all,
     offset_of,
+    order_cells,
 )
 from perception.mapping.surfaces.records import ANGLES, BLOCK, FREE, CellCounts, LocalMap
 from perception.records import Records, records, zeros
@@ -35,16 +37,15 @@ def mapped(points: NDArray[Any], echoes: float = 3.0) -> tuple[Records[LocalMap]
         counts["all_hits"][0, i, j] = int(echoes * WHOLE / 3) * (DIRECTIONS // 2)
         counts["block_hits"][0, i // BLOCK, j // BLOCK] = 1
     room, seen = records(LocalMap, local), records(CellCounts, counts)
-    capture(room[0], seen[0], 2, CELLS - 2)
-    count = int(local["cell_count"][0])
-    counts["order"][0, :count] = np.argsort(-local["cells"]["strength"][0, :count], kind="stable")
+    assert capture(room[0], seen[0], 0, 10**6) == ROW_PARTS
+    order_cells(room, seen)
     return room, local, counts
 
 
 def grown(points: NDArray[Any]) -> NDArray[Any]:
     """Return the pieces in such a map, the longest first."""
     room, local, counts = mapped(points)
-    assert grow_all(room[0], records(CellCounts, counts)[0], 10_000) < 10_000
+    assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
     found = local["pieces"][0, : int(local["piece_count"][0])]
     longest: NDArray[Any] = found[np.argsort(found["low"] - found["high"])]
     return longest
@@ -79,9 +80,41 @@ def test_parallel_surfaces_ten_centimetres_apart_are_two() -> None:
     np.testing.assert_allclose(pieces["high"] - pieces["low"], [2.0, 1.2], atol=0.15)
 
 
+def test_the_strongest_cells_come_first() -> None:
+    local, counts = zeros(LocalMap, 1), zeros(CellCounts, 1)
+    strengths = np.random.default_rng(4).gamma(2.0, 3.0, 3000).round(1)
+    strengths[:5] = 1e4, 256.0, 255.9, 0.0, 300.0
+    local["cells"]["strength"][0, :3000], local["cell_count"] = strengths, 3000
+    order_cells(records(LocalMap, local), records(CellCounts, counts))
+    steps = np.minimum(strengths * 256.0, 65535.0).astype(int)
+    np.testing.assert_array_equal(counts["order"][0, :3000], np.argsort(-steps, kind="stable"))
+
+
+def test_a_search_in_parts_finds_the_same() -> None:
+    """Cells are captured some at a time, and pieces grow some at a time."""
+    points = np.concatenate([line(-2.0, 0.0, -0.4, 0.0), line(0.4, 0.0, 2.0, 0.0), line(2.0, 0.0, 2.0, 1.5)])
+    _, whole, heard = mapped(points)
+    local = zeros(LocalMap, 1)
+    room = records(LocalMap, local)
+    heard["index"] = 0
+    counts, at, parts = records(CellCounts, heard)[0], 0, 0
+    while at < ROW_PARTS:
+        at, parts = at + capture(room[0], counts, at, 10), parts + 1
+    assert parts > 5
+    np.testing.assert_array_equal(local["cells"], whole["cells"])
+    parts = 1
+    while not grow_all(room[0], counts, 50):
+        parts += 1
+    assert parts > 3
+    np.testing.assert_array_equal(
+        np.sort(local["pieces"]["low"][0, : int(local["piece_count"][0])]), np.sort(grown(points)["low"])
+    )
+
+
 def test_a_few_cells_are_no_piece() -> None:
     room, local, counts = mapped(line(0.0, 0.0, 0.12, 0.0))
-    grow_all(room[0], records(CellCounts, counts)[0], 100)
+    assert not grow_all(room[0], records(CellCounts, counts)[0], 0)
+    assert grow_all(room[0], records(CellCounts, counts)[0], 100_000)
     assert local["piece_count"][0] == 0
     assert (local["cells"]["owner"][0, : int(local["cell_count"][0])] == FREE).all()
 
