@@ -97,10 +97,9 @@ class Perception:
         """The map of surfaces in the frame of `method`."""
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
-        self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._half_angle, self._models = math.radians(ring.beam_half_angle_deg), tuple(models)
         self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning, ring.window_m)
         self._reach_m, self._sensors = reach_m(ring), len(ring.mounts)
-        self._models = tuple(models)
         self.vacant = VacantAreas()
         """In the frame of `method`."""
         width_m = 2.0 * (max(math.hypot(*mount[:2]) for mount in mounts.tolist()) + PASSAGE_M)
@@ -225,17 +224,18 @@ class Perception:
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label: models, walls, corners, posts, unknowns near the robot, and pieces of walls."""
-        walls, _ = self.surfaces.report(self._known)
-        return self._in_odometry(self.vacant.outside((*self.method.labelled_objects(), *walls)))
+        labelled = self.surfaces.with_walls(self.method.labelled_objects(), self._known)
+        return self._in_odometry(self.vacant.outside(labelled))
 
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label and was left behind; without correction the same tuple until it changes."""
-        return self._in_odometry(self.vacant.archived_outside(self.method.archived_objects()))
+        archived = self.surfaces.archived_beside(self.method.archived_objects())
+        return self._in_odometry(self.vacant.archived_outside(archived))
 
     def polylines(self) -> tuple[Polyline, ...]:
         """Return what is not straight; without correction the same tuple until it changes."""
-        _, seen = self.surfaces.report(self._known)
-        return self.map_frame.polylines_in_odometry(self.vacant.polylines_outside(seen))
+        seen = self.vacant.polylines_outside(self.surfaces.report(self._known).polylines)
+        return self.map_frame.polylines_in_odometry(seen)
 
     def vacant_areas(self) -> tuple[VacantArea, ...]:
         """Return the areas in which nothing stands, in odometry's frame."""

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from config.model import ModelConfig
 from config.settings import SurfacesConfig
 from drivers.messages import Firing
 from perception.detected_object import DetectedObject
 from perception.polyline import Polyline
+
+
+class SurfaceReport(NamedTuple):
+    """What is reported of the map of surfaces."""
+
+    walls: tuple[DetectedObject, ...] = ()
+    polylines: tuple[Polyline, ...] = ()
+    stands_for_walls: bool = False
+    """Whether the method's own walls are not shown, as its shapes explain little of this place."""
 
 
 class NoSurfaces:
@@ -37,7 +47,7 @@ class NoSurfaces:
     def report(
         self,
         known: Callable[[], tuple[DetectedObject, ...]],  # noqa: ARG002 - other maps need it
-    ) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:
+    ) -> SurfaceReport:
         """Return walls and polylines beside what the method reports; the same tuples until they change.
 
         Parameters
@@ -45,7 +55,22 @@ class NoSurfaces:
         known : callable
             Returns what the method reports.
         """
-        return (), ()
+        return SurfaceReport()
+
+    def with_walls(
+        self,
+        objects: tuple[DetectedObject, ...],
+        known: Callable[[], tuple[DetectedObject, ...]],  # noqa: ARG002 - other maps need it
+    ) -> tuple[DetectedObject, ...]:
+        """Return the method's objects and the walls beside them, or in place of its own; `known` as for `report`."""
+        return objects
+
+    def archived_beside(self, archived: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return the method's objects that were left behind, without walls where others stand for them.
+
+        There may be many: the same tuple until they change.
+        """
+        return archived
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Compare with these models."""

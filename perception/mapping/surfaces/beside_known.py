@@ -1,7 +1,7 @@
-"""What the map of surfaces adds to what the method knows: walls beside its own, which are more exact, and polylines.
+"""What is reported of the map of surfaces: walls beside the method's own or in their place, and polylines.
 
 Whether a straight piece is a wall depends on the place: where the shapes of the method explain what is heard, the
-rest is not made of walls; where they explain little, it is.
+rest is not made of walls; where they explain little, the pieces are the walls, and the method's own are not shown.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from perception.detected_object import DetectedObject, wall_between
 from perception.kernel import Floats
-from perception.mapping.surfaces.parameters import AGREES_M, KNOWN_NAT, PIECE_MIN_M, UNKNOWN_M
+from perception.mapping.no_surfaces import SurfaceReport
+from perception.mapping.surfaces.parameters import AGREES_M, KNOWN_NAT, KNOWN_SHARE, PIECE_MIN_M, UNKNOWN_M
 from perception.mapping.surfaces.surface_list import ENDS, find_near, places_on
 from perception.polyline import Polyline
 
@@ -24,22 +25,31 @@ PLACES: Final = 16
 CORNERS: Final = ("inside corner", "edge")
 CORNER_REACH_M: Final = 0.25
 """Around a corner its echoes are shared among places that are as far from the robot."""
+LEFTOVER_M: Final = 0.2
+"""So near what is known a piece may be what is left of its echoes. Share of pieces so near: 0.91 and more in
+generated rooms, 0.51 and less on drives; within 0.1 m it is 0.66 and 0.39."""
+FAR: Final = 0
+NEAR: Final = 1
+ALONG: Final = 2
+ON_BODY: Final = 3
+"""How near a place is to what is known: within `LEFTOVER_M` of it; along a wall or around a corner; on a body."""
 STRAIGHT_M: Final = 1.0
 STRAIGHT_NAT: Final = 15.0
-"""Evidence for straight pieces of this length by which walls are expected at all."""
+"""Evidence for straight pieces of this length by which walls are expected at all, and the most that one piece says
+for itself: its echoes repeat one another."""
 THIN_SHARE: Final = 0.25
-"""A piece with less than this share of the usual echoes a metre is none."""
+"""A piece with less than this share of the usual echoes a metre does not show that there are walls."""
 EVIDENCE_MAX: Final = 30.0
 """Greatest log odds that are reported, nat."""
-WALL_FIELDS: Final = (*ENDS, "variance_across", "variance_turn", "echoes", "evidence")
+SIZES: Final = ("variance_across", "variance_turn", "echoes")
 Runs = list[tuple[float, float]]
 """Parts of a piece, from 0 to 1."""
 
 
-def free_of_known(
+def nearness(
     rows: NDArray[Any], known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]
-) -> NDArray[np.bool_]:  # fmt: skip
-    """Return which places along surfaces lie along no known wall and not on an object, shape (n, PLACES).
+) -> NDArray[np.int64]:  # fmt: skip
+    """Return how near places along surfaces are to what is known, from `FAR` to `ON_BODY`, shape (n, PLACES).
 
     Parameters
     ----------
@@ -51,65 +61,77 @@ def free_of_known(
         Radius within which each model's outline lies, m.
     """
     walls = np.array([one.ends for one in known if one.ends is not None]).reshape(-1, 4)
-    reach_m = {**reach_m, **dict.fromkeys(CORNERS, CORNER_REACH_M)}
-    bodies = np.array([(one.x, one.y, reach_m[one.model]) for one in known if one.model in reach_m]).reshape(-1, 3)
-    return is_free(rows, walls, bodies)
+    bodies = _bodies(known, reach_m)
+    around = np.concatenate([bodies, _bodies(known, dict.fromkeys(CORNERS, CORNER_REACH_M))])
+    places = places_on(rows, PLACES)
+    found = np.zeros(len(places), np.int64)
+    for how_near, lines, circles, within in (
+        (NEAR, walls, around, LEFTOVER_M), (ALONG, walls, around, AGREES_M), (ON_BODY, walls[:0], bodies, AGREES_M),
+    ):  # fmt: skip
+        marks = np.zeros(len(places), np.int64)
+        find_near(places, lines, within, marks)
+        for x, y, radius in circles.tolist():
+            find_near(places, np.array([[x, y, x, y]]), radius + within, marks)
+        found[marks == 1] = how_near
+    return found.reshape(-1, PLACES)
 
 
-def beside_known(
-    rows: NDArray[Any], free: NDArray[np.bool_]
-) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
-    """Return the walls and the polylines in what is free.
+def _bodies(known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]) -> Floats:
+    """Return place and reach of what is known of some kinds, shape (k, 3), m."""
+    return np.array([(one.x, one.y, reach_m[one.model]) for one in known if one.model in reach_m]).reshape(-1, 3)
+
+
+def beside_known(rows: NDArray[Any], near: NDArray[np.int64]) -> SurfaceReport:
+    """Return the walls and the polylines that are reported beside what is known, or in place of its walls.
 
     Parameters
     ----------
     rows : (n,) record of Surface
         The surfaces.
-    free : (n, PLACES) bool
-        Which places along them are free of what the method knows.
+    near : (n, PLACES) int
+        How near places along them are to what is known.
     """
     if not len(rows):
-        return (), ()
+        return SurfaceReport()
     is_piece = rows["number"] < 0
     length = np.hypot(rows["x2"] - rows["x1"], rows["y2"] - rows["y1"]) * is_piece
-    density = rows["echoes"] / np.maximum(length, PIECE_MIN_M)
-    is_dense = density > THIN_SHARE * (float(np.median(density[is_piece])) if is_piece.any() else 0.0)
-    known_m = float(length @ (1.0 - free.mean(axis=1))) + UNKNOWN_M
-    known_share = known_m / (float(length.sum()) + UNKNOWN_M)
-    # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls.
-    is_long = (length >= STRAIGHT_M) & free.all(axis=1) & is_dense
-    straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
-    prior = KNOWN_NAT * (2.0 * straight_share * (1.0 - known_share) - 1.0)
-    is_wall = is_piece & (rows["evidence"] + prior > 0.0) & is_dense
-    straight, places = rows[is_wall], free[is_wall]
-    numbers = zip(*(straight[name].tolist() for name in WALL_FIELDS), strict=True)
+    prior = wall_prior(rows, length, near)
+    evidence = rows["evidence"].clip(None, STRAIGHT_NAT) + prior
+    free = near < (ON_BODY if prior > 0.0 else ALONG)
+    is_wall = is_piece & (evidence > 0.0)
+    straight = rows[is_wall]
+    numbers = zip(*(straight[name].tolist() for name in ENDS + SIZES), evidence[is_wall].tolist(), strict=True)
     found = [
-        _wall(wall, begin, end, prior)
-        for wall, length_m, runs in zip(numbers, length[is_wall].tolist(), map(_runs, places), strict=True)
+        _wall(wall, begin, end)
+        for wall, length_m, runs in zip(numbers, length[is_wall].tolist(), map(_runs, free[is_wall]), strict=True)
         for begin, end in runs
         if (end - begin) * length_m >= PIECE_MIN_M
     ]
     rest = ~is_wall & free.any(axis=1)
-    return tuple(found), tuple(_polylines(rows[rest]))
+    return SurfaceReport(tuple(found), tuple(_polylines(rows[rest])), prior > 0.0)
 
 
-def is_free(rows: NDArray[Any], walls: Floats, bodies: Floats) -> NDArray[np.bool_]:
-    """Return which places along surfaces lie along no wall and on no body, shape (n, PLACES).
+def wall_prior(rows: NDArray[Any], length: Floats, near: NDArray[np.int64]) -> float:
+    """Return the log odds that a piece of this place is a wall, before its own evidence, nat.
 
     Parameters
     ----------
     rows : (n,) record of Surface
         The surfaces.
-    walls : (k, 4) float
-        Ends x, y, x, y of the walls, m.
-    bodies : (m, 3) float
-        x, y, radius, m.
+    length : (n,) float
+        Lengths of the pieces, 0 of parts of polylines, m.
+    near : (n, PLACES) int
+        As for `beside_known`.
     """
-    places, found = places_on(rows, PLACES), np.zeros(len(rows) * PLACES, np.int64)
-    find_near(places, walls, AGREES_M, found)
-    for x, y, radius in bodies.tolist():
-        find_near(places, np.array([[x, y, x, y]]), radius + AGREES_M, found)
-    return np.asarray(found.reshape(-1, PLACES) == 0)
+    is_piece = length > 0.0
+    density = rows["echoes"] / np.maximum(length, PIECE_MIN_M)
+    is_dense = density > THIN_SHARE * (float(np.median(density[is_piece])) if is_piece.any() else 0.0)
+    known_m = float(length @ (near > FAR).mean(axis=1)) + UNKNOWN_M
+    known_share = known_m / (float(length.sum()) + UNKNOWN_M)
+    # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls.
+    is_long = (length >= STRAIGHT_M) & (near == FAR).all(axis=1) & is_dense
+    straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
+    return KNOWN_NAT * (straight_share * (1.0 - known_share) / (1.0 - KNOWN_SHARE) - 1.0)
 
 
 def _runs(free: NDArray[np.bool_]) -> Runs:
@@ -120,13 +142,13 @@ def _runs(free: NDArray[np.bool_]) -> Runs:
     return [(begin / PLACES, end / PLACES) for begin, end in borders.reshape(-1, 2).tolist()]
 
 
-def _wall(wall: tuple[float, ...], begin: float, end: float, prior: float) -> DetectedObject:
-    """Return a part of a piece, the values of `WALL_FIELDS`, as a wall, as sure as the whole."""
+def _wall(wall: tuple[float, ...], begin: float, end: float) -> DetectedObject:
+    """Return a part of a piece as a wall, as sure as the whole: its ends, `SIZES` and log odds."""
     x, y, x2, y2, variance_across, variance_turn, echoes, evidence = wall
     dx, dy = x2 - x, y2 - y
     return wall_between(
         (x + begin * dx, y + begin * dy, x + end * dx, y + end * dy),
-        variance_across, variance_turn, round((end - begin) * echoes), min(evidence + prior, EVIDENCE_MAX),
+        variance_across, variance_turn, round((end - begin) * echoes), min(evidence, EVIDENCE_MAX),
     )  # fmt: skip
 
 

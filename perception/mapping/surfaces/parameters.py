@@ -86,6 +86,8 @@ LINK_M: Final = 0.2
 AGREES_M: Final = 0.1
 """Two surfaces within this are one: the distance within which a surface explains an echo."""
 KNOWN_NAT: Final = 40.0
+KNOWN_SHARE: Final = 0.7
 UNKNOWN_M: Final = 10.0
-"""Log odds that a piece is a wall, before its own evidence: from this, where nothing that was heard lies along what
-the method knows, to as much against it, where all does. So many metres count as known before anything is heard."""
+"""Log odds that a piece is a wall, before its own evidence: against it by this, where all that was heard lies along
+what the method knows; even, where this share of it does: half-way between generated rooms and drives. So many metres
+count as known before anything is heard."""

@@ -22,12 +22,11 @@ from perception.bayes.inference.kernel_settings import circle_models
 from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
-from perception.mapping.no_surfaces import NoSurfaces
-from perception.mapping.surfaces.beside_known import beside_known, free_of_known
+from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
+from perception.mapping.surfaces.beside_known import beside_known, nearness
 from perception.mapping.surfaces.local_map import LocalMapSearch
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_MIN_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
-from perception.polyline import Polyline
 from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
@@ -47,7 +46,7 @@ class SurfaceMap(NoSurfaces):
         The settings.
     """
 
-    SCRATCH: Final = ("_known", "_free", "_report")
+    SCRATCH: Final = ("_known", "_near", "_report", "_archived")
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: SurfacesConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
@@ -60,8 +59,9 @@ class SurfaceMap(NoSurfaces):
 
     def _forget_derived(self) -> None:
         self._known: tuple[DetectedObject, ...] = ()
-        self._free = np.zeros((0, 0), np.bool_)
-        self._report: tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]] | None = None
+        self._near = np.zeros((0, 0), np.int64)
+        self._report: SurfaceReport | None = None
+        self._archived: tuple[tuple[DetectedObject, ...], tuple[DetectedObject, ...]] | None = None
 
     @property
     def can_refine(self) -> bool:
@@ -144,9 +144,7 @@ class SurfaceMap(NoSurfaces):
         rows["echoes"] = (np.bincount(of, cells["strength"]) / np.maximum(count, 1))[of[begin]]
         return rows
 
-    def report(
-        self, known: Callable[[], tuple[DetectedObject, ...]]
-    ) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
+    def report(self, known: Callable[[], tuple[DetectedObject, ...]]) -> SurfaceReport:
         """Return walls and polylines beside what the method reports; the same tuples until they change.
 
         Parameters
@@ -157,11 +155,34 @@ class SurfaceMap(NoSurfaces):
         objects = known()
         if self._report is None or objects != self._known:
             rows = self._list.archived_rows
-            free = free_of_known(rows, objects, self._reach_m)
-            if self._report is None or not np.array_equal(free, self._free):
-                self._free, self._report = free, beside_known(rows, free)
+            near = nearness(rows, objects, self._reach_m)
+            if self._report is None or not np.array_equal(near, self._near):
+                self._near, self._report = near, beside_known(rows, near)
+                self._archived = None
             self._known = objects
         return self._report
+
+    def with_walls(
+        self, objects: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
+    ) -> tuple[DetectedObject, ...]:
+        """Return the method's objects and the walls beside them, or in place of its own; `known` as for `report`."""
+        walls = self.report(known).walls
+        return (*self._without_walls(objects), *walls)
+
+    def archived_beside(self, archived: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return the method's objects that were left behind, without walls where others stand for them.
+
+        There may be many: the same tuple until they change.
+        """
+        if self._archived is None or archived is not self._archived[0]:
+            self._archived = (archived, self._without_walls(archived))
+        return self._archived[1]
+
+    def _without_walls(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return objects without the walls for which the pieces of the last report stand."""
+        if self._report is None or not self._report.stands_for_walls:
+            return objects
+        return tuple(one for one in objects if one.ends is None)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Compare with the round ones of these models."""

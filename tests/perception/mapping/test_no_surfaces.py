@@ -21,5 +21,5 @@ def test_nothing_is_done_and_nothing_is_reported() -> None:
     assert not surfaces.can_refine
     assert surfaces.converged
     assert surfaces.refine() == 0
-    assert surfaces.report(lambda: 1 / 0) == ((), ())  # type: ignore[arg-type,return-value]  # it is not asked
+    assert surfaces.report(lambda: 1 / 0) == ((), (), False)  # type: ignore[arg-type,return-value]  # it is not asked
     assert issubclass(SurfaceMap, NoSurfaces)

@@ -1,4 +1,4 @@
-"""What is reported of the map of surfaces beside the walls and objects that the method knows."""
+"""What is reported of the map of surfaces: beside what the method knows, or in place of its walls."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from perception.detected_object import DetectedObject, wall_between
-from perception.mapping.surfaces.beside_known import beside_known, free_of_known
+from perception.mapping.no_surfaces import SurfaceReport
+from perception.mapping.surfaces.beside_known import beside_known, nearness
 from perception.mapping.surfaces.surface_list import ENDS, Surface
-from perception.polyline import Polyline
 from perception.records import zeros
 
 
@@ -37,13 +37,13 @@ def known_wall(x1: float, y1: float, x2: float, y2: float) -> DetectedObject:
 
 
 def report(
-    surfaces: np.ndarray, known: tuple[DetectedObject, ...], reach_m: dict[str, float]
-) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:  # fmt: skip
-    return beside_known(surfaces, free_of_known(surfaces, known, reach_m))
+    rows: np.ndarray, known: tuple[DetectedObject, ...] = (), reach_m: dict[str, float] | None = None
+) -> SurfaceReport:  # fmt: skip
+    return beside_known(rows, nearness(rows, known, reach_m or {}))
 
 
 def test_pieces_in_a_room_that_the_method_does_not_know_are_walls() -> None:
-    walls, polylines = report(room(), (), {})
+    walls, polylines, _ = report(room(), (), {})
     assert sorted(round(np.hypot(w.ends[2] - w.ends[0], w.ends[3] - w.ends[1])) for w in walls if w.ends) == [
         6,
         6,
@@ -54,22 +54,39 @@ def test_pieces_in_a_room_that_the_method_does_not_know_are_walls() -> None:
     assert polylines == ()
 
 
-def test_what_a_known_wall_or_object_covers_is_left_out() -> None:
-    surfaces = room()
+def test_where_little_is_known_pieces_stand_for_the_walls() -> None:
+    """They are reported whole, though a wall of the method lies along one; but a drum's outline is no wall."""
     drum = DetectedObject("drum", 8.0, 3.0, 0.0, 0.01, 9, 1.0)
-    walls, _ = report(surfaces, (known_wall(0.0, 0.03, 4.0, 0.03), drum), {"drum": 0.3})
-    ends = np.array([w.ends for w in walls])
-    assert not ((ends[:, 1] == 0.0) & (ends[:, 0] < 3.5) & (ends[:, 2] < 4.5)).any()
+    found = report(room(), (known_wall(0.0, 0.03, 4.0, 0.03), drum), {"drum": 0.3})
+    ends = np.array([w.ends for w in found.walls])
+    assert found.stands_for_walls
+    assert ((ends[:, 1] == 0.0) & (ends[:, 0] == 0.0) & (ends[:, 2] == 8.0)).any()
     beside = ends[(ends[:, 0] == 8.0) & (ends[:, 2] == 8.0)]
     assert len(beside) == 2
     assert not ((beside[:, [1, 3]].min(axis=1) < 3.0) & (beside[:, [1, 3]].max(axis=1) > 3.0)).any()
+
+
+@pytest.mark.parametrize("known", range(5))
+def test_the_method_s_walls_are_shown_once_it_knows_most(known: int) -> None:
+    """Four walls are known one after the other: from some share on the method's own are shown, and nothing beside."""
+    rows = room()
+    found = report(rows, tuple(known_wall(*row) for row in zip(*(rows[name][:known] for name in ENDS), strict=True)))
+    assert (len(found.walls), found.stands_for_walls) == ((4, True) if known < 3 else (0, False))
+
+
+def test_what_is_left_of_the_echoes_of_known_walls_is_no_wall() -> None:
+    """Beside each wall a piece with as much evidence as one may have: its echoes are the wall's."""
+    rows = room()
+    known = tuple(known_wall(*row) for row in zip(*(rows[name] for name in ENDS), strict=True))
+    beside = pieces((1.0, 0.15, 7.0, 0.12), (7.85, 1.0, 7.85, 4.0), evidence=1000.0, echoes=400.0)
+    assert report(np.concatenate([rows, beside]), known).walls == ()
 
 
 def test_where_the_method_explains_the_place_pieces_are_outlines() -> None:
     """A shelf in a room of walls that are known: nothing says that it is a wall."""
     known = tuple(known_wall(*row) for row in zip(*(room()[name] for name in ENDS), strict=True))
     surfaces = np.concatenate([room(), pieces((2.0, 2.0, 2.6, 2.0), evidence=1.0)])
-    walls, polylines = report(surfaces, known, {})
+    walls, polylines, _ = report(surfaces, known, {})
     assert walls == ()
     assert [line.points.tolist() for line in polylines] == [[[2.0, 2.0], [2.6, 2.0]]]
 
@@ -83,20 +100,15 @@ def test_pieces_of_round_bodies_alone_are_no_walls(radius: float) -> None:
         for x in range(0, 40, 2)
         for a, b in itertools.pairwise(turns)
     ]
-    walls, polylines = report(pieces(*ends, evidence=2.0), (), {})
+    walls, polylines, _ = report(pieces(*ends, evidence=2.0), (), {})
     assert walls == ()
     assert len(polylines) > 100
-
-
-def test_a_piece_with_few_echoes_beside_the_others_is_no_wall() -> None:
-    surfaces = np.concatenate([room(), pieces((2.0, 2.0, 4.0, 2.0), echoes=10.0)])
-    assert len(report(surfaces, (), {})[0]) == 4
 
 
 def test_a_polyline_keeps_its_points_in_order() -> None:
     parts = pieces((0.0, 0.0, 0.1, 0.1), (0.1, 0.1, 0.2, 0.1), (0.5, 0.5, 0.55, 0.5))
     parts["number"], parts["echoes"] = [4, 4, 5], 2.0
-    _, polylines = report(parts, (), {})
+    polylines = report(parts).polylines
     assert [(line.number, line.points.tolist()) for line in polylines] == [
         (4, [[0.0, 0.0], [0.1, 0.1], [0.2, 0.1]]),
         (5, [[0.5, 0.5], [0.55, 0.5]]),

@@ -11,10 +11,10 @@ from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject, wall_between
+from perception.mapping.no_surfaces import SurfaceReport
 from perception.mapping.surfaces.quantum import search_is_due
 from perception.mapping.surfaces.surface_map import SurfaceMap
 from perception.pipeline import Perception
-from perception.polyline import Polyline
 
 pytestmark = pytest.mark.compiled
 
@@ -106,19 +106,36 @@ def test_a_robot_that_stands_adds_nothing(driven: Perception) -> None:
 
 
 def test_a_report_changes_only_with_what_is_free(driven: Perception) -> None:
-    """A known wall that moves by a millimetre covers the same: the report is not made again."""
+    """A known wall that moves by a millimetre lies along the same: the report is not made again."""
     surfaces = driven.surfaces
     assert isinstance(surfaces, SurfaceMap)
 
-    def beside(*known: DetectedObject) -> tuple[tuple[DetectedObject, ...], tuple[Polyline, ...]]:
+    def beside(*known: DetectedObject) -> SurfaceReport:
         return surfaces.report(lambda: known)
 
     without = beside()
     one, other = (wall_between((-3.0, -2.0 + off, 3.0, -2.0 + off), 1e-4, 1e-4, 50, 9.0) for off in (0.0, 0.001))
     covered = beside(one)
-    assert len(covered[0]) < len(without[0])
+    assert covered is not without
     assert beside(other) is covered
-    assert [wall.ends for wall in beside()[0]] == [wall.ends for wall in without[0]]
+    assert [wall.ends for wall in beside().walls] == [wall.ends for wall in without.walls]
+
+
+def test_pieces_stand_for_the_walls_of_a_place_that_is_not_known(driven: Perception) -> None:
+    """The method's walls are not shown, near the robot and left behind; its other objects are."""
+    surfaces = driven.surfaces
+    assert isinstance(surfaces, SurfaceMap)
+    wall = wall_between((-3.0, -2.0, 3.0, -2.0), 1e-4, 1e-4, 50, 9.0)
+    post = DetectedObject("post", 1.0, 1.0, 0.0, 0.01, 9, 1.0)
+    shown = surfaces.with_walls((wall, post), lambda: (wall, post))
+    assert wall not in shown
+    assert shown == (post, *surfaces.report(lambda: (wall, post)).walls)
+    archived = (post, wall)
+    assert surfaces.archived_beside(archived) == (post,)
+    assert surfaces.archived_beside(archived) is surfaces.archived_beside(archived)
+    surfaces.clear()
+    assert surfaces.with_walls((wall, post), lambda: (wall, post)) == (wall, post)
+    assert surfaces.archived_beside(archived) is archived
 
 
 def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
