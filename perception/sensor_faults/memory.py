@@ -114,6 +114,15 @@ class RingMemory(Record):
     x: Place
     """Place of the last firing, m."""
     y: Place
+    turn_x: Place
+    """Place where it began to turn in place, m, …"""
+    turn_y: Place
+    turn_firing: Count
+    """… the firing with which that began, …"""
+    turned: Place
+    """… by how much it has turned since, counter-clockwise, rad, …"""
+    turn_yaw: Place
+    """… and its direction at the last firing, rad."""
     regularity: Share
     """Recent share of firings whose set was known."""
     audible: Count

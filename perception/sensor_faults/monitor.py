@@ -5,7 +5,8 @@ A single reading proves nothing; how readings change while the robot moves and w
 - *Stuck.* The sensor repeats one reading although its base has moved towards or away from any surface in its beam
   that could give that reading, or although its neighbours saw objects pass. The same reading is legitimate at rest,
   along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
-  or those of the whole ring do not.
+  or those of the whole ring do not. Or it repeats one through a full turn in place, while others read otherwise
+  (`perception.sensor_faults.turning`).
 - *Silent.* The sensor hears nothing of what others heard where it looks, from both sides of its axis
   (`perception.sensor_faults.silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
   still counts as a look (`perception.obstacle_echoes.fresh_echoes`), which has no echo.
@@ -46,8 +47,8 @@ surfaces."""
 NEAR_SHARE: Final = 0.45
 """Share of the ring's reach beyond which an echo does not predict what another sensor hears: along a straight wall a
 beam measures up to 2.2 times as far as its neighbour 15° nearer to the wall."""
-LEAST_SHARE: Final = 0.5
-"""What is below this share of the least range is too near to be measured; a calibration doubles a range at most."""
+LEAST_SHARE: Final = 0.95
+"""What is below this share of the least range cannot be measured: temperature changes ranges by at most 5 %."""
 SAME_AXIS_RAD: Final = 1e-6
 """Sensors whose axes differ by less look the same way and are not neighbours."""
 TOLERANCE_MIN_M: Final = 0.005

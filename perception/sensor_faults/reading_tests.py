@@ -18,6 +18,7 @@ from perception.sensor_faults.crosstalk import count_short_readings, find_set, i
 from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, SensorMemory
 from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 from perception.sensor_faults.silence import weigh_silence
+from perception.sensor_faults.turning import follow_turn, repeats_through_turn
 from perception.sensor_faults.wall import NOISE_SHARE, is_along_wall
 
 # The thresholds below were tuned on the simulated halls of tests/perception/sensor_faults/test_monitor.py: no healthy
@@ -194,7 +195,7 @@ def is_stuck(
 @kernel
 def update_run_faults(
     i: int, r: float, x: float, y: float, axis: float, half_angle: float, tolerance: float, neighbours: Ints,
-    sensors: Records[SensorMemory],
+    sensors: Records[SensorMemory], ring: Records[RingMemory],
 ) -> None:  # fmt: skip
     """Set or clear sensor `i`'s fault `STUCK` from its run of equal readings.
 
@@ -208,13 +209,17 @@ def update_run_faults(
         As for `is_stuck`.
     tolerance : float
         Readings that differ by no more than this are equal, m.
+    ring : (1,) record
+        What is remembered of the ring.
     """
     c = sensors[i]
     if c.faults & STUCK:
         c.off_stuck = 0 if abs(r - c.stuck_m) <= tolerance else c.off_stuck + 1
         if c.off_stuck >= RECOVERY_READINGS:
             c.faults &= ~STUCK
-    elif math.isfinite(r) and is_stuck(i, x, y, axis, half_angle, neighbours, sensors):
+    elif math.isfinite(r) and (
+        is_stuck(i, x, y, axis, half_angle, neighbours, sensors) or repeats_through_turn(i, r, sensors, ring)
+    ):
         c.faults |= STUCK
         c.stuck_m, c.off_stuck = c.run_m, 0
 
@@ -282,6 +287,7 @@ def check_firing(
     ring[0].firings += 1
     has_leapt = math.hypot(x - ring[0].x, y - ring[0].y) >= APPROACH_MIN_M
     ring[0].x, ring[0].y = x, y
+    follow_turn(x, y, yaw, ring)
     changed = 0
     for i in range(ranges.shape[0]):
         c = sensors[i]
@@ -310,7 +316,7 @@ def check_firing(
         else:
             c.run_length += 1
         axis = own_yaw + mounts[i, 2]
-        update_run_faults(i, r, x, y, axis, half_angle, tolerance, neighbours, sensors)
+        update_run_faults(i, r, x, y, axis, half_angle, tolerance, neighbours, sensors, ring)
         cos, sin = math.cos(own_yaw), math.sin(own_yaw)
         own_x, own_y = x + cos * mounts[i, 0] - sin * mounts[i, 1], y + sin * mounts[i, 0] + cos * mounts[i, 1]
         c.faults &= ~SILENT

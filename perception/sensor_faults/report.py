@@ -75,7 +75,7 @@ def describe_fault(
         return SensorReport(
             sensor,
             "too_near",
-            f"sensor {sensor} answers ranges far below ring.range_min_m, which it cannot measure: masked; check its "
+            f"sensor {sensor} answers ranges below ring.range_min_m, which it cannot measure: masked; check its "
             f"trigger and supply, and that nothing covers it, or correct range_min_m",
         )
     if faults & SILENT:

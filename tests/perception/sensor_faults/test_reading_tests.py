@@ -105,11 +105,11 @@ def test_stuck_needs_a_way_equal_readings_and_neighbours_that_change(
 def test_a_stuck_sensor_recovers_after_several_other_readings() -> None:
     memory = sensors()
     run_of(memory, PASSED_READINGS_MIN, 20, 20)
-    update_run_faults(0, 2.0, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
+    update_run_faults(0, 2.0, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory, ring())
     assert memory[0].faults == STUCK
     for k in range(RECOVERY_READINGS):
         assert memory[0].faults == STUCK
-        update_run_faults(0, 3.0 + k, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
+        update_run_faults(0, 3.0 + k, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory, ring())
     assert memory[0].faults == 0
 
 

@@ -20,7 +20,7 @@ from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, T
         (CROSSTALK, "crosstalk", "sensor 7 reads short when it fires together with 3, 11 and not otherwise"),
         (FAILING | STUCK | SILENT | CROSSTALK, "failing", "check its cable and its board"),
         (STUCK | SILENT | CROSSTALK, "stuck", "look for something that hangs in front of it"),
-        (TOO_NEAR | SILENT, "too_near", "sensor 7 answers ranges far below ring.range_min_m"),
+        (TOO_NEAR | SILENT, "too_near", "sensor 7 answers ranges below ring.range_min_m"),
         (SILENT | CROSSTALK, "silent", "check that nothing covers it"),
         (CROSSTALK, "crosstalk", "fire them apart (ring.firing)"),
     ],

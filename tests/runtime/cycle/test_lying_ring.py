@@ -69,6 +69,19 @@ def test_sensors_that_read_what_they_cannot_are_named_and_stop_the_robot(measure
     measured(f"two sensors ahead that answer 1 cm: named, SAFE_STOP after {run.run_s:.1f} s")
 
 
+@pytest.mark.parametrize(("range_m", "fault"), [(0.09, "too_near"), (0.12, "stuck")])
+def test_a_robot_that_turns_away_from_what_its_sensors_repeat_does_not_turn_for_ever(
+    range_m: float, fault: str
+) -> None:
+    ahead = [
+        StuckSensor(kind="stuck_sensor", at_s=0.0, duration_s=LASTS_S, sensor=i, range_m=range_m) for i in (3, 4)
+    ]
+    run = driven("p3dx", *ahead, until_s=30.0)
+    assert run.mode is Mode.SAFE_STOP
+    assert "no usable range from sensor 3, 4" in str(run.state.mode.reason)
+    assert {r.sensor: r.fault for r in run.state.perception.sensor_reports()} == dict.fromkeys((3, 4), fault)
+
+
 def test_a_robot_whose_other_beams_cover_the_way_drives_on_without_them() -> None:
     ahead = [StuckSensor(kind="stuck_sensor", at_s=0.0, duration_s=LASTS_S, sensor=i, range_m=0.01) for i in (0, 1)]
     run = driven("ears", *ahead, until_s=10.0)
