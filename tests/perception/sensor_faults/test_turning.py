@@ -1,4 +1,4 @@
-"""A full turn in place tells a stuck sensor from an honest one, in rooms of any shape."""
+"""A full turn in place separates a stuck sensor from an honest one, in rooms of any shape."""
 
 from __future__ import annotations
 
