@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, Ints, kernel, loop_kernel
-from perception.mapping.surfaces.cells import RIM, cell_of, greatest_strength, strength_of
+from perception.mapping.surfaces.cells import CELLS_A_M, RIM, cell_of, greatest_strength, strength_of
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
@@ -153,18 +153,24 @@ def walk(
     ux, uy = line.ux, line.uy
     low, high = begin, begin
     steps, met_steps = 0, 0
+    # The line in cells, from the map's corner.
+    row, column = line.x * CELLS_A_M + CELLS // 2, line.y * CELLS_A_M + CELLS // 2
+    rows, columns = ux * CELLS_A_M, uy * CELLS_A_M
     for side in range(2):
         way = 1.0 - 2.0 * side
         t, last, since = 0.0, 0.0, 0
         while t <= reach and t - last <= GAP_M + STEP_M:
             is_met = False
+            along = begin + way * t
             for k in range(-OFFSETS, OFFSETS + 1):
                 off = k * OFF_LINE_M / OFFSETS
-                i = cell_of(line.x + (begin + way * t) * ux - off * uy)
-                j = cell_of(line.y + (begin + way * t) * uy + off * ux)
-                if i < 0 or j < 0 or counts.index[i, j] == 0:
+                x, y = row + along * rows - off * columns, column + along * columns + off * rows
+                if not (RIM <= x < CELLS - RIM and RIM <= y < CELLS - RIM):
                     continue
+                i, j = int(x), int(y)
                 n = counts.index[i, j] - 1
+                if n < 0:
+                    continue
                 dx, dy = offset_of(i) - line.x, offset_of(j) - line.y
                 if abs(dy * ux - dx * uy) > OFF_LINE_M:
                     continue
@@ -182,8 +188,8 @@ def walk(
                 sums[6] += 1.0
                 if cells[n].owner == FREE:
                     sums[7] += 1.0
-                along = dx * ux + dy * uy
-                low, high = min(low, along), max(high, along)
+                end = dx * ux + dy * uy
+                low, high = min(low, end), max(high, end)
             since += 1
             counts.steps += 1
             if is_met:
