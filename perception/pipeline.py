@@ -195,7 +195,7 @@ class Perception:
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
-        return self._in_odometry(self.vacant.outside(self.method.objects()))
+        return self._in_odometry(self.vacant.outside(self.surfaces.credible(self.method.objects(), self._known)))
 
     def mapped_objects(self) -> tuple[DetectedObject, ...]:
         """Return the same objects in the map frame; without correction of drift that is odometry's."""

@@ -19,6 +19,8 @@ class SurfaceReport(NamedTuple):
     polylines: tuple[Polyline, ...] = ()
     stands_for_walls: bool = False
     """Whether the method's own walls are not shown, as its shapes explain little of this place."""
+    refuted: frozenset[int] = frozenset()
+    """Numbers of round objects of the method that are not shown: the pieces at their places are straight."""
 
 
 class NoSurfaces:
@@ -56,6 +58,14 @@ class NoSurfaces:
             Returns what the method reports.
         """
         return SurfaceReport()
+
+    def credible(
+        self,
+        objects: tuple[DetectedObject, ...],
+        known: Callable[[], tuple[DetectedObject, ...]],  # noqa: ARG002 - other maps need it
+    ) -> tuple[DetectedObject, ...]:
+        """Return the method's objects that the surfaces at their places do not refute; `known` as for `report`."""
+        return objects
 
     def with_walls(
         self,

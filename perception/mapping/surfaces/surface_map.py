@@ -23,7 +23,7 @@ from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
-from perception.mapping.surfaces.beside_known import beside_known, nearness
+from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
 from perception.mapping.surfaces.local_map import LocalMapSearch
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_MIN_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
@@ -54,8 +54,13 @@ class SurfaceMap(NoSurfaces):
         half = min(math.radians(ring.beam_half_angle_deg), HALF_ANGLE_MAX)
         self._search = LocalMapSearch(half, ring.range_max_m, round_radii(models))
         self._list = SurfaceList()
-        self._reach_m = {one.name: one.reach_m for one in models}
+        self._name_sizes(models)
         self._forget_derived()
+
+    def _name_sizes(self, models: Sequence[ModelConfig]) -> None:
+        self._reach_m = {one.name: one.reach_m for one in models}
+        radii, names = circle_models(models)
+        self._radius_m = dict(zip(names, radii, strict=True))
 
     def _forget_derived(self) -> None:
         self._known: tuple[DetectedObject, ...] = ()
@@ -155,19 +160,29 @@ class SurfaceMap(NoSurfaces):
         objects = known()
         if self._report is None or objects != self._known:
             rows = self._list.archived_rows
-            near = nearness(rows, objects, self._reach_m)
-            if self._report is None or not np.array_equal(near, self._near):
-                self._near, self._report = near, beside_known(rows, near)
+            near, gone = nearness(rows, objects, self._reach_m), frozenset[int]()
+            if wall_prior(rows, near) > 0.0:
+                gone = refuted(rows, objects, self._radius_m)
+                near = nearness(rows, tuple(one for one in objects if one.number not in gone), self._reach_m)
+            if self._report is None or gone != self._report.refuted or not np.array_equal(near, self._near):
+                self._near, self._report = near, beside_known(rows, near)._replace(refuted=gone)
                 self._archived = None
             self._known = objects
         return self._report
+
+    def credible(
+        self, objects: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
+    ) -> tuple[DetectedObject, ...]:
+        """Return the method's objects that the surfaces at their places do not refute; `known` as for `report`."""
+        gone = self.report(known).refuted
+        return tuple(one for one in objects if one.number not in gone) if gone else objects
 
     def with_walls(
         self, objects: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
     ) -> tuple[DetectedObject, ...]:
         """Return the method's objects and the walls beside them, or in place of its own; `known` as for `report`."""
         walls = self.report(known).walls
-        return (*self._without_walls(objects), *walls)
+        return (*self._shown(objects), *walls)
 
     def archived_beside(self, archived: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return the method's objects that were left behind, without walls where others stand for them.
@@ -175,19 +190,20 @@ class SurfaceMap(NoSurfaces):
         There may be many: the same tuple until they change.
         """
         if self._archived is None or archived is not self._archived[0]:
-            self._archived = (archived, self._without_walls(archived))
+            self._archived = (archived, self._shown(archived))
         return self._archived[1]
 
-    def _without_walls(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
-        """Return objects without the walls for which the pieces of the last report stand."""
-        if self._report is None or not self._report.stands_for_walls:
+    def _shown(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return objects without what the last report stands for or refutes."""
+        report = self._report
+        if report is None or not report.stands_for_walls:
             return objects
-        return tuple(one for one in objects if one.ends is None)
+        return tuple(one for one in objects if one.ends is None and one.number not in report.refuted)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Compare with the round ones of these models."""
         self._search.radii = round_radii(models)
-        self._reach_m = {one.name: one.reach_m for one in models}
+        self._name_sizes(models)
         self._forget_derived()
 
     def apply_settings(self, config: SurfacesConfig) -> None:

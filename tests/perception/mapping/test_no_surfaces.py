@@ -6,7 +6,7 @@ import numpy as np
 
 from config.load import load_settings
 from drivers.messages import Firing, Pose
-from perception.mapping.no_surfaces import NoSurfaces
+from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
 from perception.mapping.surfaces.surface_map import SurfaceMap
 
 
@@ -21,5 +21,5 @@ def test_nothing_is_done_and_nothing_is_reported() -> None:
     assert not surfaces.can_refine
     assert surfaces.converged
     assert surfaces.refine() == 0
-    assert surfaces.report(lambda: 1 / 0) == ((), (), False)  # type: ignore[arg-type,return-value]  # it is not asked
+    assert surfaces.report(lambda: 1 / 0) == SurfaceReport()  # type: ignore[arg-type,return-value]  # it is not asked
     assert issubclass(SurfaceMap, NoSurfaces)

@@ -9,7 +9,7 @@ import pytest
 
 from perception.detected_object import DetectedObject, wall_between
 from perception.mapping.no_surfaces import SurfaceReport
-from perception.mapping.surfaces.beside_known import beside_known, nearness
+from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted
 from perception.mapping.surfaces.surface_list import ENDS, Surface
 from perception.records import zeros
 
@@ -43,7 +43,7 @@ def report(
 
 
 def test_pieces_in_a_room_that_the_method_does_not_know_are_walls() -> None:
-    walls, polylines, _ = report(room(), (), {})
+    walls, polylines, *_ = report(room(), (), {})
     assert sorted(round(np.hypot(w.ends[2] - w.ends[0], w.ends[3] - w.ends[1])) for w in walls if w.ends) == [
         6,
         6,
@@ -86,7 +86,7 @@ def test_where_the_method_explains_the_place_pieces_are_outlines() -> None:
     """A shelf in a room of walls that are known: nothing says that it is a wall."""
     known = tuple(known_wall(*row) for row in zip(*(room()[name] for name in ENDS), strict=True))
     surfaces = np.concatenate([room(), pieces((2.0, 2.0, 2.6, 2.0), evidence=1.0)])
-    walls, polylines, _ = report(surfaces, known, {})
+    walls, polylines, *_ = report(surfaces, known, {})
     assert walls == ()
     assert [line.points.tolist() for line in polylines] == [[[2.0, 2.0], [2.6, 2.0]]]
 
@@ -100,9 +100,22 @@ def test_pieces_of_round_bodies_alone_are_no_walls(radius: float) -> None:
         for x in range(0, 40, 2)
         for a, b in itertools.pairwise(turns)
     ]
-    walls, polylines, _ = report(pieces(*ends, evidence=2.0), (), {})
+    walls, polylines, *_ = report(pieces(*ends, evidence=2.0), (), {})
     assert walls == ()
     assert len(polylines) > 100
+
+
+@pytest.mark.parametrize(("probability", "straight", "is_refuted"), [
+    (0.996, -4.0, True), (0.996, -30.0, False), (1.0 - 1e-9, 0.0, False), (1.0 - 1e-9, 10.0, True), (1.0, 0.0, False),
+])  # fmt: skip
+def test_what_seems_round_among_straight_pieces_needs_evidence(
+    probability: float, straight: float, is_refuted: bool
+) -> None:
+    """That of the pieces at its outline counts as well; those farther away say nothing."""
+    drum = DetectedObject("drum", 2.0, 2.0, 0.0, 0.01, 9, probability, probability, number=5)
+    rows = np.concatenate([pieces((1.8, 1.7, 2.2, 1.7), evidence=straight), pieces((1.0, 1.0, 3.0, 1.0))])
+    assert refuted(rows, (drum,), {"drum": 0.3}) == (frozenset({5}) if is_refuted else frozenset())
+    assert refuted(rows, (drum,), {"barrel": 0.2}) == frozenset()
 
 
 def test_a_polyline_keeps_its_points_in_order() -> None:

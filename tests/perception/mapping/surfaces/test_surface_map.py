@@ -133,9 +133,16 @@ def test_pieces_stand_for_the_walls_of_a_place_that_is_not_known(driven: Percept
     archived = (post, wall)
     assert surfaces.archived_beside(archived) == (post,)
     assert surfaces.archived_beside(archived) is surfaces.archived_beside(archived)
-    surfaces.clear()
-    assert surfaces.with_walls((wall, post), lambda: (wall, post)) == (wall, post)
-    assert surfaces.archived_beside(archived) is archived
+    surfaces.set_models(load_settings("hallway").models)
+    drum = DetectedObject("drum", -2.5, 0.0, 0.0, 0.01, 9, 0.99, 0.99, number=7)
+    assert surfaces.credible((drum, post), lambda: (drum, post)) == (post,)
+    assert drum not in surfaces.with_walls((drum, post), lambda: (drum, post))
+    surfaces.set_models(())
+    settings = perception_settings()
+    nothing = SurfaceMap(settings.ring, settings.models, settings.perception.surfaces)
+    assert nothing.with_walls((wall, post), lambda: (wall, post)) == (wall, post)
+    assert nothing.credible((drum, post), lambda: (drum, post)) == (drum, post)
+    assert nothing.archived_beside(archived) is archived
 
 
 def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
