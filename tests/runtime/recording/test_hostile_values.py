@@ -95,6 +95,7 @@ def test_every_number_of_a_cycle(small: list[RawMessage], tmp_path: Path) -> Non
 
 
 @pytest.mark.promise("P21")
+@pytest.mark.usefixtures("warm_kernels")  # to compile them is one more line
 @pytest.mark.parametrize("command", [("replay",), ("report", "--force", "--out")], ids=["replay", "report"])
 def test_commands_end_in_one_line(
     command: tuple[str, ...], small: list[RawMessage], tmp_path: Path, capsys: pytest.CaptureFixture[str]
