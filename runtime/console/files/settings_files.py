@@ -13,12 +13,11 @@ from typing import Final
 
 from config.errors import UserError
 from config.files import ConfigError, DocumentRead, in_place_of, read_file
-from config.load import parse_text
-from config.places import PlacesConfig
+from config.load import parse_text, with_room
 from config.settings import Settings
 from config.toml_lines import located
 from config.world import WorldConfig
-from runtime.analysis.export.world_file import text_with_places, with_places
+from runtime.analysis.export.world_file import text_with_places
 from runtime.console.commands.command_error import CommandError
 from runtime.console.sent_messages import ProblemRow, SettingsCheck, SettingsRow, SettingsText
 from runtime.support.config_lint import lint_settings
@@ -28,7 +27,6 @@ KINDS: Final = MappingProxyType(
     {"runs": "run", "robots": "robot", "worlds": "world", "models": "model", "missions": "mission"}
 )
 """Kinds of files as the page names them."""
-NO_PLACES: Final = PlacesConfig()
 
 
 class SettingsFiles:
@@ -114,9 +112,10 @@ class SettingsFiles:
             text = self._read(document)["text"]
             try:
                 world = parse_text(WorldConfig, text, document.name)
+                of_file = with_room(settings, world, document.name).perception.localization.known_room
             except ConfigError as error:
                 raise CommandError(f"the places are in force, but not kept in {document.name}: {error}") from None
-            if with_places(world, NO_PLACES) == with_places(room, NO_PLACES):
+            if of_file == room:
                 if world.places() != settings.places:
                     self._put(document, document.path, text_with_places(text, settings.places))
                 return

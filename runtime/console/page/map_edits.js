@@ -13,7 +13,7 @@ const DONE = {
   confirm_object: "The object is not confirmed any more",
   reject_object: "The object is reported again",
   lift_area: "The area is vacant again",
-  clear_map: "Segments and objects are back; walls are recognised anew",
+  clear_map: "Segments, objects and walls are back",
 };
 const SETTLED_MS = 1500; // by then the readings have moved an object that was placed badly
 const STRAYED_M = 0.03;

@@ -114,7 +114,10 @@ async def test_a_run_is_started_again_only_with_settings_that_are_right(run: Run
 
 async def test_changed_places_are_kept_in_the_map_that_the_run_was_started_with(tmp_path: Path) -> None:
     path, other = tmp_path / "map.toml", tmp_path / "other.toml"
-    text = "# by hand\n[[wall]]\nx1_m = 0.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n"
+    text = (
+        "# by hand\n[[wall]]\nx1_m = 0.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n"
+        '[start]\nx_m = 1.0\n[acoustics]\nmodel = "specular"\n'
+    )
     for file in (path, other):
         file.write_text(text)
     with noting_files_read():
