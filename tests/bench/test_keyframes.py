@@ -67,8 +67,8 @@ def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> Non
     ("run", "robot", "seconds", "sets"),
     [
         ("office", "denning", 48.0, ()),
-        ("room", "p3dx", 90.0, ("perception.grid.method=off",)),
-        ("room", "ears", 48.0, ("perception.grid.method=elfes",)),
+        ("room", "p3dx", 36.0, ("perception.grid.method=off",)),
+        ("room", "ears", 24.0, ("perception.grid.method=elfes",)),
     ],
 )
 def test_no_keyframe_of_the_shipped_runs_is_refused(

@@ -85,10 +85,11 @@ def test_no_honest_drive_is_stopped_as_for_a_lie(measured: Callable[[str], None]
     measured(f"{len(results)} honest drives, {hours:.1f} h: 0 stops as for a lie, {others} for other reasons")
 
 
-def test_an_honest_drive_goes_on() -> None:
+def test_an_honest_drive_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.lies.HONEST_S", 30.0)
     result = run_trial("p3dx", "furnished", None, 0, 0)
     assert (result.named_s, result.contact_s, result.is_contact) == (None, None, False)
-    assert result.drive_s == pytest.approx(120.0, abs=0.1)
+    assert result.drive_s == pytest.approx(30.0, abs=0.1)
 
 
 def test_trials_and_their_table() -> None:

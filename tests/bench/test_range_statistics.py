@@ -11,17 +11,16 @@ import pytest
 from bench.range_statistics import COLUMNS, KNOWN, REAL, facing_ahead, measure, real_drive, statistics
 from config.errors import UserError
 
-ROOMS = 6
-
 
 def no_report(_: str) -> None:
     pass
 
 
+@pytest.mark.parametrize("rooms", [2, pytest.param(6, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("model", ["cone", "mirrors"])
-def test_generated_rooms_are_within_the_spread_of_the_real_ones(model: str) -> None:
+def test_generated_rooms_are_within_the_spread_of_the_real_ones(model: str, rooms: int) -> None:
     """Between the two real drives, or beyond one of them by no more than a quarter of it or .03 (m, or a share)."""
-    rows = measure(range(100, 100 + ROOMS), (model,), None, no_report)
+    rows = measure(range(100, 100 + rooms), (model,), None, no_report)
     for column in COLUMNS:
         real = [rows[name][column] for name in REAL[model]]
         low, high = min(0.75 * min(real), min(real) - 0.03), max(1.25 * max(real), max(real) + 0.03)

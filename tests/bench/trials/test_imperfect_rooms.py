@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -14,6 +15,7 @@ from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
 
 SEEDS = range(4)
+mixed_room = functools.cache(imperfect_room)
 
 
 def surfaces_of(world: WorldConfig) -> set[str | None]:
@@ -21,24 +23,24 @@ def surfaces_of(world: WorldConfig) -> set[str | None]:
 
 
 def test_a_seed_is_one_room_whatever_it_is_heard_by() -> None:
-    for seed in SEEDS:
-        mixed = imperfect_room(seed).world
+    for seed in SEEDS[:2]:
+        mixed = mixed_room(seed).world
         assert mixed == imperfect_room(seed).world
-        for model in MODELS:
+        for model in MODELS.keys() - {"mixture"}:
             world = imperfect_room(seed, model).world
             for kind in ("wall", "box", "drum"):
                 bare = [
                     [it.model_copy(update={"surface": None}) for it in getattr(of, kind)] for of in (world, mixed)
                 ]
                 assert bare[0] == bare[1]
-    assert imperfect_room(0).world != imperfect_room(1).world
+    assert mixed_room(0).world != mixed_room(1).world
 
 
 def test_rooms_have_what_real_ones_have() -> None:
     surfaces: set[str | None] = set()
     walls, legs, boxes = [], [], 0
     for seed in SEEDS:
-        world = imperfect_room(seed).world
+        world = mixed_room(seed).world
         assert sum(it.radius_m == DRUM_RADIUS_M for it in world.drum) == 3
         surfaces |= surfaces_of(world)
         walls += [it for it in world.wall if it.surface != "silent"]
@@ -67,7 +69,7 @@ def test_only_a_mixture_has_surfaces_of_its_own_and_only_jitter_jitters() -> Non
 
 def test_drives_go_through_the_whole_room_and_touch_nothing() -> None:
     for seed in SEEDS:
-        room = imperfect_room(seed)
+        room = mixed_room(seed)
         scene, poses = compile_scene(room.world), drive_through(room, seed, 0.1, 30.0)
         assert poses.shape == (300, 3)
         assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.1 + 1e-9

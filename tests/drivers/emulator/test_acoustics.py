@@ -196,7 +196,7 @@ def test_mixed_surfaces_answer_each_by_its_own_model(model: str, worlds: int) ->
 def test_a_cone_behind_cloth_is_heard_where_it_is_in_sight() -> None:
     """No ray of many finds a nearer point in sight, and the found one is in the beam and in sight."""
     found, rng = 0, np.random.default_rng(8)
-    for world, _, sensors, half in random_cases(9, 15):
+    for world, _, sensors, half in random_cases(9, 9):
         bare = world.model_copy(update={"drum": ()})
         apart = [d for d in world.drum if clearance_of(bare, d.x_m, d.y_m) > d.radius_m][:1]  # no surfaces that cross
         mixed = with_surfaces(bare.model_copy(update={"drum": tuple(apart)}), one_of(rng, "silent", None))
@@ -210,7 +210,7 @@ def test_a_cone_behind_cloth_is_heard_where_it_is_in_sight() -> None:
                 assert naive.in_beam(at, sensor, axis, half, 1e-6)
                 assert naive.in_sight(shapes, sensor, at, 1e-3)
                 found += 1
-    assert found > 20
+    assert found > 12
 
 
 def clearance_of(world: WorldConfig, x: float, y: float) -> float:

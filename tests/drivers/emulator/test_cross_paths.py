@@ -19,7 +19,7 @@ from tests.drivers.emulator.one_sensor import drum, wall
 from tests.drivers.emulator.test_acoustics import random_cases
 
 MICROMETRE = 1e-6
-WORLDS = (15, pytest.param(400, marks=pytest.mark.soak))
+WORLDS = (10, pytest.param(400, marks=pytest.mark.soak))
 """Random worlds."""
 LOBE = 2.0
 

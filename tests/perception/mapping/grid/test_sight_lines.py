@@ -52,13 +52,16 @@ def test_a_passage_counts_up_to_the_first_cell_on_its_line_that_holds_something(
     found = evidence(lines, window)
     sensor = np.array([x + 0.2 * math.cos(yaw), y + 0.2 * math.sin(yaw)])
     end = r
-    for row, column in np.argwhere(np.ones_like(holds)).tolist():
-        at = corners + CELL_M * (np.array([column, row]) + 0.5) - sensor
+    centres = CELL_M * (np.stack(np.meshgrid(np.arange(128), np.arange(128)), axis=-1) + 0.5)
+    away = corners + centres - sensor
+    bearing = np.arctan2(away[..., 1], away[..., 0]) - yaw
+    is_outside = np.abs(np.remainder(bearing + math.pi, math.tau) - math.pi) > RING.half_angle + 1e-6
+    is_outside |= np.hypot(away[..., 0], away[..., 1]) > end
+    assert (found[is_outside] == 0.0).all()
+    for row, column in np.argwhere(~is_outside).tolist():
+        at = away[row, column]
         d = math.hypot(*at)
         off = abs(math.remainder(math.atan2(at[1], at[0]) - yaw, 2.0 * math.pi))
-        if off > RING.half_angle + 1e-6 or d > end:
-            assert found[row, column] == 0.0
-            continue
         towards = at / d
         ahead = (stands - sensor) @ towards
         beside = np.abs((stands - sensor) @ np.array([-towards[1], towards[0]]))
