@@ -185,7 +185,7 @@ def poisons(values: np.ndarray[Any, Any], bound: Bound) -> list[float]:
     if values.dtype.kind in {"b", "u"}:
         return [0, 1, 2, 255]
     of = np.iinfo(values.dtype)
-    return [n for n in (low, high, low - 1, high + 1, -1, of.min, of.max) if of.min <= n <= of.max]
+    return sorted({n for n in (low, high, low - 1, high + 1, -1, of.min, of.max) if of.min <= n <= of.max})
 
 
 def poison_all(moment: Moment, is_replayed: Callable[[str], bool]) -> Counter[str]:
@@ -228,18 +228,18 @@ def test_every_poisoned_number_is_refused_or_harmless(
     moments: dict[int, Moment], measured: Callable[[str], None], share: int
 ) -> None:
     """Replay what is not refused: where array bounds are checked all whole numbers, which may be indices, and a share
-    of the others; elsewhere every seventh field, to end no process."""
-    last = moments[POISONED_CYCLE]
-    replayed = {
-        name
-        for i, (name, values) in enumerate(numbers_of(last.snapshot))
-        if (i % share == 0 or values.dtype.kind != "f" if BOUNDS_CHECKED else i % 7 == 0)
-    }
-    found = poison_all(last, replayed.__contains__)
-    for moment in moments.values():
+    of the others, another one in each moment; elsewhere every seventh field, to end no process."""
+    found = Counter[str]()
+    for at, moment in enumerate(reversed(moments.values())):
         assert not ends_in_error(moment, moment.snapshot)
-        if BOUNDS_CHECKED and moment is not last:
-            found += poison_all(moment, lambda name: name.startswith(JOB))
+        replayed = {
+            name
+            for i, (name, values) in enumerate(numbers_of(moment.snapshot), at)
+            if (i % share == 0 or values.dtype.kind != "f" if BOUNDS_CHECKED else i % 7 == 0)
+            if moment.cycle == POISONED_CYCLE or name.startswith(JOB)
+        }
+        if BOUNDS_CHECKED or moment.cycle == POISONED_CYCLE:
+            found += poison_all(moment, replayed.__contains__)
     assert found["refused"] > 100
     assert found["harmless"] > 10 * found["ended"]
     measured(
