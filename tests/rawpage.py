@@ -12,7 +12,8 @@ import time
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-TIMEOUT_S = 120.0
+from tests.hil.machine import TIMEOUT_S
+
 READ_BYTES = 65_536
 
 

@@ -30,9 +30,8 @@ from runtime.recording.storage import RecordingTarget, SingleFile
 from runtime.recording.verification import ReplayResult, verify_recording
 from runtime.recording.writer import RecorderStatus
 from runtime.simulation.closed_loop import OperatorInput, simulate
+from tests.hil.machine import TIMEOUT_S
 
-WAIT_S = 60.0
-"""Only a hang reaches it."""
 SECONDS = 12.0
 """Length of the recorded run that tests share, s."""
 
@@ -44,7 +43,7 @@ def hall(*sets: str) -> Settings:
 
 def until(done: Callable[[], bool], what: str) -> None:
     """Wait until a condition holds that another thread makes true."""
-    end_s = time.monotonic() + WAIT_S
+    end_s = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < end_s, what
         time.sleep(0.001)
@@ -110,7 +109,7 @@ def record(
     now = [0.0]
     place = SingleFile(path) if isinstance(path, Path) else path
     with (
-        mock.patch("runtime.recording.writer.CLOSE_MAX_S", WAIT_S),
+        mock.patch("runtime.recording.writer.CLOSE_MAX_S", TIMEOUT_S),
         Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max, emulated=True, on=on) as recorder,
     ):
         until(lambda: not on or recorder.status.file is not None or recorder.status.last_error is not None, "a file")

@@ -13,6 +13,7 @@ import pytest
 import echolocate
 from runtime.batch.cluster import WORKER_COMMAND
 from runtime.support.child_process import child_environment, start_child
+from tests.hil.machine import TIMEOUT_S
 
 ROOT = Path(__file__).resolve().parents[1]
 HOSTILE = ("config", "dask", "drivers", "numpy", "orjson", "perception", "runtime", "structlog")
@@ -28,8 +29,9 @@ def imported_names(path: Path) -> set[str]:
 def call(*words: str, path: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run Python in a folder with a `PYTHONPATH`, without the current folder in its path."""
     env = {**os.environ, "PYTHONPATH": path}
+    command = [sys.executable, "-P", *words]
     return subprocess.run(
-        [sys.executable, "-P", *words], capture_output=True, text=True, cwd=folder, env=env, check=False, timeout=60
+        command, capture_output=True, text=True, cwd=folder, env=env, check=False, timeout=TIMEOUT_S
     )
 
 
@@ -98,9 +100,8 @@ async def test_a_child_process_imports_nothing_of_the_current_folder(
 
 def test_a_local_worker_imports_nothing_of_the_current_folder(hostile: Path) -> None:
     pytest.importorskip("dask", reason="pip install 'echolocate[sweep]'")
-    subprocess.run(
-        [*WORKER_COMMAND, "--help"], capture_output=True, cwd=hostile, env=child_environment(), check=True, timeout=60
-    )
+    command, env = [*WORKER_COMMAND, "--help"], child_environment()
+    subprocess.run(command, capture_output=True, cwd=hostile, env=env, check=True, timeout=TIMEOUT_S)
     assert list(hostile.glob("*.ran")) == []
 
 

@@ -16,9 +16,10 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import async_playwright, expect
 
-from tests.browser.fake_server import TIMEOUT_S, FakeServer, serving
+from tests.browser.fake_server import FakeServer, serving
 from tests.browser.open_page import Opener, PagePool
 from tests.browser.synthetic_run import Hall
+from tests.hil.machine import TIMEOUT_S
 
 ARGUMENTS = ("--disable-gpu", "--disable-dev-shm-usage", "--force-color-profile=srgb")
 

@@ -15,12 +15,11 @@ from typing import Any, Final
 from aiohttp import WSMsgType, web
 
 from tests.browser.synthetic_run import Hall, greeting
+from tests.hil.machine import TIMEOUT_S
 from tests.page_types import shape_error
 
 PAGE: Final = Path(__file__).parents[2] / "runtime" / "console" / "page"
 POLICY: Final = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
-TIMEOUT_S: Final = 60.0
-"""For what comes at once on any machine: only what hangs takes so long."""
 TOKEN: Final = "right-token"
 TOML: Final = "[cycle]\nperception_budget_s = 0.005\n"
 SYNC: Final = "sync"

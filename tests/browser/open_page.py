@@ -15,7 +15,8 @@ from typing import Any, Literal, Self
 
 from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Error, Page, Request, expect
 
-from tests.browser.fake_server import SYNC, TIMEOUT_S
+from tests.browser.fake_server import SYNC
+from tests.hil.machine import TIMEOUT_S
 
 DESKTOP, PHONE, PROJECTOR = (1440, 900), (360, 740), (1920, 1080)
 PROBES = Path(__file__).parent / "probes"

@@ -14,10 +14,10 @@ import pytest
 from playwright.async_api import expect
 
 from drivers.messages import Flags
-from tests.browser.fake_server import TIMEOUT_S
 from tests.browser.open_page import Opened, Opener, until
 from tests.browser.real_run import Run, run
 from tests.browser.test_drive import press_pad
+from tests.hil.machine import TIMEOUT_S
 from tests.hil.running import running
 
 pytestmark = [

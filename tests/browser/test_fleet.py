@@ -14,9 +14,9 @@ from playwright.async_api import Locator, Page, expect
 
 from runtime.bridges.fleet import Fleet
 from runtime.bridges.fleet_server import serve_fleet
-from tests.browser.fake_server import TIMEOUT_S
 from tests.browser.open_page import Opener, until
 from tests.browser.real_run import Run, run
+from tests.hil.machine import TIMEOUT_S
 from tests.hil.running import ARM_AGAIN_S
 
 pytestmark = [

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivers.emulator.port_link import EmulatorError, PortLink
+from tests.hil.machine import TIMEOUT_S
 
 KILLED = """
 import os, sys
@@ -25,7 +26,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_what_a_killed_emulator_has_left_is_taken_over(path: Path) -> None:
-    subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False, timeout=60)
+    subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False, timeout=TIMEOUT_S)
     assert {file.name for file in path.parent.iterdir()} == {"robot", ".robot.lock"}
     link = PortLink(str(path))
     link.point_at("/dev/pts/1")

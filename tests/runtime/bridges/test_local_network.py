@@ -11,6 +11,7 @@ import pytest
 
 from runtime.bridges import local_network
 from runtime.bridges.local_network import LOOPBACK, TEXT_MAX, Announced, addresses_of, announced, find_robots, serve
+from tests.hil.machine import TIMEOUT_S
 
 GOOD = {b"name": b"alpha", b"mode": b"DRIVE", b"version": b"1.2"}
 
@@ -71,7 +72,7 @@ async def test_an_announced_run_is_found_and_gone_with_its_input() -> None:
     lines, port = asyncio.StreamReader(), 49_151
     lines.feed_data(b'{"name": "alpha", "mode": "READY"}\n')
     serving = asyncio.create_task(serve(LOOPBACK, port, lines))
-    async with asyncio.timeout(30.0):
+    async with asyncio.timeout(TIMEOUT_S):
         while not (found := [one for one in await find_robots(0.5, [LOOPBACK]) if one.port == port]):
             pass
         assert [(one.name, one.mode, one.address) for one in found] == [("alpha", "READY", LOOPBACK)]

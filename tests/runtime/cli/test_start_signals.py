@@ -21,8 +21,8 @@ import pytest
 from config.errors import UserError
 from runtime.cli.start_signals import ending_in_order, ending_the_start
 from runtime.support.child_process import child_environment
+from tests.hil.machine import TIMEOUT_S
 
-TIMEOUT_S: Final = 60.0
 START_MAX_S: Final = 600.0
 """For the imports of a start, some seconds of processor time: only what hangs takes so long."""
 PROGRAM: Final = """

@@ -37,10 +37,9 @@ from runtime.timing.clock_sampler import ClockSampler
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.time_control import TimeControl
 from runtime.timing.timing_monitor import TimingMonitor
+from tests.hil.machine import TIMEOUT_S
 from tests.page_types import shape_error
 
-TIMEOUT_S = 60.0
-"""Only a hang reaches it."""
 NO_IDLE_FRAMES_S = 1e6
 FREE_PORT = "console.port=0"
 

@@ -10,7 +10,8 @@ import struct
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
-from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase
+from tests.hil.machine import TIMEOUT_S
+from tests.runtime.console.console_case import ConsoleCase
 
 
 @dataclass

@@ -8,7 +8,8 @@ from unittest import mock
 
 import pytest
 
-from tests.recorded import WAIT_S, entries_of, rewrite
+from tests.hil.machine import TIMEOUT_S
+from tests.recorded import entries_of, rewrite
 from tests.runtime.recording.edited_run import record_edited
 
 
@@ -16,8 +17,8 @@ from tests.runtime.recording.edited_run import record_edited
 def _patient_writers() -> Iterator[None]:
     """Give a busy machine a minute to write the end of a file."""
     with (
-        mock.patch("runtime.recording.writer.CLOSE_MAX_S", WAIT_S),
-        mock.patch("runtime.recording.ring_log_writer.CLOSE_MAX_S", WAIT_S),
+        mock.patch("runtime.recording.writer.CLOSE_MAX_S", TIMEOUT_S),
+        mock.patch("runtime.recording.ring_log_writer.CLOSE_MAX_S", TIMEOUT_S),
     ):
         yield
 

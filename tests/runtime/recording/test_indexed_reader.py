@@ -20,6 +20,7 @@ from mcap.reader import NonSeekingReader, SeekingReader
 
 from runtime.cli.app import run_command
 from runtime.recording.recovery import recover
+from tests.hil.machine import TIMEOUT_S
 
 SCRIPT: Final = Path(__file__).with_name("indexed_reader.mjs")
 PACKAGES: Final = Path(sys.prefix) / "npm"
@@ -122,7 +123,7 @@ def test_npms_indexed_reader_reads_every_message(file: Path) -> None:
     counts = counts_of(file)
     topic = max(counts, key=lambda name: counts[name])
     command = [node, str(SCRIPT), str(PACKAGES), str(file), topic]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["counts"] == counts

@@ -35,6 +35,7 @@ from runtime.support.kernel_loader import KernelLoader
 from runtime.support.logs import LogStatus
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.cycle_stats import CycleStats
+from tests.hil.machine import TIMEOUT_S
 from tests.runtime.cli.terminal.test_view import EMPTY
 from tests.runtime.virtual_time import VirtualLoop, in_virtual_time
 
@@ -44,7 +45,6 @@ PLANT = 40
 """The cycle in which something is killed: the robot drives by then."""
 LAST = 90
 WITHIN = 2
-TIMEOUT_S = 60.0
 
 Plant = Callable[[RobotProcess, VirtualLoop], None]
 

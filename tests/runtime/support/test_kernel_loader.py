@@ -21,6 +21,7 @@ from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_loader
 from runtime.support.kernel_cache import BAYES, EMULATOR, POLYGONS, RING, needed_parts
 from runtime.support.kernel_loader import KernelLoader, KernelPreparation, progress_text
+from tests.hil.machine import TIMEOUT_S
 from tests.hil.running import ROOT
 
 ROUND = load_settings("hallway")
@@ -118,7 +119,7 @@ async def test_a_run_that_ends_does_not_wait_for_a_compiler(tmp_path: Path, monk
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(asyncio, "create_subprocess_exec", slow)
     ready = asyncio.create_task(_ready(structlog.wrap_logger(None, processors=[LogCapture()])))
-    async with asyncio.timeout(60.0):
+    async with asyncio.timeout(TIMEOUT_S):
         while not (processes and started_file.exists()):  # the process may run before its start has returned
             await asyncio.sleep(0.01)
     ready.cancel()

@@ -8,12 +8,13 @@ import threading
 import time
 
 from runtime.timing.stall_sampler import StallSampler, readable
+from tests.hil.machine import TIMEOUT_S
 
 
 def hold(sampler: StallSampler) -> None:
     # Set in here: the function that runs when the timer fires is sampled, which on a busy machine may be at once.
     sampler.sample_after(0.01)
-    end_s = time.monotonic() + 60.0
+    end_s = time.monotonic() + TIMEOUT_S
     while sampler.sample is None and time.monotonic() < end_s:
         pass
 
@@ -22,7 +23,7 @@ async def test_the_stall_sampler_names_the_callback_that_blocks_the_loop() -> No
     sampler = StallSampler()
     with sampler.active():
         asyncio.get_running_loop().call_soon(hold, sampler)
-        async with asyncio.timeout(60.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while sampler.sample is None:
                 await asyncio.sleep(0.001)
         assert sampler.sample in {("hold", "hold"), ("hold", "StallSampler.sample_after")}
@@ -41,7 +42,7 @@ async def test_the_stall_sampler_finds_nothing_while_the_loop_sleeps() -> None:
     sampler._take_sample = counted  # type: ignore[method-assign, assignment]
     with sampler.active():
         sampler.sample_after(0.005)
-        async with asyncio.timeout(60.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while not taken:
                 await asyncio.sleep(0.2)
     assert sampler.sample is None or sampler.sample.callback.startswith("test_the_stall_sampler_finds_nothing")

@@ -16,6 +16,7 @@ import pytest
 
 from runtime.cli.terminal.keys import keys
 from runtime.cycle.inputs import Request
+from tests.hil.machine import TIMEOUT_S
 
 
 @pytest.fixture
@@ -33,11 +34,11 @@ async def test_keys_arm_halt_and_quit_and_leave_the_terminal_as_it_was(keyboard:
     quits = asyncio.Event()
     with keys(asked.append, quits.set):
         os.write(keyboard, b"ax h")
-        async with asyncio.timeout(60.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while len(asked) < 3:  # keys that came together are all taken at once
                 await asyncio.sleep(0.01)
         os.write(keyboard, b"q")
-        await asyncio.wait_for(quits.wait(), 60.0)
+        await asyncio.wait_for(quits.wait(), TIMEOUT_S)
     assert asked == [Request.ARM, Request.HALT, Request.HALT]
     assert termios.tcgetattr(sys.stdin.fileno()) == before
 
@@ -60,7 +61,7 @@ async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
         is_in_front = True
         os.kill(os.getpid(), signal.SIGCONT)
         os.write(keyboard, b" ")
-        async with asyncio.timeout(60.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while not asked:
                 await asyncio.sleep(0.01)
     assert asked == [Request.HALT]

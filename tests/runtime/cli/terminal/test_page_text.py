@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright._impl._driver import compute_driver_executable
@@ -19,8 +20,15 @@ from perception.detected_object import DetectedObject
 from runtime import console as page_folder
 from runtime.cli.terminal import page_text
 from runtime.support.length_format import Units
+from tests.hil.machine import TIMEOUT_S
 
 NODE, _ = compute_driver_executable()  # the one that drives the browser in tests
+
+
+def printed(script: str) -> Any:
+    """Return what a script of the page's language prints as JSON."""
+    command = [NODE, "--input-type=module", "-e", script]
+    return json.loads(subprocess.run(command, capture_output=True, check=True, timeout=TIMEOUT_S).stdout)
 
 
 @pytest.mark.promise("P31")
@@ -39,7 +47,6 @@ def test_the_forms_are_those_of_the_page() -> None:
         f"for (const s of {shares}) out.push(percent(s));"
         f"for (const s of {sigmas}) out.push(units.spread(s)); console.log(JSON.stringify(out));"
     )
-    done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
     units: tuple[Units, ...] = ("m", "ft")
     ours = [
         form
@@ -51,7 +58,7 @@ def test_the_forms_are_those_of_the_page() -> None:
         )
     ]  # fmt: skip
     spreads = [page_text.spread(sigma, "ft") for sigma in sigmas]
-    assert json.loads(done.stdout) == [*ours, *map(page_text.percent, shares), *spreads]
+    assert printed(script) == [*ours, *map(page_text.percent, shares), *spreads]
 
 
 @pytest.mark.parametrize("exponent", range(-30, 31, 3))
@@ -70,9 +77,8 @@ def test_odds_on_the_page_end_at_a_million_and_magnitudes_at_a_thousand() -> Non
         f"import {{magnitude, times}} from {json.dumps((page / 'units.js').as_uri())};"
         f"console.log(JSON.stringify([...{logarithms}.map(times), ...[0.5, 99.9, 1e6].map(magnitude)]));"
     )
-    done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
     million = "more than a million"
-    assert json.loads(done.stdout) == ["1", "2", "11", "10⁴", "10⁵", "10⁶", million, million, million,
+    assert printed(script) == ["1", "2", "11", "10⁴", "10⁵", "10⁶", million, million, million,
                                       "0.50", "99.90", "unbounded"]  # fmt: skip
 
 
@@ -92,7 +98,6 @@ def test_what_a_wall_hides_is_what_it_hides_on_the_page(measured: Callable[[str]
         " return hidingWall({ pose: [rx, ry], objects: [wall, seen] }, seen, radius) !== null; });"
         " console.log(JSON.stringify(out));"
     )
-    done = subprocess.run([NODE, "--input-type=module", "-e", script], capture_output=True, check=True, timeout=60)
     ours = list[bool]()
     for (x, y, theta, half), (rx, ry), (ox, oy, radius) in cases:
         along = half * half / 3.0  # of an even distribution over its length
@@ -102,7 +107,7 @@ def test_what_a_wall_hides_is_what_it_hides_on_the_page(measured: Callable[[str]
         seen = DetectedObject("drum", ox, oy, 0.0, 0.1, 9, 0.9, 0.9)
         ours.append(page_text.is_hidden(seen, radius, Pose(rx, ry, 0.0), (wall, seen)))
         assert not page_text.is_hidden(wall, 0.1, Pose(rx, ry, 0.0), (wall, wall))
-    assert json.loads(done.stdout) == ours
+    assert printed(script) == ours
     assert 20 < sum(ours) < 280
     measured(f"{len(ours)} scenes of a wall and an object: hidden in {sum(ours)}, as by the page's code")
 

@@ -28,6 +28,7 @@ from runtime.cli.terminal.view import EVERY_CYCLES, View, after_each_cycle
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
 from runtime.timing.cycle_stats import CycleStats
+from tests.hil.machine import TIMEOUT_S
 
 SETTINGS = load_settings("hallway")
 NO_SEGMENTS: Floats = np.zeros((0, 5))
@@ -80,7 +81,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[Terminal]:
 
 
 def until(done: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 60.0
+    end_s = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < end_s, "timed out"
         time.sleep(0.005)

@@ -29,7 +29,8 @@ from runtime.console.http.server import JOINS_BURST
 from runtime.cycle.callbacks import CONSOLE_RECEIVE
 from runtime.cycle.inputs import Request
 from runtime.timing.timing_monitor import SPANS_MAX
-from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase, Page, open_console
+from tests.hil.machine import TIMEOUT_S
+from tests.runtime.console.console_case import ConsoleCase, Page, open_console
 from tests.runtime.console.raw_page import raw_page
 
 pytestmark = pytest.mark.promise("P22")

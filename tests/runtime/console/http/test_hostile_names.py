@@ -13,7 +13,8 @@ from runtime.console.commands.command_error import CommandError
 from runtime.console.files.jobs import Jobs
 from runtime.console.files.recording_files import RecordingFiles
 from runtime.recording.folder_files import delete_recording, describe_recordings, pin_recording
-from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase
+from tests.hil.machine import TIMEOUT_S
+from tests.runtime.console.console_case import ConsoleCase
 from tests.runtime.console.files.files_case import with_files
 from tests.runtime.console.sample_messages import ALL
 

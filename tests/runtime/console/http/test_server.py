@@ -14,7 +14,8 @@ from aiohttp import WSServerHandshakeError
 from runtime.console.http import server
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.inputs import Request
-from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase, open_console
+from tests.hil.machine import TIMEOUT_S
+from tests.runtime.console.console_case import ConsoleCase, open_console
 
 
 async def refused(case: ConsoleCase, **how: str | None) -> tuple[int, str]:

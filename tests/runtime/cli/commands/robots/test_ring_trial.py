@@ -21,6 +21,7 @@ from runtime.cli.app import run_command
 from runtime.cli.commands.robots import ring_trial
 from runtime.cli.commands.robots.ring_trial import RingTest, judge_motion, judge_sensor, one_at_a_time, only_port
 from tests.drivers.firmware.board import install, start
+from tests.hil.machine import TIMEOUT_S
 from tests.runtime.virtual_time import MemoryLink, VirtualLoop
 
 INF = math.inf
@@ -33,7 +34,6 @@ RING = RingConfig(
     range_max_m=4.0,
     firing=FiringConfig(preset="quadrants"),
 )
-TIMEOUT_S = 120.0
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from runtime.cli.commands.run import local_runs
 from runtime.cli.commands.run.local_runs import other_runs, shown_local_runs
 from runtime.support.console_address import announced
+from tests.hil.machine import TIMEOUT_S
 
 OWN = "http://127.0.0.1:8765/?token=own"
 
@@ -38,5 +39,5 @@ def test_they_are_shown_when_they_change(tmp_path: Path, monkeypatch: pytest.Mon
                 await until(1)
             await until(2)
 
-    asyncio.run(asyncio.wait_for(body(), 60.0))
+    asyncio.run(asyncio.wait_for(body(), TIMEOUT_S))
     assert [len(rows) for rows in shown] == [1, 0]

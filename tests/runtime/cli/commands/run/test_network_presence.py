@@ -16,6 +16,7 @@ from config.settings import ConsoleConfig
 from runtime.cli.commands.run import network_presence
 from runtime.cli.commands.run.network_presence import UNSENT_MAX, NetworkPresence, is_announced, on_the_network
 from runtime.cycle.modes import Mode
+from tests.hil.machine import TIMEOUT_S
 from tests.runtime.bridges.test_local_network import _multicast
 
 __all__ = ["_multicast"]
@@ -36,7 +37,7 @@ class Page:
         self.shown.set()
 
     async def wait_for(self, is_good: Callable[[dict[int, dict[str, Any]]], bool]) -> None:
-        async with asyncio.timeout(30.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while not is_good({one["port"]: one for one in self.robots}):
                 self.shown.clear()
                 await self.shown.wait()
@@ -142,7 +143,7 @@ async def test_a_process_that_ends_is_said_and_its_robots_are_gone(monkeypatch: 
     monkeypatch.setattr(network_presence, "PROGRAM", "no_such_module")
     async with on_the_network(page, Run("a", Mode.READY), ConsoleConfig(announce="always"), quiet(events)):  # type: ignore[arg-type]
         await page.wait_for(lambda _: bool(events) or page.shown.is_set())
-        async with asyncio.timeout(30.0):
+        async with asyncio.timeout(TIMEOUT_S):
             while not events:
                 await asyncio.sleep(0)
     assert "not announced on the network any more: " in events[0]
