@@ -17,19 +17,19 @@ from runtime.recording.conventions.headings import (
     SURE,
     Angles,
     echo_scores,
+    mirror_image,
     motion_scores,
+    opposite,
     sureness,
 )
+from runtime.recording.conventions.not_fired import find_not_fired, option_of, without_not_fired
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.repeats import find_repeats
+from runtime.recording.conventions.sensor_order import check_shift, mirrored_columns
 from runtime.recording.conventions.silence import Silence, check_near, find_silence
 from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
 from runtime.recording.conventions.units import Units, check_scale, find_units, way_ratios
 from runtime.recording.ring_log import RingLogError
-
-MIRROR_M: Final = 0.02
-"""How far a sensor's mirror image may lie from the sensor that takes its column, m and rad."""
-
 
 KERNEL: Final = 0.07
 """Width of an echo's density, as a share of the median range, where units are compared."""
@@ -54,6 +54,7 @@ class Conventions:
     """
 
     silence: Silence = _NO_SILENCE
+    not_fired: float | None = None
     units: Units = _SI
     angles: Angles = _RADIANS
     columns: NDArray[np.int64] | None = None
@@ -63,21 +64,22 @@ class Conventions:
     @property
     def is_plain(self) -> bool:
         """Whether firings pass as they are."""
-        return self.columns is None and (self.silence, self.units, self.angles) == (_NO_SILENCE, _SI, _RADIANS)
+        is_plain = (self.not_fired, self.silence, self.units, self.angles) == (None, _NO_SILENCE, _SI, _RADIANS)
+        return self.columns is None and is_plain
 
     def is_same(self, other: Conventions) -> bool:
         """Return whether both convert alike, up to the width of a noisy band of silence and the time of a cycle."""
         one, two = self.silence, other.silence
         is_alike = one.option == two.option and one.nan_is_silence == two.nan_is_silence
-        return is_alike and (self.units, self.angles) == (other.units, other.angles) and (
-            (self.cycle_s is None) == (other.cycle_s is None)
-        )  # fmt: skip
+        rest, others = ((of.not_fired, of.units, of.angles, of.cycle_s is None) for of in (self, other))
+        return is_alike and rest == others
 
     def converted(self, firing: Firing) -> Firing:
         """Return a firing in metres, radians and seconds; repeats are still in it."""
         rule, unit = HEADINGS[self.angles.heading], ANGLES[self.angles.unit]
         length, reach = LENGTHS[self.units.length], LENGTHS[self.units.range_]
-        ranges, heard = self.silence.applied(firing.ranges_m) * reach, firing.cross_paths
+        ranges = self.silence.applied(without_not_fired(firing.ranges_m, self.not_fired)) * reach
+        heard = firing.cross_paths
         if heard is not None:
             listeners, transmitters = heard.listeners, heard.transmitters
             if self.columns is not None:
@@ -111,6 +113,11 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     columns = mirrored_columns(robot.ring) if options.sensor_order == "mirrored" else None
     said = []
     set_size, pattern_s = _firing_limits(robot.ring)
+    not_fired = find_not_fired(table.ranges, options.not_fired, set_size)
+    if options.not_fired == "auto" and not_fired is not None:
+        value = option_of(not_fired)
+        said.append((f"a sensor that did not fire is {value.split()[1]}", f"{value}, or --not-fired empty if not"))
+    table = table._replace(ranges=without_not_fired(table.ranges, not_fired))
     silence = find_silence(table, options.silence, set_size)
     if silence.words:
         said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
@@ -134,6 +141,9 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if any(g == "auto" and u != plain for g, u, plain in zip(given, units, Units(), strict=True)):
         said.append((units.words, units.options))
     angles = _find_angles(table, robot, options, units, motion, is_related=is_related)
+    if is_related and options.sensor_order == "auto":
+        reach = LENGTHS[units.range_]
+        check_shift(table, robot, angles, reach, LENGTHS[units.length] / reach)
     asked = Angles(
         "ccw" if options.heading == "auto" else options.heading,
         "rad" if options.angle_unit == "auto" else options.angle_unit,
@@ -141,7 +151,7 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if angles != asked:
         said.append((angles.words, angles.options))
     if options.silence == "auto":
-        check_near(table.ranges, LENGTHS[units.range_], robot.ring.range_min_m)
+        check_near(table.ranges, LENGTHS[units.range_], robot.ring.range_min_m, silence.option)
     if said and len(scores) > 1:
         finite = table.ranges[np.isfinite(table.ranges)]
         kernel = KERNEL * float(np.median(finite)) if len(finite) else 1.0
@@ -156,27 +166,7 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if is_latched:
         row_s = TIMES[units.time] * float(np.median(np.diff(table.t))) if len(table.t) > 1 else 0.0
         cycle_s = max(pattern_s, period * row_s if period > 1 else 0.0)
-    return Conventions(silence, units, angles, columns, cycle_s, tuple(said))
-
-
-def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
-    """Return for each sensor the one at its mirror image.
-
-    Raises
-    ------
-    RingLogError
-        The ring is not its own mirror image.
-    """
-    mounts = np.array(ring.mounts)
-    image = mounts * [1.0, -1.0, -1.0]
-    off = np.hypot(*(mounts[:, None, :2] - image[None, :, :2]).transpose(2, 0, 1))
-    off += np.abs(np.angle(np.exp(1j * (mounts[:, None, 2] - image[None, :, 2]))))
-    columns: NDArray[np.int64] = off.argmin(axis=0)
-    if float(off.min(axis=0).max()) > MIRROR_M:
-        raise RingLogError(
-            "--sensor-order mirrored: this ring is not its own mirror image; name the robot's own file"
-        )
-    return columns
+    return Conventions(silence, not_fired, units, angles, columns, cycle_s, tuple(said))
 
 
 def _firing_limits(ring: RingConfig) -> tuple[int, float]:
@@ -219,6 +209,8 @@ def _find_angles(
     most = max(motion.values())
     # Without motion the unit stays: angles in another one hardly turn the ring, and then even noise agrees.
     near = [one for one in motion if (motion[one] > most - NEAR_NAT if is_related else one.unit == default.unit)]
+    backward = {} if not is_related else {opposite(one): one for one in near if opposite(one) in motion}
+    near += [one for one in backward if one not in near]  # a robot may drive backward all the time
     reach, length = LENGTHS[units.range_], LENGTHS[units.length]
     echoes = echo_scores(table, robot, list(dict.fromkeys([default, *near])), reach, length / reach)
     clearest = max(echoes, key=lambda one: float(echoes[one].mean()))
@@ -230,15 +222,25 @@ def _find_angles(
         is_alike = all(sureness(echoes[default], echoes[one]) == 0.0 for one in fits)
         if not is_alike:
             fits = [default, *fits]
+    fits = [one for one in fits if backward.get(one) not in fits or one == default]
     plain = [one for one in fits if one.heading == "ccw"]
     if plain and default not in fits:
         fits = plain
-    is_mirrored = options.sensor_order == "auto" and any(one.heading == "left-handed" for one in fits)
-    if len(fits) == 1 and not is_mirrored:
+    is_open = options.heading == options.sensor_order == "auto"
+    is_mirrored = is_open and any(HEADINGS[one.heading].hand < 0 for one in fits)
+    is_backward = len(fits) == 1 and fits[0] in backward and options.heading == "auto"
+    if len(fits) == 1 and not (is_mirrored or is_backward):
         return fits[0]
     names = [f"{one.words} ({one.options})" for one in fits[:4] or left[:4]]
     if is_mirrored:
-        names.append("the sensors are numbered the other way round (--sensor-order mirrored)")
+        other = mirror_image(next(one for one in fits if HEADINGS[one.heading].hand < 0))
+        said = f"the sensors are numbered the other way round, and {other.words}"
+        names.append(f"{said} (--sensor-order mirrored {other.options})")
+    if is_backward:
+        names = [
+            f"the robot drives backward and {names[0]}",
+            "the ring is turned by 180° (write its sensors into the robot file)",
+        ]
     raise RingLogError(
         f"the robot's motion and the ranges leave open how headings are counted: {', or '.join(names)}"
     )

@@ -16,7 +16,7 @@ import numpy as np
 from config.robot import RobotConfig
 from drivers.messages import Floats
 from runtime.recording.conventions.options import RingLogOptions
-from runtime.recording.conventions.table import ANGLES, HEADINGS, Table
+from runtime.recording.conventions.table import ANGLES, HEADINGS, HeadingRule, Table
 
 STEPS: Final = 400
 """Steps of the way in which directions are compared."""
@@ -60,6 +60,26 @@ class Angles(NamedTuple):
         return HEADINGS[self.heading].angles(ANGLES[self.unit] * angles)
 
 
+def opposite(one: Angles) -> Angles:
+    """Return the convention under which the robot looks the other way."""
+    rule = HEADINGS[one.heading]
+    return _named(one, rule._replace(offset_rad=rule.offset_rad + math.pi))
+
+
+def mirror_image(one: Angles) -> Angles:
+    """Return the convention that looks the same if the ring is mirrored: the same angles, y on the other side."""
+    rule = HEADINGS[one.heading]
+    return _named(one, rule._replace(hand=-rule.hand))
+
+
+def _named(one: Angles, wanted: HeadingRule) -> Angles:
+    for name, rule in HEADINGS.items():
+        is_from_there = math.isclose(math.cos(rule.offset_rad - wanted.offset_rad), 1.0)
+        if is_from_there and (rule.turn, rule.hand) == (wanted.turn, wanted.hand):
+            return one._replace(heading=name)
+    raise ValueError(one.heading)  # all turns, quarters and hands have a name
+
+
 def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, float], bool]:
     """Return the log-likelihood of the way's directions under each convention, and whether they follow theta at all.
 
@@ -101,7 +121,7 @@ def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, f
 
 def echo_scores(
     table: Table, robot: RobotConfig, choices: list[Angles], mounts_per_unit: float, length_per_range: float,
-    kernel_m: float = KERNEL_M,
+    kernel_m: float = KERNEL_M, echoes: int = ECHOES,
 ) -> dict[Angles, Floats]:  # fmt: skip
     """Return how well earlier echoes explain later ones under each convention, in blocks of time.
 
@@ -119,12 +139,14 @@ def echo_scores(
         The unit of positions over that of ranges.
     kernel_m : float
         Width of an echo's density.
+    echoes : int
+        Most echoes that are compared.
     """
     rows, sensors = np.nonzero(np.isfinite(table.ranges))
     if len(rows) < 4 * BLOCKS:
         return {one: np.zeros(BLOCKS) for one in choices}
-    if len(rows) > ECHOES:
-        chosen = np.random.default_rng(0).choice(len(rows), ECHOES, replace=False)
+    if len(rows) > echoes:
+        chosen = np.random.default_rng(0).choice(len(rows), echoes, replace=False)
         chosen.sort()
         rows, sensors = rows[chosen], sensors[chosen]
     mounts = np.array(robot.ring.mounts)[sensors]

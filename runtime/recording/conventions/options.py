@@ -8,9 +8,13 @@ from typing import Final, Literal, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
 
-Heading: TypeAlias = Literal["auto", "ccw", "cw", "north-cw", "north-ccw", "y-down", "left-handed"]
+Heading: TypeAlias = Literal[
+    "auto", "ccw", "cw", "north-cw", "north-ccw", "y-down", "left-handed", "west-ccw", "west-cw", "south-ccw",
+    "south-cw", "y-down-north-ccw", "y-down-north-cw", "y-down-west-ccw", "y-down-west-cw", "y-down-south-ccw",
+    "y-down-south-cw",
+]  # fmt: skip
 AngleUnit: TypeAlias = Literal["auto", "rad", "deg"]
-TimeUnit: TypeAlias = Literal["auto", "s", "ms", "us"]
+TimeUnit: TypeAlias = Literal["auto", "s", "ms", "us", "ns"]
 LengthUnit: TypeAlias = Literal["auto", "m", "cm", "mm", "in", "ft"]
 
 
@@ -24,7 +28,8 @@ class RingLogOptions:
         Ring logs: whether each row repeats the last value of every sensor, so that only changes are readings.
     heading
         Ring logs: how theta and y are counted: ccw (from x, y to the left), cw, north-cw (a compass), north-ccw,
-        y-down (y to the right, theta counter-clockwise), left-handed (y to the right, theta from x to y).
+        y-down (y to the right, theta counter-clockwise), left-handed (y to the right, theta from x to y); the others
+        are counted from where their names say on a map whose x points east, with y north or down.
     sensor_order
         Ring logs: whether the columns follow the robot file (file) or run the other way round (mirrored).
     angle_unit
@@ -38,6 +43,9 @@ class RingLogOptions:
     silence
         Ring logs: what stands for a sensor that fired and heard nothing: inf alone, nan, exactly a number as 0, -1 or
         7.6, or max, the narrow band at the top of the ranges. Numbers are in the file's unit.
+    not_fired
+        Ring logs: what stands for a sensor that did not fire in this row: empty (an empty cell alone), nan, inf, or
+        exactly a number as 0 or -1.
     """
 
     latched: Literal["auto", "yes", "no"] = "auto"
@@ -48,25 +56,22 @@ class RingLogOptions:
     length_unit: LengthUnit = "auto"
     range_unit: LengthUnit = "auto"
     silence: str = "auto"
+    not_fired: str = "auto"
 
     def check(self) -> None:
-        """Raise an error if `silence` is neither a word nor a number.
+        """Raise an error if `silence` or `not_fired` is neither a word nor a number.
 
         Raises
         ------
         UserError
-            It is not.
+            One is.
         """
-        if self.silence in {"auto", "inf", "nan", "max"}:
-            return
-        try:
-            number = float(self.silence)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise UserError(
-                f"--silence {self.silence}: give auto, inf, nan, max or a number, as 0, -1 or 7.6", WRONG_CALL
-            )
+        for name, value, words in (
+            ("silence", self.silence, ("auto", "inf", "nan", "max")),
+            ("not-fired", self.not_fired, ("auto", "empty", "nan", "inf")),
+        ):
+            if value not in words and not _is_number(value):
+                raise UserError(f"--{name} {value}: give {', '.join(words)} or a number, as 0 or -1", WRONG_CALL)
 
     def refuse_for(self, recording: str) -> None:
         """Raise an error if an option is given for a recording, whose conventions are known.
@@ -79,6 +84,13 @@ class RingLogOptions:
         given = [f"--{name.replace('_', '-')}" for name, value in vars(self).items() if value != "auto"]
         if given:
             raise UserError(f"{recording}: is a recording; {', '.join(given)} applies to ring logs only", WRONG_CALL)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 AUTO: Final = RingLogOptions()

@@ -48,7 +48,9 @@ def open_ring_log(
         The file cannot be read, is invalid, or its conventions are ambiguous; the text names the option to give.
     """
     options.check()
-    rows = read_ring_log(path, sensors=len(robot.ring.mounts), is_strict=options.silence == "inf")
+    rows = read_ring_log(
+        path, sensors=len(robot.ring.mounts), is_strict=(options.silence, options.not_fired) == ("inf", "empty")
+    )
     first = FIRST if path.is_file() else FIRST_OF_PIPE
     yield from converted_firings(rows, path, robot, options, warn, first=first)
 

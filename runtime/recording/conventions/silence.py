@@ -130,7 +130,7 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
     return _top(finite_moved) or _spikes(moved) or Silence()
 
 
-def check_near(ranges: Floats, unit_m: float, range_min_m: float) -> None:
+def check_near(ranges: Floats, unit_m: float, range_min_m: float, silence: str) -> None:
     """Raise an error if half of the sensors have one and the same value that is too short for the ring.
 
     Parameters
@@ -141,6 +141,8 @@ def check_near(ranges: Floats, unit_m: float, range_min_m: float) -> None:
         That unit, m.
     range_min_m : float
         Shortest range of the ring, m.
+    silence : str
+        The option that says what silence is known.
 
     Raises
     ------
@@ -156,7 +158,7 @@ def check_near(ranges: Floats, unit_m: float, range_min_m: float) -> None:
     if count > 0.9 * len(near) and (ranges == value).any(axis=0).mean() >= 0.5:
         raise RingLogError(
             f"{100 * count / finite.sum():.0f} % of the ranges are exactly {value:g}, and the ring's shortest is "
-            f"{range_min_m:g} m: say --silence {value:.10g} if that is no echo, inf if it is something too near"
+            f"{range_min_m:g} m: say --silence {value:.10g} if that is no echo, {silence} if it is something too near"
         )
 
 

@@ -13,7 +13,7 @@ from config.units import FOOT_M
 from drivers.messages import Floats
 
 ANGLES: Final = MappingProxyType[str, float]({"rad": 1.0, "deg": math.pi / 180.0})
-TIMES: Final = MappingProxyType[str, float]({"s": 1.0, "ms": 1e-3, "us": 1e-6})
+TIMES: Final = MappingProxyType[str, float]({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
 LENGTHS: Final = MappingProxyType[str, float]({"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": FOOT_M})
 
 
@@ -31,6 +31,8 @@ class HeadingRule(NamedTuple):
         return self.hand * (self.turn * angles + self.offset_rad)
 
 
+_DOWN: Final = "y points to the right of x, and theta is"
+
 HEADINGS: Final = MappingProxyType[str, HeadingRule](
     {
         "ccw": HeadingRule(1, 0.0, 1, "theta is counter-clockwise from x"),
@@ -39,6 +41,16 @@ HEADINGS: Final = MappingProxyType[str, HeadingRule](
         "north-ccw": HeadingRule(1, 0.5 * math.pi, 1, "theta is counter-clockwise from y"),
         "y-down": HeadingRule(-1, 0.0, -1, "y points to the right of x, and theta is counter-clockwise"),
         "left-handed": HeadingRule(1, 0.0, -1, "y points to the right of x, and theta turns from x to y"),
+        "west-ccw": HeadingRule(1, math.pi, 1, "theta is counter-clockwise from -x"),
+        "west-cw": HeadingRule(-1, math.pi, 1, "theta is clockwise from -x"),
+        "south-ccw": HeadingRule(1, -0.5 * math.pi, 1, "theta is counter-clockwise from -y"),
+        "south-cw": HeadingRule(-1, -0.5 * math.pi, 1, "theta is clockwise from -y"),
+        "y-down-north-ccw": HeadingRule(-1, -0.5 * math.pi, -1, f"{_DOWN} counter-clockwise from -y"),
+        "y-down-north-cw": HeadingRule(1, -0.5 * math.pi, -1, f"{_DOWN} clockwise from -y"),
+        "y-down-west-ccw": HeadingRule(-1, math.pi, -1, f"{_DOWN} counter-clockwise from -x"),
+        "y-down-west-cw": HeadingRule(1, math.pi, -1, f"{_DOWN} clockwise from -x"),
+        "y-down-south-ccw": HeadingRule(-1, 0.5 * math.pi, -1, f"{_DOWN} counter-clockwise from y"),
+        "y-down-south-cw": HeadingRule(1, 0.5 * math.pi, -1, f"{_DOWN} clockwise from y"),
     }
 )
 

@@ -19,6 +19,8 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Floats, Pose
+from runtime.recording.conventions.sensor_order import mirrored_columns
+from runtime.recording.conventions.table import HEADINGS
 from runtime.simulation.drift_trials import oval
 
 ROBOTS: Final = ("p3dx", "denning", "p3at", "amigo", "magellan")
@@ -26,8 +28,11 @@ WORLDS: Final = ("room", "hall")
 MODELS: Final = ("cone", "specular")
 ANGLES: Final = {"rad": 1.0, "deg": 180.0 / math.pi}
 LENGTHS: Final = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": 1.0 / 0.0254, "ft": 1.0 / FOOT_M}
-TIMES: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
-HEADINGS: Final = ("ccw", "cw", "north-cw", "north-ccw", "y-down", "left-handed", "sensors-cw")
+TIMES: Final = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+HEADING_NAMES: Final = ("ccw", "cw", "north-cw", "north-ccw", "y-down", "left-handed", "sensors-cw")
+RARE_HEADINGS: Final = tuple(sorted(HEADINGS.keys() - set(HEADING_NAMES)))
+NOT_FIRED: Final = ("0", "-1", "nan", "inf")
+"""In place of empty cells."""
 SILENCES: Final = ("inf", "zero", "max", "noisy-max", "glitch-max", "-1", "999", "65535", "255", "nan")
 Wrapped = Literal["no", "signed", "positive"]
 DRIVE_S: Final = 150.0
@@ -62,6 +67,10 @@ class Convention:
     silence: str = "inf"
     latched: bool = False
     decimals: int = 4
+    not_fired: str = ""
+    mirrored: bool = False
+    shift: int = 0
+    """The column of the robot file's first sensor."""
 
 
 def _room(rng: np.random.Generator, acoustics: AcousticsConfig) -> tuple[WorldConfig, tuple[float, float]]:
@@ -176,26 +185,12 @@ def written(drive: Drive, how: Convention, rng: np.random.Generator, path: Path)
         drive = latched(drive)
     x, y, theta, yaw = drive.pose.T.copy()
     ranges = drive.ranges.copy()
-    if how.heading in {"y-down", "left-handed"}:
-        y = -y
-    if how.heading in {"cw", "left-handed"}:
-        theta, yaw = -theta, -yaw
-    if how.heading == "north-cw":
-        theta, yaw = 0.5 * math.pi - theta, 0.5 * math.pi - yaw
-    if how.heading == "north-ccw":
-        theta, yaw = theta - 0.5 * math.pi, yaw - 0.5 * math.pi
-    if how.heading == "sensors-cw":
-        mounts = [(m.x_m, m.y_m, m.angle_rad) for m in drive.settings.ring.mounts]
-        mirror = [
-            min(
-                range(len(mounts)),
-                key=lambda k: math.hypot(
-                    mounts[k][0] - x_m, mounts[k][1] + y_m, abs(math.remainder(mounts[k][2] + angle, math.tau))
-                ),
-            )
-            for x_m, y_m, angle in mounts
-        ]
-        ranges = ranges[:, mirror]
+    rule = HEADINGS["ccw" if how.heading == "sensors-cw" else how.heading]
+    y = rule.hand * y
+    theta, yaw = (rule.turn * (rule.hand * a - rule.offset_rad) for a in (theta, yaw))
+    if how.heading == "sensors-cw" or how.mirrored:
+        ranges = ranges[:, mirrored_columns(drive.settings.ring)]
+    ranges = np.roll(ranges, how.shift, axis=1)
     if how.wrapped != "no":
         low = 0.0 if how.wrapped == "positive" else -math.pi
         theta, yaw = ((a - low) % (2 * math.pi) + low for a in (theta, yaw))
@@ -208,7 +203,7 @@ def written(drive: Drive, how: Convention, rng: np.random.Generator, path: Path)
         "inf": "inf", "zero": 0, "max": round(top * unit, how.decimals), "-1": -1, "nan": "nan",
         "999": 999, "65535": 65535, "255": 255,
     }  # fmt: skip
-    text = [[("" if v != v else repr(v)) for v in row] for row in out.tolist()]
+    text = [[(how.not_fired if v != v else repr(v)) for v in row] for row in out.tolist()]
     noisy = np.round((top - 0.15 + 0.05 * rng.standard_normal(n)) * unit, how.decimals).tolist()
     for count, (i, j) in enumerate(zip(*np.nonzero(silent), strict=True)):
         if how.silence == "noisy-max":
@@ -249,8 +244,13 @@ def draw(seed: int) -> Case:
     unit = pick(tuple(LENGTHS))
     apart = rng.random() < 0.4
     how = Convention(
-        heading=pick(HEADINGS), angle=pick(tuple(ANGLES)), wrapped=pick(("no", "signed", "positive")),  # type: ignore[arg-type]
+        heading=pick(HEADING_NAMES), angle=pick(tuple(ANGLES)), wrapped=pick(("no", "signed", "positive")),  # type: ignore[arg-type]
         position=pick(("m", "cm", "mm")) if apart else unit, range_=unit, time=pick(tuple(TIMES)),
         silence=pick(SILENCES), latched=bool(rng.random() < 0.4),
     )  # fmt: skip
-    return Case(seed, pick(ROBOTS), pick(WORLDS), pick(MODELS), how)
+    case = Case(seed, pick(ROBOTS), pick(WORLDS), pick(MODELS), how)
+    if rng.random() < 0.25:
+        how = replace(how, heading=pick(RARE_HEADINGS))
+    if not how.latched and rng.random() < 0.25:
+        how = replace(how, not_fired=pick(NOT_FIRED), silence=pick(("max", "noisy-max", "999")))
+    return replace(case, how=how)

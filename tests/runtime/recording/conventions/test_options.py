@@ -19,6 +19,17 @@ def test_other_silence_is_refused(silence: str) -> None:
         RingLogOptions(silence=silence).check()
 
 
+@pytest.mark.parametrize("value", ["auto", "empty", "nan", "inf", "0", "-1"])
+def test_a_number_or_a_word_stands_for_not_fired(value: str) -> None:
+    RingLogOptions(not_fired=value).check()
+
+
+@pytest.mark.parametrize("value", ["max", "none", "1e999"])
+def test_another_value_for_not_fired_is_refused(value: str) -> None:
+    with pytest.raises(UserError, match=r"--not-fired .*: give auto, empty, nan, inf or a number"):
+        RingLogOptions(not_fired=value).check()
+
+
 def test_a_recording_takes_no_options() -> None:
     AUTO.refuse_for("run.mcap")
     with pytest.raises(UserError, match="--heading, --range-unit applies to ring logs only"):

@@ -41,12 +41,12 @@ DRUM_M = 0.06
 
 def right_options(how: Convention) -> RingLogOptions:
     """Return the options that describe a table."""
-    is_mirrored = how.heading == "sensors-cw"
+    is_mirrored = how.heading == "sensors-cw" or how.mirrored
     silence = {"zero": "0", "noisy-max": "max", "glitch-max": "max"}.get(how.silence, how.silence)
     return RingLogOptions(
-        latched="yes" if how.latched else "no", heading="ccw" if is_mirrored else how.heading,  # type: ignore[arg-type]
+        latched="yes" if how.latched else "no", heading="ccw" if how.heading == "sensors-cw" else how.heading,  # type: ignore[arg-type]
         sensor_order="mirrored" if is_mirrored else "file", angle_unit=how.angle, time_unit=how.time,  # type: ignore[arg-type]
-        length_unit=how.position, range_unit=how.range_, silence=silence,  # type: ignore[arg-type]
+        length_unit=how.position, range_unit=how.range_, silence=silence, not_fired=how.not_fired or "empty",  # type: ignore[arg-type]
     )  # fmt: skip
 
 
@@ -113,7 +113,7 @@ def test_a_table_in_any_convention_is_right_or_refused_with_the_option(seed: int
 @pytest.mark.soak
 def test_many_tables_in_any_convention(tmp_path: Path) -> None:
     outcomes = Counter(try_case(draw(seed), tmp_path / "table.csv") for seed in range(2000, 2200))
-    assert outcomes["right"] > 100
+    assert outcomes["right"] > 60
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -122,6 +122,64 @@ def test_a_table_of_which_all_is_said_gives_its_drive(seed: int, tmp_path: Path)
     drive = make_drive(case.seed, case.robot, case.world, case.model)
     path = written(drive, case.how, np.random.default_rng(seed), tmp_path / "table.csv")
     check_right(list(open_ring_log(path, drive.settings, right_options(case.how))), drive, case.how)
+
+
+def said_of(how: Convention, robot: str, path: Path) -> str:
+    """Return what is said of a table that is converted right."""
+    drive = make_drive(12, robot, "room", "specular")
+    written(drive, how, np.random.default_rng(12), path)
+    said: list[str] = []
+    check_right(list(open_ring_log(path, drive.settings, warn=said.append)), drive, how)
+    return " ".join(said)
+
+
+@pytest.mark.parametrize("robot", ["p3dx", "denning"])
+@pytest.mark.parametrize(
+    ("not_fired", "silence"), [("0", "max"), ("-1", "999"), ("nan", "max"), ("inf", "noisy-max")]
+)
+def test_a_value_for_what_did_not_fire_is_no_silence(
+    not_fired: str, silence: str, robot: str, tmp_path: Path
+) -> None:
+    said = said_of(Convention(not_fired=not_fired, silence=silence), robot, tmp_path / "table.csv")
+    assert f"--not-fired {not_fired}" in said
+    assert "--silence" in said
+
+
+@pytest.mark.parametrize("heading", ["west-ccw", "west-cw", "south-ccw", "south-cw"])
+def test_headings_may_count_from_anywhere(heading: str, tmp_path: Path) -> None:
+    assert f"--heading {heading} " in said_of(Convention(heading=heading), "p3dx", tmp_path / "table.csv")
+
+
+def test_times_in_nanoseconds_are_not_taken_for_microseconds(tmp_path: Path) -> None:
+    assert "--time-unit ns" in said_of(Convention(time="ns"), "p3dx", tmp_path / "table.csv")
+
+
+@pytest.mark.parametrize(
+    ("how", "named"),
+    [
+        (Convention(heading="y-down"), ("--heading y-down ", "--sensor-order mirrored --heading cw ")),
+        (Convention(heading="cw", mirrored=True), ("--heading y-down ", "--sensor-order mirrored --heading cw ")),
+        (Convention(heading="y-down-north-cw"), ("--heading y-down-north-cw ", "--heading south-ccw ")),
+        (Convention(shift=3), ("r00 is sensor 13 of the robot file",)),
+        (Convention(shift=8), ("the robot drives backward", "the ring is turned by 180°")),
+    ],
+)
+def test_a_turned_or_mirrored_ring_is_refused_with_what_it_may_be(
+    how: Convention, named: tuple[str, ...], tmp_path: Path
+) -> None:
+    drive = make_drive(12, "p3dx", "room", "specular")
+    path = written(drive, how, np.random.default_rng(12), tmp_path / "table.csv")
+    with pytest.raises(RingLogError) as refused:
+        list(open_ring_log(path, drive.settings))
+    assert all(text in str(refused.value) for text in named), str(refused.value)
+    if how.shift == 0:
+        check_right(list(open_ring_log(path, drive.settings, right_options(how))), drive, how)
+
+
+def test_a_robot_that_always_drives_backward_is_believed(tmp_path: Path) -> None:
+    drive = make_drive(12, "p3dx", "room", "specular")
+    back = replace(drive, pose=drive.pose[::-1].copy(), ranges=drive.ranges[::-1].copy())
+    check_unchanged(written(back, Convention(), np.random.default_rng(12), tmp_path / "table.csv"), "p3dx")
 
 
 def check_unchanged(path: Path, robot: str) -> None:
