@@ -215,3 +215,18 @@ async def test_a_plot_has_two_axes_a_rate_and_a_difference(server: FakeServer, o
     assert (await names.all_inner_texts())[0] == both
     await page.get_by_label("Combine speed", exact=True).select_option(label="pose x apart")
     assert (await names.all_inner_texts())[0] == "speed"
+
+
+async def test_a_mark_on_an_axis_that_is_zero_but_for_rounding_reads_zero(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    marks = await opened.page.evaluate(
+        """async () => {
+            const { valueAxis } = await import('/page/plot_draw.js');
+            const texts = [], nothing = () => undefined;
+            const ctx = { beginPath: nothing, moveTo: nothing, lineTo: nothing, stroke: nothing,
+                fillText: (text) => texts.push(text) };
+            valueAxis(ctx, { font: nothing }, (v) => v, [-0.54, 1.4e-14, 0.54], { right: false, width: 9 });
+            return texts;
+        }"""
+    )
+    assert marks == ["−0.54", "0", "0.54"]

@@ -37,6 +37,7 @@ export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
   ctx.textAlign = right ? "left" : "right";
   ctx.textBaseline = "middle";
   ctx.lineWidth = 1;
+  const least = 1e-9 * Math.max(...marks.map(Math.abs)); // below are rounding errors of a zero
   for (const mark of marks) {
     const at = Math.round(y(mark)) + 0.5;
     if (!right) {
@@ -47,7 +48,7 @@ export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
       ctx.stroke();
     }
     ctx.fillStyle = right ? colour : theme.muted;
-    ctx.fillText(digits(mark), right ? width + 5 : LEFT - 5, at);
+    ctx.fillText(digits(Math.abs(mark) < least ? 0 : mark), right ? width + 5 : LEFT - 5, at);
   }
 }
 
