@@ -77,8 +77,9 @@ COVERED_MIN: Final = 0.6
 """Least share of a piece's length with occupied cells."""
 END_STRENGTH: Final = 1.5
 """A piece ends at its outermost cell of this strength. Drives: false length 4.0 to 1.7 % in the office."""
-NODE_STRENGTH: Final = 1.5
-"""Strength of the cells from which polylines are drawn."""
+CHAIN_STRENGTH: Final = 2.5
+"""Strength of all cells of a polyline together, at least. Drives: of those of one weak cell 2 to 10 % are false, of
+the others none."""
 NODE_M: Final = 0.1
 """Distance between the points of a polyline, at least, …"""
 LINK_M: Final = 0.2

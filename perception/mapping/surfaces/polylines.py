@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from perception.kernel import kernel
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, LINK_M, NODE_M, NODE_STRENGTH
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, CHAIN_STRENGTH, LINK_M, NODE_M
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap
 
 APART: Final = round(NODE_M / CELL_M)
@@ -26,7 +26,7 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
     """
     for at in range(begin, end):
         cell = room.cells[counts.order[at]]
-        if cell.owner != FREE or cell.strength < NODE_STRENGTH:
+        if cell.owner != FREE:
             continue
         is_apart = True
         for i in range(max(0, cell.i - APART), min(CELLS, cell.i + APART + 1)):
@@ -89,6 +89,11 @@ def chain_all(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
         if room.cells[counts.order[at]].owner != NODE or room.chained + CHAIN_MAX + 1 > len(room.chains):
             continue
         count = chain(room, counts, counts.order[at])
+        strength = 0.0
+        for k in range(count):
+            strength += room.cells[counts.chain[k]].strength
+        if strength < CHAIN_STRENGTH:
+            continue  # strays
         for k in range(count):
             room.chains[room.chained + k] = counts.chain[k] + 1
         room.chains[room.chained + count] = 0

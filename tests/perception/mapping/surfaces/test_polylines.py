@@ -16,9 +16,9 @@ from tests.perception.mapping.surfaces.test_pieces import mapped
 pytestmark = pytest.mark.compiled
 
 
-def chains(points: np.ndarray) -> list[np.ndarray]:
+def chains(points: np.ndarray, echoes: float = 3.0) -> list[np.ndarray]:
     """Return the polylines through places that were heard, as places (m)."""
-    room, local, counts = mapped(points)
+    room, local, counts = mapped(points, echoes)
     view, count = records(CellCounts, counts)[0], int(local["cell_count"][0])
     choose_nodes(room[0], view, 0, count)
     assert (local["cells"]["owner"][0, :count] == NODE).any()
@@ -43,6 +43,14 @@ def test_a_bend_is_one_polyline_in_order() -> None:
 def test_objects_apart_are_polylines_apart() -> None:
     found = chains(np.array([[0.0, 0.0], [1.0, 1.0], [1.1, 1.05], [3.0, -2.0]]))
     assert sorted(len(one) for one in found) == [1, 1, 2]
+
+
+def test_weak_cells_are_a_polyline_only_together() -> None:
+    """A stray leaves one; each of these has the strength of one echo and a bit."""
+    row = np.column_stack([np.arange(0.0, 0.6, 0.05), np.zeros(12)])
+    assert len(chains(row, echoes=0.7)) == 1
+    assert len(chains(np.concatenate([row, [[2.0, 2.0]]]), echoes=0.7)) == 1
+    assert len(chains(np.array([[0.0, 0.0], [3.0, -2.0]]), echoes=0.7)) == 0
 
 
 def test_a_long_outline_is_cut() -> None:
