@@ -37,8 +37,10 @@ LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
     "most such silences are named at once, and some are not before a contact.",
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
-    "become so where the ring hears four echoes or fewer: from then on they change as the robot's motion says. A map "
-    "of the room contradicts them; without one, only a bumper stops the robot.",
+    "become so where the ring hears four echoes or fewer from then on: they change as the robot's motion says. A "
+    "map of the room contradicts them; without one, only a bumper stops the robot.",
+    "A ring that freezes while one sensor alone still hears: its echo may be a stuck sensor's, and the rest are "
+    "silent anyway.",
     "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "
     "which the robot drives goes on, and one that turns into it has never heard that part.",
     "Echoes of an earlier drive that fit the present one, until they come again: replays in a corridor along its "
