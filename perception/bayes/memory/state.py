@@ -59,11 +59,10 @@ from perception.kernel import Floats, Ints
 from perception.records import Record, Records, records, zeros
 
 RAYS_MAX: Final = 5
-"""Greatest number of rays that is distinguished from a whole beam. By more, drums are found by their nearest points,
-and with these as hypotheses furniture of a real drive was a drum."""
+"""Greatest number of rays that is distinguished from a whole beam. By more, drums are found by their nearest points."""
 NEAREST_SHARE: Final = 0.99999
 """Share of the objects that answer with their nearest point, before any is known; all shares weigh as one object.
-With .99, furniture of a real drive led by 9 nat as a drum heard by rays; drums that are lead by hundreds."""
+Drums that are heard by rays lead by hundreds of nat. A share of 0.9 makes a firing among boxes 16 to 60 % dearer."""
 FREE, TENTATIVE, ESTABLISHED = range(3)
 """Values of `Track.status`."""
 CONFIRMED: Final = 1
