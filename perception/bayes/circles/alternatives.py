@@ -1,8 +1,7 @@
 """Alternative explanations of the readings of a circle track, each fitted with its own best pose.
 
 Explanations can be compared only on the same readings. One that was fitted to other readings would win or lose by
-readings that it was not scored on. Each is heard as the scratch says (`perception.bayes.inference.beam`), whose log
-prior counts.
+readings that it was not scored on.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.beam import rays_prior
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.range_fit import fit_circle, fit_reading_line, score_circle, score_line
 from perception.bayes.memory.elements import Reading
@@ -86,7 +84,7 @@ def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius:
     """
     scratch = s[0].scratch
     score_circle(scratch.readings[:n], x, y, radius, p, s[0].noise_level, scratch.predicted, scratch.score)
-    return scratch.score.log_likelihood_ratio + rays_prior(s, scratch.predicted.rays)
+    return scratch.score.log_likelihood_ratio
 
 
 @kernel
@@ -155,4 +153,4 @@ def fit_other_line(
         scratch.line_fit,
     )
     score_line(readings, scratch.line_fit, cx, cy, p, s[0].noise_level, scratch.line_score)
-    return scratch.line_score.log_likelihood_ratio + rays_prior(s, scratch.line_fit.rays)
+    return scratch.line_score.log_likelihood_ratio

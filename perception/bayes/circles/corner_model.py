@@ -10,7 +10,6 @@ import math
 from typing import Final
 
 from perception.bayes.circles.alternatives import bearing_if_near
-from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line, rays_prior
 from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.inference.range_fit import fit_reading_line
@@ -52,10 +51,6 @@ def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
     face : LineFit
         Unit normal and distance of the face from the origin.
     """
-    if face.rays > 0 and not is_crossed(q):
-        away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
-        half, _ = ray_over_line(q, face.normal_x, face.normal_y, away, face.half_angle, face.rays)
-        return q.range_m - half
     if is_crossed(q):
         away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
         half, _, _ = over_line(q, face.normal_x, face.normal_y, away)
@@ -90,7 +85,7 @@ def is_of_face(
         e1 += CORNER_OUT_OF_BEAM_GATES * gate
     if (e0 <= e1) != (side == 0):
         return False
-    if not has_edge or first.rays > 0:
+    if not has_edge:
         return True
     ex = corner.edge_x - q.x
     ey = corner.edge_y - q.y
@@ -238,8 +233,6 @@ def score_corner(
     readings = scratch.readings[:n]
     corner = scratch.corner_fit
     cos_may, gate = p[0].cos_may_answer, p[0].gate_m
-    if corner.faces[0].rays > 0:
-        cos_may = GRAZING_MIN  # a ray meets a face at any angle
     count, sx, sy = find_facing(readings, scratch.own, cx, cy, gate, scratch.facing)
     if count < CORNER_READINGS_MIN:
         return IMPOSSIBLE_NAT
@@ -259,11 +252,11 @@ def score_corner(
             face = corner.faces[side]
             if face.normal_x * q.axis_x + face.normal_y * q.axis_y >= cos_may:
                 v = max(v, log_likelihood(p, level, face_error(q, cx, cy, face)))
-        if has_edge and corner.faces[0].rays == 0:  # a ray misses an edge
+        if has_edge:
             ex = corner.edge_x - q.x
             ey = corner.edge_y - q.y
             d = math.sqrt(ex * ex + ey * ey)
             if ex * q.axis_x + ey * q.axis_y >= cos_may * d:
                 v = max(v, log_likelihood(p, level, circle_error(q, ex, ey, d, 0.0)))
         total += v - CORNER_HIT_NAT if v > 0.0 else p[0].table[level, TABLE_BINS - 1]
-    return total - CORNER_MODEL_NAT + rays_prior(s, corner.faces[0].rays)
+    return total - CORNER_MODEL_NAT

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from perception.bayes.circles.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
-from perception.bayes.inference.beam import are_rays_due, assume_rays, next_rays
 from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.lines import enter_line
 from perception.bayes.inference.noise_estimation import noise_variance
@@ -41,9 +40,6 @@ from perception.bayes.memory.parameters import (
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
-
-UNTRIED, SETTLED, UNSUPPORTED = range(3)
-"""Outcomes of a hypothesis: too few readings; a track, or a reason for none; the readings do not support it."""
 
 
 @kernel
@@ -108,10 +104,6 @@ def reset_circle(track: CircleTrack) -> None:
     track.kind = 0
     track.alternative = 0
     track.is_named = 0
-    track.rays = 0
-    track.other_rays = 0
-    track.rays_compared = 0
-    track.counted_rays = 0
     track.radius = 0.0
     track.root_xx = 0.0
     track.root_yx = 0.0
@@ -136,7 +128,7 @@ def reset_circle(track: CircleTrack) -> None:
 def restart_circle(
     s: StateRecord, track: CircleTrack, kind: int, radius: float, x: float, y: float, n: int
 ) -> None:  # fmt: skip
-    """Set a track to a tentative one on the first `n` readings of the scratch, heard as the scratch says.
+    """Set a track to a tentative one on the first `n` readings of the scratch.
 
     Parameters
     ----------
@@ -152,7 +144,6 @@ def restart_circle(
     reset_circle(track)
     track.status = TENTATIVE
     track.kind = kind
-    track.rays = s[0].scratch.predicted.rays
     track.unseen = n
     track.x = x
     track.y = y
@@ -205,8 +196,6 @@ def initiate_circle(
 ) -> int:  # fmt: skip
     """Try a circle behind a segment and start a track if the readings support it; return 1 if that took work.
 
-    Where they do not, as objects are heard here, it is tried by another number of rays, each in its turn.
-
     Parameters
     ----------
     s, tracks, p
@@ -216,52 +205,19 @@ def initiate_circle(
     x, y, nx, ny : float
         The segment's middle (m) and unit normal, away from the sensors.
     """
+    scratch = s[0].scratch
+    fit = scratch.circle_fit
     radius = p[0].circles[kind].radius_m
-    hypothesis = s[0].scratch.hypothesis
+    hypothesis = scratch.hypothesis
     hypothesis.x = x + radius * nx
     hypothesis.y = y + radius * ny
     hypothesis.heading = 0.0
     if is_known(tracks, p, hypothesis.x, hypothesis.y, radius, nx, ny):
         return 0
     relax_onto_map(s, p, kind)
-    outcome, evidence = try_circle(s, tracks, p, kind, nx, ny, s[0].rays, CIRCLE_EVIDENCE_MIN_NAT)
-    if outcome != UNSUPPORTED:
-        return outcome
-    if not are_rays_due(s):
-        return 1
-    s[0].tried_rays = next_rays(s[0].tried_rays, s[0].rays)
-    try_circle(s, tracks, p, kind, nx, ny, s[0].tried_rays, evidence)
-    return 1
-
-
-@kernel
-def try_circle(
-    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, nx: float, ny: float, rays: int, least: float
-) -> tuple[int, float]:  # fmt: skip
-    """Start a track at the scratch's hypothesis if the readings support it, heard by so many rays.
-
-    Parameters
-    ----------
-    s, tracks, p, kind, nx, ny
-        As for `initiate_circle`.
-    rays : int
-        As in `CircleTrack`.
-    least : float
-        Least evidence, nat.
-
-    Returns
-    -------
-    (int, float)
-        `UNTRIED`, `SETTLED` or `UNSUPPORTED`, and what evidence another explanation needs.
-    """
-    scratch = s[0].scratch
-    fit = scratch.circle_fit
-    radius = p[0].circles[kind].radius_m
-    hypothesis = scratch.hypothesis
-    assume_rays(s, p, rays)
     n = gather_relevant(s, tracks, p, hypothesis.x, hypothesis.y, radius)
     if n < CIRCLE_READINGS_MIN:
-        return UNTRIED, least
+        return 0
     var0, rel2 = noise_variance(s, p)
     if not fit_circle(
         scratch.readings[:n],
@@ -276,28 +232,27 @@ def try_circle(
         scratch.predicted,
         fit,
     ):
-        return UNTRIED, least
+        return 0
     n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
     if not fit_circle(
         scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, scratch.predicted,
         fit,
     ):  # fmt: skip
-        return UNTRIED, least
+        return 0
     x, y = fit.x, fit.y
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
     llr = score(s, p, n, x, y, radius)
     near = scratch.score.near
-    if scratch.score.hits < CIRCLE_READINGS_MIN or llr < least:
-        return UNSUPPORTED, least
+    if scratch.score.hits < CIRCLE_READINGS_MIN or llr < CIRCLE_EVIDENCE_MIN_NAT:
+        return 1
     prior = p[0].model_prior_nat
     ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     own = llr + (prior if kind < p[0].model_count else 0.0)
-    as_line = fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS)
-    if as_line > own + SWITCH_LEAD_NAT:
+    if fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             enter_line(s, scratch.line_fit, x, y, line)
-        return UNSUPPORTED, as_line
+        return 1
     chosen = kind
     best = own
     best_x = x
@@ -313,14 +268,14 @@ def try_circle(
                 best_x = fit.x
                 best_y = fit.y
     if chosen == kind and llr < p[0].unknown_nat * near:
-        return UNSUPPORTED, max(best, least)
+        return 1
     if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:
-        return UNSUPPORTED, max(best, least)
+        return 1
     if is_known(tracks, p, best_x, best_y, -1.0, nx, ny) or is_rejected(s, best_x, best_y, chosen, best):
-        return SETTLED, best
+        return 1
     t = start_circle(s, tracks, chosen, p[0].circles[chosen].radius_m, best_x, best_y, n)
     if t < 0:
-        return SETTLED, best
+        return 1
     det = h00 * h11 - h01 * h01
     track = tracks[t]
     track.log_likelihood_ratio = llr
@@ -328,4 +283,4 @@ def try_circle(
     track.covariance_yy = min(h00 / det, CENTRE_VARIANCE_MAX_M2) if det > 0.0 else CENTRE_VARIANCE_MAX_M2
     track.root_xx = math.sqrt(track.covariance_xx)
     track.root_yy = math.sqrt(track.covariance_yy)
-    return SETTLED, best
+    return 1

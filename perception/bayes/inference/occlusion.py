@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.inference.beam import answer
-from perception.bayes.inference.cross_path import is_crossed, is_near_circle
+from perception.bayes.inference.cross_path import circle_error, is_crossed, is_near_circle
 from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.reservoir import copy_reading
@@ -74,7 +73,6 @@ def find_others(
         other.y = track.y
         other.radius = track.radius
         other.root_xx = track.root_xx
-        other.rays = track.rays
         other.is_named = track.is_named
         is_of_polygon = p[0].polygon_count > 0 and track.kind >= p[0].model_count
         is_rival = not is_of_polygon and is_elsewhere(track, p, cx, cy, radius)
@@ -139,15 +137,12 @@ def is_explained_elsewhere(
         dx = other.x - q.x
         dy = other.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        if other.rays == 0 and dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d:
+        if dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d:
             continue
         tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * other.root_xx
-        if other.rays == 0 and not is_near_circle(q, d, other.radius, tight):
+        if not is_near_circle(q, d, other.radius, tight):
             continue
-        e, ahead = answer(q, dx, dy, d, other.radius, p[0].half_angle_rad, other.rays)
-        if ahead < p[0].cos_may_answer * d:
-            continue
-        if abs(e) < (tight if other.takes == TAKES_ALL else min(off, tight)):
+        if abs(circle_error(q, dx, dy, d, other.radius)) < (tight if other.takes == TAKES_ALL else min(off, tight)):
             return True
     return False
 

@@ -58,11 +58,6 @@ from perception.bounds import (
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records, records, zeros
 
-RAYS_MAX: Final = 5
-"""Greatest number of rays that is distinguished from a whole beam. By more, drums are found by their nearest points."""
-NEAREST_SHARE: Final = 0.99999
-"""Share of the objects that answer with their nearest point, before any is known; all shares weigh as one object.
-Drums that are heard by rays lead by hundreds of nat. A share of 0.9 makes a firing among boxes 16 to 60 % dearer."""
 FREE, TENTATIVE, ESTABLISHED = range(3)
 """Values of `Track.status`."""
 CONFIRMED: Final = 1
@@ -177,14 +172,6 @@ class CircleTrack(Track):
     """Index of the alternative that was compared last."""
     is_named: Flag
     """1 while it is reported as a model."""
-    rays: Annotated[int, up_to(RAYS_MAX)]
-    """By how many rays it is heard, 0 by its nearest point; see `inference.beam`."""
-    other_rays: Annotated[int, up_to(RAYS_MAX)]
-    """That which was compared last, …"""
-    rays_compared: Count
-    """… and how many were since it had the hits that tell them apart."""
-    counted_rays: Annotated[int, up_to(RAYS_MAX + 1)]
-    """That plus one by which it counts in `State.ray_counts`; 0 while it does not."""
     radius: Annotated[float, RADIUS]
     root_xx: Finite
     """Lower Cholesky root of the covariance from which the next grid starts, m."""
@@ -285,14 +272,6 @@ class State(Record):
     """Evidence of the readings' roughness for each noise."""
     residuals_nat: Annotated[Floats, NOISES, FINITE]
     """Evidence of all objects' residuals for each noise."""
-    rays: Annotated[int, up_to(RAYS_MAX)]
-    """By how many rays most objects are heard here, as in `CircleTrack`, …"""
-    tried_rays: Annotated[int, up_to(RAYS_MAX)]
-    """… by how many one that failed was tried last, …"""
-    untried: Finite
-    """… how many since then were not, divided by how many are known, …"""
-    ray_counts: Annotated[Floats, RAYS_MAX + 1, Bound(1e-9, 1e9)]
-    """… and how many objects each; see `inference.beam.count_rays`."""
     crosses: Annotated[Records[Reading], CROSS_HISTORY]
     """A ring buffer of cross paths."""
     sensors: Annotated[Records[Sensor], SENSORS_MAX]
@@ -355,5 +334,4 @@ class Memory:
             self.state["sensors"]["last"][field] = self.state["sensors"]["crossed"][field] = np.nan
         self.state["noise_level"] = START_NOISE
         self.state["roughness_nat"][0, START_NOISE] = START_NOISE_NAT
-        self.state["ray_counts"] = NEAREST_SHARE, *[(1.0 - NEAREST_SHARE) / RAYS_MAX] * RAYS_MAX
         self.state["scratch"]["attracting_rows"] = np.arange(ATTRACTING_MAX)

@@ -9,20 +9,24 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.circles.alternatives import score
+from perception.bayes.circles.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
+from perception.bayes.circles.corner_model import score_corner
 from perception.bayes.circles.lateral_search import search_across
 from perception.bayes.circles.outline_check import other_bodies, outline_lead, round_lead
 from perception.bayes.circles.posterior import posterior_circle
-from perception.bayes.inference.beam import assume_rays, count_rays, rays_prior
 from perception.bayes.inference.likelihood import bounded_exp
-from perception.bayes.inference.lines import is_in_wall
+from perception.bayes.inference.lines import enter_line, is_in_wall
 from perception.bayes.inference.noise_estimation import add_residuals, noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
+from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.range_fit import fit_circle, score_circle
 from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
-from perception.bayes.inference.track_labels import drop_track, hold, merge_duplicates
+from perception.bayes.inference.track_labels import drop_track, hold, may_become, merge_duplicates
 from perception.bayes.memory.parameters import (
+    ALTERNATIVE_STEPS,
     CENTRE_VARIANCE_MAX_M2,
+    CERTAIN_PROBABILITY,
+    CORNER_MISS_SHARE,
     DOUBT_PROBABILITY,
     DOUBTED_DISPERSION_SHARE,
     ESTABLISH_HITS,
@@ -33,15 +37,17 @@ from perception.bayes.memory.parameters import (
     FITTED_REFINEMENTS,
     IN_WALL_NAT,
     LATERAL_STEP_M,
+    LINE_LENGTH_MIN_M,
     LINE_PRIOR_NAT,
     LOST_NAT,
     MODEL_CHECK_EVERY,
     PLACED_STRAY_MAX_M,
-    RESIDUAL_EVERY,
-    RESIDUAL_HITS_MIN,
-    RESIDUAL_PROBABILITY_MIN,
+    REPLACING_LINE_HITS_MIN,
     ROOT_CORRELATION_MAX,
     ROOT_VARIANCE_MIN_M2,
+    SWITCH_LEAD_NAT,
+    SWITCH_ROOT_M,
+    SWITCH_UNSEEN,
     TENTATIVE_FIT_STEPS,
     TRACK_FIT_STEPS,
     TRACK_READINGS_MIN,
@@ -53,13 +59,11 @@ from perception.bayes.memory.state import (
     CONFIRMED,
     ESTABLISHED,
     PLACED,
-    RAYS_MAX,
     TENTATIVE,
     CircleTrack,
     CircleTracks,
     StateRecord,
 )
-from perception.bayes.tracks.comparison import compare_alternatives, compare_rays
 from perception.bayes.tracks.model_check import check_model, count_names, is_careful
 from perception.bayes.tracks.naming import update_name, withdraw_overlapping
 from perception.bayes.tracks.track_selection import choose_circle, is_waiting
@@ -157,7 +161,7 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     scratch = s[0].scratch
     said = scratch.score
     score_circle(scratch.readings[:n], track.x, track.y, track.radius, p, s[0].noise_level, scratch.own, said)
-    track.log_likelihood_ratio = said.log_likelihood_ratio + rays_prior(s, track.rays)
+    track.log_likelihood_ratio = said.log_likelihood_ratio
     track.hits = said.hits
     track.misses = said.misses
     track.near = said.near
@@ -166,6 +170,89 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     track.leads[track.kind] = 0.0
     beyond: float = max(0.0, said.closest - p[0].far_m)
     return p[0].model_prior_nat - p[0].far_nat_per_m * beyond
+
+
+@kernel
+def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, evidence_nat: float) -> None:
+    """Change a track to another circle that explains it better.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch holds the other circle's fit, and settings.
+    track : CircleTrack
+        Updated.
+    k : int
+        Index of the other circle.
+    evidence_nat : float
+        Its log ratio.
+    """
+    track.x = s[0].scratch.circle_fit.x
+    track.y = s[0].scratch.circle_fit.y
+    track.radius = p[0].circles[k].radius_m
+    for z in range(p[0].circle_count + 2):
+        track.leads[z] += track.log_likelihood_ratio - evidence_nat
+    track.kind = k
+    track.leads[k] = 0.0
+    track.outline_lead = 0.0
+    track.round_lead = 0.0
+    track.log_likelihood_ratio = evidence_nat
+    track.refinements = 0
+    track.unseen += SWITCH_UNSEEN
+    track.root_xx = max(track.root_xx, SWITCH_ROOT_M)
+    track.root_yy = max(track.root_yy, SWITCH_ROOT_M)
+
+
+@kernel
+def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, prior: float) -> bool:
+    """Compare the next alternatives; return whether the track is still an object and not a line.
+
+    `leads` holds the lead of each at its last comparison. (Log ratios of different ages cannot be compared: the
+    readings have changed in between.)
+
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate_circle`.
+    prior : float
+        From `update_score`.
+    """
+    line, corner = p[0].circle_count, p[0].circle_count + 1
+    var0, rel2 = noise_variance(s, p)
+    scratch = s[0].scratch
+    ux, uy = mean_bearing(scratch.readings[:n], scratch.own, track.x, track.y, p[0].gate_m)
+    turns = corner + 1 if n < p[0].compare_all_below and track.probability < CERTAIN_PROBABILITY else 1
+    for _ in range(turns):
+        track.alternative = (track.alternative + 1) % (corner + 1)
+        if track.alternative == track.kind:
+            track.alternative = (track.alternative + 1) % (corner + 1)
+        k = track.alternative
+        own_prior = prior if track.kind < p[0].model_count else 0.0
+        if k < line:
+            v = fit_other_circle(
+                s, p, n, track.x, track.y, track.radius, ux, uy, p[0].circles[k].radius_m, ALTERNATIVE_STEPS
+            )  # fmt: skip
+            track.leads[k] = v - track.log_likelihood_ratio
+            leads = (
+                v + (prior if k < p[0].model_count else 0.0)
+                > track.log_likelihood_ratio + own_prior + SWITCH_LEAD_NAT
+            )
+            if leads and may_become(s, track, k, v):
+                change_kind(s, p, track, k, v)
+                predict_circle(scratch.readings[:n], track.x, track.y, track.radius, scratch.own)
+                break
+        elif k == line:
+            v = fit_other_line(s, p, n, track.x, track.y, track.radius, ux, uy, ALTERNATIVE_STEPS)
+            track.leads[k] = v - track.log_likelihood_ratio
+            if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
+                said = s[0].scratch.line_score
+                if said.hits >= REPLACING_LINE_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
+                    enter_line(s, s[0].scratch.line_fit, track.x, track.y, said)
+                return False
+        else:
+            v = score_corner(s, p, n, track.x, track.y, track.radius, var0, rel2)
+            track.leads[k] = v + CORNER_MISS_SHARE * p[0].missed_echo_nat * track.misses - track.log_likelihood_ratio
+    return True
 
 
 @kernel
@@ -222,7 +309,6 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     track = tracks[t]
     n = copy_reservoir(track, s[0].scratch.readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, s[0].scratch.readings, n)
-    assume_rays(s, p, track.rays)
     n = keep_relevant(s, tracks, p, n, track.x, track.y, track.radius, t)
     track.reservoir = n
     track.unseen = 0
@@ -239,9 +325,6 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     prior = update_score(s, p, track, n)
     if not compare_alternatives(s, p, track, n, prior) and drop_track(track):
         return
-    is_due = track.rays > 0 or track.refinements % RESIDUAL_EVERY == 0
-    if is_due and track.rays_compared < RAYS_MAX:
-        compare_rays(s, p, track, n, prior)
     careful = is_careful(s, p)
     add_residuals(s, tracks, p, t, n, careful)
     is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
@@ -260,8 +343,6 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     update_name(track, p, report, near, careful)
     withdraw_overlapping(tracks, t)
     if track.is_named == 1:
-        if track.probability >= RESIDUAL_PROBABILITY_MIN and track.hits >= RESIDUAL_HITS_MIN:
-            count_rays(s, track)
         track.marks &= CONFIRMED
     elif track.marks != 0:
         hold(track, x, y)
