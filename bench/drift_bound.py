@@ -24,6 +24,7 @@ from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
 from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, level_name, oval
+from runtime.simulation.open_loop import perceive
 from runtime.simulation.random_halls import ACOUSTICS
 
 PARTICLES: Final = 1000
@@ -167,9 +168,7 @@ def errors_of(settings: Settings, errors: OdometryConfig, seed: int) -> dict[str
     config = settings.perception.model_copy(update={"localization": LocalizationConfig(correct_drift=True)})
     perception = Perception(settings.ring, settings.models, config)
     for firing in drive:
-        perception.observe(firing)
-        while perception.can_refine and perception.refine():
-            pass
+        perceive(perception, firing)
     localized = perception.localized()
     assert localized is not None
     assert isinstance(perception.map_frame, MapFrame)

@@ -33,6 +33,7 @@ from perception.sensor_mounts import mounts_array
 from runtime.analysis.export.occupancy_image import FREE, FREE_MAX, RESOLUTION_M, occupancy_image
 from runtime.analysis.export.world_file import world_of
 from runtime.analysis.timeline import ECHO, Echoes
+from runtime.simulation.open_loop import perceive
 
 STEP_M: Final = 0.5 * FOOT_M
 """Way between two firings of one sensor."""
@@ -170,9 +171,7 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, *, late: bool) 
         firings = with_late_strays(firings, settings.ring, scene, np.random.default_rng([seed, 41]))
     perception = Perception(settings.ring, settings.models, settings.perception)
     for firing in firings:
-        perception.observe(firing)
-        while perception.can_refine and perception.refine():
-            pass
+        perceive(perception, firing)
     seen, beams = perception.labelled_objects(), beams_of(firings, ring)
     window = perception.occupancy()
     assert window is not None

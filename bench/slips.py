@@ -14,6 +14,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.pipeline import Perception
 from runtime.simulation.drift_trials import LEVELS, STEP_FT, drum_hall, odometry_along, oval
+from runtime.simulation.open_loop import perceive
 from runtime.simulation.scenes import OCTET, SPEED_M_S
 
 SLIPS: Final = (
@@ -38,9 +39,7 @@ def slip_once(settings: Settings, slip: Pose, seed: int) -> tuple[float, float, 
     for k, (planned, pose) in enumerate(zip(path[: END_AT + 1], reported, strict=False)):
         true = planned if k < SLIPS_AT else turned.compose(planned)
         ranges = sonar.fire(true, true.theta, range(k % OCTET, len(settings.ring.mounts), OCTET))
-        perception.observe(Firing(k * STEP_FT / SPEED_M_S, pose, pose.theta, ranges))
-        while perception.can_refine and perception.refine():
-            pass
+        perceive(perception, Firing(k * STEP_FT / SPEED_M_S, pose, pose.theta, ranges))
     here = perception.localized()
     if here is None:
         raise ValueError("perception does not correct drift")

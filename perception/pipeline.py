@@ -195,7 +195,7 @@ class Perception:
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
-        return self._in_odometry(self.vacant.outside(self.surfaces.credible(self.method.objects(), self._known)))
+        return self._in_odometry(self.vacant.outside(self.surfaces.report(self._known).shown(self.method.objects())))
 
     def mapped_objects(self) -> tuple[DetectedObject, ...]:
         """Return the same objects in the map frame; without correction of drift that is odometry's."""
@@ -224,12 +224,12 @@ class Perception:
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label: models, walls, corners, posts, unknowns near the robot, and pieces of walls."""
-        labelled = self.surfaces.with_walls(self.method.labelled_objects(), self._known)
-        return self._in_odometry(self.vacant.outside(labelled))
+        report = self.surfaces.report(self._known)
+        return self._in_odometry(self.vacant.outside((*report.shown(self.method.labelled_objects()), *report.walls)))
 
     def archived_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label and was left behind; without correction the same tuple until it changes."""
-        archived = self.surfaces.archived_beside(self.method.archived_objects())
+        archived = self.surfaces.archived_shown(self.method.archived_objects(), self._known)
         return self._in_odometry(self.vacant.archived_outside(archived))
 
     def polylines(self) -> tuple[Polyline, ...]:

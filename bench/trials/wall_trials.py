@@ -23,6 +23,7 @@ from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose
 from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
+from runtime.simulation.open_loop import perceive
 
 Spans: TypeAlias = list[tuple[float, float]]
 """Parts of a line from low to high in ascending order, m."""
@@ -252,9 +253,7 @@ def recognise(settings: Settings, heard: Heard) -> Perception:
     """Return perception after a drive."""
     perception = Perception(settings.ring, settings.models, settings.perception)
     for firing in heard.firings:
-        perception.observe(firing)
-        while perception.can_refine and perception.refine():
-            pass
+        perceive(perception, firing)
     perception.surfaces.finish()
     return perception
 

@@ -22,6 +22,12 @@ class SurfaceReport(NamedTuple):
     refuted: frozenset[int] = frozenset()
     """Numbers of round objects of the method that are not shown: the pieces at their places are straight."""
 
+    def shown(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return the method's objects without those for which the surfaces stand, or which they refute."""
+        if not self.stands_for_walls:
+            return objects
+        return tuple(one for one in objects if one.ends is None and one.number not in self.refuted)
+
 
 class NoSurfaces:
     """A map of surfaces without any."""
@@ -59,26 +65,14 @@ class NoSurfaces:
         """
         return SurfaceReport()
 
-    def credible(
+    def archived_shown(
         self,
-        objects: tuple[DetectedObject, ...],
+        archived: tuple[DetectedObject, ...],
         known: Callable[[], tuple[DetectedObject, ...]],  # noqa: ARG002 - other maps need it
     ) -> tuple[DetectedObject, ...]:
-        """Return the method's objects that the surfaces at their places do not refute; `known` as for `report`."""
-        return objects
+        """Return what is shown of the objects left behind, which may be many; the same tuple until it changes.
 
-    def with_walls(
-        self,
-        objects: tuple[DetectedObject, ...],
-        known: Callable[[], tuple[DetectedObject, ...]],  # noqa: ARG002 - other maps need it
-    ) -> tuple[DetectedObject, ...]:
-        """Return the method's objects and the walls beside them, or in place of its own; `known` as for `report`."""
-        return objects
-
-    def archived_beside(self, archived: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
-        """Return the method's objects that were left behind, without walls where others stand for them.
-
-        There may be many: the same tuple until they change.
+        `known` as for `report`.
         """
         return archived
 

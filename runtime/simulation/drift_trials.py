@@ -23,6 +23,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
+from runtime.simulation.open_loop import perceive
 from runtime.simulation.random_halls import ACOUSTICS
 from runtime.simulation.scenes import OCTET, SPEED_M_S
 
@@ -211,9 +212,7 @@ def drive(
     perception = Perception(settings.ring, settings.models, config)
     pose = path[0]
     for firing in firings(settings, world, path, errors, seed, synchro=synchro):
-        perception.observe(firing)
-        while perception.can_refine and perception.refine():
-            pass
+        perceive(perception, firing)
         pose = firing.pose
     localized = perception.localized()
     robot = pose if localized is None else localized.pose

@@ -37,8 +37,6 @@ STRAIGHT_M: Final = 1.0
 STRAIGHT_NAT: Final = 15.0
 """Evidence for straight pieces of this length by which walls are expected at all, and the most that one piece says
 for itself: its echoes repeat one another."""
-THIN_SHARE: Final = 0.25
-"""A piece with less than this share of the usual echoes a metre does not show that there are walls."""
 EVIDENCE_MAX: Final = 30.0
 """Greatest log odds that are reported, nat."""
 PROBABILITY_MIN: Final = 1e-300
@@ -62,27 +60,29 @@ def nearness(
         Radius within which each model's outline lies, m.
     """
     walls = np.array([one.ends for one in known if one.ends is not None]).reshape(-1, 4)
-    bodies = _bodies(known, reach_m)
-    around = np.concatenate([bodies, _bodies(known, dict.fromkeys(CORNERS, CORNER_REACH_M))])
+    bodies, body_reaches = _bodies(known, reach_m)
+    corners, corner_reaches = _bodies(known, dict.fromkeys(CORNERS, CORNER_REACH_M))
+    every = np.concatenate([walls, bodies, corners])
+    reaches = np.concatenate([np.zeros(len(walls)), body_reaches, corner_reaches])
     places = places_on(rows, PLACES)
     found = np.zeros(len(places), np.int64)
-    for how_near, lines, circles, within in (
-        (NEAR, walls, around, LEFTOVER_M), (ALONG, walls, around, AGREES_M), (ON_BODY, walls[:0], bodies, AGREES_M),
+    for how_near, ends, within in (
+        (NEAR, every, reaches + LEFTOVER_M), (ALONG, every, reaches + AGREES_M),
+        (ON_BODY, bodies, body_reaches + AGREES_M),
     ):  # fmt: skip
         marks = np.zeros(len(places), np.int64)
-        find_near(places, lines, within, marks)
-        for x, y, radius in circles.tolist():
-            find_near(places, np.array([[x, y, x, y]]), radius + within, marks)
+        find_near(places, ends, within, marks)
         found[marks == 1] = how_near
     return found.reshape(-1, PLACES)
 
 
-def _bodies(known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]) -> Floats:
-    """Return place and reach of what is known of some kinds, shape (k, 3), m."""
-    return np.array([(one.x, one.y, reach_m[one.model]) for one in known if one.model in reach_m]).reshape(-1, 3)
+def _bodies(known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]) -> tuple[Floats, Floats]:
+    """Return what is known of some kinds as segments without length, shape (k, 4), and their reaches, (k,), m."""
+    found = np.array([(one.x, one.y, reach_m[one.model]) for one in known if one.model in reach_m]).reshape(-1, 3)
+    return found[:, [0, 1, 0, 1]], found[:, 2]
 
 
-def beside_known(rows: NDArray[Any], near: NDArray[np.int64]) -> SurfaceReport:
+def beside_known(rows: NDArray[Any], near: NDArray[np.int64], prior: float) -> SurfaceReport:
     """Return the walls and the polylines that are reported beside what is known, or in place of its walls.
 
     Parameters
@@ -91,11 +91,13 @@ def beside_known(rows: NDArray[Any], near: NDArray[np.int64]) -> SurfaceReport:
         The surfaces.
     near : (n, PLACES) int
         How near places along them are to what is known.
+    prior : float
+        From `wall_prior`, nat.
     """
     if not len(rows):
         return SurfaceReport()
     is_piece = rows["number"] < 0
-    length, prior = lengths(rows), wall_prior(rows, near)
+    length = lengths(rows)
     evidence = rows["evidence"].clip(None, STRAIGHT_NAT) + prior
     free = near < (ON_BODY if prior > 0.0 else ALONG)
     is_wall = is_piece & (evidence > 0.0)
@@ -127,13 +129,10 @@ def wall_prior(rows: NDArray[Any], near: NDArray[np.int64]) -> float:
         As for `beside_known`.
     """
     length = lengths(rows)
-    is_piece = length > 0.0
-    density = rows["echoes"] / np.maximum(length, PIECE_MIN_M)
-    is_dense = density > THIN_SHARE * (float(np.median(density[is_piece])) if is_piece.any() else 0.0)
     known_m = float(length @ (near > FAR).mean(axis=1)) + UNKNOWN_M
     known_share = known_m / (float(length.sum()) + UNKNOWN_M)
     # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls.
-    is_long = (length >= STRAIGHT_M) & (near == FAR).all(axis=1) & is_dense
+    is_long = (length >= STRAIGHT_M) & (near == FAR).all(axis=1)
     straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
     return KNOWN_NAT * (straight_share * (1.0 - known_share) / (1.0 - KNOWN_SHARE) - 1.0)
 

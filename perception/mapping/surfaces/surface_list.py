@@ -37,7 +37,7 @@ class Surface(Record):
 ENDS: Final = ("x1", "y1", "x2", "y2")
 GROUP: Final = 16
 """Points that follow each other lie near each other: so many are compared with a segment at once."""
-PLACES: Final = 5
+COMPARED: Final = 5
 """Places along a surface that are compared with others."""
 
 
@@ -47,7 +47,7 @@ def ends_of(rows: NDArray[Any]) -> Floats:
 
 
 @kernel
-def find_near(points: Floats, ends: Floats, within: float, found: Ints) -> None:
+def find_near(points: Floats, ends: Floats, reaches: Floats, found: Ints) -> None:
     """Write 1 for each point that lies near one of some segments, and leave the others as they are.
 
     Parameters
@@ -56,8 +56,8 @@ def find_near(points: Floats, ends: Floats, within: float, found: Ints) -> None:
         m.
     ends : (k, 4) float
         Ends x, y, x, y of the segments, m.
-    within : float
-        m.
+    reaches : (k,) float
+        How near each of them, m.
     found : (n,) int
         Updated.
     """
@@ -65,16 +65,17 @@ def find_near(points: Floats, ends: Floats, within: float, found: Ints) -> None:
         end = min(begin + GROUP, len(points))
         low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
         for n in range(begin, end):
-            low_x, high_x = min(low_x, points[n, 0] - within), max(high_x, points[n, 0] + within)
-            low_y, high_y = min(low_y, points[n, 1] - within), max(high_y, points[n, 1] + within)
+            low_x, high_x = min(low_x, points[n, 0]), max(high_x, points[n, 0])
+            low_y, high_y = min(low_y, points[n, 1]), max(high_y, points[n, 1])
         for k in range(len(ends)):
             ax, ay = ends[k, 0], ends[k, 1]
             bx, by = ends[k, 2] - ax, ends[k, 3] - ay
+            within = reaches[k]
             if (
-                max(ax, ax + bx) < low_x
-                or min(ax, ax + bx) > high_x
-                or max(ay, ay + by) < low_y
-                or min(ay, ay + by) > high_y
+                max(ax, ax + bx) < low_x - within
+                or min(ax, ax + bx) > high_x + within
+                or max(ay, ay + by) < low_y - within
+                or min(ay, ay + by) > high_y + within
             ):
                 continue
             squared = max(bx * bx + by * by, 1e-12)
@@ -95,9 +96,9 @@ def places_on(rows: NDArray[Any], count: int) -> Floats:
 
 def is_covered(rows: NDArray[Any], by: NDArray[Any]) -> NDArray[np.bool_]:
     """Return which surfaces lie along others, shape (n,)."""
-    found = np.zeros(len(rows) * PLACES, np.int64)
-    find_near(places_on(rows, PLACES), ends_of(by), AGREES_M, found)
-    return np.asarray(found.reshape(len(rows), PLACES).all(axis=1))
+    found = np.zeros(len(rows) * COMPARED, np.int64)
+    find_near(places_on(rows, COMPARED), ends_of(by), np.full(len(by), AGREES_M), found)
+    return np.asarray(found.reshape(len(rows), COMPARED).all(axis=1))
 
 
 class SurfaceList:

@@ -161,44 +161,29 @@ class SurfaceMap(NoSurfaces):
         if self._report is None or objects != self._known:
             rows = self._list.archived_rows
             near, gone = nearness(rows, objects, self._reach_m), frozenset[int]()
-            if wall_prior(rows, near) > 0.0:
+            prior = wall_prior(rows, near)
+            if prior > 0.0:
                 gone = refuted(rows, objects, self._radius_m)
+            if gone:
                 near = nearness(rows, tuple(one for one in objects if one.number not in gone), self._reach_m)
+                prior = wall_prior(rows, near)
             if self._report is None or gone != self._report.refuted or not np.array_equal(near, self._near):
-                self._near, self._report = near, beside_known(rows, near)._replace(refuted=gone)
+                self._near, self._report = near, beside_known(rows, near, prior)._replace(refuted=gone)
                 self._archived = None
             self._known = objects
         return self._report
 
-    def credible(
-        self, objects: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
+    def archived_shown(
+        self, archived: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
     ) -> tuple[DetectedObject, ...]:
-        """Return the method's objects that the surfaces at their places do not refute; `known` as for `report`."""
-        gone = self.report(known).refuted
-        return tuple(one for one in objects if one.number not in gone) if gone else objects
+        """Return what is shown of the objects left behind, which may be many; the same tuple until it changes.
 
-    def with_walls(
-        self, objects: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
-    ) -> tuple[DetectedObject, ...]:
-        """Return the method's objects and the walls beside them, or in place of its own; `known` as for `report`."""
-        walls = self.report(known).walls
-        return (*self._shown(objects), *walls)
-
-    def archived_beside(self, archived: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
-        """Return the method's objects that were left behind, without walls where others stand for them.
-
-        There may be many: the same tuple until they change.
+        `known` as for `report`.
         """
+        report = self.report(known)
         if self._archived is None or archived is not self._archived[0]:
-            self._archived = (archived, self._shown(archived))
+            self._archived = (archived, report.shown(archived))
         return self._archived[1]
-
-    def _shown(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
-        """Return objects without what the last report stands for or refutes."""
-        report = self._report
-        if report is None or not report.stands_for_walls:
-            return objects
-        return tuple(one for one in objects if one.ends is None and one.number not in report.refuted)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Compare with the round ones of these models."""

@@ -9,7 +9,7 @@ import pytest
 
 from perception.detected_object import DetectedObject, wall_between
 from perception.mapping.no_surfaces import SurfaceReport
-from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted
+from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
 from perception.mapping.surfaces.surface_list import ENDS, Surface
 from perception.records import zeros
 
@@ -39,7 +39,8 @@ def known_wall(x1: float, y1: float, x2: float, y2: float) -> DetectedObject:
 def report(
     rows: np.ndarray, known: tuple[DetectedObject, ...] = (), reach_m: dict[str, float] | None = None
 ) -> SurfaceReport:  # fmt: skip
-    return beside_known(rows, nearness(rows, known, reach_m or {}))
+    near = nearness(rows, known, reach_m or {})
+    return beside_known(rows, near, wall_prior(rows, near))
 
 
 def test_pieces_in_a_room_that_the_method_does_not_know_are_walls() -> None:

@@ -22,12 +22,14 @@ def test_points_near_segments() -> None:
     rng = np.random.default_rng(2)
     points, ends = rng.uniform(-2.0, 2.0, (200, 2)), rng.uniform(-2.0, 2.0, (7, 4))
     found = np.zeros(200, np.int64)
-    find_near(points, ends, 0.3, found)
+    reaches = rng.uniform(0.0, 0.5, 7)
+    find_near(points, ends, reaches, found)
     shares = np.linspace(0.0, 1.0, 2001)[:, None, None]
     dense = ends[:, :2] + shares * (ends[:, 2:] - ends[:, :2])
-    nearest = np.array([np.hypot(*(dense - point).reshape(-1, 2).T).min() for point in points])
-    clear = np.abs(nearest - 0.3) > 2e-3
-    np.testing.assert_array_equal(found[clear] == 1, (nearest < 0.3)[clear])
+    nearest = np.array([np.hypot(*(dense - point).transpose(2, 0, 1)).min(axis=0) - reaches for point in points])
+    most = nearest.min(axis=1)
+    clear = np.flatnonzero(np.abs(most) > 2e-3)
+    np.testing.assert_array_equal(found[clear] == 1, most[clear] < 0.0)
 
 
 def test_a_surface_is_covered_by_a_longer_one_only() -> None:

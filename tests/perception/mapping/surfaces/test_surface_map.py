@@ -127,22 +127,21 @@ def test_pieces_stand_for_the_walls_of_a_place_that_is_not_known(driven: Percept
     assert isinstance(surfaces, SurfaceMap)
     wall = wall_between((-3.0, -2.0, 3.0, -2.0), 1e-4, 1e-4, 50, 9.0)
     post = DetectedObject("post", 1.0, 1.0, 0.0, 0.01, 9, 1.0)
-    shown = surfaces.with_walls((wall, post), lambda: (wall, post))
-    assert wall not in shown
-    assert shown == (post, *surfaces.report(lambda: (wall, post)).walls)
+    report = surfaces.report(lambda: (wall, post))
+    assert report.walls
+    assert report.shown((wall, post)) == (post,)
     archived = (post, wall)
-    assert surfaces.archived_beside(archived) == (post,)
-    assert surfaces.archived_beside(archived) is surfaces.archived_beside(archived)
+    left = surfaces.archived_shown(archived, lambda: (wall, post))
+    assert left == (post,)
+    assert surfaces.archived_shown(archived, lambda: (wall, post)) is left
     surfaces.set_models(load_settings("hallway").models)
     drum = DetectedObject("drum", -2.5, 0.0, 0.0, 0.01, 9, 0.99, 0.99, number=7)
-    assert surfaces.credible((drum, post), lambda: (drum, post)) == (post,)
-    assert drum not in surfaces.with_walls((drum, post), lambda: (drum, post))
+    assert surfaces.report(lambda: (drum, post)).shown((drum, post)) == (post,)
     surfaces.set_models(())
     settings = perception_settings()
     nothing = SurfaceMap(settings.ring, settings.models, settings.perception.surfaces)
-    assert nothing.with_walls((wall, post), lambda: (wall, post)) == (wall, post)
-    assert nothing.credible((drum, post), lambda: (drum, post)) == (drum, post)
-    assert nothing.archived_beside(archived) is archived
+    assert nothing.report(lambda: (wall, drum)).shown((wall, drum)) == (wall, drum)
+    assert nothing.archived_shown(archived, lambda: archived) is archived
 
 
 def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
