@@ -320,6 +320,22 @@ def clear_cells(cells: CellCounts, begin: int, end: int) -> None:
 
 
 @kernel
+def hits_around(cells: CellCounts, b: int, i: int, j: int, reach: int) -> int:
+    """Return the hits from a direction of the cells up to `reach` rows and columns from one, not in the rim."""
+    hits = 0
+    for row in range(i - reach, i + reach + 1):
+        for column in range(j - reach, j + reach + 1):
+            hits += cells.hits[b, row, column]
+    return hits
+
+
+@kernel
+def direction_strength(hits: int) -> float:
+    """Return how many echoes the hits from one direction are worth: they repeat one another."""
+    return min(hits / WHOLE, 1.0) + STRENGTH_SHARE * hits / WHOLE
+
+
+@kernel
 def greatest_strength(cells: CellCounts, i: int, j: int) -> float:
     """Return what `strength_of` a cell cannot exceed; it is quick."""
     every, near = cells.all_hits, 0
@@ -346,10 +362,7 @@ def strength_of(cells: CellCounts, i: int, j: int) -> float:
     strength = 0.0
     is_answering = False
     for b in range(DIRECTIONS):
-        heard = 0
-        for di in range(-1, 2):
-            for dj in range(-1, 2):
-                heard += cells.hits[b, i + di, j + dj]
-        strength += min(heard / WHOLE, 1.0) + STRENGTH_SHARE * heard / WHOLE
+        heard = hits_around(cells, b, i, j, 1)
+        strength += direction_strength(heard)
         is_answering = is_answering or (heard > 0 and answer_probability(cells, i, j, b) > ANSWER_MIN)
     return strength * math.sqrt(min(own, 1.0)) if is_answering else 0.0

@@ -1,12 +1,23 @@
-"""Polylines through the occupied cells that no straight piece has taken: what is not straight, or too short."""
+"""Polylines through the occupied cells for which no straight piece stands: what is not straight, or too short."""
 
 from __future__ import annotations
 
 from typing import Final
 
 from perception.kernel import kernel
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, CHAIN_STRENGTH, LINK_M, NODE_M
-from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap
+from perception.mapping.surfaces.cells import direction_strength, hits_around
+from perception.mapping.surfaces.parameters import (
+    CELL_M,
+    CELLS,
+    DIRECTIONS,
+    LINK_M,
+    NODE_CELLS,
+    NODE_M,
+    NODE_STRENGTH,
+    PIECE_MIN_M,
+)
+from perception.mapping.surfaces.pieces import offset_of
+from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap, SurfaceCell
 
 APART: Final = round(NODE_M / CELL_M)
 LINKED: Final = round(LINK_M / CELL_M)
@@ -15,7 +26,7 @@ LINKED: Final = round(LINK_M / CELL_M)
 
 @kernel
 def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
-    """Make the strongest free cells, at least `NODE_M` apart, points of polylines.
+    """Make the strongest cells that are left, at least `NODE_M` apart, points of polylines, where echoes agree.
 
     Parameters
     ----------
@@ -26,7 +37,7 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
     """
     for at in range(begin, end):
         cell = room.cells[counts.order[at]]
-        if cell.owner != FREE:
+        if not is_left(room, cell):
             continue
         is_apart = True
         for i in range(max(0, cell.i - APART), min(CELLS, cell.i + APART + 1)):
@@ -35,8 +46,31 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
                 is_near = (i - cell.i) ** 2 + (j - cell.j) ** 2 < APART * APART
                 if n >= 0 and is_near and room.cells[n].owner == NODE:
                     is_apart = False
-        if is_apart:
+        if is_apart and is_agreed(counts, cell):
             cell.owner = NODE
+
+
+@kernel
+def is_left(room: LocalMap, cell: SurfaceCell) -> bool:
+    """Return whether no straight piece stands for a cell: a piece may end before its cells do."""
+    if cell.owner < 0:
+        return bool(cell.owner == FREE)
+    piece = room.pieces[cell.owner]
+    if piece.high - piece.low < PIECE_MIN_M:
+        return True
+    along = (offset_of(cell.i) - piece.x) * piece.ux + (offset_of(cell.j) - piece.y) * piece.uy
+    return bool(along < piece.low - CELL_M or along > piece.high + CELL_M)
+
+
+@kernel
+def is_agreed(counts: CellCounts, cell: SurfaceCell) -> bool:
+    """Return whether two directions' echoes agree on a cell and those around it: strays come one by one."""
+    strength = 0.0
+    for b in range(DIRECTIONS):
+        strength += direction_strength(hits_around(counts, b, cell.i, cell.j, NODE_CELLS))
+        if strength >= NODE_STRENGTH:
+            return True
+    return False
 
 
 @kernel
@@ -89,11 +123,6 @@ def chain_all(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
         if room.cells[counts.order[at]].owner != NODE or room.chained + CHAIN_MAX + 1 > len(room.chains):
             continue
         count = chain(room, counts, counts.order[at])
-        strength = 0.0
-        for k in range(count):
-            strength += room.cells[counts.chain[k]].strength
-        if strength < CHAIN_STRENGTH:
-            continue  # strays
         for k in range(count):
             room.chains[room.chained + k] = counts.chain[k] + 1
         room.chains[room.chained + count] = 0

@@ -95,10 +95,13 @@ def places_on(rows: NDArray[Any], count: int) -> Floats:
 
 
 def is_covered(rows: NDArray[Any], by: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return which surfaces lie along others, shape (n,)."""
-    found = np.zeros(len(rows) * COMPARED, np.int64)
-    find_near(places_on(rows, COMPARED), ends_of(by), np.full(len(by), AGREES_M), found)
-    return np.asarray(found.reshape(len(rows), COMPARED).all(axis=1))
+    """Return which surfaces lie along others, shape (n,); a polyline covers no straight piece, which says more."""
+    covered = np.zeros(len(rows), np.bool_)
+    for which, others in ((rows["number"] < 0, by[by["number"] < 0]), (rows["number"] >= 0, by)):
+        found = np.zeros(int(which.sum()) * COMPARED, np.int64)
+        find_near(places_on(rows[which], COMPARED), ends_of(others), np.full(len(others), AGREES_M), found)
+        covered[which] = found.reshape(-1, COMPARED).all(axis=1)
+    return covered
 
 
 class SurfaceList:

@@ -1,4 +1,4 @@
-"""Polylines through cells that no piece has taken."""
+"""Polylines through cells for which no piece stands."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from perception.mapping.surfaces.parameters import CELL_M, LINK_M, NODE_M
-from perception.mapping.surfaces.polylines import chain_all, choose_nodes
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, LINK_M, NODE_M, PIECE_MIN_M
+from perception.mapping.surfaces.polylines import chain_all, choose_nodes, is_left
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts
 from perception.records import records
 from tests.perception.mapping.surfaces.test_pieces import mapped
@@ -21,7 +21,6 @@ def chains(points: np.ndarray, echoes: float = 3.0) -> list[np.ndarray]:
     room, local, counts = mapped(points, echoes)
     view, count = records(CellCounts, counts)[0], int(local["cell_count"][0])
     choose_nodes(room[0], view, 0, count)
-    assert (local["cells"]["owner"][0, :count] == NODE).any()
     chain_all(room[0], view, 0, count)
     numbers = local["chains"][0, : int(local["chained"][0])]
     cells = local["cells"][0]
@@ -45,12 +44,26 @@ def test_objects_apart_are_polylines_apart() -> None:
     assert sorted(len(one) for one in found) == [1, 1, 2]
 
 
-def test_weak_cells_are_a_polyline_only_together() -> None:
-    """A stray leaves one; each of these has the strength of one echo and a bit."""
-    row = np.column_stack([np.arange(0.0, 0.6, 0.05), np.zeros(12)])
-    assert len(chains(row, echoes=0.7)) == 1
-    assert len(chains(np.concatenate([row, [[2.0, 2.0]]]), echoes=0.7)) == 1
-    assert len(chains(np.array([[0.0, 0.0], [3.0, -2.0]]), echoes=0.7)) == 0
+def test_a_point_needs_echoes_that_agree() -> None:
+    """A stray leaves one; each of these cells has one and a half."""
+    stray = [[3.0, -2.0]]
+    assert chains(np.array([[0.0, 0.0], *stray]), echoes=0.7) == []
+    assert len(chains(np.array([[0.0, 0.0], [0.1, 0.05], *stray]), echoes=0.7)) == 1
+    assert chains(np.array([[0.0, 0.0], [0.2, 0.0], *stray]), echoes=0.7) == []
+
+
+def test_cells_of_a_piece_that_does_not_reach_them_are_left() -> None:
+    points = np.column_stack([np.arange(0.0, 1.0, CELL_M), np.zeros(20)])
+    room, local, _ = mapped(points)
+    cells = local["cells"][0, :20]
+    cells["owner"] = 0
+    piece = local["pieces"][0, 0]
+    piece["ux"], piece["low"], piece["high"] = 1.0, 0.0, 0.5
+    along = (cells["i"] + 0.5 - 0.5 * CELLS) * CELL_M
+    left = [is_left(room[0], room[0].cells[k]) for k in range(20)]
+    np.testing.assert_array_equal(left, along > 0.5 + CELL_M)
+    piece["high"] = 0.5 * PIECE_MIN_M
+    assert all(is_left(room[0], room[0].cells[k]) for k in range(20))
 
 
 def test_a_long_outline_is_cut() -> None:

@@ -8,9 +8,10 @@ from perception.mapping.surfaces.surface_list import ENDS, Surface, SurfaceList,
 from perception.records import zeros
 
 
-def rows(*ends: tuple[float, float, float, float]) -> np.ndarray:
-    """Return surfaces between these ends, of the present local map."""
+def rows(*ends: tuple[float, float, float, float], number: int = -1) -> np.ndarray:
+    """Return straight pieces between these ends, of the present local map, or parts of a polyline."""
     made = zeros(Surface, len(ends))
+    made["number"] = number
     for row, end in zip(made, ends, strict=True):
         for name, value in zip(ENDS, end, strict=True):
             row[name] = value
@@ -37,6 +38,14 @@ def test_a_surface_is_covered_by_a_longer_one_only() -> None:
     assert is_covered(short, long).tolist() == [True]
     assert is_covered(long, short).tolist() == [False]
     assert is_covered(short, rows()).tolist() == [False]
+
+
+def test_a_polyline_covers_no_piece() -> None:
+    piece, line = rows((0.0, 0.0, 3.0, 0.0)), rows((-0.1, 0.0, 3.1, 0.0), number=1)
+    assert is_covered(piece, line).tolist() == [False]
+    assert is_covered(line[:1], rows((-0.2, 0.0, 3.2, 0.0))).tolist() == [True]
+    both = np.concatenate([piece, line])
+    assert is_covered(both, both).tolist() == [True, True]
 
 
 def test_what_is_left_behind_stays_until_it_is_seen_anew() -> None:
