@@ -19,7 +19,7 @@ import pytest
 from config.errors import DONE
 from tests.hil.machine import TIMEOUT_S
 from tests.hil.planted import planted
-from tests.hil.running import emulated, wait_for
+from tests.hil.running import PATIENT, emulated, wait_for
 from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P12")]
@@ -53,7 +53,7 @@ def test_a_disk_that_fills_up_and_a_log_and_a_terminal_that_take_nothing(
     held = filled_pipe(os.open(fifo, os.O_RDWR))
     out, into = os.pipe()
     filled_pipe(into)
-    command = ["run", "--json", str(summary), "--set", f"recording.folder={json.dumps(str(runs))}"]
+    command = ["run", "--json", str(summary), "--set", f"recording.folder={json.dumps(str(runs))}", *PATIENT]
     try:
         with (
             emulated(tmp_path) as robot,

@@ -31,12 +31,12 @@ from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.run_clock import ScaledClock
 from runtime.timing.time_control import ENDED, HANGS, EmulatorTimeControl
 from tests.hil.machine import TIMEOUT_S
-from tests.hil.running import DEADMAN_S
+from tests.hil.running import DEADMAN_S, PATIENT
 from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
-SETTINGS = load_settings("hallway")
+SETTINGS = load_settings("hallway", PATIENT[1::2])
 PAUSE_S = 1.2 * DEADMAN_S
 STEPS = 5
 
@@ -102,6 +102,8 @@ async def driving(folder: Path) -> AsyncIterator[Drive]:
 async def test_paused_stepped_and_sped_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What it does to the robot is tested in virtual time; here, that the emulator follows over its pipes."""
     monkeypatch.setattr("runtime.timing.time_control.ANSWER_MAX_S", TIMEOUT_S)
+    monkeypatch.setattr("runtime.simulation.emulator_process.START_MAX_S", TIMEOUT_S)
+    monkeypatch.setattr("runtime.cycle.connection.CONNECT_MAX_S", TIMEOUT_S)
     async with driving(tmp_path) as drive:
         control = drive.control
         await drive.comes_to(Mode.DRIVE)

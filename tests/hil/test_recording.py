@@ -19,7 +19,7 @@ from runtime.recording.channels import CYCLE, KEYFRAME, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import Cycle, RunInfo
 from tests.hil.machine import stalls_excused
-from tests.hil.running import running, wait_for
+from tests.hil.running import PATIENT, running, wait_for
 from tests.recorded import entries_of
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
@@ -143,7 +143,7 @@ def test_a_killed_run_is_restored(tmp_path: Path) -> None:
     """Without an option a run records into the folder of recordings. The long form measures what a kill costs."""
     runs = tmp_path / "runs"
     where = ("--set", f"recording.folder={json.dumps(str(runs))}", "--set", "recording.keyframe_period_s=1.0")
-    with running(tmp_path, "run", "run", *where, *TIGHT) as run:
+    with running(tmp_path, "run", "run", *where, *TIGHT, *PATIENT) as run:
         wait_for(lambda: bool(run.modes()), "a first cycle")  # on a busy machine much is recorded before it
         before = size_of(runs)
         wait_for(lambda: size_of(runs) > before + RECORDED_BYTES, "a recording")

@@ -23,7 +23,7 @@ from runtime.recording.channels import LOG, SERIAL, SETTINGS, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import LogLine, SerialBytes
 from tests.hil.planted import planted
-from tests.hil.running import Running, emulated, wait_for
+from tests.hil.running import PATIENT, Running, emulated, wait_for
 from tests.hil.test_long_runs import WRAP_S
 from tests.hil.test_stops_by_itself import Drive
 from tests.hil.truth import DRIVING_M_S, Truth
@@ -103,7 +103,7 @@ def test_a_service_is_armed_reloaded_halted_and_ended(tmp_path: Path, measured: 
     address, config, recorded = str(tmp_path / "notify"), tmp_path / "run.toml", tmp_path / "run.mcap"
     good = 'robot = "denning"\n[behaviors]\narbiter.base_velocity_m_s = 0.3\nmove_ahead.distance_m = 1e4\n'
     config.write_text(good, encoding="utf-8")
-    command = ["run", str(config), "--record", str(recorded), "--json", str(tmp_path / "summary.json")]
+    command = ["run", str(config), "--record", str(recorded), "--json", str(tmp_path / "summary.json"), *PATIENT]
     env = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "400000"}
     with (
         manager(address) as hears,

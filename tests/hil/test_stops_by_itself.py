@@ -24,7 +24,7 @@ import pytest
 from drivers.messages import Flags
 from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.planted import HELD, LONG_S, planted
-from tests.hil.running import DEADMAN_S, Running, emulated, wait_for
+from tests.hil.running import DEADMAN_S, PATIENT, Running, emulated, wait_for
 from tests.hil.truth import DRIVING_M_S, Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P1")]
@@ -237,7 +237,7 @@ def stands_until_armed(drive: Drive, stops_before: int) -> None:
 def test_one_fault_of_each_kind(tmp_path: Path, measured: Callable[[str], None]) -> None:
     with (
         emulated(tmp_path, "--world", world(tmp_path)) as robot,
-        planted(tmp_path, "run", "busy", "run", "--port", robot.port, *STRAIGHT_ON) as run,
+        planted(tmp_path, "run", "busy", "run", "--port", robot.port, *STRAIGHT_ON, *PATIENT) as run,
     ):
         run.comes_to("READY")
         drive = Drive(run, Truth(robot.trace))

@@ -6,7 +6,10 @@ import re
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from runtime.support.build import commit_of, describe_build, kept_commit, version_of
+from tests.hil.machine import TIMEOUT_S
 
 
 def git(folder: Path, *arguments: str) -> None:
@@ -19,7 +22,8 @@ def test_the_line_names_version_python_and_packages() -> None:
     assert version_of("no-such-package") == "missing"
 
 
-def test_the_commit_of_a_clone_and_whether_files_differ(tmp_path: Path) -> None:
+def test_the_commit_of_a_clone_and_whether_files_differ(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("runtime.support.build.GIT_TIMEOUT_S", TIMEOUT_S)
     assert commit_of(tmp_path) is None
     git(tmp_path, "init", "--quiet")
     assert commit_of(tmp_path) is None, "no commit yet"

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import socketserver
 import threading
 import tty
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from config.errors import DONE, FAILED
+from drivers.heard_bytes import HeardBytes
 from runtime.bridges import local_network
 from runtime.bridges.local_network import Announced
 from runtime.cli.app import run_command
 from runtime.cli.commands.robots import port_probe
+from runtime.cycle.connection import POLL_S
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.running import emulated
 from tests.hil.truth import Truth
 
@@ -49,9 +54,12 @@ def test_runs_on_the_local_network_are_listed(
     ("robot", "said"),
     [("denning", "24 sensors; battery not reported; "), ("p3at", "16 sensors; battery 12.6 V; ")],
 )
+@stalls_excused
 def test_a_robot_is_named_and_does_not_move(
-    robot: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    robot: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(port_probe, "READY_MAX_S", TIMEOUT_S)
+    capsys.readouterr()
     with emulated(tmp_path, "--robot", robot) as found:
         assert run_command(["probe", found.port]) == DONE
     port, text, command = capsys.readouterr().out.splitlines()
@@ -87,12 +95,71 @@ def test_no_port_and_one_that_cannot_be_opened(
     assert "none" in lines[1]
 
 
+class Exchange:
+    """What went over one connection, bytes."""
+
+    def __init__(self) -> None:
+        self.asked = self.taken = self.answered = self.heard = 0
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is on its way."""
+        return self.asked == self.taken and self.answered == self.heard
+
+
+class Exchanges:
+    """The connections to a device, and a clock that stands while anything is on its way, however long that takes."""
+
+    def __init__(self) -> None:
+        self.all: list[Exchange] = []
+        self.numbers = itertools.count()
+        self.now_s = 0.0
+
+    def clock(self) -> float:
+        if all(exchange.is_whole for exchange in self.all[-1:]):
+            self.now_s += POLL_S
+        return self.now_s
+
+    def counted(self) -> HeardBytes:
+        self.all.append(Exchange())
+        return CountedBytes(self.all[-1])
+
+
+class CountedBytes(HeardBytes):
+    """The probe's end of a connection."""
+
+    def __init__(self, exchange: Exchange) -> None:
+        super().__init__()
+        self._exchange = exchange
+
+    def sent(self, data: bytes) -> None:
+        self._exchange.asked += len(data)
+        super().sent(data)
+
+    def received(self, data: bytes) -> None:
+        self._exchange.heard += len(data)
+        super().received(data)
+
+
+class Server(socketserver.ThreadingTCPServer):
+    """Serves a device."""
+
+    exchanges: Exchanges
+
+
 class Peer(socketserver.BaseRequestHandler):
     """A device on the network that is no robot."""
 
+    server: Server
+
     def handle(self) -> None:
+        exchanges = self.server.exchanges
+        exchange = exchanges.all[next(exchanges.numbers)]
         while data := self.request.recv(4096):
-            self.request.sendall(self.answer(data))
+            answer = self.answer(data)
+            exchange.answered += len(answer)
+            exchange.taken += len(data)
+            self.request.sendall(answer)
 
     def answer(self, data: bytes) -> bytes:
         raise NotImplementedError
@@ -126,8 +193,12 @@ def test_a_device_that_is_no_robot_is_named_and_a_socket_has_no_speeds(
     peer: type[Peer], robot: str | None, said: str,
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(port_probe, "ANSWER_MAX_S", 0.5)
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), peer) as server:
+    exchanges = Exchanges()
+    monkeypatch.setattr(port_probe, "ANSWER_MAX_S", 0.5)  # by their clock
+    monkeypatch.setattr(port_probe, "HeardBytes", exchanges.counted)
+    monkeypatch.setattr(port_probe, "time", SimpleNamespace(monotonic=exchanges.clock))
+    with Server(("127.0.0.1", 0), peer) as server:
+        server.exchanges = exchanges
         threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
         named = () if robot is None else ("--robot", robot)
         assert run_command(["probe", f"socket://127.0.0.1:{server.server_address[1]}", *named]) == FAILED
