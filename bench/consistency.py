@@ -12,8 +12,9 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Final
 
+from bench.correction_drives import level_name
 from config.settings import Settings
-from runtime.simulation.drift_trials import LEVELS, drive, level_name, summarise_drives
+from runtime.simulation.drift_trials import LEVELS, drive, summarise_drives
 
 POSE_DEGREES: Final = 3
 PLACE_DEGREES: Final = 2

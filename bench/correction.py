@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from statistics import mean
 from typing import Final
 
-from bench.correction_drives import correction_drive
+from bench.correction_drives import correction_drive, level_name
 from config.world import OdometryConfig
 from drivers.messages import Pose, wrap_angle
 from runtime.recording.replay_summary import ReplaySummary
 from runtime.recording.ring_log_replay import replay_firings, replay_localized
-from runtime.simulation.drift_trials import LEVELS, level_name
+from runtime.simulation.drift_trials import LEVELS
 
 NEAR_GOOD: Final = OdometryConfig(scale=1.002, heading_rad_per_sqrt_m=math.radians(0.1))
 MOVED_M: Final = 0.02

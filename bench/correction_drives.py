@@ -54,6 +54,11 @@ AROUND_M: Final = 1.5
 """How far around the surfaces of an open world the robot drives."""
 
 
+def level_name(errors: OdometryConfig) -> str:
+    """Return a level's errors as a table names them."""
+    return f"{errors.scale - 1.0:.0%}, {math.degrees(errors.heading_rad_per_sqrt_m):g}°/√m"
+
+
 @dataclass(frozen=True, slots=True)
 class CorrectionDrive:
     """One drive.

@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from bench.correction_drives import level_name
 from config.settings import LocalizationConfig, Settings
 from config.units import FOOT_M
 from config.world import OdometryConfig
@@ -23,7 +24,7 @@ from perception.kernel import kernel
 from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
-from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, level_name, oval
+from runtime.simulation.drift_trials import LEVELS, RADIUS_FT, drum_hall, firings, oval
 from runtime.simulation.open_loop import perceive
 from runtime.simulation.random_halls import ACOUSTICS
 

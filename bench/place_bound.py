@@ -25,7 +25,7 @@ from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEA
 from perception.localization.known_room.particle_update import TEMPER
 from perception.localization.known_room.pose_grid import GRID_CELL_M, GRID_DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
 from perception.localization.localized_pose import Status
-from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges, surfaces_near
+from perception.localization.room.expected_ranges import EDGE_REACH_M, Beams, Reflection, expected_ranges
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 
@@ -67,6 +67,34 @@ class Grid(NamedTuple):
     """Expected ranges of a sensor in the ring's middle, shape (HEADINGS, rows, columns) by its direction."""
 
 
+def surfaces_near(room: Room, x: float, y: float, window_m: float) -> Room:
+    """Return the surfaces that a sensor at a place can hear.
+
+    Parameters
+    ----------
+    room : Room
+        All surfaces.
+    x, y : float
+        The place, m.
+    window_m : float
+        Greatest range, m.
+
+    Returns
+    -------
+    Room
+        A part of the room; it may have no surface.
+    """
+    to_x, to_y = x - room.walls[:, 0], y - room.walls[:, 1]
+    along_x, along_y = room.walls[:, 2] - room.walls[:, 0], room.walls[:, 3] - room.walls[:, 1]
+    share = np.clip((to_x * along_x + to_y * along_y) / (along_x**2 + along_y**2), 0.0, 1.0)
+    walls = np.hypot(to_x - share * along_x, to_y - share * along_y) <= window_m
+    heard_m = np.where(room.corners[:, 3] < np.pi, window_m, EDGE_REACH_M)
+    corners = np.hypot(room.corners[:, 0] - x, room.corners[:, 1] - y) <= heard_m
+    distance = np.hypot(room.circles[:, 0] - x, room.circles[:, 1] - y) - room.circles[:, 2]
+    circles = room.circles[distance <= window_m]
+    return Room(room.walls[walls], room.normals[walls], room.offsets[walls], room.corners[corners], circles)
+
+
 def make_grid(room: Room, ring: RingConfig) -> Grid:
     """Return the grid of a room for a ring whose sensors stand at its centre."""
     low, high = room.bounds
@@ -78,7 +106,7 @@ def make_grid(room: Room, ring: RingConfig) -> Grid:
     codes: dict[Reflection, Codes] = {"cone": silent, "specular": silent.copy()}
     for i, j in np.ndindex(*shape):
         x, y = (origin + GRID_CELL_M * np.array([i, j])).tolist()
-        near = surfaces_near(room, x, y, 0.0, ring.window_m)
+        near = surfaces_near(room, x, y, ring.window_m)
         beams = Beams(np.full(HEADINGS, x), np.full(HEADINGS, y), axes)
         for reflection, table in codes.items():
             ranges_m = expected_ranges(near, beams, half, reflection).range_m

@@ -132,7 +132,7 @@ def score_circle(
     axes = w[hit, 2:4].sum(0)
     return {
         "llr": float(llr), "hits": float(hit.sum()), "throughs": throughs, "near": float(near.sum()),
-        "shorts": shorts, "closest": float(w[hit, 4].min(initial=1e9)),
+        "closest": float(w[hit, 4].min(initial=1e9)),
         "dispersion": 1.0 - float(np.hypot(*axes)) / max(1.0, float(hit.sum())),
     }  # fmt: skip
 

@@ -51,11 +51,6 @@ MATCH_M: Final = FOOT_M
 """An object farther than this from every drum is false."""
 
 
-def level_name(errors: OdometryConfig) -> str:
-    """Return a level's errors as a table names them."""
-    return f"{errors.scale - 1.0:.0%}, {math.degrees(errors.heading_rad_per_sqrt_m):g}°/√m"
-
-
 @dataclass(frozen=True, slots=True)
 class DriftOutcome:
     """The end of one drive; lengths in metres, angles in rad.

@@ -95,7 +95,6 @@ def score_circle(
     hits = 0.0
     misses = 0.0
     near = 0.0
-    shorts = 0.0
     axis_x = 0.0
     axis_y = 0.0
     closest = NONE_YET
@@ -123,7 +122,6 @@ def score_circle(
                 llr += v
         elif ahead >= cos_must * d:
             llr += short
-            shorts += 1.0
     extra = misses - DROP_OUT_SHARE * (hits + misses)
     if extra > 1.0:
         llr -= DROP_OUT_NAT * (extra - 1.0)
@@ -131,7 +129,6 @@ def score_circle(
     score.hits = hits
     score.misses = misses
     score.near = near
-    score.shorts = shorts
     score.closest = closest
     score.dispersion = 1.0 - math.sqrt(axis_x * axis_x + axis_y * axis_y) / max(hits, 1.0)
 

@@ -42,8 +42,6 @@ class PairSegment(Record):
     normal_x: float
     normal_y: float
     length: float
-    sigma_normal: float
-    """Standard deviation along the normal, m."""
     sigma_direction: float
     """Standard deviation of the direction, rad."""
     reading: int
@@ -114,8 +112,6 @@ class Score(Record):
     """Readings that should have hit and passed through."""
     near: float
     """Readings within the gate."""
-    shorts: float
-    """Readings that ended before it."""
     closest: float
     """Least range of a hit, m."""
     dispersion: float

@@ -24,7 +24,7 @@ def tangent(first: Reading, second: Reading, cos_half: float, var_r: float, out:
 
     McKerrow's construction (1993; paper §3.2, Figure 2): the tangent's normal makes the angle acos((r1 − r2)/L) with
     the baseline of length L. Both ends carry an independent error of variance `var_r` along the normal, so that the
-    middle has var_r / 2 and the direction √(2 var_r) / (length of the segment).
+    direction has the standard deviation √(2 var_r) / (length of the segment).
 
     Parameters
     ----------
@@ -71,6 +71,5 @@ def tangent(first: Reading, second: Reading, cos_half: float, var_r: float, out:
     out.normal_x = nx
     out.normal_y = ny
     out.length = length
-    out.sigma_normal = math.sqrt(0.5 * var_r)
     out.sigma_direction = math.sqrt(2.0 * var_r) / max(length, LENGTH_MIN_M)
     return True

@@ -71,36 +71,6 @@ def expected_ranges(room: Room, beams: Beams, half_angle: float, reflection: Ref
     return Expected(*(part.reshape(beams.x.shape) for part in expected))
 
 
-def surfaces_near(room: Room, x: float, y: float, within_m: float, window_m: float) -> Room:
-    """Return the surfaces that sensors near a place can hear.
-
-    Parameters
-    ----------
-    room : Room
-        All surfaces.
-    x, y : float
-        The place, m.
-    within_m : float
-        Greatest distance of a sensor from it, m.
-    window_m : float
-        Greatest range, m.
-
-    Returns
-    -------
-    Room
-        A part of the room; it may have no surface.
-    """
-    to_x, to_y = x - room.walls[:, 0], y - room.walls[:, 1]
-    along_x, along_y = room.walls[:, 2] - room.walls[:, 0], room.walls[:, 3] - room.walls[:, 1]
-    share = np.clip((to_x * along_x + to_y * along_y) / (along_x**2 + along_y**2), 0.0, 1.0)
-    walls = np.hypot(to_x - share * along_x, to_y - share * along_y) <= within_m + window_m
-    heard_m = np.where(room.corners[:, 3] < np.pi, window_m, EDGE_REACH_M)
-    corners = np.hypot(room.corners[:, 0] - x, room.corners[:, 1] - y) <= within_m + heard_m
-    distance = np.hypot(room.circles[:, 0] - x, room.circles[:, 1] - y) - room.circles[:, 2]
-    circles = room.circles[distance <= within_m + window_m]
-    return Room(room.walls[walls], room.normals[walls], room.offsets[walls], room.corners[corners], circles)
-
-
 def crossed(room: Room, x: Floats, y: Floats, to_x: Floats, to_y: Floats, slack: float) -> NDArray[np.bool_]:
     """Return which lines of sight cross a surface.
 

@@ -16,7 +16,7 @@ from tests.perception.bayes.range_cases import COSINES, GATE, MISS, OPT, SHORT, 
 
 
 def score_circle(case: Case, readings: Records[Reading], x: float, y: float) -> Floats:
-    """Return the fields of the score: evidence, hits, misses, near, shorts, closest, dispersion, sure hits."""
+    """Return the fields of the score: evidence, hits, misses, near, closest, dispersion, sure hits."""
     score, fields = one(Score)
     range_fit.score_circle(readings, x, y, case.rho, case.p, case.level, predictions(), score[0])
     return fields
@@ -34,9 +34,9 @@ def test_a_circles_score_equals_its_oracle(examples: int) -> None:
     for case in cases(examples, 1):
         fields = score_circle(case, case.readings, *case.place)
         want = naive_bayes.score_circle(case.used, case.centre, case.rho, COSINES, GATE, MISS, SHORT, case.noise)
-        names = ("llr", "hits", "throughs", "near", "shorts", "closest")
-        assert fields[:6] == pytest.approx([want[name] for name in names], rel=1e-12, abs=1e-11)
-        assert fields[6] == pytest.approx(want["dispersion"], abs=1e-12)
+        names = ("llr", "hits", "throughs", "near", "closest")
+        assert fields[:5] == pytest.approx([want[name] for name in names], rel=1e-12, abs=1e-11)
+        assert fields[5] == pytest.approx(want["dispersion"], abs=1e-12)
         hits += fields[1]
     assert hits > 5 * examples
 

@@ -50,12 +50,12 @@ def test_segments_equal_their_oracle(examples: int) -> None:
                     var = var0 + rel2 * float(fired[i, 4]) ** 2
                     a, b = readings_of(np.array([old[:5], fired[i, :5]]))
                     if tangent(a, b, float(S.cos_half_angle), var, records(PairSegment, segment)[0]):
-                        expected.append((*segment[0].item()[:7], i))
+                        expected.append((*segment[0].item()[:6], i))
         assert made == len(expected)
         got = scratch["segments"][0, :made]
-        actual = np.array([row[:7] for row in got.tolist()]).reshape(made, 7)
-        assert actual == pytest.approx(np.array([e[:7] for e in expected]).reshape(made, 7), rel=1e-12, abs=1e-12)
-        assert got["reading"].tolist() == [e[7] for e in expected]
+        actual = np.array([row[:6] for row in got.tolist()]).reshape(made, 6)
+        assert actual == pytest.approx(np.array([e[:6] for e in expected]).reshape(made, 6), rel=1e-12, abs=1e-12)
+        assert got["reading"].tolist() == [e[6] for e in expected]
         long = [e for e in expected if e[4] > MAPPED_LENGTH_MIN_M]
         assert memory.state["segments_numbered"][0] == numbered + len(long)
         segments += made
@@ -72,7 +72,7 @@ def test_segments_equal_their_oracle(examples: int) -> None:
 def test_a_mapped_segment_gets_the_next_number_and_the_time_of_the_firing() -> None:
     memory = new_memory()
     array = zeros(PairSegment, 1)
-    array[0] = (0.1, 0.2, 0.6, 0.8, 0.3, 0.01, 0.02, 4)
+    array[0] = (0.1, 0.2, 0.6, 0.8, 0.3, 0.02, 4)
     for number, time_s in ((1, 7.5), (2, 8.5)):
         pairing.map_segment(memory.s, records(PairSegment, array)[0], time_s)
         assert mapped_segments(memory)[-1].item() == (0.1, 0.2, 0.6, 0.8, number, time_s)
