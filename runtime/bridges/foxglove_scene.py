@@ -15,6 +15,7 @@ from runtime.analysis.export.foxglove_messages import RunChannels, object_label
 from runtime.analysis.export.shapes import even_radius
 from runtime.analysis.timeline import CROSS_PATH, CrossPathRows
 from runtime.bridges.console_client import ConsoleClient, Message
+from runtime.support.log_sentence import sentence
 
 CIRCLE_POINTS: Final = 36
 MAP_EVERY: Final = 4
@@ -63,8 +64,7 @@ class SceneChannels:
 
     def take_log(self, entry: Message, at: int) -> None:
         """Write a line of the log."""
-        fields = " ".join(f"{name}={value}" for name, value in entry["fields"].items())
-        self._run.write_log(entry["level"], f"{entry['event']} {fields}".strip(), at)
+        self._run.write_log(entry["level"], sentence(entry["event"], entry["fields"]), at)
 
     def _write_frames(self, state: Message, at: int) -> None:
         x, y, theta = state["pose"]

@@ -13,6 +13,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import orjson
@@ -23,6 +24,7 @@ from config.files import one_line, utf8
 from drivers.token_bucket import LineLimit
 from runtime.support.background_writer import BackgroundWriter
 from runtime.support.log_file import LogFile
+from runtime.support.log_sentence import sentence
 from runtime.support.user_folders import expanded, has_home, state_folder
 
 if TYPE_CHECKING:
@@ -46,6 +48,13 @@ LINES_PER_S: Final = 5.0
 LINES_BURST: Final = 300.0
 """Lines of one level at once; each level has its own limit, so that warnings suppress no error."""
 MEGABYTE: Final = 1_000_000
+NOT_SAID: Final = frozenset({"event", "level", "timestamp", "exception"})
+SECONDS: Final = len("2026-01-02T03:04:05")
+"""A time on the terminal, in UTC, has no fractions of seconds; those are in the file."""
+COLOURS: Final = MappingProxyType(
+    {"debug": "\x1b[2m", "info": "\x1b[32m", "warning": "\x1b[33m", "error": "\x1b[1;31m"}
+)
+COLOUR_END: Final = "\x1b[0m"
 
 
 class LogStatus:
@@ -105,9 +114,9 @@ class _LineOutput:
         self._clock = clock
         self._is_terminal = terminal is not None and terminal.isatty()
         self._path = path
-        self._render = structlog.dev.ConsoleRenderer(colors=self._is_terminal and takes_colours(), pad_event_to=0)
+        self._has_colours = self._is_terminal and takes_colours()
 
-    def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+    def __call__(self, _logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         limit = self._limits.setdefault(name, LineLimit(LINES_PER_S, LINES_BURST))
         left_out = limit.take(self._clock())
         if left_out is None:
@@ -116,12 +125,12 @@ class _LineOutput:
             event["left_out_before"] = left_out
         settings = event.pop("settings", None)
         event = {name: utf8(value) if isinstance(value, str) else value for name, value in event.items()}
-        self._report_error(logger, event)
+        self._report_error(event)
         if self._status.file is not None:
             if settings is not None:
                 self._status.file.put(_json({"event": "settings", "settings": settings}))
             self._status.file.put(_json(event))
-        self._show(logger, name, event)
+        self._show(event)
         raise structlog.DropEvent
 
     @property
@@ -129,29 +138,33 @@ class _LineOutput:
         """Number of lines left out since the last one of their level."""
         return sum(limit.suppressed for limit in self._limits.values())
 
-    def _report_error(self, logger: object, event: Mapping[str, Any]) -> None:
+    def _report_error(self, event: Mapping[str, Any]) -> None:
         """Warn once of each error of the file, on the terminal and to the listeners."""
         error = self._status.last_error
         if error != self._reported:
             self._reported = error
             warning = {"event": "log lines are missing in the file", "reason": error, "lost": self._status.lost}
-            self._show(logger, "warning", {**warning, "level": "warning", "timestamp": event.get("timestamp")})
+            self._show({**warning, "level": "warning", "timestamp": event.get("timestamp")})
 
-    def _show(self, logger: object, name: str, event: Mapping[str, Any]) -> None:
+    def _show(self, event: Mapping[str, Any]) -> None:
         for listener in (*(() if self._listener is None else (self._listener,)), *self._status.listeners):
             listener({name: value for name, value in event.items() if name not in SECRET})
         if self._status.terminal is not None:
             where = "on a terminal only" if self._status.file is None else f"in {self._path}"
             hidden = {} if self._is_terminal else dict.fromkeys(SECRET & event.keys(), where)
-            shown = {name: _printable(name, value) for name, value in {**event, **hidden}.items()}
-            self._status.terminal.put((str(self._render(logger, name, shown)) + "\n").encode(errors="replace"))
+            shown = _line_for_people({**event, **hidden}, has_colours=self._has_colours)
+            self._status.terminal.put(shown.encode(errors="replace"))
 
 
-def _printable(name: str, value: object) -> object:
-    """Return a field as it may go to a terminal, which obeys control characters wherever they come from."""
-    if not isinstance(value, str):
-        return value
-    return "\n".join(map(one_line, value.split("\n"))) if name == "exception" else one_line(value)
+def _line_for_people(event: Mapping[str, Any], *, has_colours: bool) -> str:
+    """Return a line as it may go to a terminal, which obeys control characters wherever they come from."""
+    shown = {name: one_line(value) if isinstance(value, str) else value for name, value in event.items()}
+    rest = {name: value for name, value in shown.items() if name not in NOT_SAID}
+    level = f"{event['level']:7}"
+    if has_colours:
+        level = f"{COLOURS.get(event['level'], '')}{level}{COLOUR_END}"
+    line = f"{str(event['timestamp'])[:SECONDS]}Z {level} {one_line(sentence(shown['event'], rest))}\n"
+    return line + "".join(f"{one_line(part)}\n" for part in str(event.get("exception", "")).splitlines())
 
 
 def _json(event: Mapping[str, Any]) -> bytes:

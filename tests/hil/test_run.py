@@ -126,7 +126,7 @@ def test_a_run_from_its_start_url_to_its_end(tmp_path: Path) -> None:
         ) as run,
     ):  # fmt: skip
         truth, url = Truth(robot.trace), start_url(run)
-        wait_for(lambda: "from_elsewhere='ssh -L " in run.err, "the console's line in the terminal")
+        wait_for(lambda: "from elsewhere ssh -L " in run.err, "the console's line in the terminal")
         page = RawPage(url)
         session = page.next("session")
         assert (session["role"], session["emulated"], session["truth"]) == ("control", False, None)

@@ -63,7 +63,7 @@ def test_a_state_is_on_the_topics_of_the_export(tmp_path: Path) -> None:
     assert [(p.x, p.y) for p in wall.points] == [(0.0, 1.0), (2.0, 1.0)]
     assert [(p.x, p.y) for p in polyline.points] == [(1.0, 0.0), (2.0, 1.0)]
     assert [text.text for text in found["/models"][0].entities[0].texts] == ["7 drum 0.99"]
-    assert found["/log"][0].message == "mode mode=DRIVE"
+    assert found["/log"][0].message == "Mode DRIVE."
     assert set(found["/state"][0]) == set(STATE_FIELDS)
     assert found["/state"][0]["phases"] == {"decide": 3.0}
 

@@ -32,8 +32,9 @@ def test_each_line_of_the_file_is_json(tmp_path: Path, capsys: pytest.CaptureFix
     assert (second["event"], second["level"], second["path"], second["number"]) == ("odd", "warning", "a/b", None)
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert "mode" in shown.err
-    assert "DRIVE" in shown.err
+    assert [line.partition("Z ")[2] for line in shown.err.splitlines()] == [
+        r'info    Mode DRIVE: "two\nlines and \"quotes\"" (cycle 3)', "warning Odd (path a/b, number nan)"
+    ]  # fmt: skip
     assert "\x1b" not in shown.err, "no colours without a terminal"
 
 
@@ -107,9 +108,9 @@ def test_an_unwritable_state_folder_is_a_warning(
     with open_log(LogConfig(), terminal=True) as log:
         log.info("still here")
     warning, line = capsys.readouterr().err.splitlines()
-    assert "no log file is written" in warning
+    assert "No log file is written" in warning
     assert str(tmp_path / "state") in warning
-    assert "still here" in line
+    assert "Still here" in line
 
 
 @pytest.mark.promise("P22")
@@ -201,7 +202,7 @@ def test_without_a_home_folder_the_log_goes_to_a_temporary_one_and_says_so(
     (file,) = homeless.glob("tmp/*/echolocate.jsonl")
     assert [line["event"] for line in lines(file)][1:] == ["start"]
     err = capsys.readouterr().err
-    assert "no home folder is known" in err
+    assert "No home folder is known" in err
     assert str(file.parent) in err
 
 
