@@ -31,6 +31,11 @@ def state_folder() -> Path:
     return users_own(user_state_path) or _temporary_folder()
 
 
+def kept_places(map_name: str) -> Path:
+    """Return the file in which the places of a shipped map are kept: the map itself comes with the program."""
+    return state_folder() / "places" / f"{map_name}.toml"
+
+
 def has_home() -> bool:
     """Return whether the user has a home folder, or the environment names another place for the state."""
     return users_own(user_state_path) is not None

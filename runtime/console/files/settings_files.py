@@ -17,16 +17,18 @@ from config.load import parse_text, with_room
 from config.settings import Settings
 from config.toml_lines import located
 from config.world import WorldConfig
-from runtime.analysis.export.world_file import text_with_places
+from runtime.analysis.export.world_file import text_with_places, with_places, world_text
 from runtime.console.commands.command_error import CommandError
 from runtime.console.sent_messages import ProblemRow, SettingsCheck, SettingsRow, SettingsText
 from runtime.support.config_lint import lint_settings
+from runtime.support.user_folders import kept_places
 from runtime.support.whole_file import whole_file
 
 KINDS: Final = MappingProxyType(
     {"runs": "run", "robots": "robot", "worlds": "world", "models": "model", "missions": "mission"}
 )
 """Kinds of files as the page names them."""
+HEAD: Final = "The places of the map {}, kept for the next run with it (m)."
 
 
 class SettingsFiles:
@@ -81,6 +83,8 @@ class SettingsFiles:
     async def keep_places(self, settings: Settings) -> None:
         """Write the places of a run into the map file that it was started with, if it was.
 
+        Those of a shipped map go to a file in the user's state folder, which the next run with that map reads.
+
         Raises
         ------
         CommandError
@@ -107,7 +111,7 @@ class SettingsFiles:
     def _keep_places(self, settings: Settings) -> None:
         room = settings.perception.localization.known_room
         for document in reversed(self._documents):  # the map is read after the emulator's world
-            if room is None or document.kind != "worlds" or document.path is None:
+            if room is None or document.kind != "worlds":
                 continue
             text = self._read(document)["text"]
             try:
@@ -116,7 +120,10 @@ class SettingsFiles:
             except ConfigError as error:
                 raise CommandError(f"the places are in force, but not kept in {document.name}: {error}") from None
             if of_file == room:
-                if world.places() != settings.places:
+                if document.path is None:
+                    text = world_text(with_places(WorldConfig(), settings.places), (HEAD.format(document.name),))
+                    self._put(document, kept_places(Path(document.name).stem), text)
+                elif world.places() != settings.places:
                     self._put(document, document.path, text_with_places(text, settings.places))
                 return
 
@@ -173,7 +180,9 @@ class SettingsFiles:
 
 
 def _write(path: Path, text: str) -> None:
-    """Replace a file by one with this text and the same permissions."""
+    """Write a file with this text; one that is there is replaced, and its permissions stay."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part:
         part.write_text(text, encoding="utf-8", newline="")
-        part.chmod(path.stat().st_mode & 0o7777)
+        if path.exists():
+            part.chmod(path.stat().st_mode & 0o7777)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from config.errors import WRONG_CALL, UserError
 from config.files import is_utf8, one_line, utf8
-from config.load import ConfigError, list_shipped, load_settings, with_goal, with_known_room
+from config.load import ConfigError, list_shipped, load_settings, load_world, with_goal, with_known_room
 from config.mission_step import Frame
 from config.places import check_places, no_such_place
 from config.settings import GoalConfig, Settings
+from runtime.support.user_folders import kept_places
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,8 @@ class SettingsFiles:
     def read(self) -> Settings:
         """Return the settings as the files are now, on the port that they name.
 
-        Without a run file and a mission, a shipped world is driven as the shipped run of its name: with its goal.
+        Without a run file and a mission, a shipped world is driven as the shipped run of its name: with its goal. A
+        shipped map has the places that an earlier run kept for it.
 
         Raises
         ------
@@ -57,6 +59,8 @@ class SettingsFiles:
         settings = load_settings(config, self.sets, robot=self.robot, world=self.world, mission=self.mission)
         if self.map_file is not None:
             settings = with_known_room(settings, self.map_file)
+            if self.map_file in list_shipped("worlds") and (kept := kept_places(self.map_file)).exists():
+                settings = settings.model_copy(update={"places": load_world(kept).places()})
         if self.goal is not None:
             if self.mission is not None:
                 raise UserError("--goal and --mission exclude each other: leave one of them out", WRONG_CALL)

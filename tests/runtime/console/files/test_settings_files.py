@@ -10,6 +10,7 @@ from config.files import documents_read, noting_files_read
 from config.load import load_settings, load_world, with_known_room, with_room
 from config.places import PlaceConfig, PlacesConfig
 from config.settings import Settings
+from runtime.cli.commands.run.run_settings import SettingsFiles as RunFiles
 from runtime.console.commands.command_error import CommandError
 from runtime.console.files.settings_files import SettingsFiles
 
@@ -136,3 +137,20 @@ async def test_changed_places_are_kept_in_the_map_that_the_run_was_started_with(
     path.write_text("[[wall]")
     with pytest.raises(CommandError, match="not kept in"):
         await files.keep_places(marked)
+
+
+async def test_places_on_a_shipped_map_are_kept_for_the_next_run_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    command = RunFiles(world="room", map_file="office")
+    with noting_files_read():
+        settings = command.read()
+        files = SettingsFiles(documents_read(), lambda: settings, lambda: None)
+    charger = PlacesConfig(place=(PlaceConfig(name="charger", x_m=1.0, y_m=2.0),))
+    await files.keep_places(settings.model_copy(update={"places": charger}))
+    assert command.read().places == charger
+    assert RunFiles(map_file="office", goal="charger").read(), "a goal there is known"
+    assert RunFiles(map_file="room").read().places == PlacesConfig()
+    await files.keep_places(settings)
+    assert command.read().places == PlacesConfig()
