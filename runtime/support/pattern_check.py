@@ -52,7 +52,7 @@ def refuse_undrivable(settings: Settings) -> None:
         if not math.isfinite(oldest_s):
             unseen = unseen_way(percept, course, body, arbiter.clearance_m)
             left_out = [] if unseen is None else [i for i in unseen.sensors if math.isinf(view.sensor_ages_s[i])]
-            remedy = f"add sensors to the sets: {listed(left_out)}" if left_out else "the ring has no sensor there"
+            remedy = f"add sensors to the sets: {listed(left_out)}" if left_out else _gaps_ahead(settings, course)
             raise FiringError(
                 f"ring.firing: the pattern does not look {where}, so that the robot could not drive there; {remedy}"
             )
@@ -94,6 +94,25 @@ def courses_rad(settings: Settings) -> tuple[float, ...]:
         return (0.0,)
     out = math.radians(ahead.move_ahead_direction_deg)
     return (out, out + math.pi) if ahead.distance_m is not None and ahead.at_end == "turn_back" else (out,)
+
+
+def _gaps_ahead(settings: Settings, course_rad: float) -> str:
+    """Return which gaps between beams lie in the robot's path on a course, and what closes them."""
+    view = oldest_percept(settings, 0.0).field_of_view
+    axes = np.sort(np.degrees(view.axes_rad[np.isfinite(view.sensor_ages_s)] - course_rad + math.pi) % 360.0) - 180.0
+    beam_deg = math.degrees(view.half_angle_rad)
+    path_deg = math.degrees(path_half_angle_rad(settings.body, settings.behaviors.arbiter.clearance_m))
+    ends = zip([-180.0 - beam_deg, *axes], [*axes, 180.0 + beam_deg], strict=True)
+    shift = math.degrees(course_rad)
+    gaps = [
+        f"{begin + beam_deg + shift:.0f}° to {end - beam_deg + shift:.0f}°"
+        for begin, end in ends
+        if end - begin > 2.0 * beam_deg and begin + beam_deg < path_deg and end - beam_deg > -path_deg
+    ]
+    return (
+        f"no beam covers {' and '.join(gaps)} (counter-clockwise from the ring's front), and the path needs every "
+        f"direction within {path_deg:.0f}° of the way: add sensors there, or correct ring.beam_half_angle_deg"
+    )
 
 
 def oldest_percept(settings: Settings, course_rad: float, missed: int = 0) -> Percept:

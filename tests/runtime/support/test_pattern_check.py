@@ -71,7 +71,8 @@ def test_a_pattern_that_looks_backwards() -> None:
 
 def test_a_ring_with_a_hole_ahead() -> None:
     line = problem("ring.beam_half_angle_deg=7")
-    assert line.endswith("does not look ahead, so that the robot could not drive there; the ring has no sensor there")
+    assert "could not drive there; no beam covers -38° to -37° and" in line
+    assert line.endswith("add sensors there, or correct ring.beam_half_angle_deg")
 
 
 def test_a_window_that_ends_within_the_clearance() -> None:
