@@ -19,6 +19,7 @@ from config.robot import RingConfig
 from config.settings import SurfacesConfig
 from drivers.messages import Firing
 from perception.bayes.inference.kernel_settings import circle_models
+from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
@@ -58,9 +59,10 @@ class SurfaceMap(NoSurfaces):
         self._forget_derived()
 
     def _name_sizes(self, models: Sequence[ModelConfig]) -> None:
-        self._reach_m = {one.name: one.reach_m for one in models}
+        rivals = {round_label(radius): radius for radius in RIVAL_RADII_M if radius > 0.0}
+        self._reach_m = rivals | {one.name: one.reach_m for one in models}
         radii, names = circle_models(models)
-        self._radius_m = dict(zip(names, radii, strict=True))
+        self._radius_m = rivals | dict(zip(names, radii, strict=True))
 
     def _forget_derived(self) -> None:
         self._known: tuple[DetectedObject, ...] = ()

@@ -144,6 +144,20 @@ def test_pieces_stand_for_the_walls_of_a_place_that_is_not_known(driven: Percept
     assert nothing.archived_shown(archived, lambda: archived) is archived
 
 
+def test_what_lies_on_a_barrel_is_no_wall(driven: Perception) -> None:
+    """A round object without a model's name has an outline, too: the box's side would be a part of it."""
+    surfaces = driven.surfaces
+    assert isinstance(surfaces, SurfaceMap)
+    barrel = DetectedObject("barrel", 0.55, 0.87, 0.0, 0.01, 90, 0.99, 1.0 - 1e-15, number=3)
+
+    def lies_at_the_side(report: SurfaceReport) -> bool:
+        lines = [np.array(wall.ends).reshape(2, 2) for wall in report.walls if wall.ends is not None]
+        return any(np.hypot(*(line.mean(axis=0) - (0.55, 0.2))).min() < 0.2 for line in lines)
+
+    assert lies_at_the_side(surfaces.report(tuple))
+    assert not lies_at_the_side(surfaces.report(lambda: (barrel,)))
+
+
 def test_perception_continues_from_a_snapshot_to_the_bit() -> None:
     """At many moments: while readings are entered, shared again, and in each step of a search."""
     settings = perception_settings()
