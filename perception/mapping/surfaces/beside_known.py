@@ -23,16 +23,19 @@ from perception.polyline import Polyline
 PLACES: Final = 16
 """Places along a piece that are compared, those at its ends half a step inside."""
 CORNERS: Final = ("inside corner", "edge")
+UNKNOWN: Final = "unknown"
 CORNER_REACH_M: Final = 0.25
 """Around a corner its echoes are shared among places that are as far from the robot."""
 LEFTOVER_M: Final = 0.2
 """So near what is known a piece may be what is left of its echoes. Share of pieces so near: 0.91 and more in
 generated rooms, 0.51 and less on drives; within 0.1 m it is 0.66 and 0.39."""
+UNSURE: Final = -1
 FAR: Final = 0
 NEAR: Final = 1
 ALONG: Final = 2
 ON_BODY: Final = 3
-"""How near a place is to what is known: within `LEFTOVER_M` of it; along a wall or around a corner; on a body."""
+"""How near a place is to what is known: perhaps on an unknown object, which may be as large as the largest body and
+is not known; within `LEFTOVER_M` of what is; along a wall or around a corner; on a body."""
 STRAIGHT_M: Final = 1.0
 STRAIGHT_NAT: Final = 15.0
 """Evidence for straight pieces of this length by which walls are expected at all, and the most that one piece says
@@ -48,7 +51,7 @@ Runs = list[tuple[float, float]]
 def nearness(
     rows: NDArray[Any], known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]
 ) -> NDArray[np.int64]:  # fmt: skip
-    """Return how near places along surfaces are to what is known, from `FAR` to `ON_BODY`, shape (n, PLACES).
+    """Return how near places along surfaces are to what is known, from `UNSURE` to `ON_BODY`, shape (n, PLACES).
 
     Parameters
     ----------
@@ -61,14 +64,15 @@ def nearness(
     """
     walls = np.array([one.ends for one in known if one.ends is not None]).reshape(-1, 4)
     bodies, body_reaches = _bodies(known, reach_m)
+    unknown, unknown_reaches = _bodies(known, {UNKNOWN: max(reach_m.values(), default=0.0)})
     corners, corner_reaches = _bodies(known, dict.fromkeys(CORNERS, CORNER_REACH_M))
     every = np.concatenate([walls, bodies, corners])
     reaches = np.concatenate([np.zeros(len(walls)), body_reaches, corner_reaches])
     places = places_on(rows, PLACES)
     found = np.zeros(len(places), np.int64)
     for how_near, ends, within in (
-        (NEAR, every, reaches + LEFTOVER_M), (ALONG, every, reaches + AGREES_M),
-        (ON_BODY, bodies, body_reaches + AGREES_M),
+        (UNSURE, unknown, unknown_reaches + AGREES_M), (NEAR, every, reaches + LEFTOVER_M),
+        (ALONG, every, reaches + AGREES_M), (ON_BODY, bodies, body_reaches + AGREES_M),
     ):  # fmt: skip
         marks = np.zeros(len(places), np.int64)
         find_near(places, ends, within, marks)
@@ -99,7 +103,7 @@ def beside_known(rows: NDArray[Any], near: NDArray[np.int64], prior: float) -> S
     is_piece = rows["number"] < 0
     length = lengths(rows)
     evidence = rows["evidence"].clip(None, STRAIGHT_NAT) + prior
-    free = near < (ON_BODY if prior > 0.0 else ALONG)
+    free = near < ON_BODY if prior > 0.0 else (near >= FAR) & (near < ALONG)
     is_wall = is_piece & (evidence > 0.0)
     straight = rows[is_wall]
     numbers = zip(*(straight[name].tolist() for name in ENDS + SIZES), evidence[is_wall].tolist(), strict=True)

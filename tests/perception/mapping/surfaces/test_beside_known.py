@@ -106,6 +106,18 @@ def test_pieces_of_round_bodies_alone_are_no_walls(radius: float) -> None:
     assert len(polylines) > 100
 
 
+def test_a_piece_on_an_unknown_object_is_no_wall_where_the_method_explains_the_place() -> None:
+    """It may be as large as the largest body. It is not known, so that it says nothing of the place."""
+    known = tuple(known_wall(*row) for row in zip(*(room()[name] for name in ENDS), strict=True))
+    rows = np.concatenate([room(), pieces((3.0, 3.0, 4.2, 3.0), evidence=100.0)])
+    unknown, reach_m = DetectedObject("unknown", 3.6, 2.5, 0.0, 0.01, 9, 1.0), {"drum": 0.3, "barrel": 0.7}
+    free, taken = (nearness(rows, objects, reach_m) for objects in (known, (*known, unknown)))
+    assert wall_prior(rows, taken) < wall_prior(rows, free) < 0.0
+    assert len(beside_known(rows, free, -1.0).walls) == 1
+    assert beside_known(rows, taken, -1.0).walls == ()
+    assert len(beside_known(rows, taken, 1.0).walls) == 1 + len(beside_known(rows[:-1], taken[:-1], 1.0).walls)
+
+
 @pytest.mark.parametrize(("probability", "straight", "is_refuted"), [
     (0.996, -4.0, True), (0.996, -30.0, False), (1.0 - 1e-9, 0.0, False), (1.0 - 1e-9, 10.0, True), (1.0, 0.0, False),
 ])  # fmt: skip
