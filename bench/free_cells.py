@@ -111,6 +111,12 @@ def with_late_strays(
     return found
 
 
+def placed_ring(ring: RingConfig) -> Ring:
+    """Return a ring's sensors as they are placed."""
+    half_angle = math.radians(ring.beam_half_angle_deg)
+    return Ring(mounts_array(ring.mounts), half_angle, 0.0, ring.range_max_m, ring.turning)
+
+
 def beams_of(firings: Iterable[Firing], ring: Ring) -> Floats:
     """Return place x, y (m) and direction (rad) of each sensor that fired, shape (n, 3)."""
     return np.concatenate([np.array(placed(firing, ring))[~np.isnan(firing.ranges_m)] for firing in firings])
@@ -161,10 +167,7 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, *, late: bool) 
     late : bool
         Whether some silent readings become late strays.
     """
-    ring = Ring(
-        mounts_array(settings.ring.mounts), math.radians(settings.ring.beam_half_angle_deg), 0.0,
-        settings.ring.range_max_m, settings.ring.turning,
-    )  # fmt: skip
+    ring = placed_ring(settings.ring)
     scene = compile_scene(room.world)
     firings: list[Firing] = list(listen(settings.ring, room, seed, STEP_M).firings)
     if late:

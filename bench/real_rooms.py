@@ -15,9 +15,11 @@ from typing import Final
 
 import numpy as np
 
+from bench.free_cells import echoes_of, placed_ring
 from bench.range_statistics import POSE_COLUMNS, read_tables
 from bench.trials.imperfect_trials import (
     EXPLAINED_M,
+    NEAR_M,
     ROUND,
     away_from,
     distances,
@@ -28,6 +30,9 @@ from bench.trials.wall_trials import Segment, reported_corners, reported_walls
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing, Floats, Pose
+from perception.pipeline import Perception
+from runtime.analysis.export.occupancy_image import FREE, OCCUPIED, RESOLUTION_M, occupancy_image
+from runtime.analysis.export.world_file import world_of
 from runtime.recording.ring_log_replay import FiringReplayer
 
 ROUNDINGS: Final = ((1e-4, 1e-3, 1e-3), (1e-3, 1e-3, 1e-2), (1e-4, 1e-2, 1e-3))
@@ -88,12 +93,37 @@ def rounded(firings: Iterable[Firing], steps: tuple[float, float, float]) -> lis
     return found
 
 
-def score(drive: RealDrive, firings: Iterable[Firing]) -> Row:
-    """Return what is explained of a drive, and what is false, after its firings were perceived."""
+def perceived(drive: RealDrive, firings: Iterable[Firing]) -> Perception:
+    """Return perception after it was given firings of a drive."""
     replayer = FiringReplayer(drive.settings, firings)
     for _ in replayer:
         pass
-    perception = replayer.perception
+    return replayer.perception
+
+
+def score_image(drive: RealDrive) -> Row:
+    """Return what is false of the exported image of a drive: occupied pixels and laser points in free ones."""
+    perception, ring = perceived(drive, drive.firings), drive.settings.ring
+    seen = (*perception.labelled_objects(), *perception.archived_objects())
+    walls = np.array([(*wall.begin, *wall.end) for wall in reported_walls(seen)]).reshape(-1, 4)
+    bodies = [one for one in seen if one.ends is None]
+    world = world_of(bodies, walls, drive.settings.models, perception.polylines())
+    way = np.array([(firing.pose.x, firing.pose.y) for firing in drive.firings])
+    echoes = echoes_of(drive.firings, placed_ring(ring))
+    image = occupancy_image(world, echoes, ring, way, drive.settings.body.radius_m, surfaces_mapped=True)
+    pixels, corner = image.pixels[::-1], (image.x_m, image.y_m)
+    rows, columns = np.nonzero(pixels == OCCUPIED)
+    occupied = np.column_stack([columns + 0.5, rows + 0.5]) * RESOLUTION_M + corner
+    away = np.array([np.hypot(*(drive.points - place).T).min() for place in occupied])
+    at = np.floor((drive.points - corner) / RESOLUTION_M).astype(np.int64)
+    at = at[((at >= 0) & (at < pixels.shape[::-1])).all(axis=1)]
+    is_free = pixels[at[:, 1], at[:, 0]] == FREE
+    return {"image false": float((away > NEAR_M).mean()), "points in free": float(is_free.sum() / len(drive.points))}
+
+
+def score(drive: RealDrive, firings: Iterable[Firing]) -> Row:
+    """Return what is explained of a drive, and what is false, after its firings were perceived."""
+    perception = perceived(drive, firings)
     seen = (*perception.labelled_objects(), *perception.archived_objects())
     walls, lines = reported_walls(seen), reported_lines(perception)
     away = away_from(drive.echoes, walls, reported_corners(seen))
@@ -139,5 +169,6 @@ def measure(folders: Iterable[Path], roundings: int, report: Callable[[str], Non
             steps = tuple((1.0 + 0.1 * (k // len(ROUNDINGS))) * step for step in ROUNDINGS[k % len(ROUNDINGS)])
             others.append(score(drive, rounded(drive.firings, (steps[0], steps[1], steps[2])))["explained"])
         row["spread"] = max(others) - min(others)
+        row |= score_image(drive)
         rows[folder.name] = row
     return rows

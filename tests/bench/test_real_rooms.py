@@ -54,6 +54,7 @@ def test_a_drive_along_a_wall_is_explained(folder: Path) -> None:
     assert row["with outlines"] > 0.9
     assert row["false"] == row["drums"] == 0.0
     assert 0.0 <= row["spread"] < 0.2
+    assert row["image false"] == row["points in free"] == 0.0
 
 
 def test_rounded_numbers(folder: Path) -> None:

@@ -1,9 +1,10 @@
 """A finished run's map as an occupancy image with its YAML, as ROS's map_server reads and writes them.
 
-Occupied is what was recognised, and what the evidence grid holds for occupied. Free is where the robot has been, and
-what the grid holds for free where a line of sight has crossed it. All else is unknown. The grid enters all readings
-of the run once more: an echo that something recognised explains marks its contact only. Then they are entered again
-as lines of sight, which end at what is known by then: so no beam of the first minute passes a wall found later.
+Occupied is what was recognised, and what the evidence grid holds for occupied, unless all surfaces were mapped: what
+else it holds are strays then. Free is where the robot has been, and what the grid holds for free where a line of
+sight has crossed it, a cell away from anything occupied. All else is unknown. The grid enters all readings of the run
+once more: an echo that something recognised explains marks its contact only. Then they are entered again as lines of
+sight, which end at what is known by then: so no beam of the first minute passes a wall found later.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def yaml_beside(path: Path) -> Path:
 
 def occupancy_image(
     world: WorldConfig, echoes: Echoes, ring: RingConfig, way: Floats, body_radius_m: float,
-    method: str = GridConfig().method,
+    method: str = GridConfig().method, surfaces_mapped: bool = False,
 ) -> OccupancyImage:  # fmt: skip
     """Return the image of a run.
 
@@ -103,6 +104,8 @@ def occupancy_image(
         The robot's radius, m.
     method : str
         Of the evidence grid, as the settings name it; `directed` where they keep none.
+    surfaces_mapped : bool
+        Whether the world has everything that was heard, whatever its shape.
 
     Raises
     ------
@@ -121,12 +124,14 @@ def occupancy_image(
     window = run_evidence(world, echoes, ring, low, high, method)
     pixels = np.full((rows, columns), UNKNOWN, np.uint8)
     probability = _pixels_of(window, low, rows, columns)
-    pixels[probability <= FREE_MAX] = FREE
-    _enter_way(pixels, way - low, body_radius_m)
-    pixels[probability >= OCCUPIED_MIN] = OCCUPIED
+    stray, known = probability >= OCCUPIED_MIN, np.zeros((rows, columns), np.bool_)
     for outline in outlines:
         cells = np.floor((_dense(outline) - low) / RESOLUTION_M).astype(np.int64)
-        pixels[np.clip(cells[:, 1], 0, rows - 1), np.clip(cells[:, 0], 0, columns - 1)] = OCCUPIED
+        known[np.clip(cells[:, 1], 0, rows - 1), np.clip(cells[:, 0], 0, columns - 1)] = True
+    # A surface lies within a cell of where the grid holds it.
+    pixels[(probability <= FREE_MAX) & ~_within(known | stray, CELL_M)] = FREE
+    _enter_way(pixels, way - low, body_radius_m)
+    pixels[known if surfaces_mapped else known | stray] = OCCUPIED
     return OccupancyImage(np.ascontiguousarray(pixels[::-1]), float(low[0]), float(low[1]))
 
 
@@ -232,6 +237,17 @@ def _dense(chain: Floats) -> Floats:
     return np.concatenate(
         [np.linspace(a, b, 2 + int(steps * np.hypot(*(b - a)))) for a, b in itertools.pairwise(chain)]
     )
+
+
+def _within(marked: NDArray[np.bool_], distance_m: float) -> NDArray[np.bool_]:
+    """Return which pixels are this near to a marked one."""
+    reach = round(distance_m / RESOLUTION_M)
+    rows, columns = marked.shape
+    wide, found = np.pad(marked, reach), np.zeros_like(marked)
+    for i, j in itertools.product(range(-reach, reach + 1), repeat=2):
+        if i * i + j * j <= reach * reach:
+            found |= wide[reach + i : reach + i + rows, reach + j : reach + j + columns]
+    return found
 
 
 def _enter_way(pixels: NDArray[np.uint8], way: Floats, radius_m: float) -> None:

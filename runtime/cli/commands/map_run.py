@@ -116,7 +116,8 @@ def map_run(
             way = scans if view is None else view.way
             with progress(console, "drawing the map"):
                 method, radius_m = settings.perception.grid.method, settings.body.radius_m
-                image = occupancy_image(world, echoes, settings.ring, way, radius_m, method)
+                mapped = len(polylines) > 0
+                image = occupancy_image(world, echoes, settings.ring, way, radius_m, method, mapped)
         except ValueError as error:
             raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
         with writing("--grid", grid):

@@ -12,6 +12,7 @@ import pytest
 from config.robot import FiringConfig, RingConfig, SensorConfig
 from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from runtime.analysis.export.occupancy_image import (
+    CELL_M,
     FREE,
     OCCUPIED,
     RESOLUTION_M,
@@ -57,6 +58,21 @@ def test_free_is_what_sound_has_passed_and_where_the_robot_stood_and_occupied_wh
     assert [value_at(image, x, 0.02) for x in (1.5, 2.5, 3.03, 3.3)] == [FREE, FREE, OCCUPIED, UNKNOWN]
     assert [value_at(image, 2.5, y) for y in (0.2, 0.6)] == [FREE, UNKNOWN]
     assert (value_at(image, -0.15, 0.0), value_at(image, -0.3, 0.0)) == (FREE, UNKNOWN)
+
+
+def test_where_all_surfaces_were_mapped_other_echoes_are_strays() -> None:
+    """The grid's cell is not free for that, nor are those beside it."""
+    wall = WorldConfig(wall=(WallConfig(x1_m=-1.0, y1_m=1.0, x2_m=4.0, y2_m=1.0),))
+    image = occupancy_image(wall, driving(3.03), RING, WAY, BODY_M, surfaces_mapped=True)
+    assert [value_at(image, x, 0.02) for x in (2.5, 2.93, 3.03, 3.13)] == [FREE, UNKNOWN, UNKNOWN, UNKNOWN]
+    assert value_at(image, 2.0, 1.0) == OCCUPIED
+
+
+def test_no_pixel_is_free_within_a_cell_of_an_occupied_one() -> None:
+    image = occupancy_image(WorldConfig(), driving(3.03), RING, WAY, BODY_M)
+    occupied, free = (np.argwhere(image.pixels == value) for value in (OCCUPIED, FREE))
+    apart = np.hypot(*(occupied[:, None] - free[None]).transpose(2, 0, 1)).min()
+    assert apart * RESOLUTION_M > CELL_M
 
 
 def test_an_echo_that_something_recognised_explains_marks_its_contact_only() -> None:
