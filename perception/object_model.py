@@ -11,7 +11,7 @@ import numpy as np
 from config.model import ModelConfig
 from perception.kernel import Floats
 
-STRAIGHT_M: Final = 1e-9
+BULGE_MIN_M: Final = 1e-9
 """An open outline that bulges by less is a straight line, m; covers rounding only."""
 
 
@@ -50,7 +50,7 @@ class ObjectModel:
         bulge = centroid - 0.5 * (vertices[0] + vertices[-1])
         facing = None
         if not config.closed:
-            straight = math.hypot(*bulge) < STRAIGHT_M
+            straight = math.hypot(*bulge) < BULGE_MIN_M
             across = math.atan2(along[0, 1], along[0, 0]) + 0.5 * math.pi
             facing = across if straight else math.atan2(bulge[1], bulge[0])
         return cls(config.name, np.ascontiguousarray(sides), (float(centroid[0]), float(centroid[1])), facing)

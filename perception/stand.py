@@ -19,10 +19,10 @@ from perception.echo_kind import EchoKind, echo_kind
 from perception.kernel import Floats
 from perception.sensor_mounts import mounts_array, mounts_at
 
-STILL_M: Final = 2e-3
+STAND_STILL_M: Final = 2e-3
 STILL_RAD: Final = math.radians(0.2)
 """A robot whose odometry differs by less stands."""
-GATE_M: Final = 0.06
+HALF_PATH_GATE_M: Final = 0.06
 """Half paths that differ by more from those over the surface's nearest point are of another surface. A wall's differ
 by 4 cm at the shortest range and the longest baseline."""
 NEAR_RAD: Final = math.radians(24.0)
@@ -95,7 +95,7 @@ def last_round(stand: Sequence[Firing]) -> Sequence[Firing]:
 
 def _is_still(one: Firing, other: Firing) -> bool:
     turned = max(abs(one.ring_yaw - other.ring_yaw), abs(one.pose.theta - other.pose.theta))
-    return math.dist((one.pose.x, one.pose.y), (other.pose.x, other.pose.y)) < STILL_M and turned < STILL_RAD
+    return math.dist((one.pose.x, one.pose.y), (other.pose.x, other.pose.y)) < STAND_STILL_M and turned < STILL_RAD
 
 
 def surfaces_of_stand(ring: RingConfig, firings: Sequence[Firing]) -> tuple[StandSurface, ...]:
@@ -156,7 +156,7 @@ def _steady(readings: Floats) -> tuple[Floats, float]:
     often = np.bincount(path)[path] >= REPEATS_MIN if len(readings) else np.zeros(0, dtype=np.bool_)
     # 1.4826: a normal distribution's standard deviation, in medians of the distance from its middle.
     noise_m = max(UNKNOWN_NOISE_M, 1.4826 * float(np.median(off[often]))) if often.any() else UNKNOWN_NOISE_M
-    return readings[off <= max(5.0 * noise_m, 0.5 * GATE_M)], noise_m
+    return readings[off <= max(5.0 * noise_m, 0.5 * HALF_PATH_GATE_M)], noise_m
 
 
 def _on_surface(
@@ -168,4 +168,4 @@ def _on_surface(
     way = [np.hypot(*(mounts[at, :2] - point).T) for at in (transmitters, listeners)]
     off = np.abs(np.angle(np.exp(1j * (mounts[transmitters, 2] - bearing))))
     beside = np.abs(0.5 * (way[0] + way[1]) - readings[:, 2])
-    return np.asarray((beside <= GATE_M + resolution_m) & (off <= NEAR_RAD))
+    return np.asarray((beside <= HALF_PATH_GATE_M + resolution_m) & (off <= NEAR_RAD))

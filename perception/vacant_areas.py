@@ -20,7 +20,9 @@ AREAS_MAX: Final = 64
 RADIUS_MIN_M: Final = 0.3
 """Least radius of an area around a rejected object: another fit of the same readings lies a decimetre beside it."""
 RADIUS_MAX_M: Final = 10.0
+"""Largest radius of a vacant area, m."""
 NO_OBJECT: Final = 0
+"""In place of the number of the object for which an area was marked."""
 NO_ROOM: Final = f"{AREAS_MAX} areas are marked as vacant, the most there is room for: lift one first"
 
 AREA: Final = np.dtype(

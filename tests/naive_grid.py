@@ -65,7 +65,7 @@ class NaiveGrid:
             weight = (
                 d.PASSED * (1.0 - d.MIRRORS_PASSED * mirrors)
                 if is_echo
-                else d.SILENT * (1.0 - d.MIRRORS_SILENT * mirrors)
+                else d.SILENT_NAT * (1.0 - d.MIRRORS_SILENT * mirrors)
             )
             weight_both = d.UNDIRECTED_PASSED if is_echo else d.UNDIRECTED_SILENT
             for cell, away, inside, k in self.beam(sensor, limit):
@@ -82,9 +82,12 @@ class NaiveGrid:
         """Enter an echo's arc, or its contact where its bearing is known."""
         sigma = self.sigma(r)
         beam = self.beam(sensor, r + d.UNDIRECTED_ARC_SIGMAS * sigma)
-        units = ((d.UNIT + d.MIRRORS_UNIT * mirrors, d.ARC_SIGMAS), (d.UNDIRECTED_UNIT, d.UNDIRECTED_ARC_SIGMAS))
+        units = (
+            (d.DIRECTED_UNIT + d.MIRRORS_UNIT * mirrors, d.DIRECTED_ARC_SIGMAS),
+            (d.UNDIRECTED_UNIT, d.UNDIRECTED_ARC_SIGMAS),
+        )
         for unit, sigmas in units:
-            is_directed = sigmas == d.ARC_SIGMAS
+            is_directed = sigmas == d.DIRECTED_ARC_SIGMAS
             arc = [
                 (cell, k if is_directed else UNDIRECTED, inside * math.exp(-0.5 * ((away - r) / sigma) ** 2))
                 for cell, away, inside, k in beam

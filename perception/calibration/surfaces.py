@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats
 
-DIRECTIONS: Final = 360
+NORMAL_DIRECTIONS: Final = 360
 """Directions of normals in which walls are looked for."""
 BIN_M: Final = 0.05
 """Width of the bins in which readings vote, m: what wrong mounts and scales displace them by at first."""
@@ -128,7 +128,7 @@ def most_voted_wall(beams: Beams, ranges: Floats, half_angle: float) -> tuple[in
         As for `find_surfaces`.
     """
     best, wall = 0, (0.0, 0.0)
-    for angle in np.linspace(-math.pi, math.pi, DIRECTIONS, endpoint=False):
+    for angle in np.linspace(-math.pi, math.pi, NORMAL_DIRECTIONS, endpoint=False):
         turned = np.remainder(angle - beams.axis + math.pi, 2.0 * math.pi) - math.pi
         inside = np.abs(turned) < half_angle
         offset = np.cos(angle) * beams.x[inside] + np.sin(angle) * beams.y[inside] + ranges[inside]

@@ -42,11 +42,11 @@ BRIDGES_MAX: Final = 24
 ENDS_M: Final = 0.1
 """Posts of a gap are known within half of this each: a gap is closed if it is narrower than what the robot passes by
 this. Otherwise two drums reported at the corners of an open end are a back."""
-POST_RADIUS_M: Final = 0.1
+SHAPELESS_RADIUS_M: Final = 0.1
 """Radius of what has a place but no known shape …"""
 POINTS: Final = ("edge", "inside corner")
 """… but for these, which are points of walls: both posts of a doorway leave all its width."""
-STEP_RAD: Final = math.radians(5.0)
+DIRECTION_STEP_RAD: Final = math.radians(5.0)
 NUDGE_RAD: Final = 1e-4
 """Directions just beside the end of a surface, so that no opening is missed between two directions."""
 CLEAR_M: Final = 0.3
@@ -97,7 +97,7 @@ def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], se
         if one.ends is not None:
             walls.append((*one.ends, weight))
         elif len(rounds) < SURFACES_MAX:
-            radius = 0.0 if one.model in POINTS else radii_m.get(one.model, POST_RADIUS_M)
+            radius = 0.0 if one.model in POINTS else radii_m.get(one.model, SHAPELESS_RADIUS_M)
             rounds.append((one.x, one.y, radius, weight))
     pieces = np.array(walls[:SURFACES_MAX]).reshape(-1, 5)
     circles = np.array(rounds).reshape(-1, 4)
@@ -125,7 +125,9 @@ def _bridges(pieces: Floats, circles: Floats, sealed_m: float) -> Floats:
         feet = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
         gaps = np.hypot(*np.moveaxis(feet - ends[:, None], 2, 0)) - radii[:, None]
         gaps[owner[:, None] == np.arange(len(pieces))] = math.inf
-        touching = np.where((owner < 0) & (radii == 0.0), POST_RADIUS_M, 0.0)  # the end of a wall is a point of it
+        touching = np.where(
+            (owner < 0) & (radii == 0.0), SHAPELESS_RADIUS_M, 0.0
+        )  # the end of a wall is a point of it
         near = np.argwhere((gaps > touching[:, None]) & (gaps < sealed_m))
         found += [(gaps[i, k], *ends[i], *feet[i, k]) for i, k in near]
     apart = np.hypot(*np.moveaxis(circles[:, None, :2] - circles[:, :2], 2, 0)) - circles[:, None, 2] - circles[:, 2]
@@ -216,7 +218,7 @@ def _seen_from(x: float, y: float, surfaces: Surfaces) -> tuple[Floats, Floats, 
     distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     half, middle = np.arcsin(np.minimum(circles[:, 2] / distance, 1.0)), np.arctan2(away[:, 1], away[:, 0])
     edges = np.concatenate([corners, middle - half, middle + half])
-    angles = np.concatenate([np.arange(-math.pi, math.pi, STEP_RAD), edges - NUDGE_RAD, edges + NUDGE_RAD])
+    angles = np.concatenate([np.arange(-math.pi, math.pi, DIRECTION_STEP_RAD), edges - NUDGE_RAD, edges + NUDGE_RAD])
     angles = np.sort(np.remainder(angles + math.pi, 2.0 * math.pi) - math.pi)
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
     ax, ay = pieces[:, 0] - x, pieces[:, 1] - y

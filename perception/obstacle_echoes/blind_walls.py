@@ -24,11 +24,11 @@ from perception.kernel import Floats, kernel
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import mounts_at
 
-DIRECTIONS: Final = 36
+TURN_DIRECTIONS: Final = 36
 """Directions of a turn that are distinguished: a wall's normal is known to about the width of a beam."""
-WIDTH_RAD: Final = math.tau / DIRECTIONS
+WIDTH_RAD: Final = math.tau / TURN_DIRECTIONS
 ROUNDING_RAD: Final = 1e-9
-SAME_M: Final = 0.15
+WALL_ECHO_M: Final = 0.15
 """A range this near to that of the wall is its echo: half a direction's width on a way of 1.7 m."""
 HIT_NAT: Final = math.log(0.92 / 0.03)
 MISS_NAT: Final = math.log(0.08 / 0.97)
@@ -74,7 +74,7 @@ def enter_looks(
         Place (m) and direction (rad) of the ring; the robot's heading, rad.
     half_angle : float
         Half the width of a beam, rad.
-    walls : (`DIRECTIONS`,) records
+    walls : (`TURN_DIRECTIONS`,) records
         What is remembered. Updated.
     """
     c, s = math.cos(yaw), math.sin(yaw)
@@ -93,7 +93,7 @@ def enter_looks(
                 one.odds = 0.0
             along = own_x * math.cos(k * WIDTH_RAD) + own_y * math.sin(k * WIDTH_RAD)
             away = one.offset - along
-            if one.odds > 0.0 and abs(r - away) <= SAME_M:
+            if one.odds > 0.0 and abs(r - away) <= WALL_ECHO_M:
                 one.odds = min(SURE_NAT, one.odds + HIT_NAT)
                 one.offset += 0.5 * (r - away)
             elif math.isfinite(r) and (one.odds <= 0.0 or r < away):  # what is nearer hides the wall
@@ -135,7 +135,7 @@ class BlindWalls:
 
     def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
         self._mounts, self._turning, self._half_angle = mounts, turning, half_angle
-        self._walls = zeros(BlindWall, DIRECTIONS)
+        self._walls = zeros(BlindWall, TURN_DIRECTIONS)
         self.records = records(BlindWall, self._walls)
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
 
@@ -164,7 +164,7 @@ class BlindWalls:
         (u,) float
             The directions of which nothing is known, in the odometry's frame, rad.
         """
-        directions = WIDTH_RAD * np.arange(DIRECTIONS)
+        directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         off = np.abs(np.remainder(directions[:, None] - axes_rad + math.pi, math.tau) - math.pi)
         nearest = off.min(axis=1)
         nearest[np.cos(directions - pose.theta) <= 0.0] = 0.0

@@ -39,7 +39,7 @@ from perception.obstacle_echoes.unheard_echoes import (
 from perception.records import Records
 from perception.sensor_mounts import mounts_at
 
-LOOKS: Final = 16
+LOOKS_REMEMBERED: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
 SAME_MAX: Final = 4
 """Looks of a sensor in one direction that are kept: the newest ones, which close gaps although a reading of either
@@ -254,11 +254,11 @@ class FreshEchoes:
         self._mounts, self._turning = mounts, turning
         self._heard_reach_m = reach_m - TOLERANCE_M
         self._half_angle = half_angle
-        self._points = np.zeros((len(mounts), LOOKS, 2))
-        self._bearings = np.zeros((len(mounts), LOOKS))
-        self._times = np.full((len(mounts), LOOKS), -math.inf)
-        self._heard = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
-        self._steady = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
+        self._points = np.zeros((len(mounts), LOOKS_REMEMBERED, 2))
+        self._bearings = np.zeros((len(mounts), LOOKS_REMEMBERED))
+        self._times = np.full((len(mounts), LOOKS_REMEMBERED), -math.inf)
+        self._heard = np.zeros((len(mounts), LOOKS_REMEMBERED), dtype=np.bool_)
+        self._steady = np.zeros((len(mounts), LOOKS_REMEMBERED), dtype=np.bool_)
         self._agreed = np.zeros(len(mounts), dtype=np.bool_)
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.unheard = UnheardEchoes(mounts)

@@ -25,7 +25,7 @@ from perception.bounds import COUNT, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Record, Records, records, zeros
 
-NEARER_M: Final = 1e-3
+COME_NEARER_M: Final = 1e-3
 """A robot that has come nearer by this since a sensor looked last has moved, m."""
 SPREAD_M: Final = 0.3
 """An echo that is nearer by less than this comes from the same place, m; as `fresh_echoes.STEADY_M`."""
@@ -37,7 +37,7 @@ SILENT_ROUNDS: Final = 4
 SUDDEN_MIN: Final = 3
 """So many sensors do not lose their echoes between two echoes of the whole ring, unless it has failed."""
 
-NONE, LEFT, KEPT, ALONE = range(4)
+NOT_KEPT, LEFT, KEPT, ALONE = range(4)
 """Of a sensor's echo: none is kept; one was lost that was random or before which the robot stood, and the ring has
 heard nothing new since; one is kept; and one is kept and the ring has heard nothing new since."""
 SILENT, UNCHANGED = range(2)
@@ -53,7 +53,7 @@ class UnheardEcho(Record):
     range_m: Place
     """… and what it heard then, m; below zero for nothing."""
     state: Annotated[int, index_of(4)]
-    """`NONE`, `LEFT`, `KEPT` or `ALONE`."""
+    """`NOT_KEPT`, `LEFT`, `KEPT` or `ALONE`."""
     x: Place
     """Place of the echo, m."""
     y: Place
@@ -77,7 +77,7 @@ def lose_echo(c: UnheardEcho, px: float, py: float, is_steady: bool, x: float, y
         Place of the ring, m.
     """
     now = math.hypot(px - x, py - y)
-    state = ALONE if is_steady and now < math.hypot(px - c.ring_x, py - c.ring_y) - NEARER_M else LEFT
+    state = ALONE if is_steady and now < math.hypot(px - c.ring_x, py - c.ring_y) - COME_NEARER_M else LEFT
     if c.state < KEPT or (state == ALONE and now < math.hypot(c.x - x, c.y - y)):
         c.state, c.x, c.y, c.lost_m = state, px, py, now
 
@@ -112,13 +112,13 @@ def contradict_echoes(
         one = echoes[i]
         if not math.isnan(ranges[i]):
             r = ranges[i] if ranges[i] < reach else -1.0
-            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) > NEARER_M
+            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) > COME_NEARER_M
             silences[SILENT] += 1
             silences[UNCHANGED] += 1
             hears = hears or r >= 0.0
             is_new = is_new or (r >= 0.0 and (r != one.range_m or not has_moved))
             one.ring_x, one.ring_y, one.range_m = x, y, r
-        kept += one.state != NONE
+        kept += one.state != NOT_KEPT
     if hears:
         silences[SILENT] = 0
     if is_new:
@@ -127,18 +127,18 @@ def contradict_echoes(
         return
     for k in range(ranges.shape[0]):
         one = echoes[k]
-        if one.state == NONE:
+        if one.state == NOT_KEPT:
             continue
         away = math.hypot(one.x - x, one.y - y)
         if away < radius:
-            one.state = NONE
+            one.state = NOT_KEPT
             continue
         if not is_new:  # nor has it had the chance to hear the echo again
             continue
         if away > one.lost_m + AWAY_M:
-            one.state = NONE
+            one.state = NOT_KEPT
             continue
-        one.state = KEPT if one.state >= KEPT else NONE
+        one.state = KEPT if one.state >= KEPT else NOT_KEPT
         for i in range(ranges.shape[0]):
             r = ranges[i]
             if not (r < reach and agreed[i]):
@@ -148,7 +148,7 @@ def contradict_echoes(
             dx, dy = one.x - own_x, one.y - own_y
             ahead, across = dx * math.cos(axis) + dy * math.sin(axis), abs(dy * math.cos(axis) - dx * math.sin(axis))
             if 0.0 < ahead < r + SPREAD_M and across < ahead * math.tan(core):
-                one.state = NONE
+                one.state = NOT_KEPT
                 break
 
 
@@ -258,4 +258,4 @@ class UnheardEchoes:
 
     def clear(self) -> None:
         """Forget all echoes."""
-        self._echoes["state"] = NONE
+        self._echoes["state"] = NOT_KEPT

@@ -29,7 +29,7 @@ NOISE_M: Final = 0.02
 """Noise of a range that is no share of it, m."""
 ROUND_M: Final = 0.5
 """A sensor that moved farther since its reading before is not compared, m."""
-SAME_M: Final = 1e-3
+WINDOW_MIN_M: Final = 1e-3
 """A window of ranges is at least as wide, m."""
 SAME_RAD: Final = 1e-6
 """Directions that differ by less are the same, rad."""
@@ -215,7 +215,7 @@ def weigh_length(
     for i in range(len(echoes)):
         one = expected[i]
         if i != k and one.source >= 0 and one.high >= 0.0:
-            low, high = max(0.0, one.low + longer), max(0.0, one.high + longer) + SAME_M
+            low, high = max(0.0, one.low + longer), max(0.0, one.high + longer) + WINDOW_MIN_M
             evidence += math.log(density(echoes[i].latest.range_m, low, high, reach, missed)) - one.honest_nat
     return evidence
 

@@ -8,7 +8,7 @@ from perception.bounds import FINITE, PLACE, POSITIVE, Count, Flag, Place
 from perception.kernel import Floats
 from perception.records import Record
 
-SILENCE_M: Final = -1.0
+NO_ECHO_M: Final = -1.0
 """In place of the range of a reading without an echo, m."""
 HALVES: Final = 2
 """Parts of the ring that may fail by themselves: all of it, and what looks ahead."""
@@ -22,7 +22,7 @@ class SensorPlace(Record):
     """Where a sensor was at a reading, in the odometry's frame."""
 
     range_m: Annotated[float, PLACE]
-    """The reading, m; `SILENCE_M` without an echo."""
+    """The reading, m; `NO_ECHO_M` without an echo."""
     x: Place
     """Place of the sensor, m."""
     y: Place

@@ -14,7 +14,7 @@ from perception.angles import wrapped
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.ring_faults.changes import NO_CHANGE, NOISE_M, Expected, weigh_changes
-from perception.ring_faults.memory import HALVES, LOOK_KINDS, QUARTERS, SILENCE_M, EchoTrace, RingTrace
+from perception.ring_faults.memory import HALVES, LOOK_KINDS, NO_ECHO_M, QUARTERS, EchoTrace, RingTrace
 from perception.ring_faults.repeats import (
     STEP_MIN_M,
     is_parallel_wall,
@@ -33,7 +33,7 @@ CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """The same for changes from one round of the firing pattern to the next, of which a day has some 3·10⁵, nat."""
 REPLAY_NAT: Final = EVIDENCE_NAT + math.log(PAST_LOOKS)
 """The same for a replay, of which each lag is tested, nat."""
-LEAP_M: Final = 0.25
+RESTART_M: Final = 0.25
 """The memory starts again where the ring has moved farther than this between two firings, m."""
 AHEAD_COS: Final = math.cos(math.radians(100.0))
 """Sensors within 100° of the direction of travel look ahead: what the robot may drive into, and both its sides."""
@@ -46,16 +46,16 @@ MOVES: Final = 1.2
 """A reading changes by no more than this times the sensor's motion; rough walls that the beam grazes change more."""
 MISSED: Final = 0.9
 """Share of looks that miss a known echo, if readings do not depend on what is there."""
-MISS_MIN: Final = 0.04
-MISS_MAX: Final = 0.6
+HONEST_MISS_MIN: Final = 0.04
+HONEST_MISS_MAX: Final = 0.6
 """An honest ring misses no less and no more of its known echoes than this: all surfaces end, and some are heard."""
 TURNING_SHARE: Final = 0.25
 """A sensor that has turned by more than this share of half its beam looks elsewhere: mirrors leave the beam."""
 STEADY, TURNING, AGAIN, DOUBTED = range(LOOK_KINDS)
 """Kinds of looks: at an echo that agreed with the one before, from the same direction or another; the second look at
 one that was missed; and at one that agreed with nothing. After that, silence is as honest: it was a stray."""
-PRIOR_MISSES: Final = (2.0, 8.0, 8.0, 10.0)
-PRIOR_LOOKS: Final = 20.0
+HONEST_MISSES: Final = (2.0, 8.0, 8.0, 10.0)
+HONEST_LOOKS: Final = 20.0
 """Misses of each kind, and looks, that stand for what is known of rings before a run."""
 MEMORY_LOOKS: Final = 500.0
 """Looks over which the rates of misses are learned; older ones count half."""
@@ -78,8 +78,8 @@ CHANGED: Final = TURNED + QUARTERS - 1
 @kernel
 def honest_share(all_of: RingTrace, kind: int) -> float:
     """Return the share of an honest ring's looks of a kind that miss a known echo, as learned so far."""
-    share: float = (all_of.misses[kind] + PRIOR_MISSES[kind]) / (all_of.looks[kind] + PRIOR_LOOKS)
-    return min(max(share, MISS_MIN), MISS_MAX)
+    share: float = (all_of.misses[kind] + HONEST_MISSES[kind]) / (all_of.looks[kind] + HONEST_LOOKS)
+    return min(max(share, HONEST_MISS_MIN), HONEST_MISS_MAX)
 
 
 @kernel
@@ -96,7 +96,7 @@ def weigh_look(
     c : record
         What is remembered of the sensor. Updated.
     r : float
-        Its reading, m; `SILENCE_M` without an echo.
+        Its reading, m; `NO_ECHO_M` without an echo.
     x, y, axis : float
         Its place (m) and the direction of its axis (rad).
     is_ahead : bool
@@ -119,7 +119,7 @@ def weigh_look(
             kind = AGAIN if c.silences > 0 else TURNING if turned > TURNING_SHARE * half_angle else STEADY
         honest = honest_share(all_of, kind)
         if kind == TURNING:
-            honest = min(max(honest, 0.25 * turned / half_angle), MISS_MAX)
+            honest = min(max(honest, 0.25 * turned / half_angle), HONEST_MISS_MAX)
         evidence = math.log((1.0 - MISSED) / (1.0 - honest)) if agrees else math.log(MISSED / honest)
         for part in range(HALVES):
             if part == 0 or is_ahead:
@@ -257,14 +257,14 @@ def check_motion(
         return NOTHING
     all_of = ring[0]
     moved = math.hypot(x - all_of.x, y - all_of.y)
-    if not all_of.is_started or moved > LEAP_M:
+    if not all_of.is_started or moved > RESTART_M:
         all_of.is_started = 1
         begin_evidence(all_of)
         replayed_nat[:] = 0.0
         looks[:] = 0
         for i in range(len(echoes)):
             echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
-            echoes[i].heard.range_m = echoes[i].agreed_m = SILENCE_M
+            echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
     elif moved > 0.0:
         all_of.travel_rad = math.atan2(y - all_of.y, x - all_of.x)
         all_of.path_m += moved
@@ -274,7 +274,7 @@ def check_motion(
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
             continue
-        r = ranges[i] if ranges[i] < reach - tolerance else SILENCE_M
+        r = ranges[i] if ranges[i] < reach - tolerance else NO_ECHO_M
         own_x = x + c * mounts[i, 0] - s * mounts[i, 1]
         own_y = y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
@@ -285,7 +285,7 @@ def check_motion(
         mark(then, r, x, y, axis, all_of.path_m)
         learn_noise(echoes[i], r, x, y, axis, tolerance, all_of)
         weigh_repeat(i, r, own_x, own_y, axis, yaw, is_ahead, mounts, half_angle, tolerance, reach, echoes, ring)
-        heard_before = echoes[i].before.range_m if echoes[i].is_compared else SILENCE_M
+        heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_ECHO_M
         nats = weigh_replay(i, r, heard_before, own_x, own_y, axis, half_angle, tolerance, past, looks, replayed_nat)
         replayed = max(replayed, nats)
         weigh_look(echoes[i], r, own_x, own_y, axis, is_ahead, half_angle, tolerance, reach, all_of)

@@ -19,8 +19,8 @@ RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 """Of a range; infinite where nothing was heard, or nothing is known yet."""
 
 
-LOOKS: Final = 16
-"""Looks of each sensor that are kept, `silence.APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
+LOOKS_KEPT: Final = 16
+"""Looks of each sensor that are kept, `silence.LOOKS_APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
 
 
 class NeighbourCounts(Record):
@@ -87,8 +87,8 @@ class SensorMemory(Record):
     """For each set, short readings less those that were not."""
     is_crossed: Annotated[Ints, SETS_MAX, FLAG]
     """For each set, 1 where the sensor is masked for crosstalk."""
-    looks: Annotated[Records[SensorLook], LOOKS]
-    """The last looks, of the number n in place n % LOOKS."""
+    looks: Annotated[Records[SensorLook], LOOKS_KEPT]
+    """The last looks, of the number n in place n % LOOKS_KEPT."""
     looks_made: Count
     """Number of the next look."""
     heard_looks: Count

@@ -18,20 +18,20 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import kernel
 from perception.records import Records
-from perception.sensor_faults.memory import LOOKS, RingMemory, SensorLook, SensorMemory
+from perception.sensor_faults.memory import LOOKS_KEPT, RingMemory, SensorLook, SensorMemory
 
 DEAF_NAT: Final = math.log(1e8)
 """Evidence that names a sensor, nat: a day has some 10⁵ such looks of each of two dozen sensors."""
-PRIOR_MISSES: Final = 3.0
-PRIOR_LOOKS: Final = 10.0
+HEALTHY_MISSES: Final = 3.0
+HEALTHY_LOOKS: Final = 10.0
 """Looks, and misses among them, that stand for what is known of healthy sensors before a run."""
-MISS_MIN: Final = 0.2
+HEALTHY_MISS_MIN: Final = 0.2
 """A healthy sensor misses no less than this: the looks at one object are alike."""
-APART_M: Final = 0.1
+LOOKS_APART_M: Final = 0.1
 """A look that is nearer than this to the one before, and turned by less than a quarter of the beam, is not kept."""
 AGAIN_M: Final = 0.3
 """Looks that count are this far apart, or turned by a whole beam, as others are alike."""
-SAME_M: Final = 0.3
+SAME_ECHO_M: Final = 0.3
 """Echoes that differ by less than this come from the same place, m."""
 BESIDE_RAD: Final = math.radians(60.0)
 """Only echoes whose axes differ by less than this from that of a look are compared with it."""
@@ -62,7 +62,7 @@ def was_audible(i: int, look: SensorLook, half_angle: float, near: float, sensor
         for k in range(len(sensors)):
             if k == i:
                 continue
-            for j in range(LOOKS):
+            for j in range(LOOKS_KEPT):
                 other = sensors[k].looks[j]
                 if not other.range_m > 0.0:
                     continue
@@ -77,7 +77,7 @@ def was_audible(i: int, look: SensorLook, half_angle: float, near: float, sensor
                 if turn == 0:
                     if abs(turned) < nearest:
                         place, nearest = ahead, abs(turned)
-                elif abs(ahead - place) < SAME_M:
+                elif abs(ahead - place) < SAME_ECHO_M:
                     is_left = is_left or turned > -0.25 * half_angle
                     is_right = is_right or turned < 0.25 * half_angle
         if turn == 0 and place < 0.0:
@@ -94,7 +94,7 @@ def weigh_silence(
 ) -> bool:  # fmt: skip
     """Take a reading of a sensor, and return whether its silence shows that it is deaf.
 
-    A look is judged after half of `LOOKS` later ones: others have heard what is there before it, or since.
+    A look is judged after half of `LOOKS_KEPT` later ones: others have heard what is there before it, or since.
 
     Parameters
     ----------
@@ -113,14 +113,14 @@ def weigh_silence(
     hears = math.isfinite(r)
     if hears:
         c.deaf_looks, c.heard_looks = 0, c.looks_made
-    last = c.looks[(c.looks_made - 1) % LOOKS]
-    is_new = math.hypot(x - last.x, y - last.y) >= APART_M or abs(wrapped(axis - last.axis)) >= 0.5 * half_angle
+    last = c.looks[(c.looks_made - 1) % LOOKS_KEPT]
+    is_new = math.hypot(x - last.x, y - last.y) >= LOOKS_APART_M or abs(wrapped(axis - last.axis)) >= 0.5 * half_angle
     if c.looks_made > 0 and not is_new:
         if hears and last.range_m < 0.0:
             last.range_m = r
         return c.deaf_looks * math.log(1.0 / miss_share(c, all_of)) >= DEAF_NAT
-    judged = c.looks_made - LOOKS // 2
-    past = c.looks[judged % LOOKS]
+    judged = c.looks_made - LOOKS_KEPT // 2
+    past = c.looks[judged % LOOKS_KEPT]
     if judged >= 0 and was_audible(i, past, half_angle, near, sensors):
         missed = past.range_m < 0.0
         c.audible += 1
@@ -135,7 +135,7 @@ def weigh_silence(
         ):
             c.deaf_looks += 1
             c.deaf_x, c.deaf_y, c.deaf_axis = past.x, past.y, past.axis
-    new = c.looks[c.looks_made % LOOKS]
+    new = c.looks[c.looks_made % LOOKS_KEPT]
     new.x, new.y, new.axis = x, y, axis
     new.range_m = r if hears else -1.0
     c.looks_made += 1
@@ -146,4 +146,4 @@ def weigh_silence(
 def miss_share(c: SensorMemory, all_of: RingMemory) -> float:
     """Return the share of such looks that healthy sensors miss, by those of the others than `c`."""
     looks, misses = all_of.audible - c.audible, all_of.misses - c.misses
-    return min(0.99, max(MISS_MIN, (misses + PRIOR_MISSES) / (looks + PRIOR_LOOKS)))
+    return min(0.99, max(HEALTHY_MISS_MIN, (misses + HEALTHY_MISSES) / (looks + HEALTHY_LOOKS)))

@@ -21,7 +21,6 @@ IN_PLACE_M: Final = 0.1
 """A ring that moves farther no longer turns in place, m."""
 ELSEWHERE_M: Final = 0.3
 """Readings that differ by more are not of one surface around the place, m: three times `IN_PLACE_M`."""
-FULL_TURN_RAD: Final = 2.0 * math.pi
 
 
 @kernel
@@ -37,7 +36,7 @@ def follow_turn(x: float, y: float, yaw: float, ring: Records[RingMemory]) -> No
     """
     c = ring[0]
     is_elsewhere = math.hypot(x - c.turn_x, y - c.turn_y) > IN_PLACE_M
-    if c.firings <= 1 or is_elsewhere or abs(c.turned) >= 2.0 * FULL_TURN_RAD:
+    if c.firings <= 1 or is_elsewhere or abs(c.turned) >= 2.0 * math.tau:
         c.turn_x, c.turn_y, c.turned, c.turn_firing = x, y, 0.0, c.firings
     else:
         c.turned += wrapped(yaw - c.turn_yaw)
@@ -57,7 +56,7 @@ def repeats_through_turn(i: int, r: float, sensors: Records[SensorMemory], ring:
     sensors, ring
         What is remembered of each sensor, and of the ring.
     """
-    if abs(ring[0].turned) < FULL_TURN_RAD or sensors[i].run_firing > ring[0].turn_firing:
+    if abs(ring[0].turned) < math.tau or sensors[i].run_firing > ring[0].turn_firing:
         return False
     elsewhere = 0
     others = 0

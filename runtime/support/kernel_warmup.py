@@ -172,9 +172,9 @@ def _look_for_points(memory: Memory, constants: SettingsRecord) -> None:
     """Look for corners and edges on the line of a wall, as where mirrors are known."""
     import numpy as np
 
-    from perception.bayes.walls.points import CELLS, count_cuts, enter_point_of_line
+    from perception.bayes.walls.points import LINE_CELLS, count_cuts, enter_point_of_line
 
-    count_cuts(memory.s, constants, 0, np.zeros((2, CELLS)))
+    count_cuts(memory.s, constants, 0, np.zeros((2, LINE_CELLS)))
     enter_point_of_line(memory.s, constants, 0, 0.0, False)  # noqa: FBT003 - a kernel takes no keywords
 
 

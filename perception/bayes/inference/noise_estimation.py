@@ -9,7 +9,6 @@ residuals alone a false object could raise the noise until it fits.
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.inference.range_fit import FAR
@@ -30,8 +29,6 @@ from perception.bayes.memory.settings_record import NOISES, Settings
 from perception.bayes.memory.state import ESTABLISHED, CircleTrack, State
 from perception.kernel import Floats, kernel
 from perception.records import Records
-
-TWO_PI: Final = 2.0 * math.pi
 
 
 @kernel
@@ -80,7 +77,7 @@ def add_roughness(
         var = (
             k * (noise.absolute_m**2 + (noise.relative * b.range_m) ** 2 + half_box**2 / 3.0) + CURVATURE_VARIANCE_M2
         )
-        bell = SAME_SURFACE_SHARE * math.exp(-0.5 * e * e / var) / math.sqrt(TWO_PI * var)
+        bell = SAME_SURFACE_SHARE * math.exp(-0.5 * e * e / var) / math.sqrt(math.tau * var)
         evidence[h] = evidence[h] * ROUGHNESS_MEMORY + math.log(bell + ELSEWHERE_PER_M)
 
 

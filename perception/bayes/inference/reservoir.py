@@ -12,7 +12,6 @@ may explain. Without any for good a drum was lost that cross paths alone had hel
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.memory.elements import (
@@ -29,8 +28,6 @@ from perception.bayes.memory.settings_record import Settings
 from perception.bayes.memory.state import CircleTrack, PolygonTrack, State
 from perception.kernel import Ints, kernel, loop_kernel
 from perception.records import Records
-
-TWO_PI: Final = 2.0 * math.pi
 
 
 @kernel
@@ -59,7 +56,7 @@ def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, readin
         Copied.
     """
     bins = track.bins
-    b = int((math.atan2(reading.y - cy, reading.x - cx) / TWO_PI + 0.5) * len(bins)) % len(bins)
+    b = int((math.atan2(reading.y - cy, reading.x - cx) / math.tau + 0.5) * len(bins)) % len(bins)
     readings = bins[b].readings
     copy_reading(reading, readings[bins[b].count % len(readings)])
     bins[b].count += 1

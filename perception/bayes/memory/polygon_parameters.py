@@ -20,8 +20,9 @@ DOUBTFUL_ANSWER_NAT: Final = 0.7
 """Price of an answer that a mirror may give or not: about log 2. At a side's end or the beam's edge it costs nothing:
 all the readings of a sensor may then be heard, or none, and a price for each would turn the body until they must."""
 EDGE_REACH_M: Final = 1.0
+"""A convex edge scatters 20 to 30 dB below a mirror's echo: it is heard from within this."""
 EDGE_NAT_PER_M: Final = 3.0 / FOOT_M
-"""A convex edge scatters 20 to 30 dB below a mirror's echo: an echo from beyond this costs this much per metre."""
+"""An echo of an edge from beyond that costs this much per metre."""
 SIDE_END_MARGIN_M: Final = 0.12 * FOOT_M
 """A foot this near the end of its side need not answer: the accuracy of a pose."""
 GRAZING_COS: Final = 0.05
@@ -94,7 +95,7 @@ POLYGON_HITS_MIN: Final = 6.0
 WHOLE_SHARE: Final = 0.9
 """A track that explains this share of its near readings keeps its place …"""
 APART_WHOLE: Final = 1.5
-APART: Final = 0.5
+POLYGONS_APART: Final = 0.5
 """… and no like track starts this near, in inner radii; for any other track the distance is less."""
 CHALLENGE_UNSEEN: Final = 8
 """Unseen readings that a challenger counts as."""

@@ -32,6 +32,7 @@ RANGE_MAX_M: Final = 100.0
 RANGE_BINS_PER_M: Final = 2.0 / FOOT_M
 """Range bins per metre; within a bin a noise hypothesis has one level."""
 RANGE_BINS: Final = math.ceil(RANGE_MAX_M * RANGE_BINS_PER_M)
+"""Ranges that are distinguished in a table of noise levels."""
 
 
 class NoiseModel(Record):

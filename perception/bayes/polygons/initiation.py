@@ -16,7 +16,6 @@ from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUE
 from perception.bayes.memory.job_records import INITIATION
 from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.polygon_parameters import (
-    APART,
     APART_WHOLE,
     CHALLENGE_UNSEEN,
     COLLECTING_COST,
@@ -27,6 +26,7 @@ from perception.bayes.memory.polygon_parameters import (
     POLYGON_RELAXATION_STEPS,
     POLYGON_RESTS_M,
     POLYGON_RESTS_RAD,
+    POLYGONS_APART,
     REQUEST_SAME_COS,
     REQUEST_SAME_M,
     SIDE_SHIFTS,
@@ -89,7 +89,7 @@ def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) 
         track = s[0].polygons[t]
         if track.status != FREE and track.model == model:
             is_whole = track.status == ESTABLISHED and track.hits > WHOLE_SHARE * track.near
-            apart = (APART_WHOLE if is_whole else APART) * p[0].polygons[model].inner_radius_m
+            apart = (APART_WHOLE if is_whole else POLYGONS_APART) * p[0].polygons[model].inner_radius_m
             if math.hypot(x - track.x, y - track.y) < apart:
                 return t
     return -1

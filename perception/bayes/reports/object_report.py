@@ -19,12 +19,11 @@ from perception.bayes.memory.parameters import (
     WALL_ECHOES_MIN,
     WALL_LENGTH_MIN_M,
 )
-from perception.bayes.memory.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.reports.claimed_echoes import own_echoes
 from perception.bayes.tracks.track_archive import TrackArchive
-from perception.bayes.walls.contact import EDGE_REACH_M
 from perception.bayes.walls.crossing import CORNER_SINE_MIN
 from perception.bayes.walls.report import has_mirrors, room_report
 from perception.detected_object import DetectedObject, wall_between, worst_sigma

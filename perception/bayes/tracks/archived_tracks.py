@@ -16,9 +16,10 @@ from perception.bayes.memory.state import CircleTrack, PolygonTrack
 from perception.bounds import FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
 
-READINGS_KEPT: Final = 48
+ARCHIVED_READINGS: Final = 48
 """Readings of an archived track: one of each bearing, and some more."""
 BINS: Final = "bins"
+"""The field of a track that holds its readings, which an archived one keeps in another form."""
 
 
 def archived_dtype(track: type[CircleTrack | PolygonTrack]) -> np.dtype[Any]:
@@ -28,14 +29,14 @@ def archived_dtype(track: type[CircleTrack | PolygonTrack]) -> np.dtype[Any]:
     `readings`: x and y of the sensor about the track's centre (m), direction of its axis (rad) and range (m).
     """
     fields = [(name, track.DTYPE[name]) for name in (track.DTYPE.names or ())[:-1]]  # the last are the readings
-    readings = ("readings", np.float32, (READINGS_KEPT, 4))
+    readings = ("readings", np.float32, (ARCHIVED_READINGS, 4))
     return np.dtype((np.record, [*fields, ("is_reported", np.int64), ("kept", np.int64), readings]))
 
 
 def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
     """Return the bounds of the fields of an archived track."""
     own = {name: bound for name, bound in track.BOUNDS.items() if name != BINS}
-    return {**own, "is_reported": FLAG, "kept": up_to(READINGS_KEPT), "readings": PLACE}
+    return {**own, "is_reported": FLAG, "kept": up_to(ARCHIVED_READINGS), "readings": PLACE}
 
 
 def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDArray[Any]:
@@ -99,7 +100,7 @@ def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:
     ranks, which = np.nonzero(rank < counts)
     found: NDArray[Any] = bins["readings"][which, (counts[which] - 1 - ranks) % capacity]
     echoes: NDArray[Any] = found[(found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)]
-    return echoes[:READINGS_KEPT]
+    return echoes[:ARCHIVED_READINGS]
 
 
 def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:

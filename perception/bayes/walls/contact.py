@@ -40,8 +40,6 @@ STRAIGHT_WEIGHT: Final = 20.0
 """A span of more evidence than this and of this weight is straight beyond doubt."""
 MIRRORS_SILENCES: Final = 20.0
 """So many silences of beam edges, with so few echoes, show mirrors."""
-EDGE_REACH_M: Final = 1.0
-"""An edge between mirrors is heard from within this."""
 HEARD_REACH_M: Final = 3.0
 """Farthest beyond the ends of its wall that a corner is looked for among the echoes."""
 EDGES_LEAD: Final = 4.0

@@ -13,6 +13,7 @@ import math
 from typing import Final
 
 from perception.bayes.memory.elements import Reading
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, StateRecord
 from perception.bayes.memory.wall_records import (
@@ -25,7 +26,6 @@ from perception.bayes.memory.wall_records import (
     WallMap,
 )
 from perception.bayes.walls.contact import (
-    EDGE_REACH_M,
     EXPLAINED_SIGMAS,
     HEARD_REACH_M,
     are_mirrors,
@@ -38,7 +38,7 @@ from perception.bayes.walls.contact import (
     wall_normal,
     wall_point,
 )
-from perception.bayes.walls.crossing import CORNER_REACH_M, crossing, is_edge, position_along
+from perception.bayes.walls.crossing import CORNER_BEYOND_M, crossing, is_edge, position_along
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -57,7 +57,7 @@ EDGE_WALL_WEIGHT_MIN: Final = 20.0
 """The ends of a wall of less weight are not known."""
 EDGE_ECHOES_MIN: Final = 4.0
 """Echoes of a sure edge."""
-SYSTEMATIC_M: Final = 0.002
+CORNER_SYSTEMATIC_M: Final = 0.002
 """Least uncertainty of a line at a corner."""
 POINT_SLACK_M: Final = 0.03
 """Greatest uncertainty of a point that its echoes may show."""
@@ -74,7 +74,7 @@ PENDING: Final = 2
 def add_line(wall: Wall, x: float, y: float, sums: PointInformation) -> None:
     """Add what a wall's line says of a point on it."""
     nx, ny = wall_normal(wall)
-    w = 1.0 / (line_variance(wall, position_along(wall, x, y)) + SYSTEMATIC_M**2)
+    w = 1.0 / (line_variance(wall, position_along(wall, x, y)) + CORNER_SYSTEMATIC_M**2)
     add_information(sums, nx, ny, nx * x + ny * y, w)
 
 
@@ -183,7 +183,7 @@ def edge_at(room: WallMap, wall: Wall, end: float, side: int, reach: float) -> i
             continue
         distance, along = distance_and_foot(wall, edge.x, edge.y)
         beyond = along - end if side == 1 else end - along
-        farthest = CORNER_REACH_M if edge.echoes >= EDGE_ECHOES_MIN else EDGE_SAME_M
+        farthest = CORNER_BEYOND_M if edge.echoes >= EDGE_ECHOES_MIN else EDGE_SAME_M
         if abs(distance) < EDGE_OFF_M and -EDGE_SAME_M < beyond < farthest and abs(beyond) < nearest:
             nearest = abs(beyond)
             at = c
@@ -239,7 +239,7 @@ def find_edges(room: WallMap) -> None:
             x, y = wall_point(wall, end)
             if is_near_corner(room, k, x, y):
                 continue
-            reach = CORNER_REACH_M
+            reach = CORNER_BEYOND_M
             if e % 2 == 1 and e < 2 * wall.span_count - 1:
                 reach = min(reach, wall.spans[e // 2 + 1].low - end)
             elif e % 2 == 0 and e > 0:

@@ -13,7 +13,7 @@ from perception.bayes.memory.wall_records import Wall
 from perception.bayes.walls.contact import is_on_span, wall_normal
 from perception.kernel import kernel
 
-CORNER_REACH_M: Final = 2.0
+CORNER_BEYOND_M: Final = 2.0
 """Farthest that a corner may lie beyond the ends of its walls …"""
 CORNER_INSIDE_M: Final = 0.4
 """… and inside them."""
@@ -64,7 +64,7 @@ def crossing(a: Wall, b: Wall) -> tuple[bool, float, float]:
     y = (ax * level_b - bx * level_a) / det
     along_a = position_along(a, x, y)
     along_b = position_along(b, x, y)
-    is_near = is_on_span(a, along_a, CORNER_REACH_M) and is_on_span(b, along_b, CORNER_REACH_M)
+    is_near = is_on_span(a, along_a, CORNER_BEYOND_M) and is_on_span(b, along_b, CORNER_BEYOND_M)
     is_within = is_on_span(a, along_a, -CORNER_INSIDE_M) or is_on_span(b, along_b, -CORNER_INSIDE_M)
     # Where both go the same way, one of them is seen from behind the other: they are not sides of one corner.
     has_two_sides = is_near and way_from(a, along_a) != way_from(b, along_b)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.bayes.memory.wall_records import CANDIDATE, SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.bayes.walls.bins import HALF, clear_wall, is_covered, mean_error, middle_of
-from perception.bayes.walls.contact import EDGE_REACH_M, are_mirrors, edges_answer
+from perception.bayes.walls.contact import are_mirrors, edges_answer
 from perception.bayes.walls.evidence import judge
 from perception.bayes.walls.numbers import number_spans
 from perception.kernel import kernel

@@ -67,7 +67,7 @@ NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
 KNOWN_SIGMA_M: Final = 0.06
 """Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
 turn it, by a long lever."""
-ROUNDS: Final = 3
+FIT_ROUNDS: Final = 3
 REPLACED_WEIGHT_MAX: Final = 12.0
 """A wall of less weight gives way to a new one where there are too many."""
 
@@ -277,7 +277,7 @@ def is_wall(s: StateRecord) -> bool:
 
 def fit_candidate(memory: Memory, p: SettingsRecord) -> bool:
     """Fit the candidate, whose line is known roughly, to the recent readings; return whether it is a wall."""
-    for _ in range(ROUNDS):
+    for _ in range(FIT_ROUNDS):
         if enter_recent(memory.s, p) < NEW_WALL_ECHOES_MIN:
             return False
         fit_walls(memory.s, p, CANDIDATE, CANDIDATE + 1, 1)

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.walls.corners import CORNER_ECHOES_MIN, KEPT, SYSTEMATIC_M
+from perception.bayes.walls.corners import CORNER_ECHOES_MIN, CORNER_SYSTEMATIC_M, KEPT
 from perception.kernel import Floats
 
 APART_SIGMAS: Final = 3.0
@@ -111,7 +111,7 @@ def _agreeing(walls: Lines, points: NDArray[Any], all_: Incidences) -> Incidence
     offset, slope, variance, covariance, of_slope = walls.lines[all_.lines].T
     error = offset + slope * all_.along - all_.levels
     error += (rx * (yy * x - xy * y) + ry * (xx * y - xy * x)) / det
-    spread = (rx * rx * yy - 2.0 * rx * ry * xy + ry * ry * xx) / det + SYSTEMATIC_M**2
+    spread = (rx * rx * yy - 2.0 * rx * ry * xy + ry * ry * xx) / det + CORNER_SYSTEMATIC_M**2
     spread += variance + 2.0 * all_.along * covariance + all_.along**2 * of_slope
     agrees = np.abs(error) < APART_SIGMAS * np.sqrt(spread)
     return Incidences(*(values[agrees] for values in (all_.points, all_.lines, all_.along, all_.rows, all_.levels)))
@@ -142,8 +142,8 @@ def _solve(
     rows, k = np.zeros((len(at), len(weighed))), np.arange(len(at))
     rows[k, 2 * held.lines], rows[k, 2 * held.lines + 1] = 1.0, held.along
     rows[k, b[at]], rows[k, b[at] + 1] = held.rows.T
-    information += rows.T @ rows / SYSTEMATIC_M**2
-    weighed += held.levels @ rows / SYSTEMATIC_M**2
+    information += rows.T @ rows / CORNER_SYSTEMATIC_M**2
+    weighed += held.levels @ rows / CORNER_SYSTEMATIC_M**2
     covariance: Floats = np.asarray(np.linalg.inv(information), np.float64)
     fitted = covariance @ weighed
     lines[:, :2] = fitted[:n].reshape(-1, 2)

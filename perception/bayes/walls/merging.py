@@ -54,7 +54,7 @@ EXPLAINED_SHARE: Final = 0.6
 """A wall ends when others explain this share of its bins …"""
 FREE_BINS_MIN: Final = 4
 """… or so few are its own."""
-MISFIT_MAX: Final = 3.0
+MERGED_MISFIT_MAX: Final = 3.0
 """Greatest χ² of a wall for each degree of freedom."""
 EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin …"""
@@ -242,7 +242,7 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
             own = (turn + k) % MAX_WALLS
     if own < 0:
         return
-    if room.walls[own].misfit > MISFIT_MAX:
+    if room.walls[own].misfit > MERGED_MISFIT_MAX:
         release(room, room.walls[own], p)
         clear_wall(room.walls[own])
         return

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from perception.bayes.inference.range_fit import FAR
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory, StateRecord
 from perception.bayes.memory.wall_records import (
@@ -29,7 +30,6 @@ from perception.bayes.memory.wall_records import (
 )
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.contact import (
-    EDGE_REACH_M,
     HEARD_REACH_M,
     are_mirrors,
     distance_and_foot,
@@ -58,7 +58,7 @@ SPREAD_MIN_RAD: Final = 0.2
 SIGMAS: Final = 2.5
 LONGER_SIGMAS: Final = 1.3
 """An edge's echo is longer than its wall's own by more than this, which one in ten of those is by chance."""
-CELL_M: Final = 0.05
+LINE_CELL_M: Final = 0.05
 EDGE_CUTS_MIN: Final = 2
 """Cuts in one cell for which an edge is looked for there."""
 PLACED_TIMES: Final = 3
@@ -71,13 +71,13 @@ ACROSS_M: Final = 1.15
 """… nor what lies farther beyond its end than across a doorway."""
 SLANT_MIN: Final = 0.35
 """Least share of the range that runs along the wall: the wall's own echoes have none."""
-APART_M: Final = 0.3
+KNOWN_POINT_M: Final = 0.3
 """Least distance from a corner or an edge that is known better."""
 APART_CELLS: Final = 3
 TRIES_MAX: Final = 4
 """Greatest number of places that are looked at for each kind, the likeliest first, and how far apart they are."""
 FIRST_M: Final = -HALF * WALL_BIN_M - HEARD_REACH_M
-CELLS: Final = int((WALL_BINS * WALL_BIN_M + 2.0 * HEARD_REACH_M) / CELL_M) + 1
+LINE_CELLS: Final = int((WALL_BINS * WALL_BIN_M + 2.0 * HEARD_REACH_M) / LINE_CELL_M) + 1
 """Cells along the line of a wall, and where the first one begins, m."""
 
 
@@ -115,7 +115,7 @@ def count_cuts(s: StateRecord, p: SettingsRecord, k: int, cells: Floats) -> None
         Memory and settings.
     k : int
         The wall.
-    cells : (2, CELLS) float
+    cells : (2, LINE_CELLS) float
         Counts of the cuts of echoes from near, and of those from afar, updated.
     """
     room = s[0].room
@@ -133,9 +133,9 @@ def count_cuts(s: StateRecord, p: SettingsRecord, k: int, cells: Floats) -> None
         for sign in (-1.0, 1.0):
             along = foot + sign * half
             x, y = wall_point(wall, along)
-            cell = int((along - FIRST_M) / CELL_M)
+            cell = int((along - FIRST_M) / LINE_CELL_M)
             is_ahead = (x - q.x) * q.axis_x + (y - q.y) * q.axis_y >= p[0].cos_half_angle * r
-            if is_ahead and 0 <= cell < CELLS:
+            if is_ahead and 0 <= cell < LINE_CELLS:
                 cells[0 if r < EDGE_REACH_M else 1, cell] += 1.0
 
 
@@ -163,7 +163,7 @@ def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float,
     found = room.edges[free]
     spread = 0.0
     for turn in range(PLACED_TIMES):
-        spread = hear(room, wall, p, along, is_near, CELL_M if turn == 0 else 0.0, found)
+        spread = hear(room, wall, p, along, is_near, LINE_CELL_M if turn == 0 else 0.0, found)
         if turn < PLACED_TIMES - 1:
             step = step_along(found, wall)
             if math.isnan(step):
@@ -294,13 +294,13 @@ def displaces(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
     """
     for c in range(CORNERS_MAX):
         corner = room.corners[c]
-        if corner.is_used == KEPT and math.hypot(corner.x - found.x, corner.y - found.y) < APART_M:
+        if corner.is_used == KEPT and math.hypot(corner.x - found.x, corner.y - found.y) < KNOWN_POINT_M:
             if corner.is_edge == found.is_edge and corner.echoes < found.echoes:
                 copy_heard(found, corner)
             return False
     for c in range(EDGES_MAX):
         edge = room.edges[c]
-        if edge.is_used == KEPT and math.hypot(edge.x - found.x, edge.y - found.y) < APART_M:
+        if edge.is_used == KEPT and math.hypot(edge.x - found.x, edge.y - found.y) < KNOWN_POINT_M:
             echoes = edge.echoes - edge.far_echoes if is_near else edge.echoes
             if echoes >= found.echoes or (is_near and edge.is_edge == 0):
                 return False
@@ -321,13 +321,13 @@ def find_heard_points(memory: Memory, p: SettingsRecord, turn: int) -> None:
     k = choose_wall(memory.s, turn)
     if k < 0:
         return
-    cells = np.zeros((2, CELLS))
+    cells = np.zeros((2, LINE_CELLS))
     count_cuts(memory.s, p, k, cells)
     wall = memory.state["room"][0]["walls"][k]
     spans = wall["spans"][: int(wall["span_count"])]
     low, high = spans["low"], spans["high"]
     cuts = cells[:, :-1] + cells[:, 1:]  # in places as wide as two cells, which overlap
-    at = FIRST_M + CELL_M * np.arange(1.0, CELLS)
+    at = FIRST_M + LINE_CELL_M * np.arange(1.0, LINE_CELLS)
     beyond = np.maximum(low[0] - at, at - high[-1])
     corners = np.where((beyond > BEYOND_MIN_M) & (beyond < HEARD_REACH_M), cuts.sum(axis=0), 0.0)
     within = np.minimum(at[:, None] - low, high - at[:, None]).max(axis=1)

@@ -13,10 +13,10 @@ from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import MAX_WALLS
 from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
 from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
-from perception.bayes.walls.crossing import CORNER_INSIDE_M, CORNER_REACH_M
+from perception.bayes.walls.crossing import CORNER_BEYOND_M, CORNER_INSIDE_M
 from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.walls.numbers import SPAN_MIN_M
-from perception.bayes.walls.straight import Straight, straight, straighten
+from perception.bayes.walls.straight import TINY_M, Straight, straight, straighten
 from perception.kernel import Floats
 from perception.records import Record
 
@@ -26,7 +26,7 @@ FIRST_CHI2_MIN: Final = 40.0
 """… and of the best span of the first one: where nothing but drums stands, thousands of their tangents are tried."""
 SPAN_WEIGHT_MIN: Final = 3.0
 """Least weight of a span that is reported, …"""
-MISFIT_MAX: Final = 2.5
+REPORTED_MISFIT_MAX: Final = 2.5
 LIGHT_MISFIT_MAX: Final = 2.0
 LIGHT_WEIGHT: Final = 20.0
 """Greatest χ² of a wall's line for each degree of freedom, and that of a wall of less weight, which may be the side
@@ -37,7 +37,7 @@ DOORWAY_MIN_M: Final = 1.05
 """A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
 CORNER_PASSED_SHARE: Final = 0.2
 """… if no more than this share of the ranges towards it went on."""
-WALL_WEIGHT_MIN: Final = 12.0
+HEAVIEST_SPAN_MIN: Final = 12.0
 """… and weight of a wall's heaviest one."""
 TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
@@ -77,7 +77,6 @@ THROUGH: Final = 0.8
 """A wall this near to the middle of a named object, as a share of its radius, would go through it."""
 SIDE_M: Final = 0.08
 """A wall no longer than an object is wide, this near to touching it, is the object's side."""
-TINY_M: Final = 1e-6
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed: readings are not independent."""
 
@@ -195,7 +194,7 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
         All corners.
     """
     found: dict[int, Straight] = {}
-    misfit_max = np.where(walls["weight"] < LIGHT_WEIGHT, LIGHT_MISFIT_MAX, MISFIT_MAX)
+    misfit_max = np.where(walls["weight"] < LIGHT_WEIGHT, LIGHT_MISFIT_MAX, REPORTED_MISFIT_MAX)
     fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < misfit_max)).tolist()
     heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
     heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
@@ -204,7 +203,7 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
     pairs = np.column_stack([heard["first"], heard["second"]])[np.abs(sine) > PROOF_SINE]
     spans = walls["spans"][fitting]
     is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
-    is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= WALL_WEIGHT_MIN)
+    is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= HEAVIEST_SPAN_MIN)
     if not (spans["chi2"][is_long] >= FIRST_CHI2_MIN).any():
         return found
     for is_neighbour in (False, True):
@@ -236,7 +235,7 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     sure = dense & (length >= SPAN_MIN_M)
     if sure.any() and not is_proven:
         together = chi2 if np.count_nonzero(dense & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
-        is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
+        is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= HEAVIEST_SPAN_MIN
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
     return np.asarray(sure)
 
@@ -274,7 +273,7 @@ def reach_corners(
         is_met = len(owners) == 2
         for owner, (along, gap, at) in zip(owners, places, strict=True):
             end = owner.ends[at]
-            if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_REACH_M and not owner.is_passed(along, end):
+            if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_BEYOND_M and not owner.is_passed(along, end):
                 owner.ends[at] = along
             is_met = is_met and abs(owner.ends[at] - along) < CORNER_MET_M
         far = float(corner["far_echoes"])

@@ -17,7 +17,9 @@ from perception.kernel import Floats
 
 FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y")
 LINE: Final = ("offset", "slope", "variance_offset", "covariance", "variance_slope")
+"""Fields of a wall: its frame in the map, and its line in that frame."""
 TINY_M: Final = 1e-6
+"""Covers rounding only."""
 
 
 @dataclass(slots=True)

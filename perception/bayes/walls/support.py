@@ -15,7 +15,7 @@ from perception.bayes.memory.wall_records import IS_FREE, RecentReading, Wall, W
 from perception.bayes.walls.contact import SLANTING_MIN_COS, edges_answer
 from perception.kernel import kernel, loop_kernel
 
-REACH_M: Final = 3.0
+TOUCH_REACH_M: Final = 3.0
 """Readings that touch a candidate farther away than this do not count."""
 SCORE_SIGMAS: Final = 2.5
 SCORE_LEVER: Final = 0.03
@@ -71,7 +71,7 @@ def weigh(
         along_edge = nx * (y + reach * ey - oy) - ny * (x + reach * ex - ox)
         expected = distance if is_foot else reach
         away = abs(nx * dy - ny * dx if is_foot else along_edge)
-        touches = (dot >= SLANTING_MIN_COS) & (distance > 0.0) & (away <= REACH_M) & (is_foot | edges)
+        touches = (dot >= SLANTING_MIN_COS) & (distance > 0.0) & (away <= TOUCH_REACH_M) & (is_foot | edges)
         e = near.range_m[j] - expected
         slack = SCORE_SIGMAS * math.sqrt(variance_m2 + relative * expected * expected)
         slack += SCORE_LEVER * min(away, SCORE_LEVER_MAX_M) / base

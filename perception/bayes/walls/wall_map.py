@@ -17,6 +17,7 @@ from typing import Final
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, Memory, StateRecord
 from perception.bayes.memory.wall_records import (
@@ -34,7 +35,6 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
-    EDGE_REACH_M,
     EXPLAINED_SIGMAS,
     FOOT,
     NOWHERE,

@@ -62,6 +62,7 @@ TURN_PER_M: Final = math.radians(1.0)
 SHIFT_PER_M: Final = 0.02
 """The map frame turns (rad/m) and shifts (m/m) no faster as the robot drives: it does not jump."""
 MOTION_PER_M: Final = np.array([TURN_PER_M, SHIFT_PER_M, SHIFT_PER_M])
+"""The map frame moves no faster than this, rad and m for each metre of way."""
 
 
 class SeenObject(NamedTuple):

@@ -34,7 +34,7 @@ NOISE_MIN: Final = 0.02
 NOISE_MAX: Final = 25.0
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
-NONE: Final = -1
+NO_LANDMARK: Final = -1
 UNHEARD: Final = -1.0
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
@@ -252,7 +252,7 @@ def update_with_range(
     e: EstimateRecord, covariance: Floats, mx: float, my: float, axis: float, r: float, var0: float, rel2: float,
     half_angle: float, range_max: float,
 ) -> int:  # fmt: skip
-    """Enter the range of one sensor; return the landmark that it is from, or `NONE`.
+    """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
 
     The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
     explain it, it is not used.
@@ -278,7 +278,7 @@ def update_with_range(
     x = est.x + c * mx - s * my
     y = est.y + s * mx + c * my
     ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
-    best = second = first = NONE
+    best = second = first = NO_LANDMARK
     best_nis = second_nis = GATE
     nearest = math.inf
     is_expected = False
@@ -307,19 +307,19 @@ def update_with_range(
             second, second_nis = i, nis
     if (
         is_expected
-        and best == NONE
+        and best == NO_LANDMARK
         and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
     ):
         is_expected = False
     if is_expected:
-        est.fit_share += FIT_MEMORY * ((1.0 if best != NONE else 0.0) - est.fit_share)
-    is_missed = first != NONE and first != best and r > nearest + PASSED_M and nearest < range_max
+        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
+    is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < range_max
     if is_missed and not is_landmark_hidden(e, first, x, y):
         update_with_edge(e, covariance, first, mx, my, axis, half_angle, UNHEARD)
-    elif best == NONE and is_expected and abs(r - nearest) <= NEAR_M:
+    elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1
-    if best == NONE or second != NONE:
-        return NONE
+    if best == NO_LANDMARK or second != NO_LANDMARK:
+        return NO_LANDMARK
     c, s = math.cos(est.heading), math.sin(est.heading)
     x = est.x + c * mx - s * my
     y = est.y + s * mx + c * my
@@ -384,6 +384,6 @@ def update_with_firing(
             continue
         if r >= range_max:
             r = math.inf
-        if update_with_range(e, covariance, mx, my, axis, r, var0, rel2, half_angle, range_max) != NONE:
+        if update_with_range(e, covariance, mx, my, axis, r, var0, rel2, half_angle, range_max) != NO_LANDMARK:
             used += 1
     return used

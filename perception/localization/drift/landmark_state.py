@@ -31,6 +31,7 @@ HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
 FIRST: Final = 7
 """Row of the first landmark's x."""
 ROWS_MAX: Final = FIRST + 2 * LANDMARKS_MAX
+"""Rows of the state: that of the robot, and the place of each landmark."""
 
 
 class Landmark(Record):

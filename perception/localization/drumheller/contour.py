@@ -20,7 +20,7 @@ from perception.localization.drumheller.panorama import Panorama
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.range_likelihood import RangeModel
 
-DIRECTIONS: Final = 360
+TRIED_DIRECTIONS: Final = 360
 """Directions of normals that are tried."""
 SLANT_MAX_RAD: Final = math.radians(60.0)
 """Largest angle between a wall's normal and a beam's edge at which an echo still counts as the wall's (`cone`)."""
@@ -66,7 +66,7 @@ def contour_segments(
     """
     heard = np.flatnonzero(np.isfinite(panorama.range_m))
     r, axis = panorama.range_m[heard], panorama.axis[heard]
-    alpha = 2.0 * math.pi / DIRECTIONS * np.arange(DIRECTIONS)
+    alpha = 2.0 * math.pi / TRIED_DIRECTIONS * np.arange(TRIED_DIRECTIONS)
     off = (alpha - axis[:, None] + math.pi) % (2.0 * math.pi) - math.pi
     slant = np.maximum(np.abs(off) - half_angle, 0.0)
     offset = r[:, None] * np.cos(slant)
@@ -92,7 +92,7 @@ def contour_segments(
         along = y * math.cos(middle) - x * math.sin(middle)
         segments.append(
             ContourSegment(
-                len(run), middle, float(np.abs(spread).max()) + 2.0 * math.pi / DIRECTIONS,
+                len(run), middle, float(np.abs(spread).max()) + 2.0 * math.pi / TRIED_DIRECTIONS,
                 0.5 * float(lo[best] + hi[best]), 0.5 * float(hi[best] - lo[best]),
                 float(x.mean()), float(y.mean()), float(np.ptp(along)),
             )

@@ -17,7 +17,7 @@ from perception.kernel import Floats
 from perception.localization.drumheller.contour import ContourSegment
 from perception.localization.room.room import Room
 
-NODES_MAX: Final = 20_000
+TREE_NODES_MAX: Final = 20_000
 """Nodes of the tree that are visited at most; what lies behind is left out."""
 ANGLE_SLACK_RAD: Final = math.radians(2.0)
 """Tolerance of angles beyond the segments' own, rad."""
@@ -72,7 +72,7 @@ def interpretations(segments: Sequence[ContourSegment], room: Room) -> tuple[Int
     leaves: list[Interpretation] = []
     nodes = 0
     stack: list[tuple[int, tuple[tuple[int, int], ...], tuple[int, ...]]] = [(0, (), tuple(whole))]
-    while stack and nodes < NODES_MAX:
+    while stack and nodes < TREE_NODES_MAX:
         level, chosen, masks = stack.pop()
         nodes += 1
         if level == len(segments):

@@ -60,7 +60,7 @@ LOST_PROBABILITY: Final = 0.5
 HEADING_CELL_RAD: Final = math.radians(4.0)
 """Headings of a place that differ by more are candidates of their own: between the moments at which a turn moves an
 echo into a beam or out of one, the ranges hardly depend on it."""
-PROBABILITY_MIN: Final = 1e-3
+CANDIDATE_PROBABILITY_MIN: Final = 1e-3
 """Least probability of a candidate that is returned."""
 
 
@@ -129,7 +129,9 @@ def localize(
     total = float(np.logaddexp.reduce([missed, *(mode.log_evidence for mode in modes)]))
     if math.exp(missed - total) > LOST_PROBABILITY:
         return ()
-    found = [one for mode in modes for one in _candidates(mode, total) if one.probability >= PROBABILITY_MIN]
+    found = [
+        one for mode in modes for one in _candidates(mode, total) if one.probability >= CANDIDATE_PROBABILITY_MIN
+    ]
     return tuple(sorted(found, key=lambda one: -one.probability))
 
 

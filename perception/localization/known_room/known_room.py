@@ -21,7 +21,7 @@ from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, boun
 from perception.localization.known_room.background import Background
 from perception.localization.known_room.keyframes import Keyframes
 from perception.localization.known_room.mixed_reflection import LearnedShares
-from perception.localization.known_room.pose_grid import GRID_CELL_M, READINGS_MAX, STEP_RAD, PoseGrid
+from perception.localization.known_room.pose_grid import GRID_CELL_M, GRID_READINGS_MAX, GRID_STEP_RAD, PoseGrid
 from perception.localization.known_room.pose_particles import HYPOTHESES_MAX, MERGE_M, MERGE_RAD
 from perception.localization.known_room.pose_track import LEAST_LOG, SEARCH_LEAST_LOG, PoseTrack, heading_noise
 from perception.localization.known_room.surroundings import make_surroundings
@@ -58,6 +58,7 @@ PLACE_SURE: Final = 0.9
 PLACE_DOUBT: Final = 0.5
 """Probability below which a tracked place is no longer its own."""
 STATUSES: Final[tuple[Status, ...]] = ("localizing", "tracking", "lost")
+"""The statuses; snapshots hold their indices."""
 LOCALIZING, TRACKING, LOST = range(3)
 IDLE, DUE, COMPARING, WEIGHING = range(4)
 """Stages of a search: none, one is to begin, readings are compared with the grid, its hypotheses are weighed."""
@@ -205,7 +206,7 @@ class KnownRoom:
             if self._enter(self._tracked):
                 self._judge()
         elif self._stage == DUE:
-            readings = self._keyframes.compounded(self._window_begin, READINGS_MAX)
+            readings = self._keyframes.compounded(self._window_begin, GRID_READINGS_MAX)
             self._grid.begin(readings, self.shares.profiles())
             self._search_begin = self._window_begin
             self._stage = COMPARING if len(readings) else IDLE
@@ -217,7 +218,7 @@ class KnownRoom:
                     self.shares.guess(self._grid.best_profile)
                 starts, self._is_complete = self._grid.best_starts(HYPOTHESES_MAX), self._grid.is_complete
                 self._candidates.start(
-                    starts, GRID_CELL_M, STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
+                    starts, GRID_CELL_M, GRID_STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
                 )
                 self._stage = WEIGHING if len(starts) else IDLE
         elif self._stage == WEIGHING:

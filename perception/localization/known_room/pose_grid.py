@@ -26,14 +26,14 @@ from perception.records import Record, Records, records, zeros
 
 GRID_CELL_M: Final = 0.2
 GRID_DIRECTIONS: Final = 60
-STEP_RAD: Final = 2.0 * math.pi / GRID_DIRECTIONS
+GRID_STEP_RAD: Final = 2.0 * math.pi / GRID_DIRECTIONS
 OPEN_M: Final = 3.0
 """The grid reaches so far beyond the surfaces of a room without walls."""
 CELLS_PER_QUANTUM: Final = 4
 """Cells of the table that one quantum computes."""
 BLOCK: Final = 16
 """Cells of a block's side: a quantum of a search compares one block at one heading."""
-READINGS_MAX: Final = 108
+GRID_READINGS_MAX: Final = 108
 """Readings that are compared."""
 SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
@@ -51,7 +51,8 @@ START_LOG: Final = 40.0
 """A start less likely than the best one by more than this, nat, is not the place."""
 COMPLETE_LOG: Final = 20.0
 """Where the worst of so many starts is less likely than the best by this, nat, the place is among them."""
-NONE: Final = -1
+NO_CELL: Final = -1
+"""In place of a quantum's number where no search runs."""
 
 Bytes = NDArray[np.uint8]
 
@@ -90,7 +91,7 @@ def fill_cell(
     is_free = near.wall_count == 0 or near.wall_m[0] > clear_m
     free[i, j] = 1 if is_free and (near.circle_count == 0 or near.circle_m[0] > clear_m) else 0
     for d in range(GRID_DIRECTIONS):
-        cos, sin = math.cos(STEP_RAD * d), math.sin(STEP_RAD * d)
+        cos, sin = math.cos(GRID_STEP_RAD * d), math.sin(GRID_STEP_RAD * d)
         cone_m, _, _ = expect_cone(s, x, y, cos, sin)
         inside, beside = expect_specular(s, x, y, cos, sin, s.sensor[0].cos_fringe)
         specular_m = min(inside[0], beside[0])
@@ -124,14 +125,14 @@ def score_block(
     """
     product, score = scratch[0].product, scratch[0].score
     rows, columns = len(free), len(free[0])
-    cos, sin = math.cos(STEP_RAD * direction), math.sin(STEP_RAD * direction)
+    cos, sin = math.cos(GRID_STEP_RAD * direction), math.sin(GRID_STEP_RAD * direction)
     product[:] = 1.0
     score[:] = 0.0
     for n in range(count):
         x, y, c, s, _ = readings[n]
         shift_i = math.floor((cos * x - sin * y) / GRID_CELL_M + 0.5)
         shift_j = math.floor((sin * x + cos * y) / GRID_CELL_M + 0.5)
-        d = math.floor((STEP_RAD * direction + math.atan2(s, c)) / STEP_RAD + 0.5) % GRID_DIRECTIONS
+        d = math.floor((GRID_STEP_RAD * direction + math.atan2(s, c)) / GRID_STEP_RAD + 0.5) % GRID_DIRECTIONS
         for a in range(BLOCK):
             i = begin_i + a + shift_i
             for b in range(BLOCK):
@@ -207,8 +208,8 @@ class PoseGrid:
     """What follows from the room, what is overwritten before each use, and a view of other memory."""
     BOUNDS: Final = bounds(
         _clear_m=CONSTANT, _due=COUNT, _found=Starts.BOUNDS, _readings=PLACE._replace(infinite=True),
-        _count=up_to(READINGS_MAX), _searches=COUNT, _profiles=Bound(1, PROFILES_MAX), _shares=SHARE,
-        _quantum=Bound(NONE, COUNT.high),
+        _count=up_to(GRID_READINGS_MAX), _searches=COUNT, _profiles=Bound(1, PROFILES_MAX), _shares=SHARE,
+        _quantum=Bound(NO_CELL, COUNT.high),
     )  # fmt: skip
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
@@ -229,20 +230,20 @@ class PoseGrid:
         self._found["least"] = -math.inf
         self.starts = records(Starts, self._found)
         self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
-        self._readings = np.zeros((READINGS_MAX, 5))
+        self._readings = np.zeros((GRID_READINGS_MAX, 5))
         self._count = self._searches = 0
         self._profiles = 1
         self._shares = np.zeros((PROFILES_MAX, 3))
-        self._quantum = NONE
-        """Of the search; `NONE` without one."""
-        self._likely = np.zeros((PROFILES_MAX, READINGS_MAX, 3, SILENT_CODE + 1))
+        self._quantum = NO_CELL
+        """Of the search; `NO_CELL` without one."""
+        self._likely = np.zeros((PROFILES_MAX, GRID_READINGS_MAX, 3, SILENT_CODE + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""
 
     @property
     def is_searching(self) -> bool:
         """Whether a search has work left."""
-        return self._quantum != NONE
+        return self._quantum != NO_CELL
 
     def begin(self, readings: Floats, profiles: Floats) -> None:
         """Begin a search.
@@ -251,7 +252,7 @@ class PoseGrid:
         ----------
         readings : (n, 5) float
             Of a short drive, in one frame, as of `perception.localization.known_room.particle_update`; at most
-            `READINGS_MAX`.
+            `GRID_READINGS_MAX`.
         profiles : (n, 3) float
             How often a reading is from a smooth surface, over a second one, and anything, as in `Shares`; where that
             is not known, several guesses, at most `PROFILES_MAX`: each is tried.
@@ -265,7 +266,7 @@ class PoseGrid:
 
     def cancel(self) -> None:
         """End a search without an answer."""
-        self._quantum = NONE
+        self._quantum = NO_CELL
 
     def refine(self) -> None:
         """Do one quantum of a search: part of the table if it is not complete, otherwise a block at one heading."""
@@ -288,10 +289,10 @@ class PoseGrid:
             self._scratch,
         )  # fmt: skip
         x, y = (self._origin + GRID_CELL_M * np.array([i, j])).tolist()
-        offer_peaks(self.starts, self._scratch, x, y, direction * STEP_RAD, profile)
+        offer_peaks(self.starts, self._scratch, x, y, direction * GRID_STEP_RAD, profile)
         self._quantum += 1
         if self._quantum >= self._profiles * GRID_DIRECTIONS * blocks_i * blocks_j:
-            self._quantum = NONE
+            self._quantum = NO_CELL
 
     def best_starts(self, most: int) -> Floats:
         """Return the poses that fit best, the best first, without those that fit much worse.

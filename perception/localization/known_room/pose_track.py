@@ -40,7 +40,7 @@ SEARCH_LEAST_LOG: Final = 30.0
 """Hypotheses less likely than the best by more than this are dropped, nat: while they are tracked, and while those of
 a search enter its keyframes, over the first of which a wrong place may fit far better than the right one."""
 EVIDENCE_MIN: Final = 20.0
-EVIDENCE_MAX: Final = 7.0
+PLACE_EVIDENCE_MAX: Final = 7.0
 """Most evidence against and for a place that is remembered, nat: what is heard later must not drown in a long way."""
 ALIKE_GAIN: Final = (2.3, 1.4)
 """Gain of evidence per echo, nat, that speaks neither for the right place nor for one in a map of another room that
@@ -57,6 +57,7 @@ INDEPENDENT_M: Final = 0.5
 RIVAL_SHARE: Final = 0.1
 """A hypothesis that has this share of the best one's probability is a rival: the best is not sure beside it."""
 HEADING_NOISES: Final = 512
+"""Draws of the headings' noise, which are used in turn."""
 
 
 def heading_noise(seed: int) -> Floats:
@@ -252,9 +253,9 @@ class PoseTrack:
         gain = self.best.log_ratio - self._background.log_ratio(ranges_m, shares)
         line = float(np.interp(shares.records[0].specular, (0.0, MIRRORS), ALIKE_GAIN))
         alike = ALIKE_WEIGHT * (gain - line * heard)
-        self.likeness = max(-EVIDENCE_MAX, min(LIKENESS_MAX, self.likeness + share * alike))
+        self.likeness = max(-PLACE_EVIDENCE_MAX, min(LIKENESS_MAX, self.likeness + share * alike))
         self._gains[row], self._weights[row] = TEMPER * gain, share
-        self.evidence = max(-EVIDENCE_MIN, min(EVIDENCE_MAX, self.evidence + share * TEMPER * gain))
+        self.evidence = max(-EVIDENCE_MIN, min(PLACE_EVIDENCE_MAX, self.evidence + share * TEMPER * gain))
         self._is_weighed = True
         if self.evidence >= self._peak:
             self._peak, self.peak_at = self.evidence, self.entered

@@ -19,17 +19,17 @@ UNDIRECTED: Final = OCTANTS
 """Index of the undirected evidence of a cell, behind those of the looking directions."""
 BASE: Final = 0
 HIT: Final = 1
-FREE: Final = 2
+PASSAGE: Final = 2
 STAMP: Final = 3
 """What is kept of each evidence: its value when the robot came to this place; the strongest hit and the strongest
 passage since; and the place."""
 NAT: Final = 1024
 """One nat of log odds; evidence is kept in whole numbers, which replay to the bit."""
-PLACES: Final = 1 << 15
+PLACE_NUMBERS: Final = 1 << 15
 """Places are numbered modulo this."""
 CERTAIN: Final = 3 * NAT
 """Greatest evidence for and against, so that contradiction is soon seen."""
-NOWHERE: Final = 0
+NO_PLACE_NUMBER: Final = 0
 """The place of evidence that was never renewed; no place has this number."""
 SURE: Final = NAT // 2
 """A cell of so much evidence answers."""
@@ -54,8 +54,8 @@ def evidence_now(kept: Cells, place: int) -> int:
     place : int
         Where the robot is now.
     """
-    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[HIT]) + int(kept[FREE])))
-    faded = ((place - int(kept[STAMP])) & (PLACES - 1)) // FADING_PLACES
+    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[HIT]) + int(kept[PASSAGE])))
+    faded = ((place - int(kept[STAMP])) & (PLACE_NUMBERS - 1)) // FADING_PLACES
     return max(0, value - faded) if value > 0 else min(0, value + faded)
 
 
@@ -65,7 +65,7 @@ def renew(kept: Cells, place: int) -> None:
     if kept[STAMP] != place:
         kept[BASE] = evidence_now(kept, place)
         kept[HIT] = 0
-        kept[FREE] = 0
+        kept[PASSAGE] = 0
         kept[STAMP] = place
 
 
@@ -125,7 +125,7 @@ def fill_sure(planes: Cells, maybe_sure: Flags, place: int, out: Flags) -> None:
 @kernel
 def without_hits(kept: Cells) -> int:
     """Return the evidence of a cell in one direction, this place's hits left out."""
-    return min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
+    return min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[PASSAGE])))
 
 
 def make_draws() -> Floats:
@@ -168,7 +168,7 @@ def fill_probability(
             ix = int(corner[0]) + column
             jx = ix & mask
             both = planes[UNDIRECTED, jy, jx]
-            if both[STAMP] == NOWHERE:
+            if both[STAMP] == NO_PLACE_NUMBER:
                 out[row, column] = odds[CERTAIN]
                 continue
             if math.isnan(from_x):
@@ -176,7 +176,7 @@ def fill_probability(
                 least = 0
                 for k in range(OCTANTS if mirrors > 0.0 else 0):
                     kept = planes[k, jy, jx]
-                    if kept[STAMP] != NOWHERE:
+                    if kept[STAMP] != NO_PLACE_NUMBER:
                         value = evidence_now(kept, place)
                         most = max(most, value)
                         least = min(least, value)

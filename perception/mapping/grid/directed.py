@@ -29,10 +29,10 @@ from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
     BASE,
     CERTAIN,
-    FREE,
     HIT,
     NAT,
-    PLACES,
+    PASSAGE,
+    PLACE_NUMBERS,
     SURE,
     UNDIRECTED,
     Cells,
@@ -57,16 +57,16 @@ from perception.mapping.grid.window import (
 )
 from perception.sensor_mounts import mounts_at
 
-ARC_SIGMAS: Final = 1.5
+DIRECTED_ARC_SIGMAS: Final = 1.5
 UNDIRECTED_ARC_SIGMAS: Final = 2.0
 """Half the thickness of an echo's arc, in a looking direction and in the undirected evidence; …"""
 PASSED_SIGMAS: Final = 1.0
 """… and what is nearer than the range by this was passed."""
 PASSED: Final = 1.2 * NAT
 """Evidence of a passage through the middle of a beam; towards the edge it vanishes."""
-SILENT: Final = 1.8 * NAT
+SILENT_NAT: Final = 1.8 * NAT
 """That of a beam without an echo, which neither a chance echo nor crosstalk has cut short."""
-UNIT: Final = 1.0
+DIRECTED_UNIT: Final = 1.0
 """An echo's unit of evidence: log odds by ½ + .49 times its share."""
 MIRRORS_PASSED: Final = 0.6
 MIRRORS_SILENT: Final = 0.8
@@ -162,7 +162,7 @@ def enter_readings(
         weight = PASSED * (1.0 - MIRRORS_PASSED * mirrors)
         weight_both = UNDIRECTED_PASSED
         if not is_echo:
-            weight = SILENT * (1.0 - MIRRORS_SILENT * mirrors)
+            weight = SILENT_NAT * (1.0 - MIRRORS_SILENT * mirrors)
             weight_both = UNDIRECTED_SILENT
         nearest = math.inf
         # Cells so near are passed, and in no arc: what is done there needs no root of the square of the distance.
@@ -193,7 +193,7 @@ def enter_readings(
                     if has_arc and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
                         arc[m, 0] = jy
                         arc[m, 1] = jx
-                        arc[m, 2] = k if abs(d - r) <= ARC_SIGMAS * sigma else UNDIRECTED
+                        arc[m, 2] = k if abs(d - r) <= DIRECTED_ARC_SIGMAS * sigma else UNDIRECTED
                         arc[m, 3] = i
                         shares[m, 0] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
                         m += 1
@@ -203,10 +203,10 @@ def enter_readings(
                         continue
                 own = planes[k, jy, jx]
                 renew(own, place)
-                own[FREE] = min(int(own[FREE]), -int(weight * inside))
+                own[PASSAGE] = min(int(own[PASSAGE]), -int(weight * inside))
                 both = planes[UNDIRECTED, jy, jx]
                 renew(both, place)
-                both[FREE] = min(int(both[FREE]), -int(weight_both * inside))
+                both[PASSAGE] = min(int(both[PASSAGE]), -int(weight_both * inside))
         if is_located and m < arc.shape[0]:
             px = r * math.cos(axis + bearings[i])
             py = r * math.sin(axis + bearings[i])
@@ -224,7 +224,7 @@ def enter_readings(
                 answers[0] += 1.0
             elif nearest < passed - BEYOND_M:
                 answers[1] += 1.0
-    enter_hits(planes, maybe_sure, place, UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
+    enter_hits(planes, maybe_sure, place, DIRECTED_UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
 
 
 @kernel
@@ -285,7 +285,9 @@ class DirectedGrid:
         "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
         "_sure",
     )  # fmt: skip
-    BOUNDS: Final = bounds(cells=Bound(-PLACES, PLACES - 1), _answers=Bound(0, ANSWERS_MAX), _place=index_of(PLACES))
+    BOUNDS: Final = bounds(
+        cells=Bound(-PLACE_NUMBERS, PLACE_NUMBERS - 1), _answers=Bound(0, ANSWERS_MAX), _place=index_of(PLACE_NUMBERS)
+    )
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self.window = window
@@ -316,7 +318,7 @@ class DirectedGrid:
         """Enter a firing; see `EvidenceGrid.observe`."""
         if not self.window.follow(firing.pose, (self.cells, self._maybe_sure)):
             return
-        self._place = 1 + place % (PLACES - 1)  # never NOWHERE
+        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NOWHERE
         mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_readings(
             self._planes, self._maybe_sure, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),

@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.window import Ring, Window, placed, row_of_beam, set_edges
+from perception.mapping.grid.window import SPREAD_CELLS, Ring, Window, placed, row_of_beam, set_edges
 
 SPREAD: Final = 0.01
-SPREAD_CELLS: Final = 0.5
-"""σ_r: standard deviation of a range, as a share of it and in cells, at least."""
+"""σ_r: standard deviation of a range as a share of it, at least `SPREAD_CELLS`."""
 BEAM_SIGMAS: Final = 2.0
 """The beam's half width in σ_θ."""
 ARC_SIGMAS: Final = 2.0
 PEAK: Final = 0.49
-UNIT: Final = 4.0
+ELFES_UNIT: Final = 4.0
 """An echo's unit of evidence: a cell with a quarter of the arc's mass rises by the full peak."""
-EMPTY: Final = 0.2
+EMPTY_PEAK: Final = 0.2
 """How far the probability before the range is below one half, on the axis."""
 LOG_ODDS_MAX: Final = 8.0
+"""Greatest log odds for and against, nat: contradiction must remain possible."""
 
 
 @kernel
@@ -42,8 +42,8 @@ def enter_reading(
     With the weight w of a direction and the share m of the arc's mass::
 
         w = exp(−½ (θ/σ_θ)²);  m = w · exp(−½ ((d − r)/σ_r)²) / Σ
-        p = ½ − EMPTY · w                  for d < r − ARC_SIGMAS · σ_r
-        p = ½ + PEAK · min(1, UNIT · m)    on the arc
+        p = ½ − EMPTY_PEAK · w                  for d < r − ARC_SIGMAS · σ_r
+        p = ½ + PEAK · min(1, ELFES_UNIT · m)    on the arc
 
     Parameters
     ----------
@@ -79,13 +79,13 @@ def enter_reading(
                 value = log_odds[iy & mask, ix & mask]
                 p = 0.5
                 if d < inner:
-                    p -= EMPTY * across if step == 0 else 0.0
+                    p -= EMPTY_PEAK * across if step == 0 else 0.0
                 elif sigma > 0.0:
                     mass = across * math.exp(-0.5 * ((d - r) / sigma) ** 2)
                     if step == 0:
                         total += mass
                     else:
-                        p += PEAK * min(1.0, UNIT * mass / total)
+                        p += PEAK * min(1.0, ELFES_UNIT * mass / total)
                 value += math.log(p / (1.0 - p))
                 log_odds[iy & mask, ix & mask] = min(LOG_ODDS_MAX, max(-LOG_ODDS_MAX, value))
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.cell_evidence import PLACES
+from perception.mapping.grid.cell_evidence import PLACE_NUMBERS
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
     SPREAD_RELATIVE,
@@ -64,15 +64,15 @@ EXPLAINED_MAX: Final = 0.5
 .48 in two rooms of mirrors without late readings: there 5 and 30 % of such cells are out of reach."""
 OVER_PRIOR: Final = 10.0
 """Echoes that are assumed to have passed over something, before any was heard."""
-ECHOES_MAX: Final = 40000.0
+ECHOES_COUNTED_MAX: Final = 40000.0
 """When so many were counted, all counts are halved."""
 LINES_MIN: Final = 2.5
 """A cell was crossed if so many lines are expected to have crossed it. Fewer open more cells, and more of them with
 something in them."""
-UNIT: Final = 64
+UNITS_PER_LINE: Final = 64
 """One line is kept as this many units."""
 COUNT: Final = 0
-STAMP: Final = 1
+BLOCK_STAMP: Final = 1
 LINE: Final = 2
 LINES: Final = 3
 NOW: Final = 4
@@ -208,12 +208,12 @@ def enter_sights(
                 if d >= blocked_m[ray]:
                     continue
                 kept = sights[iy & mask, ix & mask]
-                if kept[STAMP] != place:
-                    kept[STAMP] = place
+                if kept[BLOCK_STAMP] != place:
+                    kept[BLOCK_STAMP] = place
                     kept[COUNT] = min(COUNT_MAX, int(kept[COUNT]) + 1)
                     kept[LINES] = min(COUNT_MAX, int(kept[LINES]) + int(kept[NOW]))
                     kept[NOW] = 0
-                kept[NOW] = max(int(kept[NOW]), int(UNIT * shares[ray]))
+                kept[NOW] = max(int(kept[NOW]), int(UNITS_PER_LINE * shares[ray]))
                 if is_located:
                     off = math.asin(min(1.0, max(-1.0, across)) * sine)
                     if abs(off - bearings[i]) <= LOCATED_RAD:
@@ -232,7 +232,7 @@ class SightLines:
     """
 
     SCRATCH: Final = ("_window", "_ring", "_blocked_m", "_shares", "_edges")
-    BOUNDS: Final = bounds(sights=Bound(0, PLACES - 1), _echoes=Bound(0, ECHOES_MAX))
+    BOUNDS: Final = bounds(sights=Bound(0, PLACE_NUMBERS - 1), _echoes=Bound(0, ECHOES_COUNTED_MAX))
 
     def __init__(self, window: Window, ring: Ring) -> None:
         self._window = window
@@ -260,14 +260,14 @@ class SightLines:
         """
         if not is_possible(firing.pose):
             return
-        stamp = 1 + place % (PLACES - 1)
+        stamp = 1 + place % (PLACE_NUMBERS - 1)
         mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_sights(
             self.sights, holds, self._window.corner, self._window.cell_m, stamp, float(firing.pose.x),
             float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings,
             self._ring.half_angle, self._blocked_m, self._shares, self._edges, self._echoes,
         )  # fmt: skip
-        if self._echoes[2:].sum() > 0.5 * ECHOES_MAX:
+        if self._echoes[2:].sum() > 0.5 * ECHOES_COUNTED_MAX:
             self._echoes *= 0.5
 
     @property
@@ -292,7 +292,7 @@ class SightLines:
         least = PLACES_MIN if mirrors < MIRRORS_MIN else COUNT_MAX + 1
         found = (self.sights[..., COUNT] >= least) | (self.sights[..., LINE] == 1)
         if trust > 0.0:
-            found |= self.sights[..., LINES] + self.sights[..., NOW] >= UNIT * LINES_MIN / trust
+            found |= self.sights[..., LINES] + self.sights[..., NOW] >= UNITS_PER_LINE * LINES_MIN / trust
         return np.asarray(found)
 
     def clear(self) -> None:

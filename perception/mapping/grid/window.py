@@ -29,7 +29,7 @@ SPREAD_RELATIVE: Final = 0.01
 """Standard deviation of an echo's range, in cells and as a share of the range, at least."""
 CENTRED_CELLS: Final = 4
 """The window follows once the robot is so many cells from its middle."""
-COORDINATE_MAX_M: Final = 1e6
+DRIVEN_MAX_M: Final = 1e6
 """No robot drives so far; a pose beyond it is a fault."""
 
 
@@ -114,7 +114,7 @@ def set_edges(bearing: float, half_angle: float, edges: Floats) -> None:
 
 def is_possible(pose: Pose) -> bool:
     """Return whether a robot can have a pose."""
-    return abs(pose.x) < COORDINATE_MAX_M and abs(pose.y) < COORDINATE_MAX_M and math.isfinite(pose.theta)
+    return abs(pose.x) < DRIVEN_MAX_M and abs(pose.y) < DRIVEN_MAX_M and math.isfinite(pose.theta)
 
 
 def placed(firing: Firing, ring: Ring) -> list[list[float]]:
@@ -128,7 +128,7 @@ def placed(firing: Firing, ring: Ring) -> list[list[float]]:
 
 def _corner_bound(window: Window) -> Bound:
     """Return the bound of the number of the window's first cell."""
-    most = math.ceil(COORDINATE_MAX_M / window.cell_m) + window.cells
+    most = math.ceil(DRIVEN_MAX_M / window.cell_m) + window.cells
     return Bound(-most, most)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
-from perception.obstacle_echoes.fresh_echoes import LOOKS, FreshEchoes
+from perception.obstacle_echoes.fresh_echoes import LOOKS_REMEMBERED, FreshEchoes
 from perception.pipeline import Perception
 from tests.perception.halls import settings
 
@@ -84,10 +84,10 @@ def test_a_ring_that_turns_keeps_what_it_heard_in_other_directions() -> None:
 
 def test_where_more_directions_are_heard_than_kept_the_oldest_goes() -> None:
     echoes = FreshEchoes(MOUNTS[:1], BEAM)
-    for k in range(LOOKS + 3):
+    for k in range(LOOKS_REMEMBERED + 3):
         echoes.update(at(float(k), 0.2 * k, 1.0))
-    _, ages, *_ = echoes.looks(LOOKS + 2.0, 60.0)
-    assert sorted(ages.tolist()) == list(range(LOOKS))
+    _, ages, *_ = echoes.looks(LOOKS_REMEMBERED + 2.0, 60.0)
+    assert sorted(ages.tolist()) == list(range(LOOKS_REMEMBERED))
 
 
 @pytest.mark.parametrize("turn_rad", [1e-5, 1e-3, 0.02, 0.08])

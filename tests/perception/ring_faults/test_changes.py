@@ -20,7 +20,7 @@ from perception.ring_faults.changes import (
     source,
     weigh_changes,
 )  # fmt: skip
-from perception.ring_faults.memory import SILENCE_M, EchoTrace
+from perception.ring_faults.memory import NO_ECHO_M, EchoTrace
 from perception.ring_faults.repeats import mark
 
 COUNT = 16
@@ -36,7 +36,7 @@ def looks(before: Floats, latest: Floats, moved_m: float = 0.1, turned_rad: floa
     """Return the memory of a ring that moved ahead and turned between two looks; infinite ranges are silences."""
     echoes = records(EchoTrace, zeros(EchoTrace, COUNT))
     for k in range(COUNT):
-        then, now = (r[k] if math.isfinite(r[k]) else SILENCE_M for r in (before, latest))
+        then, now = (r[k] if math.isfinite(r[k]) else NO_ECHO_M for r in (before, latest))
         echoes[k].is_compared = 1
         mark(echoes[k].before, then, 0.0, 0.0, AXES[k], 0.0)
         mark(echoes[k].latest, now, moved_m, 0.0, AXES[k] + turned_rad, moved_m)

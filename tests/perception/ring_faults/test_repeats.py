@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_faults.memory import SILENCE_M, EchoTrace, RingTrace
+from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, RingTrace
 from perception.ring_faults.motion_tests import EVIDENCE_NAT
 from perception.ring_faults.repeats import (
     EQUAL_NAT,
@@ -83,7 +83,7 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
     for x in (0.0, 0.01, 0.08):
         fire(0, 2.0, x)
         fire(12, 3.0, x)
-        fire(6, SILENCE_M, x)
+        fire(6, NO_ECHO_M, x)
     assert ring[0].repeated_nat == pytest.approx(2.0 * REPEAT_NAT)
     fire(12, 3.1, 0.08)
     assert ring[0].repeated_nat == pytest.approx(REPEAT_NAT)
@@ -128,7 +128,7 @@ def test_noise_is_learned_at_a_standstill_from_changes_that_noise_explains() -> 
     assert look(2.01) == pytest.approx(NOISY_NAT)
     assert look(2.01) == look(2.013, 0.0) + -EQUAL_NAT
     known = look(2.013)
-    for r, x in ((3.0, 0.0), (SILENCE_M, 0.0), (3.0, 0.0), (3.01, 0.1)):
+    for r, x in ((3.0, 0.0), (NO_ECHO_M, 0.0), (3.0, 0.0), (3.01, 0.1)):
         assert look(r, x) == pytest.approx(known), "a leap, silence and a reading after a way say nothing"
     for k in range(9):
         look(3.0 + 0.01 * (k % 2), 0.1)

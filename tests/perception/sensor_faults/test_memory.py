@@ -6,7 +6,7 @@ import numpy as np
 
 from drivers.messages import Firing, Pose
 from perception.records import zeros
-from perception.sensor_faults.memory import LOOKS, SETS_MAX, NeighbourCounts, RingMemory, SensorMemory
+from perception.sensor_faults.memory import LOOKS_KEPT, SETS_MAX, NeighbourCounts, RingMemory, SensorMemory
 from perception.sensor_faults.monitor import SensorMonitor
 from perception.snapshot import put_back, snapshot_of
 from tests.perception.halls import settings
@@ -18,7 +18,7 @@ def test_a_new_memory_is_zero_and_has_room_for_every_set() -> None:
     assert memory["short_readings"].shape == memory["is_crossed"].shape == (24, SETS_MAX)
     assert memory["run_neighbours"].shape == (24, 2)
     assert memory["run_neighbours"].dtype == NeighbourCounts.DTYPE
-    assert memory["looks"].shape == (24, LOOKS)
+    assert memory["looks"].shape == (24, LOOKS_KEPT)
     assert zeros(RingMemory, 1)["sets_seen"].tolist() == [0]
 
 

@@ -11,15 +11,15 @@ import pytest
 from config.load import load_robot
 from config.robot import RingConfig
 from perception.records import Records, records, zeros
-from perception.sensor_faults.memory import LOOKS, RingMemory, SensorMemory
+from perception.sensor_faults.memory import LOOKS_KEPT, RingMemory, SensorMemory
 from perception.sensor_faults.monitor import SensorMonitor
-from perception.sensor_faults.silence import DEAF_NAT, MISS_MIN, miss_share, was_audible, weigh_silence
+from perception.sensor_faults.silence import DEAF_NAT, HEALTHY_MISS_MIN, miss_share, was_audible, weigh_silence
 from tests.perception.wandering import Wandering, ring_of, ring_with_gaps
 
 pytestmark = [pytest.mark.compiled]
 promise = pytest.mark.promise("P8")
 HALF, NEAR_M = math.radians(12.0), 3.0
-LOOKS_NEEDED = math.ceil(DEAF_NAT / -math.log(MISS_MIN))
+LOOKS_NEEDED = math.ceil(DEAF_NAT / -math.log(HEALTHY_MISS_MIN))
 
 
 def memory() -> tuple[Records[SensorMemory], Records[RingMemory]]:
@@ -95,8 +95,8 @@ def test_where_the_others_miss_much_silence_says_little() -> None:
     sensors[0].audible = sensors[0].misses = 700
     assert miss_share(sensors[0], ring[0]) == pytest.approx(103.0 / 310.0), "its own do not count"
     ring[0].audible, ring[0].misses = 10_000, 700
-    assert miss_share(sensors[0], ring[0]) == MISS_MIN
-    assert LOOKS >= 2
+    assert miss_share(sensors[0], ring[0]) == HEALTHY_MISS_MIN
+    assert LOOKS_KEPT >= 2
 
 
 def named(drive: Wandering) -> dict[tuple[int, str], float]:

@@ -13,7 +13,6 @@ from perception.sensor_faults.memory import RingMemory
 from perception.sensor_faults.report import STUCK
 from perception.sensor_faults.turning import (
     ELSEWHERE_M,
-    FULL_TURN_RAD,
     IN_PLACE_M,
     follow_turn,
     repeats_through_turn,
@@ -33,7 +32,7 @@ def round_room(_bearing: float) -> float:
 
 
 def spin(check: Checker, room: Callable[[float], float], turns: float, stuck: int | None = None) -> None:
-    for k in range(round(turns * FULL_TURN_RAD / STEP_RAD)):
+    for k in range(round(turns * math.tau / STEP_RAD)):
         yaw = k * STEP_RAD
         ranges = np.array([room(yaw + 0.5 * math.pi * i) for i in range(COUNT)])
         if stuck is not None:
@@ -77,14 +76,14 @@ def test_the_turn_begins_anew_elsewhere_and_after_two_turns() -> None:
     memory[0].firings += 1
     follow_turn(1.1 * IN_PLACE_M, 0.0, 4.0, memory)
     assert (memory[0].turned, memory[0].turn_firing) == (0.0, 41)
-    memory[0].turned = -2.0 * FULL_TURN_RAD
+    memory[0].turned = -2.0 * math.tau
     memory[0].firings += 1
     follow_turn(1.1 * IN_PLACE_M, 0.0, 4.1, memory)
     assert (memory[0].turned, memory[0].turn_firing) == (0.0, 42)
 
 
 def test_most_others_must_read_otherwise_and_its_run_be_as_old_as_the_turn() -> None:
-    def judged(*others: float, run_firing: int = 5, turned: float = FULL_TURN_RAD) -> bool:
+    def judged(*others: float, run_firing: int = 5, turned: float = math.tau) -> bool:
         memory, of_ring = sensors(), records(RingMemory, zeros(RingMemory, 1))
         of_ring[0].turned, of_ring[0].turn_firing = turned, 5
         memory[0].run_firing = run_firing
@@ -94,8 +93,8 @@ def test_most_others_must_read_otherwise_and_its_run_be_as_old_as_the_turn() -> 
 
     far = 1.0 + 2.0 * ELSEWHERE_M
     assert judged(far, far, 1.0)
-    assert judged(far, far, 1.0, turned=-FULL_TURN_RAD)
+    assert judged(far, far, 1.0, turned=-math.tau)
     assert not judged(far, 1.0, 1.0)
     assert not judged(far, math.inf, math.inf), "silence says nothing"
     assert not judged(far, far, far, run_firing=6)
-    assert not judged(far, far, far, turned=0.9 * FULL_TURN_RAD)
+    assert not judged(far, far, far, turned=0.9 * math.tau)

@@ -7,7 +7,7 @@ from perception.bayes.memory.elements import POLYGON_BEARING_BINS, POLYGON_BIN_C
 
 
 def test_twins_overlap_and_a_whole_body_needs_more_room() -> None:
-    assert p.TWIN_RADII < p.APART < p.APART_WHOLE < p.OVERLAP_RADII
+    assert p.TWIN_RADII < p.POLYGONS_APART < p.APART_WHOLE < p.OVERLAP_RADII
 
 
 def test_a_quantum_holds_the_largest_step_that_cannot_be_cut() -> None:

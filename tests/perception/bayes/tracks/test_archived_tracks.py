@@ -9,7 +9,7 @@ from perception.bayes.inference import reservoir
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY, Reading
 from perception.bayes.memory.state import CircleTrack, Memory, PolygonTrack
 from perception.bayes.tracks.archived_tracks import (
-    READINGS_KEPT,
+    ARCHIVED_READINGS,
     archived_dtype,
     bearing_bins,
     newest_readings,
@@ -43,7 +43,7 @@ def filled(seed: int, readings: int) -> Memory:
     return memory
 
 
-@pytest.mark.parametrize("readings", [0, 3, READINGS_KEPT, 400])
+@pytest.mark.parametrize("readings", [0, 3, ARCHIVED_READINGS, 400])
 def test_a_track_comes_back_as_it_was_but_for_its_older_readings(readings: int) -> None:
     memory = filled(readings, readings)
     before = memory.circles[0].copy()
@@ -55,9 +55,9 @@ def test_a_track_comes_back_as_it_was_but_for_its_older_readings(readings: int) 
             assert np.array_equal(after[name], before[name]), name
     kept = np.minimum(before["bins"]["count"], BIN_CAPACITY)
     counts = after["bins"]["count"]
-    assert counts.sum() == min(kept.sum(), READINGS_KEPT)
+    assert counts.sum() == min(kept.sum(), ARCHIVED_READINGS)
     assert (counts <= kept).all()
-    assert (counts[kept > 0] > 0).all() or kept.sum() > READINGS_KEPT
+    assert (counts[kept > 0] > 0).all() or kept.sum() > ARCHIVED_READINGS
     for b, count in enumerate(counts.tolist()):
         newest = [int(before["bins"]["count"][b] - 1 - k) % BIN_CAPACITY for k in range(count)][::-1]
         for field in ("x", "y", "axis_x", "axis_y", "range_m"):
@@ -73,7 +73,7 @@ def test_a_bearing_that_gets_more_than_it_holds_keeps_the_newest() -> None:
     unpack(pack(memory.circles[:1], archived_dtype(CircleTrack), is_reported=True), memory.circles[1:2])
     bins = memory.circles["bins"][1]
     (b,) = np.flatnonzero(bins["count"]).tolist()
-    assert bins["count"][b] == BIN_CAPACITY < READINGS_KEPT
+    assert bins["count"][b] == BIN_CAPACITY < ARCHIVED_READINGS
     assert bins["readings"]["x"][b] == pytest.approx(newest["x"], abs=1e-4)
     assert bins["readings"]["y"][b] == pytest.approx(newest["y"], abs=1e-4)
 
@@ -81,8 +81,8 @@ def test_a_bearing_that_gets_more_than_it_holds_keeps_the_newest() -> None:
 def test_of_many_readings_each_bearing_keeps_its_newest() -> None:
     bins = filled(1, 400).circles["bins"][0]
     kept = newest_readings(bins)
-    assert len(kept) == READINGS_KEPT
-    assert READINGS_KEPT >= BEARING_BINS
+    assert len(kept) == ARCHIVED_READINGS
+    assert ARCHIVED_READINGS >= BEARING_BINS
     for b in np.flatnonzero(bins["count"]).tolist():
         newest = bins["readings"][b, (bins["count"][b] - 1) % BIN_CAPACITY]
         assert newest.tobytes() in {one.tobytes() for one in kept}

@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference.range_fit import FAR
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.state import Memory
 from perception.bayes.memory.wall_records import WallMap
 from perception.bayes.reports.object_report import corner_object
-from perception.bayes.walls.contact import EDGE_REACH_M, HEARD_REACH_M
+from perception.bayes.walls.contact import HEARD_REACH_M
 from perception.bayes.walls.corners import EDGE_ECHOES_MIN, KEPT, find_corners
 from perception.bayes.walls.points import (
     ACROSS_M,
-    APART_M,
-    CELL_M,
-    CELLS,
     FIRST_M,
+    KNOWN_POINT_M,
+    LINE_CELL_M,
+    LINE_CELLS,
     SLANT_MIN,
     count_cuts,
     find_heard_points,
@@ -94,7 +95,7 @@ def test_a_corner_that_ranges_passed_or_that_a_wall_would_be_or_that_is_known_is
     assert used(room) == [], "a wall across answers from its own feet"
     hear_corner(room)
     edge = room.edges[7]
-    edge.is_used, edge.is_edge, edge.x, edge.y = 1, 1, CORNER[0], CORNER[1] + 0.5 * APART_M
+    edge.is_used, edge.is_edge, edge.x, edge.y = 1, 1, CORNER[0], CORNER[1] + 0.5 * KNOWN_POINT_M
     edge.echoes = 100.0
     find_heard_points(memory, P, 0)
     assert used(room) == [], "known as an edge"
@@ -208,10 +209,16 @@ def test_a_post_that_ranges_passed_or_that_is_heard_from_afar_or_lies_too_far_be
 
 
 def test_what_is_known_by_more_echoes_stays() -> None:
-    for echoes, expected in ((1.0, tuple(EDGE)), (50.0, (2.0, EDGE[1] + 0.5 * APART_M))):
+    for echoes, expected in ((1.0, tuple(EDGE)), (50.0, (2.0, EDGE[1] + 0.5 * KNOWN_POINT_M))):
         memory, room = mirrors()
         known = room.edges[7]
-        known.is_used, known.is_edge, known.x, known.y, known.echoes = KEPT, 1, 2.0, EDGE[1] + 0.5 * APART_M, echoes
+        known.is_used, known.is_edge, known.x, known.y, known.echoes = (
+            KEPT,
+            1,
+            2.0,
+            EDGE[1] + 0.5 * KNOWN_POINT_M,
+            echoes,
+        )
         known.heard.xx = known.heard.yy = 1e4
         known.heard.x, known.heard.y = 1e4 * known.x, 1e4 * known.y
         hear_edge(room)
@@ -224,11 +231,11 @@ def test_cuts_are_those_of_the_oracle() -> None:
     rng = np.random.default_rng(6)
     rows = np.column_stack([rng.uniform(0.0, 1.9, (400, 2)), rng.uniform(-1.6, 1.6, 400), rng.uniform(0.3, 3.0, 400)])
     hear(room, list(rows[:, :2]), rows[:, 2].tolist(), rows[:, 3].tolist())
-    cells = np.zeros((2, CELLS))
+    cells = np.zeros((2, LINE_CELLS))
     count_cuts(memory.s, P, 3, cells)
     cuts, ranges = line_cuts(rows, np.zeros(2), 0.0, 2.0, math.acos(P[0].cos_half_angle), SLANT_MIN)
-    expected = np.zeros((2, CELLS))
-    np.add.at(expected, ((ranges >= EDGE_REACH_M).astype(int), ((cuts - FIRST_M) / CELL_M).astype(int)), 1.0)
+    expected = np.zeros((2, LINE_CELLS))
+    np.add.at(expected, ((ranges >= EDGE_REACH_M).astype(int), ((cuts - FIRST_M) / LINE_CELL_M).astype(int)), 1.0)
     assert len(cuts) > 20
     np.testing.assert_array_equal(cells, expected)
 

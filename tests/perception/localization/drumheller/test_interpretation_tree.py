@@ -128,7 +128,7 @@ def test_one_wall_gives_a_row_of_poses_that_see_it() -> None:
 def test_the_number_of_nodes_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     segments = [seen(angle, 2.0) for angle in (0.0, 90.0, 180.0, 270.0)]
     whole = interpretations(segments, make_room(SQUARE))
-    monkeypatch.setattr(interpretation_tree, "NODES_MAX", 50)
+    monkeypatch.setattr(interpretation_tree, "TREE_NODES_MAX", 50)
     cut = interpretations(segments, make_room(SQUARE))
     assert 0 < len(cut) < len(whole)
     assert set(cut) <= set(whole)

@@ -17,9 +17,9 @@ from perception.localization.known_room.particle_update import TEMPER
 from perception.localization.known_room.pose_track import (
     ALIKE_GAIN,
     ALIKE_WEIGHT,
-    EVIDENCE_MAX,
     EVIDENCE_MIN,
     MIRRORS,
+    PLACE_EVIDENCE_MAX,
     QUANTA,
     PoseTrack,
     heading_noise,
@@ -61,7 +61,7 @@ def test_a_keyframe_takes_quanta_for_each_hypothesis_and_the_right_one_is_left()
     assert done == [0] * (2 * QUANTA - 1) + [24]
     assert len(track) == 1
     assert track.explains > 0.9
-    assert track.evidence == pytest.approx(EVIDENCE_MAX)
+    assert track.evidence == pytest.approx(PLACE_EVIDENCE_MAX)
     assert track.peak_at == 0
     pose = track.pose(Pose(0.1, 0.0, 0.12))  # odometry's frame is the ring's at the keyframe, but for the turn
     here = (
@@ -99,7 +99,7 @@ def test_what_speaks_against_a_place_adds_up_from_when_it_began() -> None:
     while track.is_behind(keyframes):
         if track.enter(keyframes, LearnedShares()):
             evidence.append(track.evidence)
-    assert max(evidence) == pytest.approx(EVIDENCE_MAX)
+    assert max(evidence) == pytest.approx(PLACE_EVIDENCE_MAX)
     assert track.peak_at == max(k for k, value in enumerate(evidence) if value == max(evidence))
     assert evidence[-1] < 0.0
     assert track.explains < 0.1

@@ -13,10 +13,10 @@ from perception.mapping.grid.cell_evidence import (
     BASE,
     CERTAIN,
     FADING_PLACES,
-    FREE,
     HIT,
     NAT,
-    PLACES,
+    PASSAGE,
+    PLACE_NUMBERS,
     STAMP,
     SURE,
     evidence_now,
@@ -32,11 +32,11 @@ def kept(base: int, hit: int = 0, free: int = 0, stamp: int = 1) -> np.ndarray:
     return np.array([base, hit, free, stamp], np.int16)
 
 
-@given(st.integers(-CERTAIN, CERTAIN), st.integers(0, 5000), st.integers(-5000, 0), st.integers(1, PLACES - 1))
+@given(st.integers(-CERTAIN, CERTAIN), st.integers(0, 5000), st.integers(-5000, 0), st.integers(1, PLACE_NUMBERS - 1))
 def test_evidence_is_bounded_and_never_changes_sign_by_fading(base: int, hit: int, free: int, place: int) -> None:
     at_once = evidence_now(kept(base, hit, free, place), place)
     assert at_once == min(CERTAIN, max(-CERTAIN, base + hit + free))
-    later = evidence_now(kept(base, hit, free, place), (place + 500 * FADING_PLACES) % PLACES)
+    later = evidence_now(kept(base, hit, free, place), (place + 500 * FADING_PLACES) % PLACE_NUMBERS)
     assert abs(later) == max(0, abs(at_once) - 500)
     assert later * at_once >= 0
 
@@ -46,7 +46,7 @@ def test_a_new_place_keeps_what_was_found_and_the_same_place_changes_nothing() -
     renew(cell, 7)
     assert cell.tolist() == [100, 300, -50, 7]
     renew(cell, 107)
-    assert (cell[BASE], cell[HIT], cell[FREE], cell[STAMP]) == (350 - 2, 0, 0, 107)
+    assert (cell[BASE], cell[HIT], cell[PASSAGE], cell[STAMP]) == (350 - 2, 0, 0, 107)
 
 
 @pytest.mark.parametrize("seed", range(5))

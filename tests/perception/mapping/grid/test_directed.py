@@ -148,7 +148,7 @@ def test_silence_counts_in_its_own_direction_only_and_to_the_learnt_range() -> N
 def test_evidence_fades_with_the_way() -> None:
     grid = make_grid()
     grid.observe(firing([math.inf] * 4), UNKNOWN, 1, 2.0)
-    assert evidence(grid, 1, 1.2, 0.0)[0] == pytest.approx(-directed.SILENT / NAT, rel=0.1)
+    assert evidence(grid, 1, 1.2, 0.0)[0] == pytest.approx(-directed.SILENT_NAT / NAT, rel=0.1)
     later = 1 + 100 * FADING_PLACES
     assert evidence(grid, later, 1.2, 0.0)[0] == pytest.approx(evidence(grid, 1, 1.2, 0.0)[0] + 100 / NAT)
 
