@@ -49,9 +49,14 @@ class Valley:
 
 
 def follow_valley(
-    percept: Percept, to_goal: Response, goal_m: float, before: Valley, search: Search, body_radius_m: float,
+    percept: Percept,
+    to_goal: Response,
+    goal_m: float,
+    before: Valley,
+    search: Search,
+    body_radius_m: float,
     config: FollowValleyConfig,
-) -> tuple[Response, Valley]:  # fmt: skip
+) -> tuple[Response, Valley]:
     """Return the schema's vector, of length zero if no direction is free, and the valley for the next call.
 
     Parameters

@@ -128,9 +128,15 @@ NO_DETOUR: Final = Detour()
 
 
 def leave_canyon(
-    percept: Percept, goal: tuple[float, float], detour: Detour, body_radius_m: float, config: LeaveCanyonConfig,
-    *, waits: bool = False, last_rad: float | None = None,
-) -> tuple[Response | None, Detour]:  # fmt: skip
+    percept: Percept,
+    goal: tuple[float, float],
+    detour: Detour,
+    body_radius_m: float,
+    config: LeaveCanyonConfig,
+    *,
+    waits: bool = False,
+    last_rad: float | None = None,
+) -> tuple[Response | None, Detour]:
     """Return the vector round what closes the way to a goal, None while nothing does; and the detour so far.
 
     Parameters
@@ -186,9 +192,12 @@ def leave_canyon(
         )
     elif _is_round(detour, pose):
         detour = replace(
-            detour, side=_other(detour.side), began_driven_m=detour.driven_m, wall_rad=bearing,
+            detour,
+            side=_other(detour.side),
+            began_driven_m=detour.driven_m,
+            wall_rad=bearing,
             rounds=detour.rounds + 1,
-        )  # fmt: skip
+        )
     wall, heading = _along(points, pose, detour.side, detour.wall_rad, room, config)
     if leaving is not None:
         heading = _outwards(leaving, pose)
@@ -255,9 +264,15 @@ def _outwards(canyon: Canyon, pose: Pose) -> float:
 
 
 def _presume(
-    echoes: Floats, pose: Pose, detour: Detour, to_goal_m: float, bearing_rad: float, room_m: float, reach_m: float,
+    echoes: Floats,
+    pose: Pose,
+    detour: Detour,
+    to_goal_m: float,
+    bearing_rad: float,
+    room_m: float,
+    reach_m: float,
     front_m: float,
-) -> Detour:  # fmt: skip
+) -> Detour:
     """Return the detour with the way driven and what is presumed far ahead brought up to date."""
     step = 0.0 if detour.x is None or detour.y is None else math.hypot(pose.x - detour.x, pose.y - detour.y)
     detour = replace(detour, x=pose.x, y=pose.y, driven_m=detour.driven_m + step)
@@ -306,9 +321,14 @@ def _needed_m(detour: Detour, to_goal_m: float) -> float:
 
 
 def _begin(
-    points: Floats, pose: Pose, goal: tuple[float, float], canyons: tuple[Canyon, ...], detour: Detour, room_m: float,
+    points: Floats,
+    pose: Pose,
+    goal: tuple[float, float],
+    canyons: tuple[Canyon, ...],
+    detour: Detour,
+    room_m: float,
     config: LeaveCanyonConfig,
-) -> Detour:  # fmt: skip
+) -> Detour:
     """Return a detour that begins here, on the side that promises the shorter way."""
     to_goal, bearing = math.hypot(goal[0] - pose.x, goal[1] - pose.y), math.atan2(goal[1] - pose.y, goal[0] - pose.x)
 
@@ -326,9 +346,14 @@ def _begin(
     side = min(sides, key=cost)
     began_m = min(to_goal, detour.nearest_m)
     return replace(
-        detour, side=side, began_m=began_m, began_x=pose.x, began_y=pose.y, began_driven_m=detour.driven_m,
+        detour,
+        side=side,
+        began_m=began_m,
+        began_x=pose.x,
+        began_y=pose.y,
+        began_driven_m=detour.driven_m,
         wall_rad=bearing,
-    )  # fmt: skip
+    )
 
 
 def _end(canyon: Canyon, side: Side) -> tuple[float, float]:

@@ -173,19 +173,21 @@ def swirl_in_step(scene: Scene, memory: Memory, use: SwirlUse) -> Answer:
     return Answer(swirl(scene.percept, way_rad, scene.body.radius_m, config), memory)
 
 
-SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType({
-    "move_ahead": ahead_in_step,
-    "move_to_goal": to_goal_in_step,
-    "turn": turn,
-    "wander": wander,
-    "follow_wall": follow_wall,
-    "stay_on_path": stay_on_path,
-    "approach_object": approach_object,
-    "search": search,
-    "follow_valley": steering_in_step,
-    "leave_canyon": steering_in_step,
-    "avoid_past": avoid_past_in_step,
-    "noise": noise_in_step,
-    "swirl": swirl_in_step,
-})  # fmt: skip
+SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
+    {
+        "move_ahead": ahead_in_step,
+        "move_to_goal": to_goal_in_step,
+        "turn": turn,
+        "wander": wander,
+        "follow_wall": follow_wall,
+        "stay_on_path": stay_on_path,
+        "approach_object": approach_object,
+        "search": search,
+        "follow_valley": steering_in_step,
+        "leave_canyon": steering_in_step,
+        "avoid_past": avoid_past_in_step,
+        "noise": noise_in_step,
+        "swirl": swirl_in_step,
+    }
+)
 """Every schema by its name in a step."""

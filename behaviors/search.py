@@ -73,9 +73,12 @@ def lines(use: SearchUse) -> list[tuple[float, float]]:
         x, y, i = x + length * dx, y + length * dy, i + 1
         if abs(x) > use.depth_m / 2.0 + 1e-9 and abs(y) > use.width_m / 2.0 + 1e-9:
             return corners
-        corners.append((
-            max(-use.depth_m / 2.0, min(use.depth_m / 2.0, x)), max(-use.width_m / 2.0, min(use.width_m / 2.0, y)),
-        ))  # fmt: skip
+        corners.append(
+            (
+                max(-use.depth_m / 2.0, min(use.depth_m / 2.0, x)),
+                max(-use.width_m / 2.0, min(use.width_m / 2.0, y)),
+            )
+        )
 
 
 def _is_occupied(scene: Scene, there: Pose) -> bool:

@@ -88,9 +88,11 @@ class PlacesConfig(Strict):
 
     def __str__(self) -> str:
         parts = {
-            "places": self.place, "no-go lines": self.no_go_line, "no-go areas": self.no_go_area,
+            "places": self.place,
+            "no-go lines": self.no_go_line,
+            "no-go areas": self.no_go_area,
             "speed areas": self.speed_area,
-        }  # fmt: skip
+        }
         return ", ".join(f"{len(rows)} {what}" for what, rows in parts.items() if rows) or "no places"
 
     def named(self, name: str) -> PlaceConfig | None:

@@ -10,9 +10,19 @@ from config.strict import Strict, TomlList
 
 Value: TypeAlias = bool | int | float | str
 Objective: TypeAlias = Literal[
-    "recall", "f1", "false", "mean_error_m", "max_error_m", "objects", "mean_sigma_m", "stops", "predicted_nat",
-    "virtual_s", "cycle_us_p50", "cycle_us_p99",
-]  # fmt: skip
+    "recall",
+    "f1",
+    "false",
+    "mean_error_m",
+    "max_error_m",
+    "objects",
+    "mean_sigma_m",
+    "stops",
+    "predicted_nat",
+    "virtual_s",
+    "cycle_us_p50",
+    "cycle_us_p99",
+]
 """Figures of a run by which settings can be compared: of recall, f1, objects and predicted_nat more is better, of the
 others less. f1 is recall and precision in one: 2 · found / (true + found + false). predicted_nat needs no truth: how
 well readings that were withheld from perception are predicted by what it found in the others."""

@@ -68,9 +68,13 @@ def worst_sigma(xx: float, xy: float, yy: float) -> float:
 
 
 def wall_between(
-    ends: tuple[float, float, float, float], variance_across: float, variance_turn: float, echoes: int,
-    log_odds: float, number: int | None = None,
-) -> DetectedObject:  # fmt: skip
+    ends: tuple[float, float, float, float],
+    variance_across: float,
+    variance_turn: float,
+    echoes: int,
+    log_odds: float,
+    number: int | None = None,
+) -> DetectedObject:
     """Return a wall as a detected object: its middle and direction; its length is in the covariance.
 
     Parameters
@@ -94,9 +98,18 @@ def wall_between(
     xx, yy, xy = tx * tx * along + ty * ty * across, ty * ty * along + tx * tx * across, tx * ty * (along - across)
     probability = 1.0 / (1.0 + math.exp(-log_odds))
     return DetectedObject(
-        "wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.atan2(ty, tx), worst_sigma(xx, xy, yy), echoes,
-        probability, probability, (xx, xy, yy), number, sigma_theta=math.sqrt(variance_turn),
-    )  # fmt: skip
+        "wall",
+        0.5 * (x1 + x2),
+        0.5 * (y1 + y2),
+        math.atan2(ty, tx),
+        worst_sigma(xx, xy, yy),
+        echoes,
+        probability,
+        probability,
+        (xx, xy, yy),
+        number,
+        sigma_theta=math.sqrt(variance_turn),
+    )
 
 
 class MapCounts(NamedTuple):

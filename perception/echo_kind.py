@@ -220,6 +220,10 @@ def _fit(paths: Paths, t: np.ndarray, half_paths_m: Floats, sigma_m: Floats) -> 
     covariance = np.linalg.inv(hessian + 1e-12 * np.eye(2))
     width = 0.5 * math.log(max(float(np.linalg.det(covariance)), 1e-300))
     return _Fit(
-        math.remainder(float(place[0]), 2.0 * math.pi), float(place[1]), math.sqrt(covariance[0, 0]),
-        math.sqrt(covariance[1, 1]), cost, -0.5 * cost + width,
-    )  # fmt: skip
+        math.remainder(float(place[0]), 2.0 * math.pi),
+        float(place[1]),
+        math.sqrt(covariance[0, 0]),
+        math.sqrt(covariance[1, 1]),
+        cost,
+        -0.5 * cost + width,
+    )

@@ -131,9 +131,15 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no types
         if inner:
             options.no_cpython_wrapper = options.no_cfunc_wrapper = options.no_compile = True
         compiled = compiler.compile_extra(
-            _typing_context(), self.targetdescr.target_context, self.py_func, args=args, return_type=return_type,
-            flags=options, locals=self.locals, pipeline_class=_Pipeline,
-        )  # fmt: skip
+            _typing_context(),
+            self.targetdescr.target_context,
+            self.py_func,
+            args=args,
+            return_type=return_type,
+            flags=options,
+            locals=self.locals,
+            pipeline_class=_Pipeline,
+        )
         if compiled.typing_error is not None:
             raise compiled.typing_error
         return compiled

@@ -161,7 +161,7 @@ def _steady(readings: Floats) -> tuple[Floats, float]:
 
 def _on_surface(
     readings: Floats, mounts: Floats, bearing: float, range_m: float, resolution_m: float
-) -> NDArray[np.bool_]:  # fmt: skip
+) -> NDArray[np.bool_]:
     """Return which readings end on the surface whose nearest point lies in this direction at this range."""
     point = range_m * np.array([math.cos(bearing), math.sin(bearing)])
     transmitters, listeners = (readings[:, k].astype(np.int64) for k in (0, 1))

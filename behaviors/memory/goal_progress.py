@@ -44,9 +44,16 @@ class Progress:
 
 
 def observe_progress(
-    before: Progress, pose: Pose, distance_m: float, run_s: float, held: str | None, config: MoveToGoalConfig,
-    *, is_blocked: bool = False, is_occupied: bool = False,
-) -> Progress:  # fmt: skip
+    before: Progress,
+    pose: Pose,
+    distance_m: float,
+    run_s: float,
+    held: str | None,
+    config: MoveToGoalConfig,
+    *,
+    is_blocked: bool = False,
+    is_occupied: bool = False,
+) -> Progress:
     """Return the progress after a cycle; a drive that was given up stays so.
 
     Parameters

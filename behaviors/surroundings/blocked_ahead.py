@@ -139,9 +139,15 @@ def pocket_ahead(echoes: Floats, pose: Pose, way_rad: float, reach_m: float) -> 
 
 
 def blocked_ahead(
-    echoes: Floats, pose: Pose, way_rad: float, reach_m: float, ahead: Ahead | None, step_m: float, room_m: float,
+    echoes: Floats,
+    pose: Pose,
+    way_rad: float,
+    reach_m: float,
+    ahead: Ahead | None,
+    step_m: float,
+    room_m: float,
     pocket: Pocket | None = None,
-) -> Ahead | None:  # fmt: skip
+) -> Ahead | None:
     """Return the echo that stays ahead, None if there is none.
 
     Parameters

@@ -159,9 +159,14 @@ def expand(search: Search, percept: Percept, body_radius_m: float, config: Follo
 
 
 def _children(
-    node: Node, number: int, distance: float, search: Search, percept: Percept, body_radius_m: float,
+    node: Node,
+    number: int,
+    distance: float,
+    search: Search,
+    percept: Percept,
+    body_radius_m: float,
     config: FollowValleyConfig,
-) -> list[Node]:  # fmt: skip
+) -> list[Node]:
     """Return the places a step ahead of one in the directions of its candidates.
 
     Steps along the way in force cost less, so that another of almost the same cost does not replace it.

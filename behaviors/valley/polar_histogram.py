@@ -56,9 +56,13 @@ class Cells:
 
 
 def cells_near(
-    percept: Percept, x: float, y: float, reach_m: float, config: FollowValleyConfig,
+    percept: Percept,
+    x: float,
+    y: float,
+    reach_m: float,
+    config: FollowValleyConfig,
     only_heard: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> Cells:  # fmt: skip
+) -> Cells:
     """Return the cells and fresh echoes within a distance of a place.
 
     Parameters
@@ -88,18 +92,45 @@ def cells_near(
     part, echoes = np.array(part, np.float32, order="C"), np.array(percept.obstacles, np.float64, order="C")
     dx, dy, distances, certainties = np.empty((4, part.size + len(echoes)))
     count = fill_cells(
-        part, left, low, cell_m, echoes, float(x), float(y), float(reach_m), *only_heard,
-        config.occupied_probability, config.sure_probability, dx, dy, distances, certainties,
-    )  # fmt: skip
+        part,
+        left,
+        low,
+        cell_m,
+        echoes,
+        float(x),
+        float(y),
+        float(reach_m),
+        *only_heard,
+        config.occupied_probability,
+        config.sure_probability,
+        dx,
+        dy,
+        distances,
+        certainties,
+    )
     return Cells(dx[:count], dy[:count], distances[:count], certainties[:count])
 
 
 @kernel
 def fill_cells(
-    part: NDArray[np.float32], left: float, low: float, cell_m: float, echoes: Floats, x: float, y: float,
-    reach_m: float, heard_dx: float, heard_dy: float, heard_m: float, occupied: float, sure: float,
-    dx: Floats, dy: Floats, distances: Floats, certainties: Floats,
-) -> int:  # fmt: skip
+    part: NDArray[np.float32],
+    left: float,
+    low: float,
+    cell_m: float,
+    echoes: Floats,
+    x: float,
+    y: float,
+    reach_m: float,
+    heard_dx: float,
+    heard_dy: float,
+    heard_m: float,
+    occupied: float,
+    sure: float,
+    dx: Floats,
+    dy: Floats,
+    distances: Floats,
+    certainties: Floats,
+) -> int:
     """Write the cells, row by row, and the echoes within a distance of a place; return their number.
 
     Parameters
@@ -173,17 +204,31 @@ def crossed(cells: Cells, radii_m: Sequence[float], ways_m: Sequence[float], *, 
     """
     covered = np.empty((len(radii_m), SECTORS), np.bool_)
     cover(
-        cells.dx, cells.dy, cells.distances, cells.certainties, np.array(radii_m, np.float64),
-        np.array(ways_m, np.float64), in_part, np.empty((len(radii_m), LINE), np.int64), covered,
-    )  # fmt: skip
+        cells.dx,
+        cells.dy,
+        cells.distances,
+        cells.certainties,
+        np.array(radii_m, np.float64),
+        np.array(ways_m, np.float64),
+        in_part,
+        np.empty((len(radii_m), LINE), np.int64),
+        covered,
+    )
     return covered
 
 
 @kernel
 def cover(
-    dx: Floats, dy: Floats, distances: Floats, certainties: Floats, radii_m: Floats, ways_m: Floats, in_part: bool,
-    steps: Ints, covered: Sectors,
-) -> None:  # fmt: skip
+    dx: Floats,
+    dy: Floats,
+    distances: Floats,
+    certainties: Floats,
+    radii_m: Floats,
+    ways_m: Floats,
+    in_part: bool,
+    steps: Ints,
+    covered: Sectors,
+) -> None:
     """Write what `crossed` returns.
 
     A disc that passes a cell on its way touches it within asin(R/d), the enlargement of VFH+; beside its end, within

@@ -28,8 +28,13 @@ class RflexConfig(Strict):
     range_factor: float = Field(default=1476.0, gt=0.0, le=1e5)
     """Units of a range per metre."""
     banks: Annotated[TomlList[BankSize], Field(min_length=1, max_length=BANKS_MAX)] = (
-        4, 4, 4, 4, 4, 4,
-    )  # fmt: skip
+        4,
+        4,
+        4,
+        4,
+        4,
+        4,
+    )
     """Number of sonars of each bank; the ring lists them bank after bank. All banks fire in parallel."""
     first_bank: int = Field(default=0, ge=0, lt=BANKS_MAX)
     """The number of the first of these banks."""

@@ -269,10 +269,16 @@ class ArcosDevice(EventDevice):
         touched = self._touched()
         known = self._readings.take(self._now_us)
         sip = make_sip(
-            self._body, self._firmware, self._requested, touched=touched,
-            battery=self._volts(), stop=self._faults.has(StopButton), arrays=self._arrays.flags,
-            sonar=known[-SONAR_MAX:], servo=self._servo,
-        )  # fmt: skip
+            self._body,
+            self._firmware,
+            self._requested,
+            touched=touched,
+            battery=self._volts(),
+            stop=self._faults.has(StopButton),
+            arrays=self._arrays.flags,
+            sonar=known[-SONAR_MAX:],
+            servo=self._servo,
+        )
         for packet in (sip, *self._requested.due(self._body, self._firmware, *touched[:2])):
             self._send(packet)
 

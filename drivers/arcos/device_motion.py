@@ -47,9 +47,11 @@ class MotionServo:
         self._firmware = firmware
         self.enabled = False
         self.ramps = RampSettings(
-            firmware.acceleration_mm_s2, firmware.acceleration_mm_s2,
-            firmware.turn_acceleration_deg_s2, firmware.turn_acceleration_deg_s2,
-        )  # fmt: skip
+            firmware.acceleration_mm_s2,
+            firmware.acceleration_mm_s2,
+            firmware.turn_acceleration_deg_s2,
+            firmware.turn_acceleration_deg_s2,
+        )
         self.speed_mm_s, self.turn_deg_s = firmware.speed_top_mm_s, firmware.turn_top_deg_s
         self._v = self._w = 0.0
         self._way_left_m: float | None = None
@@ -164,9 +166,10 @@ class MotionServo:
         up, down = (ramps.turn_up, ramps.turn_down) if turning else (ramps.up, ramps.down)
         up, down = (size, down) if value > 0 else (up, size)
         self.ramps = (
-            RampSettings(ramps.up, ramps.down, up, down) if turning
+            RampSettings(ramps.up, ramps.down, up, down)
+            if turning
             else RampSettings(up, down, ramps.turn_up, ramps.turn_down)
-        )  # fmt: skip
+        )
 
     def _move(self, command: Command, heading: float) -> None:
         value = command.value

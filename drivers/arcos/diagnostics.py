@@ -52,26 +52,28 @@ STOP_PRESSED: Final = (
 )
 
 
-_UNANSWERED: Final = MappingProxyType({
-    Stage.CLOSING: (
-        "the robot sends the packets of an open session and does not end it",
-        "it receives nothing, or another client holds it open: end the other client, check the line, and press the "
-        "robot's reset button",
-    ),
-    Stage.SYNC1: (
-        "the robot answers SYNC0 and not {}",
-        "it is in the middle of another client's start, loses packets, or is no Pioneer: end other clients, then "
-        "restart it, or its simulator",
-    ),
-    Stage.CONFIG: (
-        "the robot answers the SYNCs, but neither OPEN nor CONFIG",
-        "it loses packets or is no Pioneer: check the line, then restart it, or its simulator",
-    ),
-    Stage.DONE: (
-        "the robot answers the SYNCs and opens its session, but sends no odometry",
-        "its controller has stopped working: restart it, or its simulator",
-    ),
-})  # fmt: skip
+_UNANSWERED: Final = MappingProxyType(
+    {
+        Stage.CLOSING: (
+            "the robot sends the packets of an open session and does not end it",
+            "it receives nothing, or another client holds it open: end the other client, check the line, and press "
+            "the robot's reset button",
+        ),
+        Stage.SYNC1: (
+            "the robot answers SYNC0 and not {}",
+            "it is in the middle of another client's start, loses packets, or is no Pioneer: end other clients, then "
+            "restart it, or its simulator",
+        ),
+        Stage.CONFIG: (
+            "the robot answers the SYNCs, but neither OPEN nor CONFIG",
+            "it loses packets or is no Pioneer: check the line, then restart it, or its simulator",
+        ),
+        Stage.DONE: (
+            "the robot answers the SYNCs and opens its session, but sends no odometry",
+            "its controller has stopped working: restart it, or its simulator",
+        ),
+    }
+)
 
 
 def watchdog_note(deadman_s: float) -> str:

@@ -37,9 +37,15 @@ class EventDevice(ABC):
     """
 
     def __init__(
-        self, robot: RobotConfig, world: WorldConfig, faults: Sequence[Fault], baud: int,
-        sonar_rng: np.random.Generator, drift_rng: np.random.Generator, line_rngs: Sequence[np.random.Generator],
-    ) -> None:  # fmt: skip
+        self,
+        robot: RobotConfig,
+        world: WorldConfig,
+        faults: Sequence[Fault],
+        baud: int,
+        sonar_rng: np.random.Generator,
+        drift_rng: np.random.Generator,
+        line_rngs: Sequence[np.random.Generator],
+    ) -> None:
         self._faults = schedule = FaultSchedule(faults)
         self._scene = scene = compile_scene(world, later=len(schedule.planned(SuddenObject)))
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))

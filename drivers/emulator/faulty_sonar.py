@@ -28,9 +28,18 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Floats, Pose
 
 KINDS: tuple[type[Fault], ...] = (
-    BlindNear, ConstantRing, DroppedReadings, FrozenRing, Outliers, RangeOffset, ReplayedEchoes, SilentRing,
-    StuckSensor, SwappedSensors, TurnedRing,
-)  # fmt: skip
+    BlindNear,
+    ConstantRing,
+    DroppedReadings,
+    FrozenRing,
+    Outliers,
+    RangeOffset,
+    ReplayedEchoes,
+    SilentRing,
+    StuckSensor,
+    SwappedSensors,
+    TurnedRing,
+)
 """The faults of sensors."""
 
 
@@ -55,9 +64,14 @@ class FaultySonar:
         self._kept_us = max((_period_us(fault) for fault in faults.planned(ReplayedEchoes)), default=0)
 
     def fire(
-        self, at_us: int, pose: Pose, ring_yaw: float, fired: Sequence[int], window_m: float,
+        self,
+        at_us: int,
+        pose: Pose,
+        ring_yaw: float,
+        fired: Sequence[int],
+        window_m: float,
         listeners: Sequence[int] = (),
-    ) -> list[float | None]:  # fmt: skip
+    ) -> list[float | None]:
         """Return what the sensors that fire at a time, and then those that listen, report.
 
         Parameters

@@ -22,9 +22,7 @@ AS_WORLD: Final = -1
 
 CIRCLE: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("radius", "f8"), ("surface", "i8")]))
 """A round surface: its centre and radius, m, and how it answers."""
-SEGMENT: Final = np.dtype(
-    (np.record, [("x1", "f8"), ("y1", "f8"), ("x2", "f8"), ("y2", "f8"), ("surface", "i8")])
-)  # fmt: skip
+SEGMENT: Final = np.dtype((np.record, [("x1", "f8"), ("y1", "f8"), ("x2", "f8"), ("y2", "f8"), ("surface", "i8")]))
 """A straight surface: its two end points, m, and how it answers."""
 CORNER: Final = np.dtype(
     (np.record, [("x", "f8"), ("y", "f8"), ("start", "f8"), ("opening", "f8"), ("surface", "i8"), ("beside", "i8")])

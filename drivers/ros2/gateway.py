@@ -141,9 +141,12 @@ class Gateway:
         yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
         with self._lock:
             self._side.odometry(
-                message.child_frame_id, _seconds(message.header.stamp), Pose(where.x, where.y, yaw),
-                Twist(twist.linear.x, twist.angular.z), time.monotonic(),
-            )  # fmt: skip
+                message.child_frame_id,
+                _seconds(message.header.stamp),
+                Pose(where.x, where.y, yaw),
+                Twist(twist.linear.x, twist.angular.z),
+                time.monotonic(),
+            )
             self._pass_on()
 
     def _pass_on(self) -> None:

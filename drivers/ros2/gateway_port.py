@@ -44,10 +44,13 @@ class GatewayPort(TcpPort):
         paths = os.pathsep.join(path for path in sys.path if path)
         with other:
             process = subprocess.Popen(  # noqa: S603 - this program
-                [sys.executable, "-P", "-m", MODULE, str(other.fileno()), text], pass_fds=[other.fileno()],
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": paths},
+                [sys.executable, "-P", "-m", MODULE, str(other.fileno()), text],
+                pass_fds=[other.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": paths},
                 start_new_session=True,
-            )  # fmt: skip
+            )
         threading.Thread(target=process.wait, name="end of the ROS process", daemon=True).start()
         try:
             self._await_ready()

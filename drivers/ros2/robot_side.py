@@ -102,9 +102,17 @@ class RobotSide:
             case Hello():
                 times = round(1e3 * self._config.ros2.deadman_s), round(1e3 * self._config.ros2.odometry_period_s)
                 self._send(
-                    frames.Ident(0, frames.VERSION, len(self._config.ring.mounts), self._radius_mm, *times,
-                                 self._boot_id, NAME, self._unit_um)
-                )  # fmt: skip
+                    frames.Ident(
+                        0,
+                        frames.VERSION,
+                        len(self._config.ring.mounts),
+                        self._radius_mm,
+                        *times,
+                        self._boot_id,
+                        NAME,
+                        self._unit_um,
+                    )
+                )
             case Pattern():  # which sensors fire is the robot's own affair
                 self._fires = bool(frame.masks)
                 self._send(frames.Ack(0, frame.seq))
@@ -186,9 +194,12 @@ class RobotSide:
         """Return a range as a count."""
         ring = self._config.ring
         meaning = range_meaning(
-            value, Limits(ring.range_min_m, min(ring.range_max_m, ring.window_m)), limits, 1e-6 * self._unit_um,
+            value,
+            Limits(ring.range_min_m, min(ring.range_max_m, ring.window_m)),
+            limits,
+            1e-6 * self._unit_um,
             zero_is_silence=self._config.ros2.zero_is_silence,
-        )  # fmt: skip
+        )
         if meaning.oddity is not None:
             self._note(meaning.oddity.value.format(frame=frame, least_m=meaning.least_m), meaning.oddity.name)
         if math.isnan(meaning.range_m):

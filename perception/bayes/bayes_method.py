@@ -155,17 +155,33 @@ class BayesPerception:
         pose, time_s = firing.pose, float(firing.robot_s)
         mounts = mounts_at(firing, self._mounts, self._turning)
         readings = associate(
-            s, tracks, settings, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), time_s,
+            s,
+            tracks,
+            settings,
+            mounts,
+            float(pose.x),
+            float(pose.y),
+            float(firing.ring_yaw),
+            time_s,
             firing.ranges_m,
-        )  # fmt: skip
+        )
         self._readings = readings
         heard = firing.cross_paths
         if heard is not None:
             # Not in the kernel: where no sensor listens, it need not be compiled.
             hear_crosses(
-                s, tracks, settings, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), readings,
-                heard.transmitters, heard.listeners, heard.half_paths_m,
-            )  # fmt: skip
+                s,
+                tracks,
+                settings,
+                mounts,
+                float(pose.x),
+                float(pose.y),
+                float(firing.ring_yaw),
+                readings,
+                heard.transmitters,
+                heard.listeners,
+                heard.half_paths_m,
+            )
         if len(self._outlines) > 0:
             # Not in the kernel: where all models are round, it need not be compiled.
             associate_polygons(s, tracks, settings, readings)

@@ -94,8 +94,13 @@ class Calibration:
 
 
 def calibrate(
-    firings: Sequence[Firing], ring: RingConfig, radii: Sequence[float], way_m: float | None, *, synchro: bool,
-) -> Calibration | None:  # fmt: skip
+    firings: Sequence[Firing],
+    ring: RingConfig,
+    radii: Sequence[float],
+    way_m: float | None,
+    *,
+    synchro: bool,
+) -> Calibration | None:
     """Return what a drive by walls and round objects shows of the robot; None if no surface was found.
 
     Parameters
@@ -131,9 +136,16 @@ def calibrate(
 
 
 def _first_guess(
-    drive: Drive, echoes: Echoes, nominal: Floats, inside: float, ring_half_angle: float, radii: Sequence[float],
-    way_m: float | None, *, synchro: bool,
-) -> Geometry | None:  # fmt: skip
+    drive: Drive,
+    echoes: Echoes,
+    nominal: Floats,
+    inside: float,
+    ring_half_angle: float,
+    radii: Sequence[float],
+    way_m: float | None,
+    *,
+    synchro: bool,
+) -> Geometry | None:
     """Return scales and surfaces near the best ones, with the nominal mounts; None if there are no surfaces.
 
     Where everything in a beam echoes, a wall looks as sharp under a turn scale that is a few percent wrong, and a fit
@@ -209,9 +221,15 @@ def _shown(fit: GeometryFit, beams: BeamFit, turn_sigmas: Floats, nominal: Float
     mounts[has_place, :2] = geometry.mounts[has_place]
     mounts[has_angle, 2] += beams.turns[has_angle]
     return Calibration(
-        mounts, np.where(has_place, fit.mount_sigmas_m, np.inf), np.where(has_angle, turn_sigmas, np.inf),
-        fit.readings, beams.half_angle if has_angle.any() else half_angle, beams.everything_echoes,
+        mounts,
+        np.where(has_place, fit.mount_sigmas_m, np.inf),
+        np.where(has_angle, turn_sigmas, np.inf),
+        fit.readings,
+        beams.half_angle if has_angle.any() else half_angle,
+        beams.everything_echoes,
         Scales(*(value if shown else 1.0 for value, shown in zip(geometry.scales, is_shown, strict=True))),
         Scales(*(sigma if shown else math.inf for sigma, shown in zip(sigmas, is_shown, strict=True))),
-        fit.noise, len(geometry.surfaces.walls), len(geometry.surfaces.drums),
-    )  # fmt: skip
+        fit.noise,
+        len(geometry.surfaces.walls),
+        len(geometry.surfaces.drums),
+    )

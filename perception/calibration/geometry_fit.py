@@ -140,9 +140,15 @@ class _Vector:
 
     def pack(self, geometry: Geometry) -> Floats:
         surfaces = geometry.surfaces
-        return np.concatenate([
-            geometry.scales, surfaces.walls.ravel(), surfaces.drums.ravel(), geometry.bends, geometry.mounts.ravel(),
-        ])  # fmt: skip
+        return np.concatenate(
+            [
+                geometry.scales,
+                surfaces.walls.ravel(),
+                surfaces.drums.ravel(),
+                geometry.bends,
+                geometry.mounts.ravel(),
+            ]
+        )
 
     def unpack(self, vector: Floats) -> Geometry:
         scales = Scales(*vector[:3].tolist())
@@ -153,9 +159,16 @@ class _Vector:
 
 
 def fit_geometry(
-    drive: Drive, echoes: Echoes, angles: Floats, half_angle: float, start: Geometry, priors: Priors,
-    way_m: float | None, *, synchro: bool,
-) -> GeometryFit:  # fmt: skip
+    drive: Drive,
+    echoes: Echoes,
+    angles: Floats,
+    half_angle: float,
+    start: Geometry,
+    priors: Priors,
+    way_m: float | None,
+    *,
+    synchro: bool,
+) -> GeometryFit:
     """Return the geometry that explains the ranges best.
 
     Parameters
@@ -233,10 +246,15 @@ def fit_geometry(
 def _prior_sigmas(vector: _Vector, start: Geometry, priors: Priors) -> Floats:
     drums = np.tile([10.0, 10.0, priors.radius_m], vector.drums)
     bend = priors.bend_rad_per_sqrt_m * math.sqrt(KNOT_M)
-    return np.concatenate([
-        [priors.scale] * 3, np.full(2 * vector.walls, 10.0), drums, np.full(len(start.bends), bend),
-        np.full(2 * len(start.mounts), priors.mount_m),
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            [priors.scale] * 3,
+            np.full(2 * vector.walls, 10.0),
+            drums,
+            np.full(len(start.bends), bend),
+            np.full(2 * len(start.mounts), priors.mount_m),
+        ]
+    )
 
 
 def _range_noise(ranges: Floats, misfits: Floats) -> RangeNoise:
@@ -269,9 +287,17 @@ def _choose(
 
 
 def _jacobian(
-    vector: _Vector, at: Floats, misfits: Callable[[Floats], Floats], here: Floats, geometry: Geometry, path: Path,
-    picked: Echoes, surface: NDArray[np.intp], beams: Beams, chosen: NDArray[np.intp],
-) -> Floats:  # fmt: skip
+    vector: _Vector,
+    at: Floats,
+    misfits: Callable[[Floats], Floats],
+    here: Floats,
+    geometry: Geometry,
+    path: Path,
+    picked: Echoes,
+    surface: NDArray[np.intp],
+    beams: Beams,
+    chosen: NDArray[np.intp],
+) -> Floats:
     """Return the derivatives of the misfits, shape (readings, parameters)."""
     jacobian = np.zeros((len(here), len(at)))
     for i in range(vector.common):

@@ -155,9 +155,15 @@ def _most_voted_drum(
     columns, rows = ((value - value.min()) / cell for value in (x, y))
     width = int(columns.max()) + 2
     # Each reading votes once for a cell, and for where it lies nearest of several readings of one place.
-    cells = np.unique(np.stack([
-        np.repeat(np.arange(len(ranges)), BEARINGS), (rows.astype(np.intp) * width + columns.astype(np.intp)).ravel()
-    ]), axis=1)[1]  # fmt: skip
+    cells = np.unique(
+        np.stack(
+            [
+                np.repeat(np.arange(len(ranges)), BEARINGS),
+                (rows.astype(np.intp) * width + columns.astype(np.intp)).ravel(),
+            ]
+        ),
+        axis=1,
+    )[1]
     votes = np.bincount(cells)
     row, column = divmod(int(votes.argmax()), width)
     return int(votes.max()), (float(x.min() + (column + 0.5) * cell), float(y.min() + (row + 0.5) * cell), radius)

@@ -73,7 +73,7 @@ class MapFrame(OdometryFrame):
 
     def follow(
         self, firing: Firing, objects: Sequence[DetectedObject], shift: Callable[[int, float, float], object]
-    ) -> Firing:  # fmt: skip
+    ) -> Firing:
         """Return a firing at its pose in the filter's frame.
 
         Parameters

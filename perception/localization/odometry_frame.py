@@ -33,7 +33,7 @@ class OdometryFrame:
 
     def follow(
         self, firing: Firing, _objects: Sequence[DetectedObject], _shift: Callable[[int, float, float], object]
-    ) -> Firing:  # fmt: skip
+    ) -> Firing:
         """Return a firing at its pose in the frame in which the method enters it."""
         return firing
 

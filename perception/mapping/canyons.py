@@ -71,9 +71,16 @@ class Surfaces(NamedTuple):
     circle_weights: Floats
 
 
-CANYON_DTYPE: Final = np.dtype([
-    ("number", "i8"), ("mouth", "f8", 4), ("axis", "f8"), ("depth", "f8"), ("probability", "f8"), ("inside", "f8", 2),
-])  # fmt: skip
+CANYON_DTYPE: Final = np.dtype(
+    [
+        ("number", "i8"),
+        ("mouth", "f8", 4),
+        ("axis", "f8"),
+        ("depth", "f8"),
+        ("probability", "f8"),
+        ("inside", "f8", 2),
+    ]
+)
 
 
 def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], sealed_m: float) -> Surfaces:
@@ -162,10 +169,12 @@ def canyon_round(x: float, y: float, surfaces: Surfaces, sealed_m: float) -> Can
         return None
     # The longest run of directions between two cuts, in turn from just after a cut.
     begins, counts = (cuts + 1) % len(angles), np.diff(np.append(cuts, cuts[0] + len(angles)))
-    spans = np.array([
-        (angles[(b + n - 1) % len(angles)] - angles[b]) % (2.0 * math.pi) if n > 1 else 0.0
-        for b, n in zip(begins, counts, strict=True)
-    ])  # fmt: skip
+    spans = np.array(
+        [
+            (angles[(b + n - 1) % len(angles)] - angles[b]) % (2.0 * math.pi) if n > 1 else 0.0
+            for b, n in zip(begins, counts, strict=True)
+        ]
+    )
     longest = int(spans.argmax())
     if spans[longest] <= math.pi:
         return None
@@ -265,12 +274,17 @@ class CanyonMap:
     BOUNDS: Final = bounds(
         sealed_m=CONSTANT,
         rows={
-            "number": COUNT, "mouth": PLACE, "axis": PLACE, "depth": PLACE, "probability": SHARE, "inside": PLACE,
+            "number": COUNT,
+            "mouth": PLACE,
+            "axis": PLACE,
+            "depth": PLACE,
+            "probability": SHARE,
+            "inside": PLACE,
         },
         numbered=COUNT,
         firings=COUNT,
         _at=PLACE,
-    )  # fmt: skip
+    )
 
     def __init__(self, sealed_m: float) -> None:
         self.sealed_m = sealed_m
@@ -344,10 +358,15 @@ class CanyonMap:
             return ()
         known = self.rows[self.rows["number"] > 0]
         return tuple(
-            Canyon(int(row["number"]), tuple(row["mouth"].tolist()), float(row["axis"]), float(row["depth"]),
-                   float(row["probability"]))
+            Canyon(
+                int(row["number"]),
+                tuple(row["mouth"].tolist()),
+                float(row["axis"]),
+                float(row["depth"]),
+                float(row["probability"]),
+            )
             for row in known[np.argsort(known["number"])]
-        )  # fmt: skip
+        )
 
     def clear(self) -> None:
         """Forget all canyons."""

@@ -59,9 +59,15 @@ class BlindWall(Record):
 
 @kernel
 def enter_looks(
-    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, heading: float, half_angle: float,
+    ranges: Floats,
+    mounts: Floats,
+    x: float,
+    y: float,
+    yaw: float,
+    heading: float,
+    half_angle: float,
     walls: Records[BlindWall],
-) -> None:  # fmt: skip
+) -> None:
     """Enter the readings of a firing.
 
     Parameters
@@ -143,9 +149,15 @@ class BlindWalls:
         """Enter a firing."""
         mounts, pose = mounts_at(firing, self._mounts, self._turning), firing.pose
         enter_looks(
-            firing.ranges_m, mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(pose.theta),
-            self._half_angle, self.records,
-        )  # fmt: skip
+            firing.ranges_m,
+            mounts,
+            float(pose.x),
+            float(pose.y),
+            float(firing.ring_yaw),
+            float(pose.theta),
+            self._half_angle,
+            self.records,
+        )
 
     def sides(self, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats]:
         """Return what is known of the directions in which no sensor looks now, within 90° of the robot's heading.

@@ -108,10 +108,22 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
 
 @kernel
 def record_echoes(
-    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, reach: float,
-    points: Floats, bearings: Floats, times: Floats, heard: NDArray[np.bool_], steady: NDArray[np.bool_],
-    agreed: NDArray[np.bool_], unheard: Records[UnheardEcho],
-) -> None:  # fmt: skip
+    ranges: Floats,
+    mounts: Floats,
+    x: float,
+    y: float,
+    yaw: float,
+    t: float,
+    same: float,
+    reach: float,
+    points: Floats,
+    bearings: Floats,
+    times: Floats,
+    heard: NDArray[np.bool_],
+    steady: NDArray[np.bool_],
+    agreed: NDArray[np.bool_],
+    unheard: Records[UnheardEcho],
+) -> None:
     """Enter the readings of a firing.
 
     Parameters
@@ -170,9 +182,17 @@ def record_echoes(
 
 @kernel
 def select_looks(
-    bearings: Floats, times: Floats, heard: NDArray[np.bool_], points: Floats, robot_s: float, age_max_s: float,
-    fresh: Floats, ages: Floats, sensor_ages: Floats, fresh_points: Floats,
-) -> tuple[int, int]:  # fmt: skip
+    bearings: Floats,
+    times: Floats,
+    heard: NDArray[np.bool_],
+    points: Floats,
+    robot_s: float,
+    age_max_s: float,
+    fresh: Floats,
+    ages: Floats,
+    sensor_ages: Floats,
+    fresh_points: Floats,
+) -> tuple[int, int]:
     """Find the looks that are young enough, their echoes, and how long ago each sensor last looked.
 
     Parameters
@@ -244,9 +264,14 @@ class FreshEchoes:
     SCRATCH: Final = ("_agreed",)
     """Not part of a snapshot: overwritten before each use."""
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _half_angle=CONSTANT, _points=PLACE, _bearings=PLACE, _times=PLACE._replace(infinite=True),
-        _heard_reach_m=CONSTANT, _radius_m=CONSTANT,
-    )  # fmt: skip
+        _mounts=CONSTANT,
+        _half_angle=CONSTANT,
+        _points=PLACE,
+        _bearings=PLACE,
+        _times=PLACE._replace(infinite=True),
+        _heard_reach_m=CONSTANT,
+        _radius_m=CONSTANT,
+    )
 
     def __init__(
         self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = (), reach_m: float = math.inf
@@ -271,13 +296,35 @@ class FreshEchoes:
         mounts = mounts_at(firing, self._mounts, self._turning)
         x, y, yaw, core = float(pose.x), float(pose.y), float(firing.ring_yaw), 0.5 * self._half_angle
         record_echoes(
-            firing.ranges_m, mounts, x, y, yaw, float(firing.robot_s), core, self._heard_reach_m, self._points,
-            self._bearings, self._times, self._heard, self._steady, self._agreed, self.unheard.records,
-        )  # fmt: skip
+            firing.ranges_m,
+            mounts,
+            x,
+            y,
+            yaw,
+            float(firing.robot_s),
+            core,
+            self._heard_reach_m,
+            self._points,
+            self._bearings,
+            self._times,
+            self._heard,
+            self._steady,
+            self._agreed,
+            self.unheard.records,
+        )
         contradict_echoes(
-            firing.ranges_m, mounts, x, y, yaw, core, self._heard_reach_m, self._radius_m, self._agreed,
-            self.unheard.records, self.unheard.silences,
-        )  # fmt: skip
+            firing.ranges_m,
+            mounts,
+            x,
+            y,
+            yaw,
+            core,
+            self._heard_reach_m,
+            self._radius_m,
+            self._agreed,
+            self.unheard.records,
+            self.unheard.silences,
+        )
         if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
             since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
             keep_sudden(self._points, self._times, self._heard, since, x, y, self.unheard.records)
@@ -299,9 +346,17 @@ class FreshEchoes:
         fresh, ages, points = np.empty(size), np.empty(size), np.empty((size, 2))
         sensor_ages = np.empty(len(self._times))
         k, h = select_looks(
-            self._bearings, self._times, self._heard, self._points, float(robot_s), float(age_max_s), fresh, ages,
-            sensor_ages, points,
-        )  # fmt: skip
+            self._bearings,
+            self._times,
+            self._heard,
+            self._points,
+            float(robot_s),
+            float(age_max_s),
+            fresh,
+            ages,
+            sensor_ages,
+            points,
+        )
         echoes = points[:h]
         if self.unheard.is_ring_silent:
             echoes = np.concatenate([echoes, self.unheard.points(ALONE)])

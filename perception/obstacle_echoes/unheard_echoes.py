@@ -84,9 +84,18 @@ def lose_echo(c: UnheardEcho, px: float, py: float, is_steady: bool, x: float, y
 
 @kernel
 def contradict_echoes(
-    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, core: float, reach: float, radius: float,
-    agreed: NDArray[np.bool_], echoes: Records[UnheardEcho], silences: Ints,
-) -> None:  # fmt: skip
+    ranges: Floats,
+    mounts: Floats,
+    x: float,
+    y: float,
+    yaw: float,
+    core: float,
+    reach: float,
+    radius: float,
+    agreed: NDArray[np.bool_],
+    echoes: Records[UnheardEcho],
+    silences: Ints,
+) -> None:
     """Drop the echoes that a firing contradicts, after `lose_echo`.
 
     Parameters
@@ -154,9 +163,14 @@ def contradict_echoes(
 
 @kernel
 def keep_sudden(
-    points: Floats, times: Floats, heard: NDArray[np.bool_], since: float, x: float, y: float,
+    points: Floats,
+    times: Floats,
+    heard: NDArray[np.bool_],
+    since: float,
+    x: float,
+    y: float,
     echoes: Records[UnheardEcho],
-) -> None:  # fmt: skip
+) -> None:
     """Keep what a ring that hears nothing heard a moment ago, if that is too much to have left at once.
 
     Parameters

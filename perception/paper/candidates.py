@@ -127,9 +127,11 @@ class Candidates:
     def follow(self, clusters: Clusters, outline: OutlineMap) -> None:
         """Move candidates to the present clusters; restart those whose cluster changed; place new ones."""
         follow_clusters(
-            self._centres[: self._count], clusters.centres[: clusters.count], self._reach_m,
+            self._centres[: self._count],
+            clusters.centres[: clusters.count],
+            self._reach_m,
             self._predecessor[: clusters.count],
-        )  # fmt: skip
+        )
         before = self.rows.copy()
         centres, sizes = self._centres.copy(), self._sizes.copy()
         self._count = clusters.count
@@ -159,9 +161,15 @@ class Candidates:
             if left > 0:
                 self._turn = (self._turn + k + 1) % many
                 done, rests = relax(
-                    self._models[m].sides, outline.segments, clusters.members(j), config.gamma, config.negligible_m,
-                    config.negligible_rad, min(config.iterations_per_quantum, left), self.rows["pose"][j, m],
-                )  # fmt: skip
+                    self._models[m].sides,
+                    outline.segments,
+                    clusters.members(j),
+                    config.gamma,
+                    config.negligible_m,
+                    config.negligible_rad,
+                    min(config.iterations_per_quantum, left),
+                    self.rows["pose"][j, m],
+                )
                 left = 0 if rests else left - done
                 self.rows["iterations_left"][j, m] = left
                 if left == 0:

@@ -139,10 +139,13 @@ class Clusters:
     """
 
     BOUNDS: Final = bounds(
-        _labels=lambda self: Bound(-1, len(self.sizes) - 1), _members=lambda self: index_of(len(self._members)),
-        _offsets=lambda self: up_to(len(self._members)), centres=PLACE, sizes=COUNT,
+        _labels=lambda self: Bound(-1, len(self.sizes) - 1),
+        _members=lambda self: index_of(len(self._members)),
+        _offsets=lambda self: up_to(len(self._members)),
+        centres=PLACE,
+        sizes=COUNT,
         count=lambda self: up_to(len(self.sizes)),
-    )  # fmt: skip
+    )
 
     def __init__(self, config: ClustersConfig, capacity: int) -> None:
         self._config = config
@@ -161,9 +164,15 @@ class Clusters:
     def update(self, outline: OutlineMap) -> None:
         """Cluster the segments of `outline`."""
         self.count = cluster_segments(
-            outline.segments, outline.status, outline.start, outline.count, self._config.threshold_m,
-            self._labels, self.centres, self.sizes,
-        )  # fmt: skip
+            outline.segments,
+            outline.status,
+            outline.start,
+            outline.count,
+            self._config.threshold_m,
+            self._labels,
+            self.centres,
+            self.sizes,
+        )
         group_by_cluster(
             self._labels, outline.start, outline.count, self.sizes, self.count, self._offsets, self._members
         )

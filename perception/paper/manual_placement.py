@@ -74,12 +74,16 @@ class Placements:
 
     BOUNDS: Final = bounds(
         rows=lambda self: {
-            "pose": PLACE, "number": COUNT, "model": index_of(len(self._models)),
-            "iterations_left": up_to(ITERATIONS_MAX), "is_confirmed": FLAG, "members_sum": COUNT,
+            "pose": PLACE,
+            "number": COUNT,
+            "model": index_of(len(self._models)),
+            "iterations_left": up_to(ITERATIONS_MAX),
+            "is_confirmed": FLAG,
+            "members_sum": COUNT,
         },
         count=up_to(PLACEMENTS_MAX),
         _turn=COUNT,
-    )  # fmt: skip
+    )
 
     def __init__(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
         self.rows = np.zeros(PLACEMENTS_MAX, PLACEMENT)
@@ -167,9 +171,15 @@ class Placements:
         self._turn = k + 1
         allowed = min(config.iterations_per_quantum, int(left[k]))
         done, rests = relax(
-            self._models[self.rows["model"][k]].sides, outline.segments, self.members(k, outline), config.gamma,
-            config.negligible_m, config.negligible_rad, allowed, self.rows["pose"][k],
-        )  # fmt: skip
+            self._models[self.rows["model"][k]].sides,
+            outline.segments,
+            self.members(k, outline),
+            config.gamma,
+            config.negligible_m,
+            config.negligible_rad,
+            allowed,
+            self.rows["pose"][k],
+        )
         left[k] = 0 if rests else left[k] - done
         return done
 
@@ -187,7 +197,7 @@ class Rejections:
 
     BOUNDS: Final = bounds(
         rows={"x": PLACE, "y": PLACE, "reach": PLACE, "model": COUNT, "newest_segment": COUNT}, total=COUNT
-    )  # fmt: skip
+    )
 
     def __init__(self) -> None:
         self.rows = np.zeros(PLACEMENTS_MAX, REJECTION)

@@ -129,14 +129,19 @@ class OutlineMap:
     """
 
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _half_angle=CONSTANT, segments=PLACE, times=PLACE, status=up_to(PINNED), numbers=COUNT,
+        _mounts=CONSTANT,
+        _half_angle=CONSTANT,
+        segments=PLACE,
+        times=PLACE,
+        status=up_to(PINNED),
+        numbers=COUNT,
         pinned=lambda self: up_to(int(PINNED_SHARE_MAX * len(self.times))),
-        start=lambda self: index_of(len(self.times)), count=lambda self: up_to(len(self.times)), total=COUNT,
-    )  # fmt: skip
+        start=lambda self: index_of(len(self.times)),
+        count=lambda self: up_to(len(self.times)),
+        total=COUNT,
+    )
 
-    def __init__(
-        self, config: MapConfig, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()
-    ) -> None:  # fmt: skip
+    def __init__(self, config: MapConfig, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
         self._config = config
         self._mounts, self._turning = mounts, turning
         self._half_angle = half_angle
@@ -237,10 +242,18 @@ class OutlineMap:
     def remove_contradicted(self, firing: Firing) -> int:
         """Remove segments behind which `firing` heard an echo; return how many."""
         return erase_contradicted(
-            self.segments, self.status, self.start, self.count, firing.ranges_m,
-            mounts_at(firing, self._mounts, self._turning), firing.pose.x, firing.pose.y, firing.ring_yaw,
-            self._half_angle, self._config.contradiction_margin_m,
-        )  # fmt: skip
+            self.segments,
+            self.status,
+            self.start,
+            self.count,
+            firing.ranges_m,
+            mounts_at(firing, self._mounts, self._turning),
+            firing.pose.x,
+            firing.pose.y,
+            firing.ring_yaw,
+            self._half_angle,
+            self._config.contradiction_margin_m,
+        )
 
     def clear(self) -> None:
         """Remove every segment."""

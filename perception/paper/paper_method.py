@@ -82,9 +82,13 @@ class PaperPerception:
         self.clusters = Clusters(config.clusters, config.map.capacity)
         self._numbers = NumberSource()
         self.candidates = Candidates(
-            self._models, config.relaxation, config.clusters.clusters_max,
-            config.clusters.segments_min, config.clusters.threshold_m, self._numbers,
-        )  # fmt: skip
+            self._models,
+            config.relaxation,
+            config.clusters.clusters_max,
+            config.clusters.segments_min,
+            config.clusters.threshold_m,
+            self._numbers,
+        )
         self.placements = Placements(self._models, config.relaxation, config.clusters.threshold_m)
         self._rejections = Rejections()
         self._placement_was_last = False
@@ -343,9 +347,16 @@ class PaperPerception:
         limits = self._config.recognition
         x, y, theta = (float(v) for v in pose)
         return goodness_of_fit(
-            self._models[m].sides, self.outline.segments, slots, x, y, theta,
-            limits.tolerance_m, math.radians(limits.tolerance_deg), self._scratch,
-        )  # fmt: skip
+            self._models[m].sides,
+            self.outline.segments,
+            slots,
+            x,
+            y,
+            theta,
+            limits.tolerance_m,
+            math.radians(limits.tolerance_deg),
+            self._scratch,
+        )
 
     def _candidate(self, cluster: int, m: int) -> DetectedObject | None:
         """Return a candidate as an object, None if it does not fit well enough."""
@@ -364,9 +375,15 @@ class PaperPerception:
         if share < limits.support_min or coverage < limits.coverage_min:
             return None
         return DetectedObject(
-            self._models[m].name, x, y, theta, residual / math.sqrt(support), support, share * coverage,
+            self._models[m].name,
+            x,
+            y,
+            theta,
+            residual / math.sqrt(support),
+            support,
+            share * coverage,
             number=int(row["number"]),
-        )  # fmt: skip
+        )
 
     def _placement(self, k: int) -> DetectedObject:
         """Return a placement as an object, however well it fits."""

@@ -202,11 +202,20 @@ class SegmentExtractor:
         """
         config = self._config
         count = pair_readings(
-            firing.ranges_m, mounts_at(firing, self._mounts, self._turning), firing.pose.x, firing.pose.y,
-            firing.ring_yaw, firing.robot_s,
-            self._sensor_records, self._half_angle, config.baseline_min_m, config.baseline_max_m, config.gap_max_s,
-            READING_SPACING * config.baseline_min_m, self._out,
-        )  # fmt: skip
+            firing.ranges_m,
+            mounts_at(firing, self._mounts, self._turning),
+            firing.pose.x,
+            firing.pose.y,
+            firing.ring_yaw,
+            firing.robot_s,
+            self._sensor_records,
+            self._half_angle,
+            config.baseline_min_m,
+            config.baseline_max_m,
+            config.gap_max_s,
+            READING_SPACING * config.baseline_min_m,
+            self._out,
+        )
         return self._out[:count]
 
     def apply_settings(self, config: SegmentsConfig) -> None:

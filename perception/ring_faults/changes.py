@@ -103,9 +103,14 @@ def source(i: int, turn: float, half_angle: float, echoes: Records[EchoTrace]) -
 
 @kernel
 def expect(
-    k: int, i: int, turn: float, half_angle: float, tolerance: float, mounts: Floats,
+    k: int,
+    i: int,
+    turn: float,
+    half_angle: float,
+    tolerance: float,
+    mounts: Floats,
     echoes: Records[EchoTrace],
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """Return between what ranges sensor `i` should hear what `k` heard before, m; (−1, −1) for a silence.
 
     A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
@@ -140,9 +145,14 @@ def expect(
 
 @kernel
 def compare(
-    half_angle: float, tolerance: float, reach: float, missed: float, mounts: Floats,
-    echoes: Records[EchoTrace], expected: Records[Expected],
-) -> bool:  # fmt: skip
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    missed: float,
+    mounts: Floats,
+    echoes: Records[EchoTrace],
+    expected: Records[Expected],
+) -> bool:
     """Compare the newest readings with what an honest ring is expected to hear; return whether most echoes differ.
 
     A change explains the echoes that differ, and misses the others: otherwise little speaks for one.
@@ -173,9 +183,15 @@ def compare(
 
 @kernel
 def weigh_exchange(
-    turn: float, half_angle: float, tolerance: float, reach: float, missed: float, mounts: Floats,
-    echoes: Records[EchoTrace], expected: Records[Expected],
-) -> float:  # fmt: skip
+    turn: float,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    missed: float,
+    mounts: Floats,
+    echoes: Records[EchoTrace],
+    expected: Records[Expected],
+) -> float:
     """Return the evidence that each sensor hears what was at an angle `turn` from it before, nat.
 
     Parameters
@@ -222,9 +238,14 @@ def weigh_length(
 
 @kernel
 def weigh_changes(
-    mounts: Floats, half_angle: float, tolerance: float, reach: float, missed: float,
-    echoes: Records[EchoTrace], expected: Records[Expected],
-) -> tuple[int, float]:  # fmt: skip
+    mounts: Floats,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    missed: float,
+    echoes: Records[EchoTrace],
+    expected: Records[Expected],
+) -> tuple[int, float]:
     """Return the common change that explains the newest readings best, and the evidence for it, nat.
 
     Parameters

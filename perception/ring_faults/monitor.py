@@ -53,19 +53,23 @@ _CHANGED: Final = (
     "the readings of the whole ring changed at once, as no motion changes them: {}; check the ring's power, cables "
     "and controller, and the odometry for a jump, then re-arm"
 )
-REASONS: Final = MappingProxyType({
-    REPEATED: "the ring repeats old readings although the odometry moves on: it is frozen, or the wheels turn and "
-    "the robot does not move; check the ring's power and cables, and whether the wheels slip, then re-arm",
-    VANISHED: "most echoes that the ring heard have vanished at once, and the robot has not moved past them: the "
-    "ring hears nothing, or not all; check its power and cables and what covers it, then re-arm",
-    SCATTERED: "the ring's readings are unrelated from one firing to the next: they do not come from what is "
-    "there; check the ring for noise, crosstalk and loose cables, and the odometry for a jump, then re-arm",
-    TURNED: _TURNED.format("90°, counter-clockwise,"),
-    TURNED + 1: _TURNED.format("180°"),
-    TURNED + 2: _TURNED.format("90°, clockwise,"),
-    CHANGED + LENGTHENED: _CHANGED.format("all ranges are longer or shorter by the same length"),
-    CHANGED + EXCHANGED: _CHANGED.format("each sensor hears what another one heard, as if the ring had been turned"),
-})  # fmt: skip
+REASONS: Final = MappingProxyType(
+    {
+        REPEATED: "the ring repeats old readings although the odometry moves on: it is frozen, or the wheels turn "
+        "and the robot does not move; check the ring's power and cables, and whether the wheels slip, then re-arm",
+        VANISHED: "most echoes that the ring heard have vanished at once, and the robot has not moved past them: the "
+        "ring hears nothing, or not all; check its power and cables and what covers it, then re-arm",
+        SCATTERED: "the ring's readings are unrelated from one firing to the next: they do not come from what is "
+        "there; check the ring for noise, crosstalk and loose cables, and the odometry for a jump, then re-arm",
+        TURNED: _TURNED.format("90°, counter-clockwise,"),
+        TURNED + 1: _TURNED.format("180°"),
+        TURNED + 2: _TURNED.format("90°, clockwise,"),
+        CHANGED + LENGTHENED: _CHANGED.format("all ranges are longer or shorter by the same length"),
+        CHANGED + EXCHANGED: _CHANGED.format(
+            "each sensor hears what another one heard, as if the ring had been turned"
+        ),
+    }
+)
 """What happened, the likely cause, the next action."""
 
 
@@ -81,10 +85,19 @@ class RingMonitor:
     SCRATCH: Final = ("_echo_records", "_ring_records", "_turned", "_expected")
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _turning=CONSTANT, _turns=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
-        _reach_m=CONSTANT, _past=PLACE, _looks=COUNT, _replayed_nat=POSITIVE,
-        _echoes=EchoTrace.BOUNDS, _ring=RingTrace.BOUNDS, _found=index_of(CHANGED + EXCHANGED + 1),
-    )  # fmt: skip
+        _mounts=CONSTANT,
+        _turning=CONSTANT,
+        _turns=CONSTANT,
+        _half_angle=CONSTANT,
+        _tolerance=CONSTANT,
+        _reach_m=CONSTANT,
+        _past=PLACE,
+        _looks=COUNT,
+        _replayed_nat=POSITIVE,
+        _echoes=EchoTrace.BOUNDS,
+        _ring=RingTrace.BOUNDS,
+        _found=index_of(CHANGED + EXCHANGED + 1),
+    )
 
     def __init__(self, ring: RingConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
@@ -111,10 +124,21 @@ class RingMonitor:
             mounts = self._turned
             turn_mounts(self._mounts, self._turning, float(pose.theta - firing.ring_yaw), mounts)
         found = check_motion(
-            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), mounts, self._half_angle,
-            self._tolerance, self._reach_m, self._echo_records, self._ring_records, self._expected,
-            self._past, self._looks, self._replayed_nat,
-        )  # fmt: skip
+            firing.ranges_m,
+            float(pose.x),
+            float(pose.y),
+            float(firing.ring_yaw),
+            mounts,
+            self._half_angle,
+            self._tolerance,
+            self._reach_m,
+            self._echo_records,
+            self._ring_records,
+            self._expected,
+            self._past,
+            self._looks,
+            self._replayed_nat,
+        )
         if found != NOTHING:
             self._found = int(found)
 

@@ -84,9 +84,17 @@ def honest_share(all_of: RingTrace, kind: int) -> float:
 
 @kernel
 def weigh_look(
-    c: EchoTrace, r: float, x: float, y: float, axis: float, is_ahead: bool, half_angle: float, tolerance: float,
-    reach: float, all_of: RingTrace,
-) -> None:  # fmt: skip
+    c: EchoTrace,
+    r: float,
+    x: float,
+    y: float,
+    axis: float,
+    is_ahead: bool,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    all_of: RingTrace,
+) -> None:
     """Test whether a reading is where the sensor's last echo leads to expect it.
 
     How often an honest ring misses an echo is learned on the way, for each kind of look.
@@ -148,9 +156,19 @@ def weigh_look(
 
 @kernel
 def weigh_change(
-    i: int, r: float, x: float, y: float, axis: float, yaw: float, mounts: Floats, half_angle: float,
-    tolerance: float, reach: float, echoes: Records[EchoTrace], all_of: RingTrace,
-) -> None:  # fmt: skip
+    i: int,
+    r: float,
+    x: float,
+    y: float,
+    axis: float,
+    yaw: float,
+    mounts: Floats,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    echoes: Records[EchoTrace],
+    all_of: RingTrace,
+) -> None:
     """Test whether the change of an echo's range follows the motion, or that of a ring that is turned.
 
     A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
@@ -224,10 +242,21 @@ def begin_evidence(all_of: RingTrace) -> None:
 
 @kernel
 def check_motion(
-    ranges: Floats, x: float, y: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float, reach: float,
-    echoes: Records[EchoTrace], ring: Records[RingTrace], expected: Records[Expected], past: Floats, looks: Ints,
+    ranges: Floats,
+    x: float,
+    y: float,
+    yaw: float,
+    mounts: Floats,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    echoes: Records[EchoTrace],
+    ring: Records[RingTrace],
+    expected: Records[Expected],
+    past: Floats,
+    looks: Ints,
     replayed_nat: Floats,
-) -> int:  # fmt: skip
+) -> int:
     """Test the readings of a firing; return what is wrong, `NOTHING` where nothing is.
 
     Parameters

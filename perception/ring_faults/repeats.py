@@ -38,9 +38,19 @@ def mark(place: SensorPlace, r: float, x: float, y: float, axis: float, path_m: 
 
 @kernel
 def is_parallel_wall(
-    i: int, r: float, dx: float, dy: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float,
-    lean: float, reach: float, echoes: Records[EchoTrace], path_m: float,
-) -> bool:  # fmt: skip
+    i: int,
+    r: float,
+    dx: float,
+    dy: float,
+    yaw: float,
+    mounts: Floats,
+    half_angle: float,
+    tolerance: float,
+    lean: float,
+    reach: float,
+    echoes: Records[EchoTrace],
+    path_m: float,
+) -> bool:
     """Return whether a wall along the path explains the reading of sensor `i`.
 
     A rough wall beside the path answers a sensor from the direction in its beam that is nearest to the wall's normal,
@@ -87,9 +97,18 @@ def is_parallel_wall(
 
 @kernel
 def changes_due(
-    i: int, x: float, y: float, axis: float, yaw: float, mounts: Floats, half_angle: float, tolerance: float,
-    reach: float, echoes: Records[EchoTrace], path_m: float,
-) -> float:  # fmt: skip
+    i: int,
+    x: float,
+    y: float,
+    axis: float,
+    yaw: float,
+    mounts: Floats,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    echoes: Records[EchoTrace],
+    path_m: float,
+) -> float:
     """Return how many times sensor `i` should have changed the reading that it repeats.
 
     A surface whose normal lies in the beam comes nearer by at least d·cos(ψ + β) when the sensor moves by d at an
@@ -165,9 +184,20 @@ def learn_noise(c: EchoTrace, r: float, x: float, y: float, axis: float, toleran
 
 @kernel
 def weigh_repeat(
-    i: int, r: float, x: float, y: float, axis: float, yaw: float, is_ahead: bool, mounts: Floats, half_angle: float,
-    tolerance: float, reach: float, echoes: Records[EchoTrace], ring: Records[RingTrace],
-) -> None:  # fmt: skip
+    i: int,
+    r: float,
+    x: float,
+    y: float,
+    axis: float,
+    yaw: float,
+    is_ahead: bool,
+    mounts: Floats,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    echoes: Records[EchoTrace],
+    ring: Records[RingTrace],
+) -> None:
     """Test whether all readings of the ring repeat; a reading ahead that differs from the last one ends that.
 
     Parameters

@@ -24,9 +24,18 @@ DIFFERS: Final = 0.05
 
 @kernel
 def weigh_replay(
-    i: int, r: float, before: float, x: float, y: float, axis: float, half_angle: float, tolerance: float,
-    past: Floats, looks: Ints, replayed_nat: Floats,
-) -> float:  # fmt: skip
+    i: int,
+    r: float,
+    before: float,
+    x: float,
+    y: float,
+    axis: float,
+    half_angle: float,
+    tolerance: float,
+    past: Floats,
+    looks: Ints,
+    replayed_nat: Floats,
+) -> float:
     """Compare a reading with those of each lag before, and keep it; return the greatest evidence of a lag, nat.
 
     Two readings of a range that varies by Δ from look to look are equal to within the tolerance with a probability

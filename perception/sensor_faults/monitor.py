@@ -125,9 +125,17 @@ class SensorMonitor:
     SCRATCH: Final = ("_trusted", "_possible", "_turns", "_sensor_records", "_ring_records")
     """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
     BOUNDS: Final = bounds(
-        changes=COUNT, _mounts=CONSTANT, _neighbours=CONSTANT, _half_angle=CONSTANT, _tolerance=CONSTANT,
-        _least=CONSTANT, _near=CONSTANT, _sensors=SensorMemory.BOUNDS, _ring=RingMemory.BOUNDS, _sets=FLAG,
-    )  # fmt: skip
+        changes=COUNT,
+        _mounts=CONSTANT,
+        _neighbours=CONSTANT,
+        _half_angle=CONSTANT,
+        _tolerance=CONSTANT,
+        _least=CONSTANT,
+        _near=CONSTANT,
+        _sensors=SensorMemory.BOUNDS,
+        _ring=RingMemory.BOUNDS,
+        _sets=FLAG,
+    )
 
     def __init__(self, ring: RingConfig) -> None:
         mounts = mounts_array(ring.mounts)
@@ -160,10 +168,24 @@ class SensorMonitor:
         if self._turning:
             self._turns[self._turning] = pose.theta - firing.ring_yaw
         changed = check_firing(
-            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._mounts, self._turns,
-            self._neighbours, self._expected, self._half_angle, self._tolerance, self._least, self._near,
-            self._sensor_records, self._ring_records, self._sets, trusted, possible,
-        )  # fmt: skip
+            firing.ranges_m,
+            float(pose.x),
+            float(pose.y),
+            float(firing.ring_yaw),
+            self._mounts,
+            self._turns,
+            self._neighbours,
+            self._expected,
+            self._half_angle,
+            self._tolerance,
+            self._least,
+            self._near,
+            self._sensor_records,
+            self._ring_records,
+            self._sets,
+            trusted,
+            possible,
+        )
         self.changes += changed & FAULTS_CHANGED
         if firing.cross_paths is not None and not are_sound(self._sensor_records):
             firing = replace(firing, cross_paths=self._between_sound(firing.cross_paths))

@@ -194,9 +194,17 @@ def is_stuck(
 
 @kernel
 def update_run_faults(
-    i: int, r: float, x: float, y: float, axis: float, half_angle: float, tolerance: float, neighbours: Ints,
-    sensors: Records[SensorMemory], ring: Records[RingMemory],
-) -> None:  # fmt: skip
+    i: int,
+    r: float,
+    x: float,
+    y: float,
+    axis: float,
+    half_angle: float,
+    tolerance: float,
+    neighbours: Ints,
+    sensors: Records[SensorMemory],
+    ring: Records[RingMemory],
+) -> None:
     """Set or clear sensor `i`'s fault `STUCK` from its run of equal readings.
 
     Parameters
@@ -239,11 +247,24 @@ def count_too_near(c: SensorMemory, is_too_near: bool) -> None:
 
 @kernel
 def check_firing(
-    ranges: Floats, x: float, y: float, yaw: float, mounts: Floats, turns: Floats, neighbours: Ints,
+    ranges: Floats,
+    x: float,
+    y: float,
+    yaw: float,
+    mounts: Floats,
+    turns: Floats,
+    neighbours: Ints,
     expected: NDArray[np.bool_],
-    half_angle: float, tolerance: float, least: float, near: float, sensors: Records[SensorMemory],
-    ring: Records[RingMemory], sets: NDArray[np.uint8], trusted: Floats, possible: Floats,
-) -> int:  # fmt: skip
+    half_angle: float,
+    tolerance: float,
+    least: float,
+    near: float,
+    sensors: Records[SensorMemory],
+    ring: Records[RingMemory],
+    sets: NDArray[np.uint8],
+    trusted: Floats,
+    possible: Floats,
+) -> int:
     """Test the readings of a firing; return the bits `FAULTS_CHANGED`, `LESS_TRUSTED` and `LESS_POSSIBLE`.
 
     Parameters

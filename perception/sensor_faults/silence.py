@@ -89,9 +89,16 @@ def was_audible(i: int, look: SensorLook, half_angle: float, near: float, sensor
 
 @kernel
 def weigh_silence(
-    i: int, r: float, x: float, y: float, axis: float, half_angle: float, near: float,
-    sensors: Records[SensorMemory], ring: Records[RingMemory],
-) -> bool:  # fmt: skip
+    i: int,
+    r: float,
+    x: float,
+    y: float,
+    axis: float,
+    half_angle: float,
+    near: float,
+    sensors: Records[SensorMemory],
+    ring: Records[RingMemory],
+) -> bool:
     """Take a reading of a sensor, and return whether its silence shows that it is deaf.
 
     A look is judged after half of `LOOKS_KEPT` later ones: others have heard what is there before it, or since.

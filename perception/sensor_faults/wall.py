@@ -18,9 +18,18 @@ NOISE_SHARE: Final = 0.04
 
 @kernel
 def is_along_wall(
-    i: int, x: float, y: float, own_yaw: float, yaw: float, mounts: Floats, turns: Floats, half_angle: float,
-    tolerance: float, neighbours: Ints, sensors: Records[SensorMemory],
-) -> bool:  # fmt: skip
+    i: int,
+    x: float,
+    y: float,
+    own_yaw: float,
+    yaw: float,
+    mounts: Floats,
+    turns: Floats,
+    half_angle: float,
+    tolerance: float,
+    neighbours: Ints,
+    sensors: Records[SensorMemory],
+) -> bool:
     """Return whether a wall along the path explains the run of sensor `i`, as a neighbour hears the same wall.
 
     A healthy sensor repeats a reading on the way only if what answers is parallel to the path. A rough wall beside

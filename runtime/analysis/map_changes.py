@@ -73,9 +73,11 @@ class MapChange:
     def __str__(self) -> str:
         x, y = self.place
         at = f"{self.kind}: {self.what} at ({x:.2f}, {y:.2f}) m"
-        return f"{at}, by {self.extent_m:.2f} m" if self.kind == "moved" else (
-            f"{at}, {self.extent_m:.2f} m long" if self.extent_m else at
-        )  # fmt: skip
+        return (
+            f"{at}, by {self.extent_m:.2f} m"
+            if self.kind == "moved"
+            else (f"{at}, {self.extent_m:.2f} m long" if self.extent_m else at)
+        )
 
 
 def looks_at_circle(echoes: Echoes, circle: tuple[float, float, float], half_angle_rad: float) -> Looks:
@@ -184,10 +186,12 @@ def compare_with_map(
             changes.append(MapChange("new", "wall", (0.5 * (x1 + x2), 0.5 * (y1 + y2)), length))
     for polyline in polylines:
         length = polyline.length_m
-        places = np.concatenate([
-            np.linspace(a, b, max(2, round(math.dist(a, b) / CELL_M)))
-            for a, b in itertools.pairwise(polyline.points)
-        ])  # fmt: skip
+        places = np.concatenate(
+            [
+                np.linspace(a, b, max(2, round(math.dist(a, b) / CELL_M)))
+                for a, b in itertools.pairwise(polyline.points)
+            ]
+        )
         if length >= OPENING_MIN_M and not _is_near(places, sides, known.drum):
             walls += polyline_walls(polyline)
             changes.append(MapChange("new", "outline", _middle(polyline.points.tolist()), length))
@@ -210,8 +214,11 @@ def _compare_drums(
         circle = (drum.x_m, drum.y_m, drum.radius_m)
         gone = not is_found and bool(looks_at_circle(echoes, circle, half_angle_rad).runs())
         (missing if gone else kept).append(drum)
-    new = [(drum, name) for drum, name in zip(found.drum, names, strict=True)
-           if all(_distance(drum, other) >= NEAR_M for other in known.drum)]  # fmt: skip
+    new = [
+        (drum, name)
+        for drum, name in zip(found.drum, names, strict=True)
+        if all(_distance(drum, other) >= NEAR_M for other in known.drum)
+    ]
     for drum, name in new:
         same = [other for other in missing if abs(other.radius_m - drum.radius_m) < AGREE_M]
         before = min(same, key=lambda other: _distance(drum, other), default=None)

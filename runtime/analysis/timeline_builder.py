@@ -183,20 +183,34 @@ class TimelineBuilder:
         window = perception.occupancy()
         snapshots.append(
             RunSnapshot(
-                t_s, self._pose, self._yaw, self._row_count, rows[:, :4], self._clusters_of(rows),
-                perception.objects(), walls_of(perception), None if window is None else known_cells(window),
-                _place_of(perception), corners_of(perception), perception.polylines(),
+                t_s,
+                self._pose,
+                self._yaw,
+                self._row_count,
+                rows[:, :4],
+                self._clusters_of(rows),
+                perception.objects(),
+                walls_of(perception),
+                None if window is None else known_cells(window),
+                _place_of(perception),
+                corners_of(perception),
+                perception.polylines(),
             )
-        )  # fmt: skip
+        )
 
     def _clusters_of(self, segments: Floats) -> tuple[Cluster, ...]:
         return tuple(
             Cluster(
-                box.centre_x, box.centre_y, box.x - 0.5 * box.length, box.y - 0.5 * box.width,
-                box.x + 0.5 * box.length, box.y + 0.5 * box.width, box.segments,
+                box.centre_x,
+                box.centre_y,
+                box.x - 0.5 * box.length,
+                box.y - 0.5 * box.width,
+                box.x + 0.5 * box.length,
+                box.y + 0.5 * box.width,
+                box.segments,
             )
             for box in self._clusters.boxes(segments)
-        )  # fmt: skip
+        )
 
 
 def _turned_echoes(to: Pose, echoes: Echoes) -> Echoes:

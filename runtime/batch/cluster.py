@@ -31,9 +31,19 @@ DEATHS_MAX: Final = 10
 """Workers that may die during one attempt at a run before it is blamed."""
 LOCAL_HOST: Final = "127.0.0.1"
 WORKER_COMMAND: Final = (
-    *INTERPRETER, "-m", "dask", "worker", "--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--no-dashboard",
-    "--host", LOCAL_HOST,
-)  # fmt: skip
+    *INTERPRETER,
+    "-m",
+    "dask",
+    "worker",
+    "--no-nanny",
+    "--nthreads",
+    "1",
+    "--memory-limit",
+    "0",
+    "--no-dashboard",
+    "--host",
+    LOCAL_HOST,
+)
 SETTINGS: Final = (
     ("distributed.scheduler.allowed-failures", DEATHS_MAX),
     ("distributed.admin.system-monitor.gil.enabled", False),
@@ -145,9 +155,7 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
         yield DaskPool(client, as_completed())
 
 
-def _await_worker(
-    client: Client, started: Sequence[subprocess.Popen[bytes]], problem: str, hint: str
-) -> None:  # fmt: skip
+def _await_worker(client: Client, started: Sequence[subprocess.Popen[bytes]], problem: str, hint: str) -> None:
     """Wait for a worker, but no longer than the first ones of this machine live.
 
     Parameters

@@ -75,6 +75,10 @@ def local_workers(
 def _start(command: Sequence[str], output: IO[bytes]) -> subprocess.Popen[bytes]:
     """Start a process in a session of its own: an interrupt of the terminal is for the sweep, which ends it."""
     return subprocess.Popen(  # noqa: S603 - our own command
-        command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=output,
+        start_new_session=True,
         env=child_environment(),
-    )  # fmt: skip
+    )

@@ -24,8 +24,9 @@ SHOWN: Final = 20
 DIGITS: Final = 4
 
 
-def page(name: str, study: StudyConfig, runs: int, combinations: Sequence[Combination],
-         unfinished: Sequence[Unfinished]) -> str:  # fmt: skip
+def page(
+    name: str, study: StudyConfig, runs: int, combinations: Sequence[Combination], unfinished: Sequence[Unfinished]
+) -> str:
     """Return the page as one HTML text that refers to nothing outside itself.
 
     Parameters
@@ -48,17 +49,22 @@ def page(name: str, study: StudyConfig, runs: int, combinations: Sequence[Combin
         (
             f'<h1>{title}</h1><p class="sub">{escape(about(study))}, version {escape(VERSION)}</p>',
             f'<div class="tiles">{tile(f"{done:,} of {runs:,}", "runs finished")}'
-            f'{tile(f"{len(combinations):,}", "combinations of settings")}'
-            f'{tile(f"{failed:,}", "drives that did not arrive")}</div>',
-            section("Best", best_table(study, combinations), note(
-                "Means over the runs of each combination; ordered by drives that did not arrive, then by the "
-                f"objectives: {', '.join(study.objectives)}.")),
+            f"{tile(f'{len(combinations):,}', 'combinations of settings')}"
+            f"{tile(f'{failed:,}', 'drives that did not arrive')}</div>",
+            section(
+                "Best",
+                best_table(study, combinations),
+                note(
+                    "Means over the runs of each combination; ordered by drives that did not arrive, then by the "
+                    f"objectives: {', '.join(study.objectives)}."
+                ),
+            ),
             section("Trade-offs", *_trade_offs(study, combinations)),
             section("What each setting changes", *_effects(effects)),
             section("Without a result", unfinished_table(unfinished)),
             section("Study", settings_list(study)),
         )
-    )  # fmt: skip
+    )
     return html_document(title, body)
 
 
@@ -146,8 +152,12 @@ def _trade_offs(study: StudyConfig, combinations: Sequence[Combination]) -> list
             parts.append(figure_block(svg, f"trade-{other}", f"{first} over {other}"))
     front = pareto_front(combinations, study.objectives)
     if len(study.objectives) > 1 and len(combinations) > 1:
-        parts.append(note(f"In all objectives together, no other is better than {len(front)} of "
-                          f"{len(combinations)} combinations:"))  # fmt: skip
+        parts.append(
+            note(
+                f"In all objectives together, no other is better than {len(front)} of "
+                f"{len(combinations)} combinations:"
+            )
+        )
         parts.append(table(*best_rows(study, front, SHOWN)))
     return parts
 
@@ -160,14 +170,15 @@ def _effects(effects: Sequence[Sensitivity]) -> list[str]:
             drawn = [(one.setting, [(shown_value(value), mean) for value, mean in one.means]) for one in own]
             svg = svg_of(effects_figure(drawn, objective))
         parts.append(figure_block(svg, f"effects-{objective}", f"{objective} by value of each setting"))
-        rows = [
-            [one.setting, f"{100.0 * one.share:.0f} %", *_extremes(one)]
-            for one in own
-        ]  # fmt: skip
+        rows = [[one.setting, f"{100.0 * one.share:.0f} %", *_extremes(one)] for one in own]
         parts.append(table([objective, "share of its variance", "least at", "", "most at", ""], rows))
     if parts:
-        parts.append(note("The share is the setting's main effect in an analysis of variance over all combinations; "
-                          "what is missing to 100 % are settings that act together."))  # fmt: skip
+        parts.append(
+            note(
+                "The share is the setting's main effect in an analysis of variance over all combinations; "
+                "what is missing to 100 % are settings that act together."
+            )
+        )
     return parts
 
 
@@ -182,10 +193,14 @@ def unfinished_table(unfinished: Sequence[Unfinished]) -> str:
     if not unfinished:
         return ""
     rows = [
-        [utf8(one.run.subject), "" if one.run.seed is None else str(one.run.seed),
-         ", ".join(f"{name} = {shown_value(value)}" for name, value in one.run.varied.items()), utf8(one.reason)]
+        [
+            utf8(one.run.subject),
+            "" if one.run.seed is None else str(one.run.seed),
+            ", ".join(f"{name} = {shown_value(value)}" for name, value in one.run.varied.items()),
+            utf8(one.reason),
+        ]
         for one in unfinished[:SHOWN]
-    ]  # fmt: skip
+    ]
     return table(["run", "seed", "settings", "reason"], rows, text=True)
 
 

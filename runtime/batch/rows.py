@@ -23,9 +23,23 @@ from runtime.support.whole_file import whole_file
 ROWS: Final = "rows"
 TABLE: Final = "runs.parquet"
 FIGURES: Final = (
-    "truth", "found", "recall", "f1", "false", "mean_error_m", "max_error_m", "inside_95", "objects", "mean_sigma_m",
-    "stops", "predicted_nat", "virtual_s", "cycle_us_p50", "cycle_us_p99", "elapsed_s",
-)  # fmt: skip
+    "truth",
+    "found",
+    "recall",
+    "f1",
+    "false",
+    "mean_error_m",
+    "max_error_m",
+    "inside_95",
+    "objects",
+    "mean_sigma_m",
+    "stops",
+    "predicted_nat",
+    "virtual_s",
+    "cycle_us_p50",
+    "cycle_us_p99",
+    "elapsed_s",
+)
 """Columns of results. Empty where a run has no such figure."""
 COUNTS: Final = frozenset({"truth", "found", "false", "objects", "stops"})
 

@@ -134,8 +134,9 @@ def _subjects(study: StudyConfig, base: Path) -> Iterator[tuple[RunKind, str, st
     known = get_args(SceneName)
     for scene in study.scenes:
         if scene not in known:
-            raise ConfigError(f'scene "{scene}": no such scene{did_you_mean(scene, known)}; '
-                              f"known scenes: {', '.join(known)}")  # fmt: skip
+            raise ConfigError(
+                f'scene "{scene}": no such scene{did_you_mean(scene, known)}; known scenes: {", ".join(known)}'
+            )
         yield "scene", scene, scene
     for world in study.worlds:
         yield "world", world, ""  # it is part of the settings

@@ -51,8 +51,10 @@ def judgement(tuned: Tuned) -> str:
         return f"the changes are better in what was held out ({first.runs} runs)"
     if first.is_known:
         return f"the changes are worse in what was held out ({first.runs} runs): keep the present settings"
-    return (f"what was held out ({first.runs} runs) shows no difference beyond chance: keep the present settings, or "
-            "tune with more recordings or seeds")  # fmt: skip
+    return (
+        f"what was held out ({first.runs} runs) shows no difference beyond chance: keep the present settings, or "
+        "tune with more recordings or seeds"
+    )
 
 
 def changes_text(name: str, study: StudyConfig, tuned: Tuned) -> str:
@@ -110,26 +112,34 @@ def page(
     judged = _judged(tuned)
     gained = f"{number(judged[0].present)} → {number(judged[0].tuned)}" if judged else "none"
     objective = study.objectives[0]
-    changes = [[setting, _present(present, setting), shown_value(value)]
-               for setting, value in tuned.best.values.items()]  # fmt: skip
+    changes = [
+        [setting, _present(present, setting), shown_value(value)] for setting, value in tuned.best.values.items()
+    ]
     idle = ", ".join(tuned.dropped)
     body = "".join(
         (
             f'<h1>{title}</h1><p class="sub">{escape(about(study))}, version {escape(VERSION)}</p>',
             f'<div class="tiles">{tile(str(len(tuned.trials)), "trials")}{tile(str(len(changes)), "changes")}'
             f"{tile(gained, objective)}</div>",
-            section("Changes", table(["setting", "present", "tuned"], changes) if changes else "",
-                    note(f"{judgement(tuned).capitalize()}."),
-                    note(f"Left as they were, for a change brought nothing: {idle}.") if idle else ""),
+            section(
+                "Changes",
+                table(["setting", "present", "tuned"], changes) if changes else "",
+                note(f"{judgement(tuned).capitalize()}."),
+                note(f"Left as they were, for a change brought nothing: {idle}.") if idle else "",
+            ),
             section("Held out", _table(tuned.held_out)),
-            section("Searched with", _table(tuned.searched),
-                    note("The search chose the settings by these runs, so they flatter the result.")
-                    if tuned.searched else ""),
+            section(
+                "Searched with",
+                _table(tuned.searched),
+                note("The search chose the settings by these runs, so they flatter the result.")
+                if tuned.searched
+                else "",
+            ),
             section("The search", _course(tuned, objective)),
             section("Without a result", unfinished_table(unfinished)),
             section("Study", settings_list(study)),
         )
-    )  # fmt: skip
+    )
     return html_document(title, body)
 
 

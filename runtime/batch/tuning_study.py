@@ -49,12 +49,15 @@ def tuned_study(name: str) -> tuple[StudyConfig, Path]:
         study = study.model_copy(update={"vary": vary})
     for one in study.vary:
         if not of_recordings and one.setting.split(".")[0] in ("ring", "body", "robot", "world"):
-            raise UserError(f"{name}: {one.setting}: scenes and worlds would be sensed by another robot then, not "
-                            "better by this one: tune it with recordings, or compare robots with a sweep",
-                            WRONG_CALL)  # fmt: skip
+            raise UserError(
+                f"{name}: {one.setting}: scenes and worlds would be sensed by another robot then, not "
+                "better by this one: tune it with recordings, or compare robots with a sweep",
+                WRONG_CALL,
+            )
         if any(part.isdigit() for part in one.setting.split(".")):
-            raise UserError(f"{name}: {one.setting}: a part of a list cannot be tuned: compare values with a sweep",
-                            WRONG_CALL)  # fmt: skip
+            raise UserError(
+                f"{name}: {one.setting}: a part of a list cannot be tuned: compare values with a sweep", WRONG_CALL
+            )
     return study, base
 
 

@@ -42,11 +42,13 @@ RETRY_FIRST_S: Final = 0.25
 RETRY_MAX_S: Final = 2.0
 """Waits between attempts to connect; each is twice the one before."""
 
-_REFUSED: Final = MappingProxyType({
-    403: "the run refuses the token: it changes with every run, so copy the start URL that this run printed",
-    421: "the run does not know itself by this name: use the address that it printed",
-    503: "too many pages are open: close some, or raise console.clients_max",
-})  # fmt: skip
+_REFUSED: Final = MappingProxyType(
+    {
+        403: "the run refuses the token: it changes with every run, so copy the start URL that this run printed",
+        421: "the run does not know itself by this name: use the address that it printed",
+        503: "too many pages are open: close some, or raise console.clients_max",
+    }
+)
 
 
 class ConsoleError(UserError):
@@ -232,9 +234,10 @@ async def connect(url: str) -> AsyncIterator[ConsoleClient]:
     async with aiohttp.ClientSession(timeout=timeout) as http:
         try:
             socket = await http.ws_connect(
-                address.with_path("/ws").with_query(address.query), headers={"Origin": str(address.origin())},
+                address.with_path("/ws").with_query(address.query),
+                headers={"Origin": str(address.origin())},
                 max_msg_size=0,
-            )  # fmt: skip
+            )
         except aiohttp.WSServerHandshakeError as error:
             text = _REFUSED.get(error.status, f"it answers with HTTP status {error.status}; is it echolocate?")
             raise ConsoleError(f"{address.origin()}: {text}") from error

@@ -49,9 +49,13 @@ async def serve_foxglove(
     context = foxglove.Context()
     try:
         server = foxglove.start_server(
-            name="echolocate", host=host, port=port, capabilities=[Capability.Parameters], server_listener=bridge,
+            name="echolocate",
+            host=host,
+            port=port,
+            capabilities=[Capability.Parameters],
+            server_listener=bridge,
             context=context,
-        )  # fmt: skip
+        )
     except RuntimeError as error:
         raise UserError(
             f"cannot listen on {host}, port {port} ({error}); choose another with --port", FAILED

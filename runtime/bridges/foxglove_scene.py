@@ -21,9 +21,29 @@ CIRCLE_POINTS: Final = 36
 MAP_EVERY: Final = 4
 """Every so many states show segments and objects."""
 STATE_FIELDS: Final = (
-    "mode", "reason", "hold_reason", "cycle", "robot_s", "pose", "ring_yaw", "twist", "flags", "cycle_us", "late_us",
-    "missed", "late", "quanta", "waiting", "phases", "link", "clients", "speed", "paused", "localized", "sensors",
-)  # fmt: skip
+    "mode",
+    "reason",
+    "hold_reason",
+    "cycle",
+    "robot_s",
+    "pose",
+    "ring_yaw",
+    "twist",
+    "flags",
+    "cycle_us",
+    "late_us",
+    "missed",
+    "late",
+    "quanta",
+    "waiting",
+    "phases",
+    "link",
+    "clients",
+    "speed",
+    "paused",
+    "localized",
+    "sensors",
+)
 """What `/state` has of a state, as JSON, to be plotted."""
 
 

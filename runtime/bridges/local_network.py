@@ -112,7 +112,7 @@ class Finder:
 
 def announced(
     properties: Mapping[bytes, bytes | None], addresses: Iterable[str], port: int | None
-) -> Announced | None:  # fmt: skip
+) -> Announced | None:
     """Return the run that a service describes, with bounded texts; None if it has no usable address.
 
     Parameters
@@ -236,11 +236,19 @@ def _service(addresses: Sequence[str], port: int, about: Mapping[str, Any], name
 
     host = socket.gethostname().partition(".")[0][:TEXT_MAX]
     return AsyncServiceInfo(
-        SERVICE, name or f"{host}-{port}.{SERVICE}", port=port, server=f"{host}.local.",
-        parsed_addresses=list(addresses), host_ttl=LIFETIME_S, other_ttl=LIFETIME_S,
-        properties={"name": _text(str(about["name"]).encode()), "mode": _text(str(about["mode"]).encode()),
-                    "version": VERSION},
-    )  # fmt: skip
+        SERVICE,
+        name or f"{host}-{port}.{SERVICE}",
+        port=port,
+        server=f"{host}.local.",
+        parsed_addresses=list(addresses),
+        host_ttl=LIFETIME_S,
+        other_ttl=LIFETIME_S,
+        properties={
+            "name": _text(str(about["name"]).encode()),
+            "mode": _text(str(about["mode"]).encode()),
+            "version": VERSION,
+        },
+    )
 
 
 async def _report(finder: Finder) -> None:

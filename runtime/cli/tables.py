@@ -95,9 +95,11 @@ def _found(what: str, rows: Sequence[DrumRow | BoxRow]) -> str:
 
 def _summary_line(found: str, outcome: Outcome, units: Units) -> str:
     mean, worst = outcome["mean_error"], outcome["max_error"]
-    errors = "" if mean is None or worst is None else (
-        f", mean error {format_length(mean, units, 3)} {units}, max {format_length(worst, units, 3)} {units}"
-    )  # fmt: skip
+    errors = (
+        ""
+        if mean is None or worst is None
+        else (f", mean error {format_length(mean, units, 3)} {units}, max {format_length(worst, units, 3)} {units}")
+    )
     return (
         f"{found}, {outcome['false']} false{errors}; {outcome['times_real_time']:.0f} times real time; "
         f"a cycle takes {outcome['cycle_us']['p50'] / 1e3:.2f} ms, p99 {outcome['cycle_us']['p99'] / 1e3:.2f} ms"
@@ -173,8 +175,9 @@ def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
     table = Table(title=title, title_justify="left", caption=caption, caption_justify="left")
     for heading, of in zip(
         ("budget", "quanta", "cut", "first", "way", "found", "false", "mean", "max"),
-        (unit, "a cycle", "short", "s", units, "", "", units, units), strict=True,
-    ):  # fmt: skip
+        (unit, "a cycle", "short", "s", units, "", "", units, units),
+        strict=True,
+    ):
         table.add_column(f"{heading}\n{of}", justify="right", no_wrap=True)
     for row in rows:
         first_s, lengths = row["first_s"], ((row["way_m"], 2), (row["mean_error"], 4), (row["max_error"], 4))
@@ -201,8 +204,20 @@ def drift_table(rows: Sequence[DriftRow], units: Units) -> Table:
     title = "three rounds among eight drums: errors at the end, with and without correction of the drift"
     caption = "error: of the drums, as seen from the robot; place, heading: of the robot; NEES: expected 3 and 2"
     table = Table(title=title, title_justify="left", caption=caption, caption_justify="left")
-    names = ("scale", "walk", "corrected", "found", "false", "error", "place", "heading", "NEES", "NEES", "odometer",
-             "range")  # fmt: skip
+    names = (
+        "scale",
+        "walk",
+        "corrected",
+        "found",
+        "false",
+        "error",
+        "place",
+        "heading",
+        "NEES",
+        "NEES",
+        "odometer",
+        "range",
+    )
     of_units = ("", "°/√m", "", "", "", units, units, "°", "pose", "drums", "", "")
     for heading, of in zip(names, of_units, strict=True):
         table.add_column(f"{heading}\n{of}", justify="right", no_wrap=True)

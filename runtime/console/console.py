@@ -294,11 +294,13 @@ class Console:
         self._publisher.expedite()
         info = session_info(
             self._run.live_settings.current, name=self._run.name, emulated=self._emulated, units=self._units
-        )  # fmt: skip
+        )
         places = places_message(self._run.live_settings.current)
         return {
-            **info, "robots": self._others(), "places": places,
-        }  # fmt: skip
+            **info,
+            "robots": self._others(),
+            "places": places,
+        }
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:
         self._console_log.note("configuration changed from the console", changed=[str(one) for one in changed])

@@ -13,6 +13,13 @@ CONSOLE_FRAME: Final = "console frame"
 CONSOLE_SEND: Final = "console send"
 VIEW: Final = "view"
 CALLBACKS: Final = (
-    LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION, CONSOLE_RECEIVE, CONSOLE_FRAME, CONSOLE_SEND, VIEW
-)  # fmt: skip
+    LINE_OPENED,
+    LINK_RECEIVE,
+    LINE_LOST,
+    COLLECTION,
+    CONSOLE_RECEIVE,
+    CONSOLE_FRAME,
+    CONSOLE_SEND,
+    VIEW,
+)
 """All of them."""

@@ -61,14 +61,25 @@ class DriveState:
     """What the last cycle in DRIVE left, whatever is driven."""
 
     def after(
-        self, drive_request: DriveRequest, leg: Leg, *, goal_drive: GoalDrive | None = None, trail: Trail = (),
+        self,
+        drive_request: DriveRequest,
+        leg: Leg,
+        *,
+        goal_drive: GoalDrive | None = None,
+        trail: Trail = (),
         step_settings: StepSettings | None = None,
-    ) -> DriveState:  # fmt: skip
+    ) -> DriveState:
         """Return the state after a cycle: what this kind of drive does not need is dropped."""
         return DriveState(
-            drive_request=drive_request, requested_run_s=self.requested_run_s, leg=leg, goal_place=self.goal_place,
-            goal_drive=goal_drive, trail=trail, step_settings=step_settings, drive_memory=self.drive_memory,
-        )  # fmt: skip
+            drive_request=drive_request,
+            requested_run_s=self.requested_run_s,
+            leg=leg,
+            goal_place=self.goal_place,
+            goal_drive=goal_drive,
+            trail=trail,
+            step_settings=step_settings,
+            drive_memory=self.drive_memory,
+        )
 
     def take_over(self, after: DriveState) -> None:
         """Go on from the state that a cycle left."""

@@ -102,9 +102,15 @@ def drive(state: DriveState, percept: Percept, settings: Settings, now: Moment) 
     )
     after, memory = result.state, state.drive_memory
     progress, leg, stalled = observe_way(
-        after.drive_request, leg if after.leg is None else after.leg, None if stands else memory.progress,
-        after.goal_drive, percept.pose, state.requested_run_s, now.run_s, settings.behaviors.move_ahead,
-    )  # fmt: skip
+        after.drive_request,
+        leg if after.leg is None else after.leg,
+        None if stands else memory.progress,
+        after.goal_drive,
+        percept.pose,
+        state.requested_run_s,
+        now.run_s,
+        settings.behaviors.move_ahead,
+    )
     after = replace(after, leg=leg, drive_memory=DriveMemory(memory.commitment, progress))
     return replace(result, state=after, hold_reason=result.hold_reason or stalled)
 
@@ -205,9 +211,12 @@ def _at_goal(
 
 
 def _turn_to(
-    direction_rad: float, responses: tuple[Response, ...], expected: tuple[str, ...], percept: Percept,
+    direction_rad: float,
+    responses: tuple[Response, ...],
+    expected: tuple[str, ...],
+    percept: Percept,
     settings: Settings,
-) -> Decision:  # fmt: skip
+) -> Decision:
     """Return the arbiter's decision on a turn on the spot to a direction of odometry's frame."""
     behaviors = settings.behaviors
     angle = wrap_angle(direction_rad - percept.pose.theta)
@@ -228,9 +237,14 @@ def _along_legs(state: DriveState, leg: Leg, percept: Percept, settings: Setting
     responses = (ahead, away, *others)
     expected = (AHEAD, AVOID, *(response.schema for response in others))
     decision = arbitrate(
-        responses, percept, settings.body, settings.behaviors.arbiter, expected,
-        commitment=state.drive_memory.commitment, run_s=now.run_s,
-    )  # fmt: skip
+        responses,
+        percept,
+        settings.body,
+        settings.behaviors.arbiter,
+        expected,
+        commitment=state.drive_memory.commitment,
+        run_s=now.run_s,
+    )
     after = state.after(state.drive_request, leg, trail=trail)
     if leg.gave_up and isinstance(decision, Drive):
         return DriveResult(Drive(STANDSTILL), (), after, LEG_GIVEN_UP)
@@ -245,9 +259,18 @@ def _on_mission(
     behaviors, body = settings.behaviors, settings.body
     radii_m = {model.name: model.reach_m for model in settings.models}
     scene = Scene(
-        percept, body, behaviors, ODOM_FRAME, 0.0, now.cycle_s, now.map_frame, radii_m=radii_m, run_s=now.run_s,
-        places=settings.places, places_frame=settings.places_frame,
-    )  # fmt: skip
+        percept,
+        body,
+        behaviors,
+        ODOM_FRAME,
+        0.0,
+        now.cycle_s,
+        now.map_frame,
+        radii_m=radii_m,
+        run_s=now.run_s,
+        places=settings.places,
+        places_frame=settings.places_frame,
+    )
     asked = drive_mission(mission, scene)
     if asked.hold_reason is not None:
         return DriveResult(Drive(STANDSTILL), (), state.after(asked.mission, leg), asked.hold_reason)
@@ -264,9 +287,15 @@ def _on_mission(
     if asked.goal is not None:
         beside = (r for r in (*asked.leads, *asked.helpers) if r.schema not in {TO_GOAL, VALLEY, CANYON})
         _, goal_drive, responses, decision, hold_reason = drive_to_goal(
-            asked.goal, goal_drive, percept, now.run_s, tuple(beside), settings, commitment,
+            asked.goal,
+            goal_drive,
+            percept,
+            now.run_s,
+            tuple(beside),
+            settings,
+            commitment,
             zone_of_goal(asked.goal, now.zones, settings),
-        )  # fmt: skip
+        )
         if goal_drive.progress.fault is not None:
             mission = given_up(mission, goal_drive.progress.fault, goal_drive.progress.given_up or "")
             goal_drive, hold_reason = None, mission.progress.reason or hold_reason
@@ -274,9 +303,15 @@ def _on_mission(
         remaining_m = math.inf if asked.remaining_m is None else asked.remaining_m
         beside = (r for r in asked.helpers if r.schema != VALLEY)
         goal_drive, responses, decision, hold_reason = drive_through_valley(
-            Response(SUM, *summed(asked.leads)), remaining_m, goal_drive, others, now.run_s, tuple(beside), settings,
+            Response(SUM, *summed(asked.leads)),
+            remaining_m,
+            goal_drive,
+            others,
+            now.run_s,
+            tuple(beside),
+            settings,
             commitment,
-        )  # fmt: skip
+        )
     else:
         away = avoid_static_obstacle(others, body.radius_m, settings.behaviors.avoid_static_obstacle)
         responses = (*asked.leads, *asked.helpers, away)

@@ -54,9 +54,15 @@ class GoalDrive:
 
 
 def drive_to_goal(
-    goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, beside: tuple[Response, ...],
-    settings: Settings, commitment: Commitment | None = None, forbidden: str | None = None,
-) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
+    goal: Goal,
+    before: GoalDrive | None,
+    percept: Percept,
+    run_s: float,
+    beside: tuple[Response, ...],
+    settings: Settings,
+    commitment: Commitment | None = None,
+    forbidden: str | None = None,
+) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:
     """Return the goal and the drive for the next cycle, the responses, the decision, and why the robot holds.
 
     Parameters
@@ -91,9 +97,14 @@ def drive_to_goal(
         stands_s = STANDS_S + math.pi / min(behaviors.move_to_goal.turn_rate_max_rad_s, body.turn_max_rad_s)
         stood_s = run_s - now.progress.moved_run_s
         around, detour = leave_canyon(
-            percept, (goal.x, goal.y), now.detour, body.radius_m, behaviors.leave_canyon,
-            waits=has_valley and stood_s < stands_s, last_rad=now.valley.direction_rad,
-        )  # fmt: skip
+            percept,
+            (goal.x, goal.y),
+            now.detour,
+            body.radius_m,
+            behaviors.leave_canyon,
+            waits=has_valley and stood_s < stands_s,
+            last_rad=now.valley.direction_rad,
+        )
         # A detour for a robot that stands gets its own time to turn before that robot counts as stuck.
         if now.detour.side == 0 != detour.side and stood_s >= stands_s:
             now = replace(now, progress=replace(now.progress, moved_run_s=run_s))
@@ -119,9 +130,15 @@ def drive_to_goal(
     now = replace(now, turn_rad_s=decision.twist.w if isinstance(decision, Drive) else 0.0)
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
-            now.progress, percept.pose, distance_m, run_s, hold_reason, behaviors.move_to_goal,
-            is_blocked=not now.search.reaches, is_occupied=_is_occupied(percept, goal, distance_m, settings),
-        )  # fmt: skip
+            now.progress,
+            percept.pose,
+            distance_m,
+            run_s,
+            hold_reason,
+            behaviors.move_to_goal,
+            is_blocked=not now.search.reaches,
+            is_occupied=_is_occupied(percept, goal, distance_m, settings),
+        )
         now = replace(now, progress=progress)
         if progress.given_up is not None:
             return goal, now, responses, Drive(STANDSTILL), progress.given_up
@@ -129,9 +146,15 @@ def drive_to_goal(
 
 
 def drive_through_valley(
-    way: Response, distance_m: float, before: GoalDrive | None, percept: Percept, run_s: float,
-    beside: tuple[Response, ...], settings: Settings, commitment: Commitment | None = None,
-) -> tuple[GoalDrive, tuple[Response, ...], Decision, str | None]:  # fmt: skip
+    way: Response,
+    distance_m: float,
+    before: GoalDrive | None,
+    percept: Percept,
+    run_s: float,
+    beside: tuple[Response, ...],
+    settings: Settings,
+    commitment: Commitment | None = None,
+) -> tuple[GoalDrive, tuple[Response, ...], Decision, str | None]:
     """Return the drive for the next cycle, the responses, the decision, and why the robot holds, without a goal.
 
     Parameters
@@ -158,9 +181,12 @@ def drive_through_valley(
 
 
 def _arbitrate(
-    responses: tuple[Response, ...], percept: Percept, last_rad_s: float, settings: Settings,
+    responses: tuple[Response, ...],
+    percept: Percept,
+    last_rad_s: float,
+    settings: Settings,
     commitment: Commitment | None,
-) -> Decision:  # fmt: skip
+) -> Decision:
     """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily.
 
     One that is pushed turns away as fast as its base can.

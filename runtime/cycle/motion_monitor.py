@@ -184,9 +184,19 @@ class MotionMonitor:
             movement = Movement.MISSING if is_stalled else fine
         still = self.still if is_still else odometry.pose
         return MotionMonitor(
-            movement, commands, odometry, directions, still, still_s, has_stood, asked_s, asked, asked_turn_s,
-            modelled, run_s,
-        )  # fmt: skip
+            movement,
+            commands,
+            odometry,
+            directions,
+            still,
+            still_s,
+            has_stood,
+            asked_s,
+            asked,
+            asked_turn_s,
+            modelled,
+            run_s,
+        )
 
     def command(self, twist: Twist | None, run_s: float) -> MotionMonitor:
         """Return the monitor after a command that reached the base; None commands no velocity: it ends any motion."""
@@ -194,10 +204,19 @@ class MotionMonitor:
         has_stood = self.has_stood and twist.v == 0.0 and twist.w == 0.0
         # As `replace` does, in a fifth of its time: this is called in each cycle.
         return MotionMonitor(
-            self.movement, (*self.commands, Command(run_s, twist)), self.odometry, self.directions, self.still,
-            self.still_s, has_stood, self.asked_s, self.asked, self.asked_turn_s,
-            self.modelled, self.modelled_run_s,
-        )  # fmt: skip
+            self.movement,
+            (*self.commands, Command(run_s, twist)),
+            self.odometry,
+            self.directions,
+            self.still,
+            self.still_s,
+            has_stood,
+            self.asked_s,
+            self.asked,
+            self.asked_turn_s,
+            self.modelled,
+            self.modelled_run_s,
+        )
 
     def _explain(
         self, commands: tuple[Command, ...], along: float, turned: float, passed_s: float, body: BodyConfig
@@ -224,9 +243,11 @@ class MotionMonitor:
         )
         ahead, back, left, right = directions
         is_excessive = (
-            ahead.excess > EXCESS.along or back.excess > EXCESS.along
-            or left.excess > EXCESS.turned or right.excess > EXCESS.turned
-        )  # fmt: skip
+            ahead.excess > EXCESS.along
+            or back.excess > EXCESS.along
+            or left.excess > EXCESS.turned
+            or right.excess > EXCESS.turned
+        )
         return tuple(Direction(d.explained) for d in directions) if is_excessive else directions, is_excessive
 
     def _model(self, run_s: float, body: BodyConfig) -> tuple[Twist, float]:

@@ -227,9 +227,14 @@ class RobotProcess:
                 self._scheduler.close()
                 await self._shut_down(link_task)
         return run_summary(
-            self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row,
-            self._mode_log.stop_reasons, self._mode_log.hold_reasons,
-        )  # fmt: skip
+            self._state,
+            self._scheduler.stats,
+            self.timing_monitor,
+            self._driver,
+            process_row,
+            self._mode_log.stop_reasons,
+            self._mode_log.hold_reasons,
+        )
 
     def _on_prepared(self) -> None:
         """Recognition begins with this cycle: what it took is no part of the run's own footprint."""
@@ -301,10 +306,13 @@ class RobotProcess:
         """Run the pure step with this process's line and clock."""
         host_clock, refine_until_host_s = self._clock.host, now.host_s + self._settings.cycle.perception_budget_s
         return step(
-            self._state, inputs, self._settings,
+            self._state,
+            inputs,
+            self._settings,
             lambda command: self._carry_out(command, inputs.run_s + inputs.gap_max_s),
-            lambda _done: host_clock() < refine_until_host_s, mark,
-        )  # fmt: skip
+            lambda _done: host_clock() < refine_until_host_s,
+            mark,
+        )
 
     def _report(self, record: CycleRecord, before: ModeState, on_cycle: OnCycle | None) -> None:
         """Record and show the cycle, and log what is new about mode, sensors and odometry."""

@@ -40,9 +40,15 @@ class DriveMemory:
 
 
 def observe_way(
-    request: DriveRequest, leg: Leg, before: WayProgress | None, goal_drive: GoalDrive | None, pose: Pose,
-    requested_run_s: float, run_s: float, config: MoveAheadConfig,
-) -> tuple[WayProgress, Leg, str | None]:  # fmt: skip
+    request: DriveRequest,
+    leg: Leg,
+    before: WayProgress | None,
+    goal_drive: GoalDrive | None,
+    pose: Pose,
+    requested_run_s: float,
+    run_s: float,
+    config: MoveAheadConfig,
+) -> tuple[WayProgress, Leg, str | None]:
     """Return the progress along legs, the leg, which turns back or ends without any, and why a drive has none.
 
     Parameters

@@ -56,9 +56,22 @@ from runtime.cycle.velocity_limits import ZoneLimits, wants_map, way_refused, zo
 from runtime.timing.phases import Phase, ignore_phase
 
 __all__ = [
-    "NO_MAP", "STANDSTILL", "Command", "CycleRecord", "DriveInput", "DriveRequest", "Edit", "Inputs", "Order",
-    "Refused", "State", "StopCause", "apply_command", "apply_settings", "step",
-]  # fmt: skip
+    "NO_MAP",
+    "STANDSTILL",
+    "Command",
+    "CycleRecord",
+    "DriveInput",
+    "DriveRequest",
+    "Edit",
+    "Inputs",
+    "Order",
+    "Refused",
+    "State",
+    "StopCause",
+    "apply_command",
+    "apply_settings",
+    "step",
+]
 
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
@@ -326,9 +339,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     percept = Percept(odometry.pose, obstacles, view, objects)
     if needs_space(state.drive_request):
         percept = replace(
-            percept, occupancy=state.perception.occupancy(), canyons=state.perception.canyons(),
+            percept,
+            occupancy=state.perception.occupancy(),
+            canyons=state.perception.canyons(),
             steady=state.perception.steady_obstacles(now_s, age_max_s),
-        )  # fmt: skip
+        )
     if (zones := state.zones) is not None:
         percept, state.hold_reason = zones.seen(percept, state.drive_request, settings.body.radius_m)
         if state.hold_reason is not None:

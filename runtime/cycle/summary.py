@@ -21,9 +21,12 @@ from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
 from runtime.timing.timing_monitor import TimingMonitor, TimingSummary
 
-CORNER_KINDS: Final[Mapping[str, Literal["inside", "edge"]]] = MappingProxyType({
-    "inside corner": "inside", "edge": "edge",
-})  # fmt: skip
+CORNER_KINDS: Final[Mapping[str, Literal["inside", "edge"]]] = MappingProxyType(
+    {
+        "inside corner": "inside",
+        "edge": "edge",
+    }
+)
 """Kinds of corners by the labels that perception gives them."""
 
 
@@ -194,7 +197,7 @@ def object_row(seen: DetectedObject) -> ObjectRow:
 
 def perceived_rows(
     perception: Perception, to: Pose | None = None, objects: Iterable[DetectedObject] | None = None
-) -> PerceivedRows:  # fmt: skip
+) -> PerceivedRows:
     """Return what perception reports in its JSON form.
 
     Parameters
@@ -209,8 +212,12 @@ def perceived_rows(
     to = Pose(0.0, 0.0, 0.0) if to is None else to
     found = (turned_object(to, seen) for seen in perception.objects()) if objects is None else objects
     rows: PerceivedRows = {
-        "objects": [object_row(seen) for seen in found], "walls": [], "corners": [], "canyons": [], "polylines": [],
-    }  # fmt: skip
+        "objects": [object_row(seen) for seen in found],
+        "walls": [],
+        "corners": [],
+        "canyons": [],
+        "polylines": [],
+    }
     for canyon in perception.canyons():
         (x1, y1), (x2, y2) = (
             (at.x, at.y)
@@ -219,31 +226,54 @@ def perceived_rows(
                 to.compose(Pose(*canyon.mouth[2:], 0.0)),
             )
         )
-        rows["canyons"].append({
-            "number": canyon.number, "x1": x1, "y1": y1, "x2": x2, "y2": y2,
-            "axis": math.remainder(to.theta + canyon.axis_rad, math.tau), "depth": canyon.depth_m,
-            "probability": canyon.probability,
-        })  # fmt: skip
+        rows["canyons"].append(
+            {
+                "number": canyon.number,
+                "x1": x1,
+                "y1": y1,
+                "x2": x2,
+                "y2": y2,
+                "axis": math.remainder(to.theta + canyon.axis_rad, math.tau),
+                "depth": canyon.depth_m,
+                "probability": canyon.probability,
+            }
+        )
     labelled = (*perception.labelled_objects(), *perception.archived_objects())
     for seen in (turned_object(to, one) for one in labelled):
         if seen.ends is not None and seen.covariance is not None:
             x1, y1, x2, y2 = seen.ends
             nx, ny, (xx, xy, yy) = -math.sin(seen.theta), math.cos(seen.theta), seen.covariance
             across = nx * nx * xx + 2.0 * nx * ny * xy + ny * ny * yy
-            rows["walls"].append({
-                "x1": x1, "y1": y1, "x2": x2, "y2": y2, "probability": seen.score,
-                "sigma_offset": math.sqrt(max(0.0, across)), "sigma_angle": seen.sigma_theta or 0.0,
-                "number": seen.number,
-            })  # fmt: skip
+            rows["walls"].append(
+                {
+                    "x1": x1,
+                    "y1": y1,
+                    "x2": x2,
+                    "y2": y2,
+                    "probability": seen.score,
+                    "sigma_offset": math.sqrt(max(0.0, across)),
+                    "sigma_angle": seen.sigma_theta or 0.0,
+                    "number": seen.number,
+                }
+            )
         elif seen.model in CORNER_KINDS:
-            rows["corners"].append({
-                "x": seen.x, "y": seen.y, "kind": CORNER_KINDS[seen.model], "sigma": seen.sigma,
-                "probability": seen.score,
-            })  # fmt: skip
+            rows["corners"].append(
+                {
+                    "x": seen.x,
+                    "y": seen.y,
+                    "kind": CORNER_KINDS[seen.model],
+                    "sigma": seen.sigma,
+                    "probability": seen.score,
+                }
+            )
     for line in (one.in_frame(to) for one in perception.polylines()):
-        rows["polylines"].append({
-            "number": line.number, "points": line.points.tolist(), "probability": line.probability,
-        })  # fmt: skip
+        rows["polylines"].append(
+            {
+                "number": line.number,
+                "points": line.points.tolist(),
+                "probability": line.probability,
+            }
+        )
     return rows
 
 

@@ -83,9 +83,14 @@ class ZoneLimits:
         return percept, VOID if self.is_void else UNKNOWN_PLACE
 
     def applied(
-        self, asked: Twist, last: Twist, drive_request: DriveRequest, odometry: Odometry, age_s: float,
+        self,
+        asked: Twist,
+        last: Twist,
+        drive_request: DriveRequest,
+        odometry: Odometry,
+        age_s: float,
         settings: Settings,
-    ) -> tuple[Twist, str | None]:  # fmt: skip
+    ) -> tuple[Twist, str | None]:
         """Return a velocity within the limits, and what the operator should know of them.
 
         Parameters

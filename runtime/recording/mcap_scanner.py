@@ -236,9 +236,11 @@ class McapScanner:
             return True
         code, length = struct.unpack_from("<BQ", self._data, at)
         longest = {
-            Opcode.CHUNK: CONTENT_MAX, Opcode.MESSAGE_INDEX: INDEX_MAX, Opcode.HEADER: HEADER_MAX,
+            Opcode.CHUNK: CONTENT_MAX,
+            Opcode.MESSAGE_INDEX: INDEX_MAX,
+            Opcode.HEADER: HEADER_MAX,
             Opcode.DATA_END: DATA_END_BYTES,
-        }.get(code, 0)  # fmt: skip
+        }.get(code, 0)
         return bool(length <= longest) and at + RECORD_HEADER + length > len(self._data)
 
     def _chunk(self, at: int, length: int) -> list[RawMessage] | None:

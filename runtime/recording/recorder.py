@@ -285,9 +285,11 @@ class Recorder:
         fields = {name: value for name, value in event.items() if name not in {"level", "event", "timestamp"}}
         run_s, host_s = self._clock.both()
         line = LogLine.model_construct(
-            run_s=run_s, level=str(event.get("level", "info")), event=str(event.get("event", "")),
+            run_s=run_s,
+            level=str(event.get("level", "info")),
+            event=str(event.get("event", "")),
             fields={name: str(value) for name, value in fields.items()},
-        )  # fmt: skip
+        )
         self._put((LOG, host_s, run_s, line))
 
     def _put(self, item: QueuedItem) -> None:

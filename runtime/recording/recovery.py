@@ -86,7 +86,7 @@ def _copy(scanner: McapScanner, source: Path, file: BinaryIO, target: Path) -> R
     os.fsync(file.fileno())
     return Recovered(
         target, chunks, messages, cycles, first_ns, last_ns, tuple(scanner.corrupt_regions), scanner.finished
-    )  # fmt: skip
+    )
 
 
 def _register(writer: Writer, scanner: McapScanner, message: RawMessage) -> int:

@@ -78,7 +78,7 @@ class FiringReplayer:
 
 def replay_localized(
     settings: Settings, firings: Iterable[Firing], on_pose: Callable[[float, LocalizedPose], None]
-) -> ReplaySummary:  # fmt: skip
+) -> ReplaySummary:
     """Run perception over firings, correct drift by what it recognises, and return what it perceived.
 
     Parameters

@@ -38,9 +38,13 @@ class RingLogWriter:
         self._bytes = 0
         self.last_error: str | None = None
         self._thread = BackgroundWriter[Firing](
-            "ring log", self._write, begin=self._begin, finish=self._finish, capacity=QUEUE_MAX,
+            "ring log",
+            self._write,
+            begin=self._begin,
+            finish=self._finish,
+            capacity=QUEUE_MAX,
             close_max_s=CLOSE_MAX_S,
-        )  # fmt: skip
+        )
 
     def __enter__(self) -> RingLogWriter:
         self._thread.start()

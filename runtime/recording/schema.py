@@ -39,8 +39,9 @@ COVARIANCE: Final = 3
 class Payload(BaseModel):
     """The content of one message. Reading validates every value; writing does not, as the values are our own."""
 
-    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64",
-                              val_json_bytes="base64")  # fmt: skip
+    model_config = ConfigDict(
+        frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64", val_json_bytes="base64"
+    )
 
     VALUES_MAX: ClassVar[int] = 300_000
     """Most values in a message; one of more is not parsed, as each may take a kilobyte until the message is refused.

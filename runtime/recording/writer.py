@@ -339,9 +339,11 @@ class RecordingWriter:
         for topic, pieces in self._pieces.items():
             _, first_host_s, first_run_s, _ = pieces[0]
             payload = SerialBytes.model_construct(
-                run_s=first_run_s, after_us=[round(1e6 * (run_s - first_run_s)) for _, _, run_s, _ in pieces],
-                sizes=[len(data) for *_, data in pieces], data=b"".join(data for *_, data in pieces).hex(),
-            )  # fmt: skip
+                run_s=first_run_s,
+                after_us=[round(1e6 * (run_s - first_run_s)) for _, _, run_s, _ in pieces],
+                sizes=[len(data) for *_, data in pieces],
+                data=b"".join(data for *_, data in pieces).hex(),
+            )
             self._add(topic, payload, self._log_ns(first_host_s))
         self._pieces.clear()
 

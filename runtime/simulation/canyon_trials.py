@@ -147,10 +147,18 @@ def drive(settings: Settings, place: CanyonWorld, seed: int) -> CanyonOutcome:
     watch = _Watch(place)
     simulate(settings, place.world, seed, TIME_MAX_S, watch.see, is_over=watch.is_over)
     return CanyonOutcome(
-        place.depth_m, place.width_m, math.dist((watch.x, watch.y), place.goal) < ARRIVED_M, watch.entries,
-        watch.deepest_m, watch.contacts, watch.way_m, place.shortest_m(settings.body.radius_m + ROOM_M), watch.time_s,
-        watch.reported_m, back_heard_m(settings, place),
-    )  # fmt: skip
+        place.depth_m,
+        place.width_m,
+        math.dist((watch.x, watch.y), place.goal) < ARRIVED_M,
+        watch.entries,
+        watch.deepest_m,
+        watch.contacts,
+        watch.way_m,
+        place.shortest_m(settings.body.radius_m + ROOM_M),
+        watch.time_s,
+        watch.reported_m,
+        back_heard_m(settings, place),
+    )
 
 
 def summarise(schemas: str, reflection: str, outcomes: Sequence[CanyonOutcome]) -> CanyonRow:

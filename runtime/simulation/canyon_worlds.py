@@ -102,9 +102,15 @@ def canyon_world(seed: int, reflection: Reflection = "specular") -> CanyonWorld:
     start_y, goal_y = (rng.uniform(-OFF_AXIS, OFF_AXIS, 2) * width).tolist()
     x, y = rng.uniform(-5.0, 5.0, 2).tolist()
     mouth = Pose(x, y, float(rng.uniform(-math.pi, math.pi)))
-    ends = [mouth.compose(Pose(u, v, 0.0)) for u, v in (
-        (0.0, 0.5 * width), (depth, 0.5 * width), (depth, -0.5 * width), (0.0, -0.5 * width),
-    )]  # fmt: skip
+    ends = [
+        mouth.compose(Pose(u, v, 0.0))
+        for u, v in (
+            (0.0, 0.5 * width),
+            (depth, 0.5 * width),
+            (depth, -0.5 * width),
+            (0.0, -0.5 * width),
+        )
+    ]
     walls = tuple(WallConfig(x1_m=a.x, y1_m=a.y, x2_m=b.x, y2_m=b.y) for a, b in itertools.pairwise(ends))
     start, goal = mouth.compose(Pose(-before, start_y, 0.0)), mouth.compose(Pose(depth + behind, goal_y, 0.0))
     heading = math.atan2(goal.y - start.y, goal.x - start.x) + float(rng.uniform(-HEADING_RAD, HEADING_RAD))

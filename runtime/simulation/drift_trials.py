@@ -28,8 +28,15 @@ from runtime.simulation.random_halls import ACOUSTICS
 from runtime.simulation.scenes import OCTET, SPEED_M_S
 
 PLACES_FT: Final = (
-    (-4.0, 5.4), (1.0, 5.5), (6.0, 5.4), (-5.0, -5.4), (0.0, -5.5), (5.5, -5.4), (-1.5, 0.0), (3.5, 0.0),
-)  # fmt: skip
+    (-4.0, 5.4),
+    (1.0, 5.5),
+    (6.0, 5.4),
+    (-5.0, -5.4),
+    (0.0, -5.5),
+    (5.5, -5.4),
+    (-1.5, 0.0),
+    (3.5, 0.0),
+)
 """Of the drums: six around the path, two within."""
 MOVES_FT: Final = (0.5, 0.3)
 """Largest random offsets of a drum."""
@@ -174,8 +181,9 @@ def firings(
     synchro : bool
         Whether the ring keeps its direction, which odometry then knows exactly, while the wheels turn.
     """
-    sonar = Sonar(settings.ring, compile_scene(world), world.acoustics,
-                  np.random.default_rng(np.random.SeedSequence([seed, 1])))  # fmt: skip
+    sonar = Sonar(
+        settings.ring, compile_scene(world), world.acoustics, np.random.default_rng(np.random.SeedSequence([seed, 1]))
+    )
     reported = odometry_along(path, errors, np.random.default_rng(np.random.SeedSequence([seed, 7])))
     sensors = len(settings.ring.mounts)
     for k, (true, pose) in enumerate(zip(path, reported, strict=True)):
@@ -218,21 +226,28 @@ def drive(
     views = [_from(robot, one.x, one.y) for one in seen]
     pairs = _pairs([_from(true, *drum) for drum in drums], views)
     outcome = DriftOutcome(
-        tuple(error for _, _, error in pairs), len(drums) - len(pairs), len(seen) - len(pairs),
-        math.dist((robot.x, robot.y), (true.x, true.y)), abs(wrap_angle(robot.theta - true.theta)),
-    )  # fmt: skip
+        tuple(error for _, _, error in pairs),
+        len(drums) - len(pairs),
+        len(seen) - len(pairs),
+        math.dist((robot.x, robot.y), (true.x, true.y)),
+        abs(wrap_angle(robot.theta - true.theta)),
+    )
     if localized is None or not isinstance(perception.map_frame, MapFrame):
         return outcome
     off = np.array([robot.x - true.x, robot.y - true.y, wrap_angle(robot.theta - true.theta)])
     object_nees = [_nees(seen[k].x - drums[i][0], seen[k].y - drums[i][1], seen[k].covariance) for i, k, _ in pairs]
     estimate = perception.map_frame.drift.e[0]
     return DriftOutcome(
-        outcome.errors, outcome.missed, outcome.false, outcome.place, outcome.heading,
+        outcome.errors,
+        outcome.missed,
+        outcome.false,
+        outcome.place,
+        outcome.heading,
         float(off @ np.linalg.solve(localized.covariance, off)),
         mean(object_nees) if object_nees else None,
         estimate.odometer_scale / errors.scale - 1.0,
         estimate.range_scale * world.acoustics.sound_speed_scale - 1.0,
-    )  # fmt: skip
+    )
 
 
 def summarise_drives(errors: OdometryConfig, outcomes: Sequence[DriftOutcome]) -> DriftRow:
@@ -288,9 +303,7 @@ def _nees(dx: float, dy: float, covariance: tuple[float, float, float] | None) -
     return (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
 
 
-def _pairs(
-    truth: Sequence[tuple[float, float]], seen: Sequence[tuple[float, float]]
-) -> list[tuple[int, int, float]]:  # fmt: skip
+def _pairs(truth: Sequence[tuple[float, float]], seen: Sequence[tuple[float, float]]) -> list[tuple[int, int, float]]:
     """Return indices and distance of each drum and its object: nearest pairs first, none beyond `MATCH_M`."""
     found: list[tuple[int, int, float]] = []
     for error, i, k in sorted((math.dist(t, s), i, k) for i, t in enumerate(truth) for k, s in enumerate(seen)):

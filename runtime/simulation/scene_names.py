@@ -6,4 +6,4 @@ from typing import Literal, TypeAlias
 
 SceneName: TypeAlias = Literal[
     "clean", "moved", "noisy", "walls", "jit10", "boxes", "boxes_facing", "boxes_45", "halls"
-]  # fmt: skip
+]

@@ -95,8 +95,10 @@ def way_refusal(settings: Settings, course_rad: float | None) -> str | None:
     courses = [deg for deg in range(0, 360, COURSE_DEG) if _speed_m_s(settings, math.radians(deg)) > 0.0]
     if not courses:
         return None  # `refuse_undrivable` says so
-    gaps = [((after - before - 1) % 360 + 1, before) for before, after in zip(courses, [*courses[1:], courses[0]],
-                                                                             strict=True)]  # fmt: skip
+    gaps = [
+        ((after - before - 1) % 360 + 1, before)
+        for before, after in zip(courses, [*courses[1:], courses[0]], strict=True)
+    ]
     widest, begin = max(gaps)
     if widest < 180:
         return None

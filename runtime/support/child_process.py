@@ -63,10 +63,16 @@ async def start_child(
     pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
     program = [LOW_PRIORITY, module] if low_priority else [module]
     return await asyncio.create_subprocess_exec(
-        *INTERPRETER, "-m", *program, *arguments,
-        stdin=pipe if pipes else nothing, stdout=pipe if pipes else nothing, stderr=pipe, start_new_session=True,
+        *INTERPRETER,
+        "-m",
+        *program,
+        *arguments,
+        stdin=pipe if pipes else nothing,
+        stdout=pipe if pipes else nothing,
+        stderr=pipe,
+        start_new_session=True,
         env={**child_environment(), **environment},
-    )  # fmt: skip
+    )
 
 
 async def kill_child(process: asyncio.subprocess.Process) -> None:

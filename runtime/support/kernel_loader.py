@@ -46,10 +46,19 @@ COMPILING_MAX_S: Final = 600.0
 WARM_UP: Final = "runtime.support.kernel_warmup"
 """The module that compiles, run as a program."""
 
-KERNEL_COUNTS: Final = MappingProxyType({
-    BAYES: 244, POLYGONS: 65, PAPER: 7, LOCALIZATION: 14, KNOWN_ROOM: 26, VALLEY: 2,
-    "directed": 13, "moravec_elfes": 6, "elfes": 6,
-})  # fmt: skip
+KERNEL_COUNTS: Final = MappingProxyType(
+    {
+        BAYES: 244,
+        POLYGONS: 65,
+        PAPER: 7,
+        LOCALIZATION: 14,
+        KNOWN_ROOM: 26,
+        VALLEY: 2,
+        "directed": 13,
+        "moravec_elfes": 6,
+        "elfes": 6,
+    }
+)
 """Kernels of each part that no part before it has, as counted after compiling; for the display of progress only."""
 
 SHARE_MIN: Final = 0.1
@@ -172,8 +181,9 @@ class KernelPreparation:
             They could not be compiled.
         """
         if uncompiled_parts(self._folder, self._all_parts):
-            self._process = await start_child(WARM_UP, [",".join(self._all_parts), "whole"], pipes=False,
-                                              low_priority=True)  # fmt: skip
+            self._process = await start_child(
+                WARM_UP, [",".join(self._all_parts), "whole"], pipes=False, low_priority=True
+            )
         while uncompiled_parts(self._folder, self._parts):
             if self._process is None or self._process.returncode is not None:
                 raise UserError(

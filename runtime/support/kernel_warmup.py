@@ -277,9 +277,12 @@ def compile_in_parallel(part: str) -> Iterator[None]:
     """Compile the refinement of `part` in another process meanwhile, and wait for it at the end."""
     null = subprocess.DEVNULL
     process = subprocess.Popen(  # noqa: S603 - this very program
-        [*INTERPRETER, "-m", "runtime.support.kernel_warmup", part], stdin=null, stdout=null, stderr=null,
+        [*INTERPRETER, "-m", "runtime.support.kernel_warmup", part],
+        stdin=null,
+        stdout=null,
+        stderr=null,
         env=child_environment(),
-    )  # fmt: skip
+    )
     try:
         yield
         # If it failed, this process compiles what is missing.

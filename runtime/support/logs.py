@@ -104,9 +104,13 @@ class _LineOutput:
     """The last processor of structlog: send one line to the file, the terminal and the listeners."""
 
     def __init__(
-        self, status: LogStatus, terminal: TextIO | None, listener: LogListener | None, path: Path,
+        self,
+        status: LogStatus,
+        terminal: TextIO | None,
+        listener: LogListener | None,
+        path: Path,
         clock: Callable[[], float],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._status = status
         self._listener = listener
         self._reported: str | None = None

@@ -224,9 +224,14 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
     it.final_refinements = FINAL_REFINEMENTS
     sigmas = np.empty(TABLE_LEVELS)
     build_table(
-        float(it.half_resolution_m), *TABLE_SIGMAS_M, 1.0 / BACKGROUND_RANGE_M, OUTLIER_SHARE, column(p, "table")[0],
-        column(p, "table_bins_per_m")[0], sigmas,
-    )  # fmt: skip
+        float(it.half_resolution_m),
+        *TABLE_SIGMAS_M,
+        1.0 / BACKGROUND_RANGE_M,
+        OUTLIER_SHARE,
+        column(p, "table")[0],
+        column(p, "table_bins_per_m")[0],
+        sigmas,
+    )
     column(p, "expected_nat")[0], column(p, "variance_nat2")[0] = expected_evidence(
         column(p, "table")[0], OUTLIER_SHARE
     )

@@ -40,9 +40,15 @@ def bounded_exp(v: float) -> float:
 
 @kernel
 def build_table(
-    half_box: float, sigma_lo: float, sigma_hi: float, density: float, outliers: float, table: Floats,
-    bins_per_m: Floats, sigmas: Floats,
-) -> None:  # fmt: skip
+    half_box: float,
+    sigma_lo: float,
+    sigma_hi: float,
+    density: float,
+    outliers: float,
+    table: Floats,
+    bins_per_m: Floats,
+    sigmas: Floats,
+) -> None:
     """Write the table: the log likelihood ratio of an error e for each level of noise.
 
     With h half the box, σ the noise and Φ the normal distribution, a uniform box convolved with a Gaussian, mixed

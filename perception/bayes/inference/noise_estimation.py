@@ -45,9 +45,7 @@ def tolerance_m(half_box: float, var: float) -> float:
 
 
 @kernel
-def add_roughness(
-    a: Reading, b: Reading, c: Reading, age_s: float, p: Records[Settings], evidence: Floats
-) -> None:  # fmt: skip
+def add_roughness(a: Reading, b: Reading, c: Reading, age_s: float, p: Records[Settings], evidence: Floats) -> None:
     """Add the evidence of three readings of one sensor for each noise.
 
     Parameters
@@ -84,7 +82,7 @@ def add_roughness(
 @kernel
 def add_residuals(
     s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], t: int, n: int, careful: bool
-) -> None:  # fmt: skip
+) -> None:
     """Update each noise's evidence from the residuals of track `t`, if the track is sure.
 
     Parameters

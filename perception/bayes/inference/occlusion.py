@@ -45,9 +45,14 @@ def is_elsewhere(track: CircleTrack, p: Records[Settings], cx: float, cy: float,
 
 @kernel
 def find_others(
-    tracks: Records[CircleTrack], own: int, p: Records[Settings], cx: float, cy: float, radius: float,
+    tracks: Records[CircleTrack],
+    own: int,
+    p: Records[Settings],
+    cx: float,
+    cy: float,
+    radius: float,
     others: Records[OtherCircle],
-) -> int:  # fmt: skip
+) -> int:
     """Write the established circles other than `own`, and return their number.
 
     Few of the tracks are in use, and to ask all of them for each reading took half of the time.
@@ -85,7 +90,7 @@ def find_others(
 @kernel
 def is_behind_body(
     others: Records[OtherCircle], x: float, y: float, cx: float, cy: float, d: float, radius: float
-) -> bool:  # fmt: skip
+) -> bool:
     """Return whether another circle lies between (x, y) and a circle about (cx, cy).
 
     Parameters
@@ -111,7 +116,7 @@ def is_behind_body(
 @kernel
 def is_explained_elsewhere(
     others: Records[OtherCircle], p: Records[Settings], q: Reading, off: float, var0: float, rel2: float
-) -> bool:  # fmt: skip
+) -> bool:
     """Return whether another established circle explains a reading, with an error smaller than `off`.
 
     A named one need only explain it: that it fits another place better is chance, where nothing is known to stand.
@@ -176,9 +181,17 @@ def answers_before(others: Records[OtherCircle], p: Records[Settings], q: Readin
 
 @kernel
 def is_relevant(
-    others: Records[OtherCircle], p: Records[Settings], q: Reading, cx: float, cy: float, radius: float, d: float,
-    e: float, var0: float, rel2: float,
-) -> bool:  # fmt: skip
+    others: Records[OtherCircle],
+    p: Records[Settings],
+    q: Reading,
+    cx: float,
+    cy: float,
+    radius: float,
+    d: float,
+    e: float,
+    var0: float,
+    rel2: float,
+) -> bool:
     """Return whether a reading bears on a circle: it is not hidden, and no other circle explains it better.
 
     Parameters
@@ -199,9 +212,15 @@ def is_relevant(
 
 @kernel
 def keep_relevant(
-    s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], n: int, cx: float, cy: float,
-    radius: float, own: int,
-) -> int:  # fmt: skip
+    s: Records[State],
+    tracks: Records[CircleTrack],
+    p: Records[Settings],
+    n: int,
+    cx: float,
+    cy: float,
+    radius: float,
+    own: int,
+) -> int:
     """Drop the readings of the scratch that do not bear on a circle; return the number of those kept.
 
     Parameters

@@ -122,7 +122,7 @@ def enter_attracting(segment: MappedSegment, row: Floats) -> None:
 @kernel
 def relax_hypothesis(
     s: StateRecord, sides: Floats, attracting: int, negligible_m: float, negligible_rad: float, steps: int
-) -> None:  # fmt: skip
+) -> None:
     """Move the scratch's hypothesis by the paper's relaxation (§3.4).
 
     Parameters
@@ -143,9 +143,15 @@ def relax_hypothesis(
     pose[1] = hypothesis.y
     pose[2] = hypothesis.heading
     relax(
-        sides, scratch.attracting[:], scratch.attracting_rows[:attracting], RELAXATION_GAMMA, negligible_m,
-        negligible_rad, steps, pose,
-    )  # fmt: skip
+        sides,
+        scratch.attracting[:],
+        scratch.attracting_rows[:attracting],
+        RELAXATION_GAMMA,
+        negligible_m,
+        negligible_rad,
+        steps,
+        pose,
+    )
     hypothesis.x = pose[0]
     hypothesis.y = pose[1]
     hypothesis.heading = pose[2]

@@ -59,7 +59,7 @@ def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
 @kernel
 def place_readings(
     s: StateRecord, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
-) -> int:  # fmt: skip
+) -> int:
     """Write the fired readings to the scratch in the odometry frame; return how many of them are not redundant.
 
     An invalid pose or range is left out, because it would corrupt every sum.

@@ -39,9 +39,16 @@ def predict_echoes(readings: Records[Reading], x: float, y: float, radius: float
 
 @loop_kernel
 def predict_any(
-    readings: Records[Reading], x: float, y: float, radius: float, error: Floats, slope_x: Floats, slope_y: Floats,
-    distance: Floats, ahead: Floats,
-) -> None:  # fmt: skip
+    readings: Records[Reading],
+    x: float,
+    y: float,
+    radius: float,
+    error: Floats,
+    slope_x: Floats,
+    slope_y: Floats,
+    distance: Floats,
+    ahead: Floats,
+) -> None:
     """Write what a circle predicts of readings; see `predict_circle`.
 
     Both ways are computed for each reading, and one is taken: without a branch, and with a number of passes that the

@@ -58,9 +58,15 @@ def robust_weight(e: float, var: float, soft: float) -> float:
 
 @kernel
 def score_circle(
-    readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], noise: int,
-    predicted: Predictions, score: Score,
-) -> None:  # fmt: skip
+    readings: Records[Reading],
+    cx: float,
+    cy: float,
+    radius: float,
+    p: Records[Settings],
+    noise: int,
+    predicted: Predictions,
+    score: Score,
+) -> None:
     """Score readings for a circle: write the log ratio to the background and the counts.
 
     ====================================  =====================================================================
@@ -135,9 +141,18 @@ def score_circle(
 
 @kernel
 def fit_circle(
-    readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], soft: float, var0: float,
-    rel2: float, steps: int, predicted: Predictions, fit: CircleFit,
-) -> bool:  # fmt: skip
+    readings: Records[Reading],
+    cx: float,
+    cy: float,
+    radius: float,
+    p: Records[Settings],
+    soft: float,
+    var0: float,
+    rel2: float,
+    steps: int,
+    predicted: Predictions,
+    fit: CircleFit,
+) -> bool:
     """Fit the centre of a circle of known radius by robust, damped Gauss–Newton on the raw ranges.
 
     With û the direction from a sensor to the centre and g the weight of its residual e, a step solves
@@ -212,9 +227,20 @@ def fit_circle(
 
 @kernel
 def fit_reading_line(
-    readings: Records[Reading], nx: float, ny: float, ox: float, oy: float, distance: float, cos_may: float,
-    gate: float, soft: float, var0: float, rel2: float, steps: int, fit: LineFit,
-) -> None:  # fmt: skip
+    readings: Records[Reading],
+    nx: float,
+    ny: float,
+    ox: float,
+    oy: float,
+    distance: float,
+    cos_may: float,
+    gate: float,
+    soft: float,
+    var0: float,
+    rel2: float,
+    steps: int,
+    fit: LineFit,
+) -> None:
     """Fit a line n·(p − o) = c by robust, damped Gauss–Newton on the raw ranges, over the normal's direction and c.
 
     Parameters
@@ -276,9 +302,14 @@ def fit_reading_line(
 
 @kernel
 def score_line(
-    readings: Records[Reading], line: LineFit, ox: float, oy: float, p: Records[Settings], noise: int,
+    readings: Records[Reading],
+    line: LineFit,
+    ox: float,
+    oy: float,
+    p: Records[Settings],
+    noise: int,
     score: LineScore,
-) -> None:  # fmt: skip
+) -> None:
     """Score readings for a line, as `score_circle`; silence counts only between the feet of the line's own hits.
 
     Parameters

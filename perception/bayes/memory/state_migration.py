@@ -28,9 +28,7 @@ def radii_of(p: SettingsRecord) -> Floats:
     return column(p, "circles")["radius_m"][0, : p[0].circle_count]
 
 
-def migrate(
-    memory: Memory, archived: NDArray[Any], before: SettingsRecord, after: SettingsRecord
-) -> None:  # fmt: skip
+def migrate(memory: Memory, archived: NDArray[Any], before: SettingsRecord, after: SettingsRecord) -> None:
     """Move values indexed by explanation to the indices of other settings.
 
     Parameters

@@ -136,9 +136,15 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float
             scratch.circle_fit,
         ):
             score_circle(
-                readings, scratch.circle_fit.x, scratch.circle_fit.y, radius, p, s[0].job.noise_level,
-                scratch.predicted, scratch.score,
-            )  # fmt: skip
+                readings,
+                scratch.circle_fit.x,
+                scratch.circle_fit.y,
+                radius,
+                p,
+                s[0].job.noise_level,
+                scratch.predicted,
+                scratch.score,
+            )
             prior = p[0].model_prior_nat if k < p[0].model_count else 0.0
             best = max(best, scratch.score.log_likelihood_ratio + prior)
     return best

@@ -23,7 +23,7 @@ from perception.records import Records
 @kernel
 def range_error(
     q: Reading, track: PolygonTrack, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
-) -> float:  # fmt: skip
+) -> float:
     """Return a reading's least absolute error against the polygon's mirror and cone predictions, m.
 
     Parameters
@@ -41,9 +41,14 @@ def range_error(
     dx = q.x - track.x
     dy = q.y - track.y
     mirror, _, _, cone, _ = predict(
-        c * dx + sn * dy, -sn * dx + c * dy, c * q.axis_x + sn * q.axis_y, -sn * q.axis_x + c * q.axis_y, sides,
-        is_closed, p,
-    )  # fmt: skip
+        c * dx + sn * dy,
+        -sn * dx + c * dy,
+        c * q.axis_x + sn * q.axis_y,
+        -sn * q.axis_x + c * q.axis_y,
+        sides,
+        is_closed,
+        p,
+    )
     return min(abs(q.range_m - mirror), abs(q.range_m - cone))
 
 

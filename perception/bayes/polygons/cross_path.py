@@ -31,9 +31,15 @@ def height(side: PolygonSide, x: float, y: float) -> float:
 
 @kernel
 def predict_cross(
-    q: Reading, x: float, y: float, c: float, s: float, sides: Records[PolygonSide], is_closed: bool,
+    q: Reading,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    sides: Records[PolygonSide],
+    is_closed: bool,
     p: SettingsRecord,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """Return half the way over a polygon to the listener, as a mirror and as a cone, and what a mirror's costs.
 
     A side is a mirror between two points on the same face of it, where the way meets the side; else the corner with
@@ -115,9 +121,17 @@ def predict_cross(
 
 @kernel
 def score_crosses(
-    readings: Records[Reading], every: int, x: float, y: float, c: float, s: float, sides: Records[PolygonSide],
-    is_closed: bool, p: SettingsRecord, noise: int,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    readings: Records[Reading],
+    every: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    sides: Records[PolygonSide],
+    is_closed: bool,
+    p: SettingsRecord,
+    noise: int,
+) -> tuple[float, float, float, float, float, float]:
     """Return evidence (nat), near readings and hits of the cross paths, as a mirror, and then as a cone.
 
     A cross path is never bound to be heard; so it counts only for a body.

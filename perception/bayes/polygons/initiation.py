@@ -204,7 +204,7 @@ def reset_polygon(track: PolygonTrack) -> None:
 @kernel
 def restart_polygon(
     track: PolygonTrack, model: int, x: float, y: float, heading: float, readings: Records[Reading]
-) -> None:  # fmt: skip
+) -> None:
     """Set a track to a tentative one on the given readings.
 
     Parameters
@@ -318,9 +318,7 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
             end_job(s)
             return 1
         job.reading_count = gather_job_readings(s, p, model, job.best.x, job.best.y)
-        start_search(
-            s, job.best.x, job.best.y, job.best.heading, FINE_STEP_M, FINE_ROUNDS, len(s[0].job_readings)
-        )  # fmt: skip
+        start_search(s, job.best.x, job.best.y, job.best.heading, FINE_STEP_M, FINE_ROUNDS, len(s[0].job_readings))
         job.stage = FINE
         return COLLECTING_COST
     shift = SIDE_SHIFTS[job.next_step % len(SIDE_SHIFTS)]
@@ -335,7 +333,7 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
     if job.reading_count >= TRIAL_READINGS_MIN:
         start_search(
             s, hypothesis.x, hypothesis.y, hypothesis.heading, TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS_MAX
-        )  # fmt: skip
+        )
         job.stage = TRY
     return COLLECTING_COST
 

@@ -83,9 +83,16 @@ def advance_search(s: StateRecord, p: SettingsRecord, model: int, left: int) -> 
     sides = outline.sides[: outline.side_count]
     each = max(1, cost(job.reading_count, job.reading_step, len(sides)))
     poses = continue_search(
-        job.search, max(1, left // each), s[0].job_readings[: job.reading_count], job.reading_step, sides,
-        outline.is_closed > 0, p, job.noise_level, s[0].scratch.score,
-    )  # fmt: skip
+        job.search,
+        max(1, left // each),
+        s[0].job_readings[: job.reading_count],
+        job.reading_step,
+        sides,
+        outline.is_closed > 0,
+        p,
+        job.noise_level,
+        s[0].scratch.score,
+    )
     return poses * each
 
 
@@ -102,9 +109,17 @@ def score_pose(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float
     """
     outline = p[0].polygons[model]
     return score_polygon(
-        s[0].job_readings[: s[0].job.reading_count], 1, x, y, heading, outline.sides[: outline.side_count],
-        outline.is_closed > 0, p, s[0].job.noise_level, s[0].scratch.score,
-    )  # fmt: skip
+        s[0].job_readings[: s[0].job.reading_count],
+        1,
+        x,
+        y,
+        heading,
+        outline.sides[: outline.side_count],
+        outline.is_closed > 0,
+        p,
+        s[0].job.noise_level,
+        s[0].scratch.score,
+    )
 
 
 @kernel

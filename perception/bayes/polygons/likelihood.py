@@ -41,7 +41,7 @@ ALONG, ACROSS, TURN = range(3)
 @kernel
 def predict(
     sx: float, sy: float, ux: float, uy: float, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
-) -> tuple[float, bool, float, float, bool]:  # fmt: skip
+) -> tuple[float, bool, float, float, bool]:
     """Return a polygon's predicted ranges, as a mirror and as a cone, and whether each must be heard.
 
     =======  ========================================================  ===========================================
@@ -142,9 +142,17 @@ def surplus_nat(throughs: float, hits: float) -> float:
 
 @kernel
 def score_polygon(
-    readings: Records[Reading], every: int, x: float, y: float, heading: float, sides: Records[PolygonSide],
-    is_closed: bool, p: SettingsRecord, noise: int, score: Score,
-) -> float:  # fmt: skip
+    readings: Records[Reading],
+    every: int,
+    x: float,
+    y: float,
+    heading: float,
+    sides: Records[PolygonSide],
+    is_closed: bool,
+    p: SettingsRecord,
+    noise: int,
+    score: Score,
+) -> float:
     """Return the log ratio (nat) of readings for a polygon at a pose to the background.
 
     ==========================  ===================================================
@@ -200,9 +208,14 @@ def score_polygon(
         dy = q.y - y
         r = q.range_m
         at, must, price, at_cone, must_cone = predict(
-            c * dx + s * dy, -s * dx + c * dy, c * q.axis_x + s * q.axis_y, -s * q.axis_x + c * q.axis_y, sides,
-            is_closed, p,
-        )  # fmt: skip
+            c * dx + s * dy,
+            -s * dx + c * dy,
+            c * q.axis_x + s * q.axis_y,
+            -s * q.axis_x + c * q.axis_y,
+            sides,
+            is_closed,
+            p,
+        )
         k = level_of(p, noise, r)
         v = 0.0
         if abs(r - at) < gate:
@@ -275,9 +288,7 @@ def moved(x: float, y: float, heading: float, axis: int, step: float) -> tuple[f
 
 
 @kernel
-def begin_search(
-    search: PoseSearch, x: float, y: float, heading: float, step_m: float, rounds: int
-) -> None:  # fmt: skip
+def begin_search(search: PoseSearch, x: float, y: float, heading: float, step_m: float, rounds: int) -> None:
     """Initialise a pose search.
 
     Parameters
@@ -303,9 +314,16 @@ def begin_search(
 
 @kernel
 def continue_search(
-    search: PoseSearch, allowed: int, readings: Records[Reading], every: int, sides: Records[PolygonSide],
-    is_closed: bool, p: SettingsRecord, noise: int, score: Score,
-) -> int:  # fmt: skip
+    search: PoseSearch,
+    allowed: int,
+    readings: Records[Reading],
+    every: int,
+    sides: Records[PolygonSide],
+    is_closed: bool,
+    p: SettingsRecord,
+    noise: int,
+    score: Score,
+) -> int:
     """Continue a search for the pose of greatest likelihood; return the number of poses scored.
 
     The likelihood has steps where sides begin and cease to answer, so no derivative is used: a coordinate search

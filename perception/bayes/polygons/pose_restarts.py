@@ -149,9 +149,16 @@ def roll(s: StateRecord, p: SettingsRecord, model: int, k: int) -> bool:
     turned %= ways
     flip = 1.0 if turned < len(sides) else -1.0
     lay_side(
-        s, p, model, turned % len(sides), 0.0, middle.x + c * x - sn * y, middle.y + sn * x + c * y,
-        flip * (c * nx - sn * ny), flip * (sn * nx + c * ny),
-    )  # fmt: skip
+        s,
+        p,
+        model,
+        turned % len(sides),
+        0.0,
+        middle.x + c * x - sn * y,
+        middle.y + sn * x + c * y,
+        flip * (c * nx - sn * ny),
+        flip * (sn * nx + c * ny),
+    )
     return True
 
 

@@ -27,9 +27,16 @@ from perception.records import Records, records, zeros
 
 @kernel
 def circle_evidence(
-    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, readings: Records[Reading],
-    score: Records[Score], predicted: Records[Predictions], others: Records[OtherCircle], nats: Floats,
-) -> int:  # fmt: skip
+    s: StateRecord,
+    tracks: CircleTracks,
+    p: SettingsRecord,
+    t: int,
+    readings: Records[Reading],
+    score: Records[Score],
+    predicted: Records[Predictions],
+    others: Records[OtherCircle],
+    nats: Floats,
+) -> int:
     """Write the evidence of each reading for circle `t`, 0 where it does not bear on it; return how many there are.
 
     Parameters
@@ -84,9 +91,17 @@ def polygon_evidence(
     n = copy_reservoir(track, readings)
     for j in range(n):
         nats[j] = score_polygon(
-            readings[j : j + 1], 1, track.x, track.y, track.heading, sides, outline.is_closed > 0, p,
-            s[0].noise_level, score[0],
-        )  # fmt: skip
+            readings[j : j + 1],
+            1,
+            track.x,
+            track.y,
+            track.heading,
+            sides,
+            outline.is_closed > 0,
+            p,
+            s[0].noise_level,
+            score[0],
+        )
     return n
 
 
@@ -124,6 +139,10 @@ def evidence_of(
     )
     said = nats[:n]
     return Evidence(
-        number, model, arcs=arcs, supporting=float(said[said > 0.0].sum()), opposing=float(said[said < 0.0].sum()),
+        number,
+        model,
+        arcs=arcs,
+        supporting=float(said[said > 0.0].sum()),
+        opposing=float(said[said < 0.0].sum()),
         rivals=rivals,
-    )  # fmt: skip
+    )

@@ -30,8 +30,15 @@ from perception.detected_object import DetectedObject, wall_between, worst_sigma
 from perception.kernel import Floats
 
 CIRCLE_FIELDS: Final = (
-    "x", "y", "covariance_xx", "covariance_xy", "covariance_yy", "hits", "number", "marks",
-)  # fmt: skip
+    "x",
+    "y",
+    "covariance_xx",
+    "covariance_xy",
+    "covariance_yy",
+    "hits",
+    "number",
+    "marks",
+)
 READINGS: Final = "readings"
 """Field of an archived circle."""
 NO_SURFACES: Final = np.empty((0, 4))
@@ -57,9 +64,17 @@ def circle_object(row: Row, label: str, probability: float) -> DetectedObject:
     x, y, xx, xy, yy, hits, number, marks = row
     xx, xy, yy = CIRCLE_INFLATION * xx, CIRCLE_INFLATION * xy, CIRCLE_INFLATION * yy
     return DetectedObject(
-        label, x, y, 0.0, worst_sigma(xx, xy, yy), int(hits), probability, probability, (xx, xy, yy),
+        label,
+        x,
+        y,
+        0.0,
+        worst_sigma(xx, xy, yy),
+        int(hits),
+        probability,
+        probability,
+        (xx, xy, yy),
         *label_fields(int(number), int(marks)),
-    )  # fmt: skip
+    )
 
 
 def label_fields(number: int, marks: int) -> tuple[int | None, bool, bool]:
@@ -95,15 +110,22 @@ def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probabili
     # Else only a user's placement gives its position so far.
     is_located = xx > 0.0 and not int(track.marks) & PLACED
     return DetectedObject(
-        label, float(track.x), float(track.y), (heading + 0.5 * period) % period - 0.5 * period,
-        worst_sigma(xx, xy, yy) if is_located else PLACED_SIGMA_M, int(track.hits), probability, probability,
-        (xx, xy, yy) if is_located else None, *label_fields(int(track.number), int(track.marks)),
-    )  # fmt: skip
+        label,
+        float(track.x),
+        float(track.y),
+        (heading + 0.5 * period) % period - 0.5 * period,
+        worst_sigma(xx, xy, yy) if is_located else PLACED_SIGMA_M,
+        int(track.hits),
+        probability,
+        probability,
+        (xx, xy, yy) if is_located else None,
+        *label_fields(int(track.number), int(track.marks)),
+    )
 
 
 def archived_models(
     archive: TrackArchive, p: SettingsRecord, rounds: Sequence[str], outlines: Sequence[str]
-) -> Iterator[DetectedObject]:  # fmt: skip
+) -> Iterator[DetectedObject]:
     """Yield the archived objects that were reported as models, circles first.
 
     Parameters
@@ -141,9 +163,16 @@ def corner_object(corner: Row) -> DetectedObject:
     x, y, xx, xy, yy, is_edge, echoes, log_odds = corner
     probability = 1.0 / (1.0 + math.exp(-log_odds))
     return DetectedObject(
-        "edge" if is_edge == 1 else "inside corner", x, y, 0.0, worst_sigma(xx, xy, yy), int(echoes), probability,
-        probability, (xx, xy, yy),
-    )  # fmt: skip
+        "edge" if is_edge == 1 else "inside corner",
+        x,
+        y,
+        0.0,
+        worst_sigma(xx, xy, yy),
+        int(echoes),
+        probability,
+        probability,
+        (xx, xy, yy),
+    )
 
 
 def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
@@ -242,9 +271,13 @@ def other_objects(
 
 
 def other_circles(
-    circles: NDArray[Any], memory: Memory, p: SettingsRecord, least: float, named: Sequence[DetectedObject],
+    circles: NDArray[Any],
+    memory: Memory,
+    p: SettingsRecord,
+    least: float,
+    named: Sequence[DetectedObject],
     surfaces: Floats = NO_SURFACES,
-) -> list[DetectedObject]:  # fmt: skip
+) -> list[DetectedObject]:
     """Return the circles without a model's name.
 
     Parameters

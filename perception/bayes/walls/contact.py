@@ -255,9 +255,7 @@ def is_from_point(room: WallMap, q: Reading, x: float, y: float, slack: float, p
 
 
 @kernel
-def is_from_circle(
-    room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, probability: float
-) -> bool:  # fmt: skip
+def is_from_circle(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, probability: float) -> bool:
     """Return whether a certain circle explains an echo, by its nearest point or where the beam's edge meets it.
 
     Parameters

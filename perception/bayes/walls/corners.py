@@ -308,7 +308,7 @@ def is_near_corner(room: WallMap, wall: int, x: float, y: float) -> bool:
 @kernel
 def point_of(
     room: WallMap, corners: Records[RoomCorner], count: int, q: Reading, p: SettingsRecord
-) -> tuple[int, float]:  # fmt: skip
+) -> tuple[int, float]:
     """Return the corner that explains an echo best, and the error as a share of the greatest explained; −1, 1: none.
 
     Parameters
@@ -361,7 +361,7 @@ def enter_echo(room: WallMap, corner: RoomCorner, q: Reading) -> None:
 @kernel
 def enter_looks(
     room: WallMap, tracks: CircleTracks, corners: Records[RoomCorner], count: int, q: Reading, p: SettingsRecord
-) -> None:  # fmt: skip
+) -> None:
     """Count a reading for or against the corners towards which it looked.
 
     Parameters

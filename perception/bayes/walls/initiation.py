@@ -73,9 +73,7 @@ REPLACED_WEIGHT_MAX: Final = 12.0
 
 
 @kernel
-def candidate(
-    a: Reading, b: Reading, choice: int, p: SettingsRecord
-) -> tuple[bool, float, float, float]:  # fmt: skip
+def candidate(a: Reading, b: Reading, choice: int, p: SettingsRecord) -> tuple[bool, float, float, float]:
     """Return a line that explains two echoes: whether there is one, its normal, and its distance from the origin, m.
 
     Parameters

@@ -119,7 +119,7 @@ def _agreeing(walls: Lines, points: NDArray[Any], all_: Incidences) -> Incidence
 
 def _solve(
     walls: Lines, points: NDArray[Any], held: Incidences, at: NDArray[np.int64]
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+) -> tuple[Floats, Floats, Floats]:
     """Return the lines (n, 5), and the points' places (m, 2) and covariances xx, xy, yy (m, 3).
 
     Parameters

@@ -191,7 +191,7 @@ def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float,
 @kernel
 def hear(
     room: WallMap, wall: Wall, p: SettingsRecord, along: float, is_near: bool, slack: float, found: RoomCorner
-) -> float:  # fmt: skip
+) -> float:
     """Write to a point what the remembered readings say of a place on a wall's line.
 
     Parameters

@@ -240,9 +240,7 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     return np.asarray(sure)
 
 
-def reach_corners(
-    walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool
-) -> list[tuple[float, ...]]:  # fmt: skip
+def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the corners in which they end, unless ranges passed there.
 
     A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
@@ -285,9 +283,7 @@ def reach_corners(
     return found
 
 
-def end_at_edges(
-    walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: bool
-) -> list[tuple[float, ...]]:  # fmt: skip
+def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the edges that are heard there.
 
     Parameters

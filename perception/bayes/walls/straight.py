@@ -100,7 +100,7 @@ def reported_line(wall: NDArray[Any]) -> tuple[float, ...]:
 
 def straighten(
     walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[Any]]:  # fmt: skip
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Fit the walls and the corners that are heard together.
 
     Parameters

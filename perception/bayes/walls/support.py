@@ -43,9 +43,15 @@ def copy_near(recent: RecentReading, near: NearReadings, n: int) -> None:
 
 @loop_kernel
 def weigh(
-    near: NearReadings, n: int, wall: Wall, p: SettingsRecord, edges: bool, variance_m2: float, relative: float,
+    near: NearReadings,
+    n: int,
+    wall: Wall,
+    p: SettingsRecord,
+    edges: bool,
+    variance_m2: float,
+    relative: float,
     base: float,
-) -> None:  # fmt: skip
+) -> None:
     """Write the weight of each reading for or against a line; see `support`, and `contact.touch` for a line.
 
     Parameters

@@ -92,9 +92,15 @@ class DriftCorrection:
     """
 
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _half_angle=CONSTANT, _range_min_m=CONSTANT, _waiting=PLACE, _arrived=COUNT, _way_m=FINITE,
-        _motion=PLACE, _checked=COUNT,
-    )  # fmt: skip
+        _mounts=CONSTANT,
+        _half_angle=CONSTANT,
+        _range_min_m=CONSTANT,
+        _waiting=PLACE,
+        _arrived=COUNT,
+        _way_m=FINITE,
+        _motion=PLACE,
+        _checked=COUNT,
+    )
 
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)

@@ -87,10 +87,21 @@ def may_be_in_beam(
 
 @kernel
 def compare_firing(
-    e: EstimateRecord, covariance: Floats, exact: EstimateRecord, exact_covariance: Floats, mounts: Floats,
-    ranges: Floats, px: float, py: float, yaw: float, var0: float, rel2: float, half_angle: float, range_min: float,
+    e: EstimateRecord,
+    covariance: Floats,
+    exact: EstimateRecord,
+    exact_covariance: Floats,
+    mounts: Floats,
+    ranges: Floats,
+    px: float,
+    py: float,
+    yaw: float,
+    var0: float,
+    rel2: float,
+    half_angle: float,
+    range_min: float,
     range_max: float,
-) -> None:  # fmt: skip
+) -> None:
     """Add the evidence of a firing's ranges to `drift_nat` of the landmarks of `exact`, before they are entered.
 
     Only the ranges count, not which sensor heard a landmark: at the edges of the beams both filters err.

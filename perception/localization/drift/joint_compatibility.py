@@ -170,7 +170,7 @@ def _is_alike(one: Pose, other: Pose) -> bool:
     return (
         math.hypot(one.x - other.x, one.y - other.y) < ALIKE_M
         and abs(wrap_angle(one.theta - other.theta)) < ALIKE_RAD
-    )  # fmt: skip
+    )
 
 
 def _paired(branch: _Branch, k: int, echo: Echo, discs: Sequence[Disc], half_angle: float) -> Iterator[_Branch]:
@@ -214,7 +214,11 @@ def _corrected(
     share = innovation / variance
     after = Pose(pose.x + gx * share, pose.y + gy * share, pose.theta + gt * share)
     left = (
-        xx - gx * gx / variance, xy - gx * gy / variance, xt - gx * gt / variance,
-        yy - gy * gy / variance, yt - gy * gt / variance, tt - gt * gt / variance,
-    )  # fmt: skip
+        xx - gx * gx / variance,
+        xy - gx * gy / variance,
+        xt - gx * gt / variance,
+        yy - gy * gy / variance,
+        yt - gy * gt / variance,
+        tt - gt * gt / variance,
+    )
     return innovation * share, after, left

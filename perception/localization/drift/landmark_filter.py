@@ -78,9 +78,17 @@ def write_lever(e: EstimateRecord, lever: Floats) -> None:
 
 @kernel
 def propagate(
-    e: EstimateRecord, covariance: Floats, forward: float, left: float, travel: float, ring_turn: float,
-    travel_turn: float, turn_variance: float, offset_variance: float, place_variance: float,
-) -> None:  # fmt: skip
+    e: EstimateRecord,
+    covariance: Floats,
+    forward: float,
+    left: float,
+    travel: float,
+    ring_turn: float,
+    travel_turn: float,
+    turn_variance: float,
+    offset_variance: float,
+    place_variance: float,
+) -> None:
     """Move the ring by what odometry reports.
 
     Parameters
@@ -233,7 +241,7 @@ def correct(e: EstimateRecord, covariance: Floats, innovation: float, variance: 
 @kernel
 def add_landmark(
     e: EstimateRecord, covariance: Floats, ahead: float, left: float, xx: float, xy: float, yy: float
-) -> int:  # fmt: skip
+) -> int:
     """Append a landmark that was measured relative to the ring; return its index, −1 where there is no room.
 
     Parameters

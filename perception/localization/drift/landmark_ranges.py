@@ -59,11 +59,7 @@ PASSED_M: Final = 0.3
 @kernel
 def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor at (x, y) (m), axis (rad), has moved or turned enough since its last reading."""
-    return (
-        last.is_known == 0
-        or abs(axis - last.axis) >= FRESH_RAD
-        or math.hypot(x - last.x, y - last.y) >= FRESH_M
-    )  # fmt: skip
+    return last.is_known == 0 or abs(axis - last.axis) >= FRESH_RAD or math.hypot(x - last.x, y - last.y) >= FRESH_M
 
 
 @kernel
@@ -116,7 +112,7 @@ def is_landmark_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
 @kernel
 def may_answer_instead(
     e: EstimateRecord, i: int, x: float, y: float, ax: float, ay: float, half_angle: float, r: float
-) -> bool:  # fmt: skip
+) -> bool:
     """Return whether a range may be of another landmark than `i`, of which any visible part is in the beam.
 
     Where drums answer with any part that is in the beam, the nearest point of one whose centre is outside is farther
@@ -249,9 +245,17 @@ def update_with_edge(
 
 @kernel
 def update_with_range(
-    e: EstimateRecord, covariance: Floats, mx: float, my: float, axis: float, r: float, var0: float, rel2: float,
-    half_angle: float, range_max: float,
-) -> int:  # fmt: skip
+    e: EstimateRecord,
+    covariance: Floats,
+    mx: float,
+    my: float,
+    axis: float,
+    r: float,
+    var0: float,
+    rel2: float,
+    half_angle: float,
+    range_max: float,
+) -> int:
     """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
 
     The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two

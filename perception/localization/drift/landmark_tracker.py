@@ -96,18 +96,30 @@ class LandmarkTracker:
     SCRATCH: Final = ("e", "_is_exact")
     """A view of the same memory, and a constant: left out of snapshots."""
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _ring=CONSTANT, estimate=Estimate.BOUNDS, covariance=FINITE, entered_at=PLACE,
-        entered=COUNT, _window_m=FINITE, _window_variance=FINITE, _window_count=COUNT,
-    )  # fmt: skip
+        _mounts=CONSTANT,
+        _ring=CONSTANT,
+        estimate=Estimate.BOUNDS,
+        covariance=FINITE,
+        entered_at=PLACE,
+        entered=COUNT,
+        _window_m=FINITE,
+        _window_variance=FINITE,
+        _window_count=COUNT,
+    )
 
     def __init__(self, ring: RingConfig, *, is_exact: bool = False) -> None:
         self._is_exact = is_exact
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         half_step_m = 0.5 * ring.resolution_m
-        self._ring = np.array([
-            half_step_m**2 / 3.0 + RANGE_NOISE_M**2, RANGE_NOISE**2, math.radians(ring.beam_half_angle_deg),
-            ring.range_min_m + half_step_m, ring.range_max_m,
-        ])  # fmt: skip
+        self._ring = np.array(
+            [
+                half_step_m**2 / 3.0 + RANGE_NOISE_M**2,
+                RANGE_NOISE**2,
+                math.radians(ring.beam_half_angle_deg),
+                ring.range_min_m + half_step_m,
+                ring.range_max_m,
+            ]
+        )
         """What `update_with_firing` takes after the pose."""
         self.estimate = zeros(Estimate, 1)
         self.e = records(Estimate, self.estimate)
@@ -228,10 +240,17 @@ class LandmarkTracker:
         if self.e[0].fit_share < SLIP_SHARE:
             slip_m2, slip_rad2 = SLIP_M**2, SLIP_RAD**2
         propagate(
-            self.e, self.covariance, c * dx + s * dy, c * dy - s * dx, theta_before - yaw_before, ring_turn,
-            travel_turn, (0.0 if self.is_synchro else turn_variance) + slip_rad2,
-            turn_variance if self.is_synchro else 0.0, place_variance + slip_m2,
-        )  # fmt: skip
+            self.e,
+            self.covariance,
+            c * dx + s * dy,
+            c * dy - s * dx,
+            theta_before - yaw_before,
+            ring_turn,
+            travel_turn,
+            (0.0 if self.is_synchro else turn_variance) + slip_rad2,
+            turn_variance if self.is_synchro else 0.0,
+            place_variance + slip_m2,
+        )
 
     def _renew_walk(self, way: float) -> None:
         """Weigh the rates of the heading's random walk by what the filter made of the last way."""

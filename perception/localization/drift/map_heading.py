@@ -60,8 +60,13 @@ class MapHeading:
 
     BOUNDS: Final = bounds(
         {"_tracker.entered": up_to(FIRST_FIRINGS)},
-        _rows=PLACE, motion=PLACE, _kept=up_to(FIRST_FIRINGS), _due_m=FINITE, start_x=PLACE, start_y=PLACE,
-    )  # fmt: skip
+        _rows=PLACE,
+        motion=PLACE,
+        _kept=up_to(FIRST_FIRINGS),
+        _due_m=FINITE,
+        start_x=PLACE,
+        start_y=PLACE,
+    )
 
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)

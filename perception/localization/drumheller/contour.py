@@ -92,11 +92,16 @@ def contour_segments(
         along = y * math.cos(middle) - x * math.sin(middle)
         segments.append(
             ContourSegment(
-                len(run), middle, float(np.abs(spread).max()) + 2.0 * math.pi / TRIED_DIRECTIONS,
-                0.5 * float(lo[best] + hi[best]), 0.5 * float(hi[best] - lo[best]),
-                float(x.mean()), float(y.mean()), float(np.ptp(along)),
+                len(run),
+                middle,
+                float(np.abs(spread).max()) + 2.0 * math.pi / TRIED_DIRECTIONS,
+                0.5 * float(lo[best] + hi[best]),
+                0.5 * float(hi[best] - lo[best]),
+                float(x.mean()),
+                float(y.mean()),
+                float(np.ptp(along)),
             )
-        )  # fmt: skip
+        )
     return tuple(sorted(segments, key=lambda s: (-s.readings, s.offset)))
 
 

@@ -50,9 +50,15 @@ class Keyframes:
     SCRATCH: Final = ("_axes",)
     """What the settings give."""
     BOUNDS: Final = bounds(
-        _latest=PLACE._replace(infinite=True), _firings=COUNT, _begin=PLACE, count=COUNT, odometry=PLACE,
-        way_m=FINITE, readings=PLACE._replace(infinite=True), counts=lambda self: up_to(self.readings.shape[1]),
-    )  # fmt: skip
+        _latest=PLACE._replace(infinite=True),
+        _firings=COUNT,
+        _begin=PLACE,
+        count=COUNT,
+        odometry=PLACE,
+        way_m=FINITE,
+        readings=PLACE._replace(infinite=True),
+        counts=lambda self: up_to(self.readings.shape[1]),
+    )
 
     def __init__(self, mounts: Floats, turning: tuple[int, ...] = ()) -> None:
         self._turning = list(turning)

@@ -93,10 +93,20 @@ class KnownRoom:
     SCRATCH: Final = ("_search_evidence",)
     """What follows from the room."""
     BOUNDS: Final = bounds(
-        _mounts=CONSTANT, _odometry=PLACE, _status=index_of(len(STATUSES)), probability=SHARE, _window_begin=COUNT,
-        _stage=Bound(IDLE, WEIGHING), _search_begin=COUNT, _searched_at_m=FINITE, _pause_m=FINITE, _travel=PLACE,
-        _named_at=COUNT, refuted=COUNT, rivals=up_to(HYPOTHESES_MAX),
-    )  # fmt: skip
+        _mounts=CONSTANT,
+        _odometry=PLACE,
+        _status=index_of(len(STATUSES)),
+        probability=SHARE,
+        _window_begin=COUNT,
+        _stage=Bound(IDLE, WEIGHING),
+        _search_begin=COUNT,
+        _searched_at_m=FINITE,
+        _pause_m=FINITE,
+        _travel=PLACE,
+        _named_at=COUNT,
+        refuted=COUNT,
+        rivals=up_to(HYPOTHESES_MAX),
+    )
 
     def __init__(self, room: Room, ring: RingConfig, model: RangeModel | None = None, seed: int = 0) -> None:
         model = model or RangeModel(

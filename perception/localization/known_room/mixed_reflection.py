@@ -148,9 +148,16 @@ def echo_density(sensor: Records[SensorModel], measured: float, expected: float,
 
 @kernel
 def mixed_ratio(
-    sensor: Records[SensorModel], measured: float, cone_m: float, cone_variance: float, specular_m: float,
-    specular_variance: float, beside_m: float, beside_variance: float, shares: Records[Shares],
-) -> tuple[float, Causes]:  # fmt: skip
+    sensor: Records[SensorModel],
+    measured: float,
+    cone_m: float,
+    cone_variance: float,
+    specular_m: float,
+    specular_variance: float,
+    beside_m: float,
+    beside_variance: float,
+    shares: Records[Shares],
+) -> tuple[float, Causes]:
     """Return how well a reading fits: its log likelihood ratio to a reading from anywhere, nat, and its causes.
 
     Parameters
@@ -197,7 +204,13 @@ def mixed_ratio(
         could_beside = (mirror + beside + away + late) / total
     anywhere = 1.0 - HEARD_PRIOR if is_silent else HEARD_PRIOR / window_m
     causes = (
-        rough / total, mirror / total, beside / total, (mirror + beside + away + late) / total,
-        (away + late) / total, late / total, wild / total, could_beside,
-    )  # fmt: skip
+        rough / total,
+        mirror / total,
+        beside / total,
+        (mirror + beside + away + late) / total,
+        (away + late) / total,
+        late / total,
+        wild / total,
+        could_beside,
+    )
     return math.log(total / anywhere), causes

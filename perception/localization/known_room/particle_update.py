@@ -37,9 +37,14 @@ def inverse(xx: float, xy: float, xs: float, yy: float, ys: float, ss: float) ->
     a, b, c = yy * ss - ys * ys, xs * ys - xy * ss, xy * ys - xs * yy
     det = xx * a + xy * b + xs * c
     return (
-        a / det, b / det, c / det, (xx * ss - xs * xs) / det, (xy * xs - xx * ys) / det, (xx * yy - xy * xy) / det,
+        a / det,
+        b / det,
+        c / det,
+        (xx * ss - xs * xs) / det,
+        (xy * xs - xx * ys) / det,
+        (xx * yy - xy * xy) / det,
         det,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -51,7 +56,7 @@ def variance_along(xx: float, xy: float, yy: float, expected: Expected) -> float
 @kernel
 def update_particle(
     s: Surroundings, particles: Records[Particle], i: int, readings: Floats, count: int, shares: Records[Shares]
-) -> None:  # fmt: skip
+) -> None:
     """Fit the place of a particle to readings, and add to its log weight how likely they are.
 
     Parameters
@@ -132,9 +137,15 @@ def update_particle(
 
 @kernel
 def update_particles(
-    s: Surroundings, of: HypothesesRecord, h: int, first: int, end: int, readings: Floats, count: int,
+    s: Surroundings,
+    of: HypothesesRecord,
+    h: int,
+    first: int,
+    end: int,
+    readings: Floats,
+    count: int,
     shares: Records[Shares],
-) -> None:  # fmt: skip
+) -> None:
     """Enter readings into some particles of a hypothesis.
 
     Parameters

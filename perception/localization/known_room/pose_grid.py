@@ -65,9 +65,7 @@ class ScoreScratch(Record):
 
 
 @kernel
-def fill_cell(
-    s: Surroundings, table: Bytes, free: Bytes, i: int, j: int, x: float, y: float, clear_m: float
-) -> None:  # fmt: skip
+def fill_cell(s: Surroundings, table: Bytes, free: Bytes, i: int, j: int, x: float, y: float, clear_m: float) -> None:
     """Write the expected ranges of one cell into the table, and whether the ring may be there.
 
     Parameters
@@ -101,9 +99,16 @@ def fill_cell(
 
 @kernel
 def score_block(
-    table: Bytes, free: Bytes, likely: Floats, readings: Floats, count: int, direction: int, begin_i: int,
-    begin_j: int, scratch: Records[ScoreScratch],
-) -> None:  # fmt: skip
+    table: Bytes,
+    free: Bytes,
+    likely: Floats,
+    readings: Floats,
+    count: int,
+    direction: int,
+    begin_i: int,
+    begin_j: int,
+    scratch: Records[ScoreScratch],
+) -> None:
     """Sum the log ratios of the readings at each cell of a block with one heading; -inf where the ring cannot be.
 
     Parameters
@@ -158,7 +163,7 @@ def score_block(
 @kernel
 def offer_peaks(
     to: Records[Starts], scratch: Records[ScoreScratch], x: float, y: float, heading: float, profile: int
-) -> None:  # fmt: skip
+) -> None:
     """Offer the cells of a block that fit at least as well as all their neighbours in it.
 
     Parameters
@@ -207,10 +212,16 @@ class PoseGrid:
     SCRATCH: Final = ("_origin", "_table", "_free", "_filled", "_scratch", "_likely", "_likely_search", "starts")
     """What follows from the room, what is overwritten before each use, and a view of other memory."""
     BOUNDS: Final = bounds(
-        _clear_m=CONSTANT, _due=COUNT, _found=Starts.BOUNDS, _readings=PLACE._replace(infinite=True),
-        _count=up_to(GRID_READINGS_MAX), _searches=COUNT, _profiles=Bound(1, PROFILES_MAX), _shares=SHARE,
+        _clear_m=CONSTANT,
+        _due=COUNT,
+        _found=Starts.BOUNDS,
+        _readings=PLACE._replace(infinite=True),
+        _count=up_to(GRID_READINGS_MAX),
+        _searches=COUNT,
+        _profiles=Bound(1, PROFILES_MAX),
+        _shares=SHARE,
         _quantum=Bound(NO_CELL, COUNT.high),
-    )  # fmt: skip
+    )
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
         self._surroundings, self._clear_m = surroundings, clear_m

@@ -130,7 +130,7 @@ HypothesesRecord: TypeAlias = Records[Hypotheses]
 @kernel
 def add_hypothesis(
     of: HypothesesRecord, x: float, y: float, heading: float, place_sigma_m: float, heading_half_rad: float
-) -> None:  # fmt: skip
+) -> None:
     """Add a hypothesis around a pose of the ring; where there are too many already, do nothing.
 
     Parameters

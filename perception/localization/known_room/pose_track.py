@@ -93,9 +93,17 @@ class PoseTrack:
     SCRATCH: Final = ("_background", "_noise", "_hypotheses", "_scratch")
     """What is given, a view of other memory, and what is overwritten before each use."""
     BOUNDS: Final = bounds(
-        _memory=Hypotheses.BOUNDS, entered=COUNT, _step=index_of(QUANTA * HYPOTHESES_MAX), _at=PLACE, evidence=FINITE,
-        likeness=FINITE, _peak=FINITE, peak_at=COUNT, _gains=FINITE, _weights=SHARE,
-    )  # fmt: skip
+        _memory=Hypotheses.BOUNDS,
+        entered=COUNT,
+        _step=index_of(QUANTA * HYPOTHESES_MAX),
+        _at=PLACE,
+        evidence=FINITE,
+        likeness=FINITE,
+        _peak=FINITE,
+        peak_at=COUNT,
+        _gains=FINITE,
+        _weights=SHARE,
+    )
 
     def __init__(self, surroundings: Surroundings, background: Background, noise: Floats) -> None:
         self._surroundings, self._background, self._noise = surroundings, background, noise
@@ -123,9 +131,14 @@ class PoseTrack:
         self.evidence = self.likeness = self._peak = 0.0
 
     def start(
-        self, poses: Floats, place_sigma_m: float, heading_half_rad: float, odometry: Pose, entered: int,
+        self,
+        poses: Floats,
+        place_sigma_m: float,
+        heading_half_rad: float,
+        odometry: Pose,
+        entered: int,
         evidence: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Start anew with hypotheses of the pose.
 
         Parameters
@@ -187,9 +200,15 @@ class PoseTrack:
             h, part = divmod(self._step, QUANTA)
             begin = part * PARTICLES_PER_QUANTUM
             update_particles(
-                self._surroundings, self._hypotheses, h, begin, min(HEADINGS, begin + PARTICLES_PER_QUANTUM),
-                keyframes.readings[row], count, shares.records,
-            )  # fmt: skip
+                self._surroundings,
+                self._hypotheses,
+                h,
+                begin,
+                min(HEADINGS, begin + PARTICLES_PER_QUANTUM),
+                keyframes.readings[row],
+                count,
+                shares.records,
+            )
             self._step += 1
             if self._step < QUANTA * len(self):
                 return 0
@@ -233,9 +252,13 @@ class PoseTrack:
     def covariance(self) -> Floats:
         """Return the covariance of x, y (m) and heading (rad) at the last keyframe, shape (3, 3)."""
         best = self.best
-        return np.array([
-            [best.xx, best.xy, best.xh], [best.xy, best.yy, best.yh], [best.xh, best.yh, best.hh],
-        ])  # fmt: skip
+        return np.array(
+            [
+                [best.xx, best.xy, best.xh],
+                [best.xy, best.yy, best.yh],
+                [best.xh, best.yh, best.hh],
+            ]
+        )
 
     def _follow(self, keyframes: Keyframes) -> None:
         """Move the hypotheses by odometry to the next keyframe."""

@@ -74,9 +74,7 @@ def _distances(room: Room, kind: int, x: float, y: float) -> Floats:
 
 
 @kernel
-def listed(
-    of: Records[Bins], starts: Ints, kind: int, x: float, y: float, within_m: float
-) -> tuple[int, int]:  # fmt: skip
+def listed(of: Records[Bins], starts: Ints, kind: int, x: float, y: float, within_m: float) -> tuple[int, int]:
     """Return where in the index the surfaces of a kind near a place begin and end; -1, -1 where it does not reach.
 
     Parameters

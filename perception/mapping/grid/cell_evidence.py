@@ -142,9 +142,16 @@ def hit_nat(share: float) -> int:
 
 @kernel
 def fill_probability(
-    planes: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
-    odds: NDArray[np.float32], out: NDArray[np.float32],
-) -> None:  # fmt: skip
+    planes: Cells,
+    corner: Ints,
+    cell_m: float,
+    place: int,
+    mirrors: float,
+    from_x: float,
+    from_y: float,
+    odds: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
     """Write the probability of each cell.
 
     Parameters

@@ -93,10 +93,27 @@ MIRROR_SHARE: Final = 0.5
 
 @kernel
 def enter_readings(
-    planes: Cells, maybe_sure: Flags, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float,
-    ranges: Floats, mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float,
-    mirrors: float, answers: Floats, arc: Ints, shares: Floats, draws: Floats, edges: Floats,
-) -> None:  # fmt: skip
+    planes: Cells,
+    maybe_sure: Flags,
+    corner: Ints,
+    cell_m: float,
+    place: int,
+    x: float,
+    y: float,
+    yaw: float,
+    ranges: Floats,
+    mounts: Floats,
+    bearings: Floats,
+    half_angle: float,
+    rounding_m: float,
+    silence_m: float,
+    mirrors: float,
+    answers: Floats,
+    arc: Ints,
+    shares: Floats,
+    draws: Floats,
+    edges: Floats,
+) -> None:
     """Enter the readings of a firing: first what they passed, then their hits, so that their order does not matter.
 
     Parameters
@@ -282,9 +299,18 @@ class DirectedGrid:
     """
 
     SCRATCH: Final = (
-        "window", "_ring", "_rounding_m", "_arc", "_shares", "_draws", "_edges", "_odds", "_planes", "_maybe_sure",
+        "window",
+        "_ring",
+        "_rounding_m",
+        "_arc",
+        "_shares",
+        "_draws",
+        "_edges",
+        "_odds",
+        "_planes",
+        "_maybe_sure",
         "_sure",
-    )  # fmt: skip
+    )
     BOUNDS: Final = bounds(
         cells=Bound(-PLACE_NUMBERS, PLACE_NUMBERS - 1), _answers=Bound(0, ANSWERS_MAX), _place=index_of(PLACE_NUMBERS)
     )

@@ -34,9 +34,17 @@ LOG_ODDS_MAX: Final = 8.0
 
 @kernel
 def enter_reading(
-    log_odds: Floats, corner: Ints, cell_m: float, sx: float, sy: float, axis: float, half_angle: float, r: float,
-    sigma: float, edges: Floats,
-) -> None:  # fmt: skip
+    log_odds: Floats,
+    corner: Ints,
+    cell_m: float,
+    sx: float,
+    sy: float,
+    axis: float,
+    half_angle: float,
+    r: float,
+    sigma: float,
+    edges: Floats,
+) -> None:
     """Enter a reading: add the log odds of p(occupied | r) to each cell of the beam.
 
     With the weight w of a direction and the share m of the arc's mass::
@@ -125,9 +133,17 @@ class ElfesGrid:
                 continue
             sigma = max(SPREAD_CELLS * cell_m, self._rounding_m, SPREAD * r) if r < math.inf else 0.0
             enter_reading(
-                self.log_odds, self.window.corner, cell_m, sx, sy, axis, self._half_angle,
-                r if r < math.inf else silence_m, sigma, self._edges,
-            )  # fmt: skip
+                self.log_odds,
+                self.window.corner,
+                cell_m,
+                sx,
+                sy,
+                axis,
+                self._half_angle,
+                r if r < math.inf else silence_m,
+                sigma,
+                self._edges,
+            )
 
     def probability(self, seen_from: tuple[float, float] | None) -> NDArray[np.float32]:
         """Return the probability of each cell."""

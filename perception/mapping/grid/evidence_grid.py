@@ -105,13 +105,16 @@ class EvidenceGrid:
     SCRATCH: Final = ("ring",)
     BOUNDS: Final = bounds(
         _way_m=PLACE, _at=PLACE._replace(nan=True), _heard=COUNT, _firings=COUNT, bearings=PLACE._replace(nan=True)
-    )  # fmt: skip
+    )
 
     def __init__(self, ring: RingConfig, config: GridConfig) -> None:
         self.ring = Ring(
-            mounts_array(ring.mounts), math.radians(ring.beam_half_angle_deg), ring.resolution_m / math.sqrt(12.0),
-            ring.range_max_m, ring.turning,
-        )  # fmt: skip
+            mounts_array(ring.mounts),
+            math.radians(ring.beam_half_angle_deg),
+            ring.resolution_m / math.sqrt(12.0),
+            ring.range_max_m,
+            ring.turning,
+        )
         self.window = Window(config.cells, config.cell_m)
         self.method = make_grid_method(config, self.window, self.ring)
         self.sight_lines = SightLines(self.window, self.ring)

@@ -31,9 +31,17 @@ NEAREST_M: Final = 0.15
 
 @kernel
 def enter_reading(
-    cells: Floats, corner: Ints, cell_m: float, sx: float, sy: float, axis: float, half_angle: float, r: float,
-    accuracy_m: float, edges: Floats,
-) -> None:  # fmt: skip
+    cells: Floats,
+    corner: Ints,
+    cell_m: float,
+    sx: float,
+    sy: float,
+    axis: float,
+    half_angle: float,
+    r: float,
+    accuracy_m: float,
+    edges: Floats,
+) -> None:
     """Enter a reading.
 
     E and O are the profiles of the beam's inside and of its arc::
@@ -131,9 +139,17 @@ class MoravecElfesGrid:
                 continue
             accuracy_m = max(ACCURACY_CELLS * cell_m, ACCURACY * r) if r < math.inf else 0.0
             enter_reading(
-                self.cells, self.window.corner, cell_m, sx, sy, axis, self._half_angle,
-                r if r < math.inf else silence_m, accuracy_m, self._edges,
-            )  # fmt: skip
+                self.cells,
+                self.window.corner,
+                cell_m,
+                sx,
+                sy,
+                axis,
+                self._half_angle,
+                r if r < math.inf else silence_m,
+                accuracy_m,
+                self._edges,
+            )
 
     def probability(self, seen_from: tuple[float, float] | None) -> NDArray[np.float32]:
         """Return the probability of each cell: ½ + ½ occupied, or ½ − ½ empty where that is greater."""

@@ -84,9 +84,18 @@ Flags = NDArray[np.bool_]
 
 @kernel
 def follow_rays(
-    holds: Flags, corner: Ints, cell_m: float, sx: float, sy: float, axis: float, sine: float, r: float, sigma: float,
-    blocked_m: Floats, shares: Floats,
-) -> int:  # fmt: skip
+    holds: Flags,
+    corner: Ints,
+    cell_m: float,
+    sx: float,
+    sy: float,
+    axis: float,
+    sine: float,
+    r: float,
+    sigma: float,
+    blocked_m: Floats,
+    shares: Floats,
+) -> int:
     """Follow the lines of a beam; return 1 if its echo came from something that holds, -1 if over it, 0 otherwise.
 
     Parameters
@@ -148,10 +157,23 @@ def follow_rays(
 
 @kernel
 def enter_sights(
-    sights: NDArray[np.int16], holds: Flags, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float,
-    ranges: Floats, mounts: Floats, bearings: Floats, half_angle: float, blocked_m: Floats, shares: Floats,
-    edges: Floats, echoes: Floats,
-) -> None:  # fmt: skip
+    sights: NDArray[np.int16],
+    holds: Flags,
+    corner: Ints,
+    cell_m: float,
+    place: int,
+    x: float,
+    y: float,
+    yaw: float,
+    ranges: Floats,
+    mounts: Floats,
+    bearings: Floats,
+    half_angle: float,
+    blocked_m: Floats,
+    shares: Floats,
+    edges: Floats,
+    echoes: Floats,
+) -> None:
     """Enter the lines of sight of a firing.
 
     Parameters
@@ -263,10 +285,23 @@ class SightLines:
         stamp = 1 + place % (PLACE_NUMBERS - 1)
         mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_sights(
-            self.sights, holds, self._window.corner, self._window.cell_m, stamp, float(firing.pose.x),
-            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings,
-            self._ring.half_angle, self._blocked_m, self._shares, self._edges, self._echoes,
-        )  # fmt: skip
+            self.sights,
+            holds,
+            self._window.corner,
+            self._window.cell_m,
+            stamp,
+            float(firing.pose.x),
+            float(firing.pose.y),
+            float(firing.ring_yaw),
+            firing.ranges_m,
+            mounts,
+            bearings,
+            self._ring.half_angle,
+            self._blocked_m,
+            self._shares,
+            self._edges,
+            self._echoes,
+        )
         if self._echoes[2:].sum() > 0.5 * ECHOES_COUNTED_MAX:
             self._echoes *= 0.5
 

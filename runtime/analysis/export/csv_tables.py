@@ -26,9 +26,14 @@ FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the
 def tables(timeline: Timeline) -> dict[str, Table]:
     """Return the tables of a run by name."""
     found = (
-        _echoes(timeline), _cross_paths(timeline), _segments(timeline), _objects(timeline), _walls(timeline),
-        _polylines(timeline), _odometry(timeline),
-    )  # fmt: skip
+        _echoes(timeline),
+        _cross_paths(timeline),
+        _segments(timeline),
+        _objects(timeline),
+        _walls(timeline),
+        _polylines(timeline),
+        _odometry(timeline),
+    )
     return dict(zip(NAMES, found, strict=True))
 
 
@@ -179,8 +184,17 @@ def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
     import pyarrow.parquet as pq
 
     whole = pa.int64()
-    kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole,
-             "number": whole, "transmitter": whole, "listener": whole, "point": whole}  # fmt: skip
+    kinds = {
+        "model": pa.string(),
+        "heard": pa.bool_(),
+        "sensor": whole,
+        "support": whole,
+        "flags": whole,
+        "number": whole,
+        "transmitter": whole,
+        "listener": whole,
+        "point": whole,
+    }
     paths = []
     for name, table in tables(timeline).items():
         schema = pa.schema(

@@ -154,9 +154,13 @@ class _RunExporter:
 def _grid(known: KnownCells, at: int) -> fx.Grid:
     """Return the evidence grid: per cent occupied in each cell, −1 where nothing is known."""
     return fx.Grid(
-        timestamp=stamp(at), frame_id="odom", pose=placed(known.x_m, known.y_m, 0.0),
-        column_count=known.percent.shape[1], cell_size=fx.Vector2(x=known.cell_m, y=known.cell_m),
-        row_stride=known.percent.shape[1], cell_stride=1,
+        timestamp=stamp(at),
+        frame_id="odom",
+        pose=placed(known.x_m, known.y_m, 0.0),
+        column_count=known.percent.shape[1],
+        cell_size=fx.Vector2(x=known.cell_m, y=known.cell_m),
+        row_stride=known.percent.shape[1],
+        cell_stride=1,
         fields=[fx.PackedElementField(name="occupied", offset=0, type=fx.PackedElementFieldNumericType.Int8)],
         data=known.percent.tobytes(),
-    )  # fmt: skip
+    )

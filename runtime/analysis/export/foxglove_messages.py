@@ -56,11 +56,14 @@ class RunChannels:
         """Write frames: the parent's name, the child's, and the child's pose in the parent."""
         transforms = [
             fx.FrameTransform(
-                timestamp=stamp(at), parent_frame_id=parent, child_frame_id=child,
-                translation=fx.Vector3(x=pose.x, y=pose.y, z=0.0), rotation=_quaternion(pose.theta),
+                timestamp=stamp(at),
+                parent_frame_id=parent,
+                child_frame_id=child,
+                translation=fx.Vector3(x=pose.x, y=pose.y, z=0.0),
+                rotation=_quaternion(pose.theta),
             )
             for parent, child, pose in frames
-        ]  # fmt: skip
+        ]
         self._frames.log(fx.FrameTransforms(transforms=transforms), log_time=at)
 
     def write_pose(self, pose: Pose, at: int) -> None:
@@ -78,9 +81,13 @@ class RunChannels:
 
     def _write_scan(self, eye: Pose, start: float, end: float, ranges_m: Sequence[float], at: int) -> None:
         message = fx.LaserScan(
-            timestamp=stamp(at), frame_id="odom", pose=placed(eye.x, eye.y, eye.theta), start_angle=start,
-            end_angle=end, ranges=list(ranges_m),
-        )  # fmt: skip
+            timestamp=stamp(at),
+            frame_id="odom",
+            pose=placed(eye.x, eye.y, eye.theta),
+            start_angle=start,
+            end_angle=end,
+            ranges=list(ranges_m),
+        )
         self._ring.log(message, log_time=at)
 
     def write_cross_paths(self, rows: CrossPathRows, half_angle: float, at: int) -> None:
@@ -91,9 +98,12 @@ class RunChannels:
     def write_segments(self, ends: Sequence[Sequence[float]], at: int) -> None:
         """Replace the outline segments: points x, y (m), two a segment."""
         many = fx.LinePrimitive(
-            type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True,
-            points=[fx.Point3(x=x, y=y) for x, y in ends], color=_colour(SEGMENT),
-        )  # fmt: skip
+            type=fx.LinePrimitiveLineType.LineList,
+            thickness=LINE_PX,
+            scale_invariant=True,
+            points=[fx.Point3(x=x, y=y) for x, y in ends],
+            color=_colour(SEGMENT),
+        )
         scene(self._segments, "segments", [many] if ends else [], [], at)
 
     def write_objects(

@@ -107,8 +107,10 @@ def _marked(places: PlacesConfig) -> Iterator[dict[str, Any]]:
 
 def _feature(shape: str, coordinates: list[Any], **properties: object) -> dict[str, Any]:
     return {
-        "type": "Feature", "properties": properties, "geometry": {"type": shape, "coordinates": coordinates},
-    }  # fmt: skip
+        "type": "Feature",
+        "properties": properties,
+        "geometry": {"type": shape, "coordinates": coordinates},
+    }
 
 
 def _circle(drum: DrumConfig) -> list[list[float]]:

@@ -85,9 +85,14 @@ def yaml_beside(path: Path) -> Path:
 
 
 def occupancy_image(
-    world: WorldConfig, echoes: Echoes, ring: RingConfig, way: Floats, body_radius_m: float,
-    method: str = GridConfig().method, surfaces_mapped: bool = False,
-) -> OccupancyImage:  # fmt: skip
+    world: WorldConfig,
+    echoes: Echoes,
+    ring: RingConfig,
+    way: Floats,
+    body_radius_m: float,
+    method: str = GridConfig().method,
+    surfaces_mapped: bool = False,
+) -> OccupancyImage:
     """Return the image of a run.
 
     Parameters
@@ -137,7 +142,7 @@ def occupancy_image(
 
 def run_evidence(
     world: WorldConfig, echoes: Echoes, ring: RingConfig, low: Floats, high: Floats, method: str = GridConfig().method
-) -> OccupancyWindow:  # fmt: skip
+) -> OccupancyWindow:
     """Return the evidence grid of all readings of a run; ½ where it is free and no line of sight has crossed.
 
     Parameters

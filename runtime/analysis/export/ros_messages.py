@@ -42,16 +42,18 @@ class Qos(Enum):
 
 DEPTHS: Final = MappingProxyType({Qos.SENSOR_DATA: 5, Qos.RELIABLE: 10, Qos.LATCHED: 1})
 FRAMES_DEPTH: Final = 100
-QOS: Final = MappingProxyType({
-    "sensor_msgs/Range": Qos.SENSOR_DATA,
-    "sensor_msgs/LaserScan": Qos.SENSOR_DATA,
-    "nav_msgs/Odometry": Qos.RELIABLE,
-    "nav_msgs/OccupancyGrid": Qos.LATCHED,
-    "geometry_msgs/PoseWithCovarianceStamped": Qos.RELIABLE,
-    "visualization_msgs/MarkerArray": Qos.RELIABLE,
-    "diagnostic_msgs/DiagnosticArray": Qos.RELIABLE,
-    "std_msgs/String": Qos.LATCHED,
-})  # fmt: skip
+QOS: Final = MappingProxyType(
+    {
+        "sensor_msgs/Range": Qos.SENSOR_DATA,
+        "sensor_msgs/LaserScan": Qos.SENSOR_DATA,
+        "nav_msgs/Odometry": Qos.RELIABLE,
+        "nav_msgs/OccupancyGrid": Qos.LATCHED,
+        "geometry_msgs/PoseWithCovarianceStamped": Qos.RELIABLE,
+        "visualization_msgs/MarkerArray": Qos.RELIABLE,
+        "diagnostic_msgs/DiagnosticArray": Qos.RELIABLE,
+        "std_msgs/String": Qos.LATCHED,
+    }
+)
 """Of each type of message; `/tf_static` is latched, too."""
 
 
@@ -125,10 +127,13 @@ class Messages:
         """Return the reading of a sensor; its range is inf if it heard nothing."""
         silent = limits_m[1] if self._no_echo is None else self._no_echo
         fields = {
-            "header": header(self.names.sonar(sensor), at), "radiation_type": 0, "field_of_view": 2.0 * half_angle,
-            "min_range": limits_m[0], "max_range": limits_m[1],
+            "header": header(self.names.sonar(sensor), at),
+            "radiation_type": 0,
+            "field_of_view": 2.0 * half_angle,
+            "min_range": limits_m[0],
+            "max_range": limits_m[1],
             "range": range_m if math.isfinite(range_m) else silent,
-        }  # fmt: skip
+        }
         return Output(f"sonar/s{sensor:02d}", "sensor_msgs/Range", fields)
 
     def odometry(self, at_pose: Pose, twist: Twist, at: int) -> Output:
@@ -138,11 +143,16 @@ class Messages:
         is_known = math.isfinite(twist.v) and math.isfinite(twist.w)
         speed = {"linear": {"x": twist.v}, "angular": {"z": twist.w}} if is_known else {}
         unknown = covariance(UNKNOWN_VARIANCE, 0.0, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE)
-        return Output("odom", "nav_msgs/Odometry", {
-            "header": header(self.odom, at), "child_frame_id": self.base,
-            "pose": {"pose": pose(at_pose.x, at_pose.y, at_pose.theta), "covariance": known},
-            "twist": {"twist": speed, "covariance": known if is_known else unknown},
-        })  # fmt: skip
+        return Output(
+            "odom",
+            "nav_msgs/Odometry",
+            {
+                "header": header(self.odom, at),
+                "child_frame_id": self.base,
+                "pose": {"pose": pose(at_pose.x, at_pose.y, at_pose.theta), "covariance": known},
+                "twist": {"twist": speed, "covariance": known if is_known else unknown},
+            },
+        )
 
     def place(self, here: Sequence[float], known: Sequence[float] | None, at: int) -> Output:
         """Return the robot in the map: x, y, theta and covariance xx, xy, yy, tt, None if that is not known."""
@@ -186,8 +196,11 @@ class Messages:
     ) -> Output:
         """Return an evidence grid: its corner x, y and cells (m), rows and columns, and per cent occupied of each."""
         info = {
-            "resolution": cell_m, "width": shape[1], "height": shape[0], "origin": pose(corner[0], corner[1], 0.0)
-        }  # fmt: skip
+            "resolution": cell_m,
+            "width": shape[1],
+            "height": shape[0],
+            "origin": pose(corner[0], corner[1], 0.0),
+        }
         fields = {"header": header(self.odom, at), "info": info, "data": cells}
         return Output("grid", "nav_msgs/OccupancyGrid", fields)
 
@@ -209,9 +222,14 @@ def line_marker(points: Iterable[tuple[float, float]], colour: Sequence[float], 
     """Return the marker of a line through points (m); `fields` are its header, namespace and number."""
     r, g, b = colour
     return {
-        "type": STRIP, "action": ADD, "pose": pose(0.0, 0.0, 0.0), "scale": {"x": LINE_M}, "points": _points(points),
-        "color": {"r": r, "g": g, "b": b, "a": 1.0}, **fields,
-    }  # fmt: skip
+        "type": STRIP,
+        "action": ADD,
+        "pose": pose(0.0, 0.0, 0.0),
+        "scale": {"x": LINE_M},
+        "points": _points(points),
+        "color": {"r": r, "g": g, "b": b, "a": 1.0},
+        **fields,
+    }
 
 
 def _markers(seen: Seen, model: Seen | None, number: int, head: Fields) -> list[Fields]:
@@ -225,9 +243,13 @@ def _markers(seen: Seen, model: Seen | None, number: int, head: Fields) -> list[
         x1, y1, x2, y2 = seen["ends"]
         return [{**line, "points": _points([(x1, y1), (x2, y2)])}]
     label = {
-        **common, "ns": f"{name} label", "type": TEXT, "pose": pose(x, y, 0.0, HEIGHT_M + 0.2),
-        "scale": {"z": 0.2}, "text": f"{number} {name} {seen['score']:.2f}",
-    }  # fmt: skip
+        **common,
+        "ns": f"{name} label",
+        "type": TEXT,
+        "pose": pose(x, y, 0.0, HEIGHT_M + 0.2),
+        "scale": {"z": 0.2},
+        "text": f"{number} {name} {seen['score']:.2f}",
+    }
     if model is None or model["arc_radius_m"] is not None:
         width = 0.2 if model is None else 2.0 * model["arc_radius_m"]
         size = {"x": width, "y": width, "z": HEIGHT_M}

@@ -140,14 +140,15 @@ class _RunExporter:
     def _write_frames(self, frames: Sequence[Frame], at: int, *, static: bool = False) -> None:
         transforms = [
             {
-                "header": header(frame.parent, frame.stamp_ns), "child_frame_id": frame.child,
+                "header": header(frame.parent, frame.stamp_ns),
+                "child_frame_id": frame.child,
                 "transform": {
                     "translation": dict(zip("xyz", frame.translation, strict=True)),
                     "rotation": dict(zip("xyzw", frame.rotation, strict=True)),
                 },
             }
             for frame in frames
-        ]  # fmt: skip
+        ]
         offered = bag_qos(Qos.LATCHED) if static else bag_qos(Qos.RELIABLE, FRAMES_DEPTH)
         self._write(Output("tf_static" if static else "tf", TF, {"transforms": transforms}), at, offered)
 
@@ -221,17 +222,31 @@ def bag_qos(qos: Qos, depth: int | None = None) -> BagQos:
     reliability = QosReliability.BEST_EFFORT if qos is Qos.SENSOR_DATA else QosReliability.RELIABLE
     durability = QosDurability.TRANSIENT_LOCAL if qos is Qos.LATCHED else QosDurability.VOLATILE
     return BagQos(
-        QosHistory.KEEP_LAST, depth or DEPTHS[qos], reliability, durability, ENDLESS, ENDLESS,
-        QosLiveliness.AUTOMATIC, ENDLESS, avoid_ros_namespace_conventions=False,
-    )  # fmt: skip
+        QosHistory.KEEP_LAST,
+        depth or DEPTHS[qos],
+        reliability,
+        durability,
+        ENDLESS,
+        ENDLESS,
+        QosLiveliness.AUTOMATIC,
+        ENDLESS,
+        avoid_ros_namespace_conventions=False,
+    )
 
 
 def as_seen(seen: DetectedObject) -> dict[str, object]:
     """Return an object as a state of the console has it."""
     return {
-        "number": seen.number, "model": seen.model, "x": seen.x, "y": seen.y, "theta": seen.theta,
-        "score": seen.score, "probability": seen.probability, "covariance": seen.covariance, "ends": seen.ends,
-    }  # fmt: skip
+        "number": seen.number,
+        "model": seen.model,
+        "x": seen.x,
+        "y": seen.y,
+        "theta": seen.theta,
+        "score": seen.score,
+        "probability": seen.probability,
+        "covariance": seen.covariance,
+        "ends": seen.ends,
+    }
 
 
 def _looped(points: Points) -> Points:

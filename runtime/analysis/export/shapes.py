@@ -67,7 +67,7 @@ def scans_of(rows: Echoes, ring: RingConfig) -> Iterator[FiringScan]:
         c, s = math.cos(yaw), math.sin(yaw)
         yield FiringScan(
             float(first["t_s"]), float(first["x"]) - c * mx + s * my, float(first["y"]) - s * mx - c * my, yaw, part
-        )  # fmt: skip
+        )
 
 
 def truth_outlines(timeline: Timeline) -> tuple[list[Points], list[Points]]:

@@ -174,10 +174,28 @@ def _mp4(shown: list[Pixels], step_s: float, path: Path, ffmpeg: str) -> list[Pa
     height, width, _ = shown[0].shape
     rest = [shown[-1]] * round(REST_S / step_s)
     command = [
-        ffmpeg, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-        "-r", f"{1.0 / step_s:.3f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p",
-        "-movflags", "+faststart", str(path),
-    ]  # fmt: skip
+        ffmpeg,
+        "-y",
+        "-loglevel",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        f"{1.0 / step_s:.3f}",
+        "-i",
+        "-",
+        "-vf",
+        "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+        "-pix_fmt",
+        "yuv420p",
+        "-movflags",
+        "+faststart",
+        str(path),
+    ]
     pixels = b"".join(frame.tobytes() for frame in [*shown, *rest])
     done = subprocess.run(command, input=pixels, capture_output=True, check=False)  # noqa: S603 - found by which
     return [path] if done.returncode == 0 else []

@@ -33,10 +33,23 @@ def history_figure(timeline: Timeline, units: Units) -> Figure:
             [one.error_m / unit for one in match_to_truth(m.objects, timeline).values()] for m in timeline.snapshots
         ]
         at = [t for t, found in zip(times, errors, strict=True) if found]
-        panels[1].plot(at, [max(found) for found in errors if found], color=SEGMENT, linewidth=1.5,
-                       linestyle=(0, (3, 1.5)), label="worst", gid="worst")  # fmt: skip
-        panels[1].plot(at, [float(np.mean(found)) for found in errors if found], color=MODEL, linewidth=1.8,
-                       label="mean", gid="mean")  # fmt: skip
+        panels[1].plot(
+            at,
+            [max(found) for found in errors if found],
+            color=SEGMENT,
+            linewidth=1.5,
+            linestyle=(0, (3, 1.5)),
+            label="worst",
+            gid="worst",
+        )
+        panels[1].plot(
+            at,
+            [float(np.mean(found)) for found in errors if found],
+            color=MODEL,
+            linewidth=1.8,
+            label="mean",
+            gid="mean",
+        )
         panels[1].set_ylabel(f"error ({units})")
         panels[1].set_ylim(bottom=0.0)
         if at:
@@ -44,8 +57,17 @@ def history_figure(timeline: Timeline, units: Units) -> Figure:
     periods = panels[-1]
     gaps = 1e3 * np.array(timeline.cycle_gaps_s)
     times_s = np.cumsum(timeline.cycle_gaps_s)
-    periods.plot(times_s, gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
-                gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
+    periods.plot(
+        times_s,
+        gaps,
+        marker=".",
+        markersize=3,
+        linestyle="",
+        color=ECHO,
+        alpha=0.6,
+        gid="gaps",
+        rasterized=len(gaps) > 2000,
+    )
     periods.set(xlabel="t (s)", ylabel="between cycles (ms)")
     periods.set_ylim(0.0, 1.1 * float(gaps.max()) if len(gaps) else None)
     for number, mark in enumerate(timeline.bookmarks, 1):
@@ -53,7 +75,13 @@ def history_figure(timeline: Timeline, units: Units) -> Figure:
             panel.axvline(
                 mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}-panel-{row}"
             )
-        known.annotate(str(number), (mark.t_s, 1.0), xycoords=("data", "axes fraction"), xytext=(2.0, -9.0),
-                       textcoords="offset points", fontsize=8)  # fmt: skip
+        known.annotate(
+            str(number),
+            (mark.t_s, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(2.0, -9.0),
+            textcoords="offset points",
+            fontsize=8,
+        )
     figure.align_ylabels()
     return figure

@@ -27,10 +27,25 @@ def trade_off_figure(points: Points, front: Points, best: tuple[float, float], l
     """
     figure = Figure(figsize=(WIDTH_IN, 3.6), layout="constrained")
     axes = figure.subplots()
-    axes.plot(*zip(*points, strict=True), linestyle="", marker="o", markersize=4, color=MUTED, alpha=0.6,
-              label="combinations", gid="combinations")  # fmt: skip
-    axes.plot(*zip(*sorted(front), strict=True), marker="o", markersize=5, linewidth=1.2, color=ECHO,
-              label="no other better in all", gid="front")  # fmt: skip
+    axes.plot(
+        *zip(*points, strict=True),
+        linestyle="",
+        marker="o",
+        markersize=4,
+        color=MUTED,
+        alpha=0.6,
+        label="combinations",
+        gid="combinations",
+    )
+    axes.plot(
+        *zip(*sorted(front), strict=True),
+        marker="o",
+        markersize=5,
+        linewidth=1.2,
+        color=ECHO,
+        label="no other better in all",
+        gid="front",
+    )
     axes.plot(*best, linestyle="", marker="*", markersize=11, color=SEGMENT, label="best", gid="best")
     axes.set(xlabel=labels[0], ylabel=labels[1])
     axes.legend()
@@ -47,8 +62,9 @@ def effects_figure(effects: Sequence[tuple[str, Sequence[tuple[str, float]]]], o
     objective : str
         Its name.
     """
-    figure = Figure(figsize=(WIDTH_IN, 0.9 + 0.28 * sum(len(values) + 1 for _, values in effects)),
-                    layout="constrained")  # fmt: skip
+    figure = Figure(
+        figsize=(WIDTH_IN, 0.9 + 0.28 * sum(len(values) + 1 for _, values in effects)), layout="constrained"
+    )
     axes = figure.subplots()
     at, ticks = 0, []
     for setting, values in effects:
@@ -75,8 +91,16 @@ def search_figure(trials: Points, best: Sequence[float]) -> Figure:
     figure = Figure(figsize=(WIDTH_IN, 2.8), layout="constrained")
     axes = figure.subplots()
     numbers = [trial for trial, _ in trials]
-    axes.plot(*zip(*trials, strict=True), linestyle="", marker="o", markersize=4, color=MUTED, alpha=0.6,
-              label="trials", gid="trials")  # fmt: skip
+    axes.plot(
+        *zip(*trials, strict=True),
+        linestyle="",
+        marker="o",
+        markersize=4,
+        color=MUTED,
+        alpha=0.6,
+        label="trials",
+        gid="trials",
+    )
     axes.step(numbers, best, where="post", linewidth=1.4, color=ECHO, label="best so far", gid="best")
     axes.plot(*trials[0], linestyle="", marker="s", markersize=7, color=SEGMENT, label="present", gid="present")
     axes.set(xlabel="trial", ylabel="cost")

@@ -27,10 +27,14 @@ from runtime.simulation.open_loop import BoxRow, match_objects
 from runtime.support.length_format import Units, format_length, format_point
 
 LOG_SHOWN: Final = 40
-STOPS: Final = MappingProxyType({
-    "budget": "the time for it was over", "quota": "as many quanta as allowed", "converged": "nothing is to gain",
-    "nothing": "nothing was left to improve",
-})  # fmt: skip
+STOPS: Final = MappingProxyType(
+    {
+        "budget": "the time for it was over",
+        "quota": "as many quanta as allowed",
+        "converged": "nothing is to gain",
+        "nothing": "nothing was left to improve",
+    }
+)
 """What ended the refinement of a cycle, in words."""
 CAPTIONS: Final = MappingProxyType(
     {

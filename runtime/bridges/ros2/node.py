@@ -31,24 +31,28 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drivers import ros_tf
 from runtime.analysis.export.ros_messages import DEPTHS, FRAMES_DEPTH, QOS, Frames, Output, Qos
 
-PROFILES: Final = MappingProxyType({
-    Qos.SENSOR_DATA: QoSProfile(depth=DEPTHS[Qos.SENSOR_DATA], reliability=ReliabilityPolicy.BEST_EFFORT),
-    Qos.RELIABLE: QoSProfile(depth=DEPTHS[Qos.RELIABLE]),
-    Qos.LATCHED: QoSProfile(depth=DEPTHS[Qos.LATCHED], durability=DurabilityPolicy.TRANSIENT_LOCAL),
-})  # fmt: skip
+PROFILES: Final = MappingProxyType(
+    {
+        Qos.SENSOR_DATA: QoSProfile(depth=DEPTHS[Qos.SENSOR_DATA], reliability=ReliabilityPolicy.BEST_EFFORT),
+        Qos.RELIABLE: QoSProfile(depth=DEPTHS[Qos.RELIABLE]),
+        Qos.LATCHED: QoSProfile(depth=DEPTHS[Qos.LATCHED], durability=DurabilityPolicy.TRANSIENT_LOCAL),
+    }
+)
 NEWEST: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For velocities: it matches every publisher, and a late one is worth nothing."""
 FRAMES: Final = QoSProfile(depth=FRAMES_DEPTH)
-TYPES: Final = MappingProxyType({
-    "sensor_msgs/Range": Range,
-    "sensor_msgs/LaserScan": LaserScan,
-    "nav_msgs/Odometry": Odometry,
-    "nav_msgs/OccupancyGrid": OccupancyGrid,
-    "geometry_msgs/PoseWithCovarianceStamped": PoseWithCovarianceStamped,
-    "visualization_msgs/MarkerArray": MarkerArray,
-    "diagnostic_msgs/DiagnosticArray": DiagnosticArray,
-    "std_msgs/String": String,
-})  # fmt: skip
+TYPES: Final = MappingProxyType(
+    {
+        "sensor_msgs/Range": Range,
+        "sensor_msgs/LaserScan": LaserScan,
+        "nav_msgs/Odometry": Odometry,
+        "nav_msgs/OccupancyGrid": OccupancyGrid,
+        "geometry_msgs/PoseWithCovarianceStamped": PoseWithCovarianceStamped,
+        "visualization_msgs/MarkerArray": MarkerArray,
+        "diagnostic_msgs/DiagnosticArray": DiagnosticArray,
+        "std_msgs/String": String,
+    }
+)
 GRAPH_S: Final = 1.0
 """How often other nodes are looked at."""
 ELEMENTS: Final = MappingProxyType(

@@ -70,11 +70,19 @@ class RingScan:
             if not length >= ranges[beam]:
                 ranges[beam] = length
         reach_m = self._ring["range_max"] + max(math.hypot(x, y) for x, y, _ in self._ring["mounts"])
-        return Output("scan", "sensor_msgs/LaserScan", {
-            "header": header(self._frame, at), "angle_min": -math.pi, "angle_max": math.pi - 2.0 * math.pi / BEAMS,
-            "angle_increment": 2.0 * math.pi / BEAMS, "range_min": self._ring["range_min"], "range_max": reach_m,
-            "ranges": ranges,
-        })  # fmt: skip
+        return Output(
+            "scan",
+            "sensor_msgs/LaserScan",
+            {
+                "header": header(self._frame, at),
+                "angle_min": -math.pi,
+                "angle_max": math.pi - 2.0 * math.pi / BEAMS,
+                "angle_increment": 2.0 * math.pi / BEAMS,
+                "range_min": self._ring["range_min"],
+                "range_max": reach_m,
+                "ranges": ranges,
+            },
+        )
 
     def _at(self, time_s: float) -> tuple[Pose, float]:
         """Return the base and the ring's yaw at a time of the robot's clock, between two states."""

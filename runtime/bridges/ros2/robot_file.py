@@ -135,9 +135,7 @@ def rotated(p: Sequence[float], q: Sequence[float]) -> tuple[float, float, float
     x, y, z, w = q
     # v + 2 u × (u × v + w v), with u the vector part.
     cx, cy, cz = y * p[2] - z * p[1] + w * p[0], z * p[0] - x * p[2] + w * p[1], x * p[1] - y * p[0] + w * p[2]
-    return (
-        p[0] + 2.0 * (y * cz - z * cy), p[1] + 2.0 * (z * cx - x * cz), p[2] + 2.0 * (x * cy - y * cx)
-    )  # fmt: skip
+    return (p[0] + 2.0 * (y * cz - z * cy), p[1] + 2.0 * (z * cx - x * cz), p[2] + 2.0 * (x * cy - y * cx))
 
 
 def firing_period_s(stamps_s: Iterable[Sequence[float]]) -> float:

@@ -156,7 +156,7 @@ class Topics:
         gone = [
             {"header": header(self._say.odom, at), "ns": ns, "id": number, "action": DELETE}
             for ns, number in sorted(self._markers - now)
-        ]  # fmt: skip
+        ]
         self._markers = now
         return [Output("objects", "visualization_msgs/MarkerArray", {"markers": [*gone, *markers]}), *poses]
 
@@ -167,10 +167,15 @@ class Topics:
         faulty = [f"sensor {sensor}: {fault}, {why}" for sensor, fault, why in state["sensors"]]
         text = f"{name_of_mode}: {reason}" if reason else name_of_mode
         statuses = [
-            _status("mode", name, dict(LEVELS).get(name_of_mode, OK), text,
-                    {"clients": state["clients"], "flags": " ".join(state["flags"]), **timing}),
+            _status(
+                "mode",
+                name,
+                dict(LEVELS).get(name_of_mode, OK),
+                text,
+                {"clients": state["clients"], "flags": " ".join(state["flags"]), **timing},
+            ),
             _status("ring", name, WARN if faulty else OK, "; ".join(faulty) or "all sensors are plausible", {}),
-        ]  # fmt: skip
+        ]
         if self.place is not None:
             known = {"probability": state["localized"]["probability"]}
             statuses.append(_status("place", name, OK if self.place == "tracking" else WARN, self.place, known))

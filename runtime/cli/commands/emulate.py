@@ -103,11 +103,19 @@ def emulate(
 
     asyncio.run(
         serve(
-            settings, settings.world, make_port=_port_maker(link, tcp), faults=script, seed=seed,
-            trace_path=trace, latency_path=latency, ready=ready, exit_with_parent=end_with_parent,
-            clock_start_us=round(1e6 * clock), control=PIPES if control else None,
+            settings,
+            settings.world,
+            make_port=_port_maker(link, tcp),
+            faults=script,
+            seed=seed,
+            trace_path=trace,
+            latency_path=latency,
+            ready=ready,
+            exit_with_parent=end_with_parent,
+            clock_start_us=round(1e6 * clock),
+            control=PIPES if control else None,
         )
-    )  # fmt: skip
+    )
     return DONE
 
 

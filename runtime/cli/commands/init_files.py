@@ -124,8 +124,11 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
     most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}[driver]
     sensors = ask.count("sensors", "Number of sensors, equally spaced", 16 if driver != "denning" else 24, 2, most)
     if driver in {"arcos", "rflex"} and sensors % ARRAY:
-        raise UserError(f"--sensors {sensors}: the driver {driver} has arrays of {ARRAY}: give {ARRAY}, {2 * ARRAY} "
-                        f"or another multiple, and describe a smaller array in the file", WRONG_CALL)  # fmt: skip
+        raise UserError(
+            f"--sensors {sensors}: the driver {driver} has arrays of {ARRAY}: give {ARRAY}, {2 * ARRAY} "
+            f"or another multiple, and describe a smaller array in the file",
+            WRONG_CALL,
+        )
     body = ask.number("body_radius", "Radius of the body, m", 0.3, 0.01, 10.0)
     ring = ask.number("ring_radius", "Distance of the sensors from the middle, m", body, 0.0, 10.0)
     beam = ask.number("beam_half_angle", "Half the width of a beam, degrees", 12.0, 0.5, 80.0)
@@ -144,9 +147,24 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
     preset = _preset(driver, sensors)
     step_s = max(0.05 if driver == "denning" else 0.041, math.ceil(1100.0 * 2.0 * high / SOUND_M_S) * 1e-3)
     draft = RobotDraft(
-        name, driver, sensors, ring, None, beam, resolution, low, high, preset, step_s, body, speed, turn,
-        synchro, baud, port,
-    )  # fmt: skip
+        name,
+        driver,
+        sensors,
+        ring,
+        None,
+        beam,
+        resolution,
+        low,
+        high,
+        preset,
+        step_s,
+        body,
+        speed,
+        turn,
+        synchro,
+        baud,
+        port,
+    )
     return _write(file, robot_text(draft), force=force)
 
 

@@ -56,8 +56,9 @@ def check_outputs(
         shown = f"{option} {one_line(str(path))}"
         found = _identity(path)
         if found in read:
-            raise UserError(f"{shown}: is an input itself: {one_line(str(read[found]))}; choose another name",
-                            WRONG_CALL)  # fmt: skip
+            raise UserError(
+                f"{shown}: is an input itself: {one_line(str(read[found]))}; choose another name", WRONG_CALL
+            )
         is_device = Path(path).exists() and not Path(path).is_file()
         if found in written:
             raise UserError(f"{shown}: is the same file as {written[found]}; choose another name", WRONG_CALL)

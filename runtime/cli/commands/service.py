@@ -52,9 +52,17 @@ WantedBy=multi-user.target
 
 
 SYSTEM_ONLY: Final = (
-    "DynamicUser=", "User=", "SupplementaryGroups=", "# The group that", "StateDirectory=", "CacheDirectory=",
-    "Environment=XDG_", "LimitRTPRIO=", "LimitMEMLOCK=", "# For the settings",
-)  # fmt: skip
+    "DynamicUser=",
+    "User=",
+    "SupplementaryGroups=",
+    "# The group that",
+    "StateDirectory=",
+    "CacheDirectory=",
+    "Environment=XDG_",
+    "LimitRTPRIO=",
+    "LimitMEMLOCK=",
+    "# For the settings",
+)
 """Lines that the manager of a user cannot carry out: the user's own folders, groups and limits hold."""
 
 

@@ -137,10 +137,12 @@ def stand_table(surfaces: tuple[StandSurface, ...], ring: Pose, robot: Pose, uni
         bearing = math.remainder(ring.theta + echo.bearing - robot.theta, 2.0 * math.pi)
         odds = " : ".join(f"{100.0 * share:.0f}" for share in echo.probabilities)
         table.add_row(
-            surface.kind, format_point(*surface.place(ring), units), format_length(echo.range_m, units, 3),
+            surface.kind,
+            format_point(*surface.place(ring), units),
+            format_length(echo.range_m, units, 3),
             f"{math.degrees(bearing):.1f} ± {math.degrees(echo.sigma_bearing):.2f}°",
             odds if surface.is_one else "more than one",
-        )  # fmt: skip
+        )
     return table
 
 
@@ -150,7 +152,15 @@ def surface_row(surface: StandSurface, ring: Pose) -> dict[str, Any]:
     x, y = surface.place(ring)
     odds = dict(zip(("plane", "corner", "edge", "cylinder"), echo.probabilities, strict=True))
     return {
-        "kind": surface.kind, "x": x, "y": y, "bearing": echo.bearing, "range": echo.range_m,
-        "sigma_bearing": echo.sigma_bearing, "sigma_range": echo.sigma_range_m, "probabilities": odds,
-        "radius": None if math.isnan(echo.radius_m) else echo.radius_m, "misfit": echo.misfit, "paths": surface.paths,
-    }  # fmt: skip
+        "kind": surface.kind,
+        "x": x,
+        "y": y,
+        "bearing": echo.bearing,
+        "range": echo.range_m,
+        "sigma_bearing": echo.sigma_bearing,
+        "sigma_range": echo.sigma_range_m,
+        "probabilities": odds,
+        "radius": None if math.isnan(echo.radius_m) else echo.radius_m,
+        "misfit": echo.misfit,
+        "paths": surface.paths,
+    }

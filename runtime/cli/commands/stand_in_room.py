@@ -23,9 +23,16 @@ if TYPE_CHECKING:
 
 
 def locate_stand(
-    file: str, map_file: str, at_s: float | None, *, robot: str | None, json_file: str | None, force: bool,
-    units: Units, options: RingLogOptions = AUTO,
-) -> int:  # fmt: skip
+    file: str,
+    map_file: str,
+    at_s: float | None,
+    *,
+    robot: str | None,
+    json_file: str | None,
+    force: bool,
+    units: Units,
+    options: RingLogOptions = AUTO,
+) -> int:
     """Print where in a known room a robot may have stood, and return the exit code.
 
     Parameters

@@ -80,8 +80,10 @@ def sweep(
     processes = worker_processes(workers, scheduler)
     chosen = load_study(study)
     if (one := next((one for one in chosen.vary if one.range), None)) is not None:
-        raise UserError(f"{study}: {one.setting} has a range, in which `echolocate tune` searches: give values for a "
-                        "sweep", WRONG_CALL)  # fmt: skip
+        raise UserError(
+            f"{study}: {one.setting} has a range, in which `echolocate tune` searches: give values for a sweep",
+            WRONG_CALL,
+        )
     runs = expand(chosen, Path(study).parent)
     for module, package in PACKAGES:
         require_package(module, package, EXTRA)
@@ -95,9 +97,11 @@ def sweep(
     for file in (folder / "runs.parquet", folder / PAGE):
         output.print(str(file))
     if unfinished:
-        raise UserError(f"{len(unfinished)} of {len(runs)} runs ended without a result, the first: "
-                        f"{unfinished[0].reason}; {folder / PAGE} lists them; the same call tries them again",
-                        FAILED)  # fmt: skip
+        raise UserError(
+            f"{len(unfinished)} of {len(runs)} runs ended without a result, the first: "
+            f"{unfinished[0].reason}; {folder / PAGE} lists them; the same call tries them again",
+            FAILED,
+        )
     return DONE
 
 

@@ -23,7 +23,7 @@ from runtime.cli.commands.sweep import (
     keeping_what_is_done,
     sweep_folder,
     worker_processes,
-)  # fmt: skip
+)
 from runtime.cli.options import Count
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.file_lock import file_lock
@@ -110,16 +110,25 @@ def tune(
         write_results(name, chosen, present, tuned, folder, unfinished)
     say_results(tuned, present, folder)
     if unfinished:
-        raise UserError(f"{len(unfinished)} runs ended without a result, the first: {unfinished[0].reason}; the same "
-                        "call tries them again", FAILED)  # fmt: skip
+        raise UserError(
+            f"{len(unfinished)} runs ended without a result, the first: {unfinished[0].reason}; the same "
+            "call tries them again",
+            FAILED,
+        )
     return DONE
 
 
 @contextmanager
 def run_maker(
-    folder: Path, console: Console, total: int, unfinished: list[Unfinished], *,
-    scheduler: str | None, workers: int, retries: int,
-) -> Iterator[Make]:  # fmt: skip
+    folder: Path,
+    console: Console,
+    total: int,
+    unfinished: list[Unfinished],
+    *,
+    scheduler: str | None,
+    workers: int,
+    retries: int,
+) -> Iterator[Make]:
     """Yield the function that makes runs on workers, and keeps them in a folder.
 
     Parameters
@@ -170,9 +179,13 @@ def run_maker(
 
 
 def write_results(
-    name: str, study: StudyConfig, present: Mapping[str, Value], tuned: Tuned, folder: Path,
+    name: str,
+    study: StudyConfig,
+    present: Mapping[str, Value],
+    tuned: Tuned,
+    folder: Path,
     unfinished: Sequence[Unfinished],
-) -> None:  # fmt: skip
+) -> None:
     """Write the changes, the trials and the page.
 
     Parameters

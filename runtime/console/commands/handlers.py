@@ -40,11 +40,13 @@ from runtime.cycle.drive_requests import NO_MAP, DriveInput, Legs, needs_map, re
 from runtime.cycle.inputs import Request
 from runtime.cycle.velocity_limits import way_refused
 
-MISSION_EDITS: Final[Mapping[str, MissionEdit]] = MappingProxyType({
-    "hold_mission": MissionEdit("hold"),
-    "resume_mission": MissionEdit("resume"),
-    "skip_step": MissionEdit("skip"),
-})  # fmt: skip
+MISSION_EDITS: Final[Mapping[str, MissionEdit]] = MappingProxyType(
+    {
+        "hold_mission": MissionEdit("hold"),
+        "resume_mission": MissionEdit("resume"),
+        "skip_step": MissionEdit("skip"),
+    }
+)
 """What each command does to the mission under way."""
 GRID_PERIOD_S: Final = 0.5
 """Least time between two messages of the evidence grid that are made."""

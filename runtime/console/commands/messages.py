@@ -49,17 +49,19 @@ FrameName: TypeAlias = Annotated[Literal["odom", "map"], Field()]
 FileName: TypeAlias = Annotated[str, Field(min_length=1, max_length=300)]
 """Of a recording, as listed."""
 
-BOUNDS: Final[Mapping[str, Any]] = MappingProxyType({
-    "x": Coordinate,
-    "y": Coordinate,
-    "theta": Angle,
-    "object": Number,
-    "area": Number,
-    "numbers": Annotated[tuple[Number, ...], Field(min_length=1, max_length=SELECTION_MAX)],
-    "model": Annotated[str, Field(min_length=1, max_length=100)],
-    "v": Annotated[float, Field(ge=-10.0, le=10.0)],
-    "w": Annotated[float, Field(ge=-20.0, le=20.0)],
-})  # fmt: skip
+BOUNDS: Final[Mapping[str, Any]] = MappingProxyType(
+    {
+        "x": Coordinate,
+        "y": Coordinate,
+        "theta": Angle,
+        "object": Number,
+        "area": Number,
+        "numbers": Annotated[tuple[Number, ...], Field(min_length=1, max_length=SELECTION_MAX)],
+        "model": Annotated[str, Field(min_length=1, max_length=100)],
+        "v": Annotated[float, Field(ge=-10.0, le=10.0)],
+        "w": Annotated[float, Field(ge=-20.0, le=20.0)],
+    }
+)
 """Bounds of the arguments of edits and drive requests, by field name: m, rad, m/s, rad/s."""
 
 

@@ -22,9 +22,9 @@ from config.strict import description
 
 KINDS: Final = ((bool, "bool"), (int, "int"), (float, "float"), (str, "text"))
 """Plain types and their names on the wire; bool precedes int, of which it is a subclass."""
-UNITS: Final = MappingProxyType({
-    "_m_s": "m/s", "_rad_s": "rad/s", "_per_s": "1/s", "_deg": "°", "_rad": "rad", "_hz": "Hz", "_m": "m", "_s": "s"
-})  # fmt: skip
+UNITS: Final = MappingProxyType(
+    {"_m_s": "m/s", "_rad_s": "rad/s", "_per_s": "1/s", "_deg": "°", "_rad": "rad", "_hz": "Hz", "_m": "m", "_s": "s"}
+)
 """Units by the ending of a name; a longer ending precedes its own endings."""
 
 

@@ -54,9 +54,16 @@ class Job:
     def message(self) -> JobMessage:
         """Return what pages get of it."""
         return {
-            "type": "job", "job": self.number, "kind": self.kind, "file": self.file, "share": round(self.share, 3),
-            "what": self.what, "made": self.made, "error": self.error, "over": self.is_over,
-        }  # fmt: skip
+            "type": "job",
+            "job": self.number,
+            "kind": self.kind,
+            "file": self.file,
+            "share": round(self.share, 3),
+            "what": self.what,
+            "made": self.made,
+            "error": self.error,
+            "over": self.is_over,
+        }
 
 
 class Jobs:
@@ -149,15 +156,19 @@ class Jobs:
     async def _run(self, job: Job, path: Path, folder: Path) -> None:
         targets = [folder / f"{path.stem}{suffix}" for suffix in SUFFIXES[job.kind]]
         options = ("--out",) if job.kind == "report" else ("--out", "--grid", "", "--geojson")
-        words = [word for option, target in zip(options, targets, strict=True) if option
-                 for word in (option, str(target))]  # fmt: skip
+        words = [
+            word for option, target in zip(options, targets, strict=True) if option for word in (option, str(target))
+        ]
         more = ["--units", self._units] if job.kind == "report" else []
         process: asyncio.subprocess.Process | None = None
         try:
             process = await start_child(
-                self._program, [job.kind, str(path), *words, *more], pipes=False, low_priority=True,
+                self._program,
+                [job.kind, str(path), *words, *more],
+                pipes=False,
+                low_priority=True,
                 environment={PROGRESS_LINES: "1"},
-            )  # fmt: skip
+            )
             async with asyncio.timeout(JOB_MAX_S):
                 last = await self._follow(job, process)
                 await process.wait()

@@ -249,8 +249,15 @@ class FrameEncoder:
             case Goal(x=x, y=y, frame=frame, heading=heading):
                 at = None if place is None else (round(place.x, 4), round(place.y, 4))
                 is_done = drive_request.reached and (heading is None or drive_request.aligned)
-                return {"kind": "goal", "x": x, "y": y, "heading": heading, "frame": frame, "at": at,
-                        "reached": is_done}  # fmt: skip
+                return {
+                    "kind": "goal",
+                    "x": x,
+                    "y": y,
+                    "heading": heading,
+                    "frame": frame,
+                    "at": at,
+                    "reached": is_done,
+                }
             case Teleoperate(v=v, w=w):
                 return {"kind": "teleoperate", "v": v, "w": w}
             case Mission():
@@ -259,8 +266,10 @@ class FrameEncoder:
 
     def _whole(self) -> bytes:
         return b'"segments":%b,"archived":%b,"polylines":%b' % (
-            self._segments.whole(), self._archived.json, self._polylines.json,
-        )  # fmt: skip
+            self._segments.whole(),
+            self._archived.json,
+            self._polylines.json,
+        )
 
     def _encode_segments(self, state: State, *, may_wait: bool) -> bytes:
         """Return the changes of the map's segments; list them only if they may have changed and may not wait."""

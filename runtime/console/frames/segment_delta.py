@@ -57,8 +57,9 @@ class SegmentDelta:
         """Return all segments of the last frame as JSON."""
         if self._whole is None:
             self._whole = b'{"added":%b,"removed":[],"pinned":%b,"whole":true}' % (
-                _encode_rows(self._numbers, self._rows), self._pinned
-            )  # fmt: skip
+                _encode_rows(self._numbers, self._rows),
+                self._pinned,
+            )
         return self._whole
 
     def _changes(self, added: bytes, removed: bytes) -> bytes:

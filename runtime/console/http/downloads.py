@@ -15,10 +15,15 @@ from aiohttp import web
 PIECE_BYTES: Final = 64 * 1024
 REST_S: Final = 0.002
 """Pause after each piece: about 30 MB/s, and the loop has most of the time for other work."""
-TYPES: Final[Mapping[str, str]] = MappingProxyType({
-    ".html": "text/html; charset=utf-8", ".toml": "application/toml", ".yaml": "application/yaml",
-    ".geojson": "application/geo+json", ".pgm": "image/x-portable-graymap",
-})  # fmt: skip
+TYPES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        ".html": "text/html; charset=utf-8",
+        ".toml": "application/toml",
+        ".yaml": "application/yaml",
+        ".geojson": "application/geo+json",
+        ".pgm": "image/x-portable-graymap",
+    }
+)
 OTHER_TYPE: Final = "application/octet-stream"
 
 

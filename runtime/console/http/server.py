@@ -228,9 +228,12 @@ class Server:
         if not self._joins.take(context.clock()):
             return self._refuse(request, HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are opened at a time")
         websocket = web.WebSocketResponse(
-            compress=False, max_msg_size=context.limits.message_bytes + 1, writer_limit=1, timeout=CLOSE_MAX_S,
+            compress=False,
+            max_msg_size=context.limits.message_bytes + 1,
+            writer_limit=1,
+            timeout=CLOSE_MAX_S,
             autoping=False,
-        )  # fmt: skip
+        )
         await websocket.prepare(request)
         transport = request.transport
         if transport is None or self._is_closing:

@@ -180,8 +180,18 @@ class ReplayClient:
             for one in found
         ]
         if current is not None and not any(row["live"] for row in rows):
-            rows.insert(0, {"file": current, "bytes": None, "modified_s": None, "duration_s": None, "state": "live",
-                            "pinned": False, "live": True})  # fmt: skip
+            rows.insert(
+                0,
+                {
+                    "file": current,
+                    "bytes": None,
+                    "modified_s": None,
+                    "duration_s": None,
+                    "state": "live",
+                    "pinned": False,
+                    "live": True,
+                },
+            )
         return rows
 
     async def open(self, viewer: Viewer, file: str) -> OpenedRecording:

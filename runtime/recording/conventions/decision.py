@@ -88,9 +88,11 @@ class Conventions:
         theta, yaw = rule.angles(unit * np.array([firing.pose.theta, firing.ring_yaw])).tolist()
         return Firing(
             firing.robot_s * TIMES[self.units.time],
-            Pose(firing.pose.x * length, rule.hand * firing.pose.y * length, theta), yaw,
-            ranges if self.columns is None else ranges[self.columns], heard,
-        )  # fmt: skip
+            Pose(firing.pose.x * length, rule.hand * firing.pose.y * length, theta),
+            yaw,
+            ranges if self.columns is None else ranges[self.columns],
+            heard,
+        )
 
 
 def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Conventions:
@@ -130,10 +132,13 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if is_latched:
         table = table._replace(ranges=_without_repeats(table.ranges))
         if options.latched == "auto":
-            said.append((
-                f"each value is repeated, for {period:g} rows mostly, until its sensor fires again: only changes are "
-                "readings", "--latched yes, or no if all are fresh",
-            ))  # fmt: skip
+            said.append(
+                (
+                    f"each value is repeated, for {period:g} rows mostly, until its sensor fires again: only changes "
+                    "are readings",
+                    "--latched yes, or no if all are fresh",
+                )
+            )
     motion, is_related = motion_scores(table, options)
     likely = max(motion, key=motion.__getitem__)
     units, scores = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
@@ -199,9 +204,14 @@ def _ratios(table: Table, robot: RobotConfig, likely: Angles) -> Floats:
 
 
 def _find_angles(
-    table: Table, robot: RobotConfig, options: RingLogOptions, units: Units, motion: dict[Angles, float], *,
+    table: Table,
+    robot: RobotConfig,
+    options: RingLogOptions,
+    units: Units,
+    motion: dict[Angles, float],
+    *,
     is_related: bool,
-) -> Angles:  # fmt: skip
+) -> Angles:
     """Return how headings are counted: the form's own way unless motion or ranges contradict it."""
     if len(motion) == 1:
         return next(iter(motion))

@@ -120,9 +120,14 @@ def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, f
 
 
 def echo_scores(
-    table: Table, robot: RobotConfig, choices: list[Angles], mounts_per_unit: float, length_per_range: float,
-    kernel_m: float = KERNEL_M, echoes: int = ECHOES,
-) -> dict[Angles, Floats]:  # fmt: skip
+    table: Table,
+    robot: RobotConfig,
+    choices: list[Angles],
+    mounts_per_unit: float,
+    length_per_range: float,
+    kernel_m: float = KERNEL_M,
+    echoes: int = ECHOES,
+) -> dict[Angles, Floats]:
     """Return how well earlier echoes explain later ones under each convention, in blocks of time.
 
     Parameters

@@ -9,10 +9,24 @@ from typing import Final, Literal, TypeAlias
 from config.errors import WRONG_CALL, UserError
 
 Heading: TypeAlias = Literal[
-    "auto", "ccw", "cw", "north-cw", "north-ccw", "y-down", "left-handed", "west-ccw", "west-cw", "south-ccw",
-    "south-cw", "y-down-north-ccw", "y-down-north-cw", "y-down-west-ccw", "y-down-west-cw", "y-down-south-ccw",
+    "auto",
+    "ccw",
+    "cw",
+    "north-cw",
+    "north-ccw",
+    "y-down",
+    "left-handed",
+    "west-ccw",
+    "west-cw",
+    "south-ccw",
+    "south-cw",
+    "y-down-north-ccw",
+    "y-down-north-cw",
+    "y-down-west-ccw",
+    "y-down-west-cw",
+    "y-down-south-ccw",
     "y-down-south-cw",
-]  # fmt: skip
+]
 AngleUnit: TypeAlias = Literal["auto", "rad", "deg"]
 TimeUnit: TypeAlias = Literal["auto", "s", "ms", "us", "ns"]
 LengthUnit: TypeAlias = Literal["auto", "m", "cm", "mm", "in", "ft"]

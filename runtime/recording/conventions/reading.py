@@ -56,9 +56,14 @@ def open_ring_log(
 
 
 def converted_firings(
-    rows: Iterable[Firing], path: Path, robot: RobotConfig, options: RingLogOptions, warn: Callable[[str], None], *,
+    rows: Iterable[Firing],
+    path: Path,
+    robot: RobotConfig,
+    options: RingLogOptions,
+    warn: Callable[[str], None],
+    *,
     first: int = FIRST,
-) -> Iterator[Firing]:  # fmt: skip
+) -> Iterator[Firing]:
     """Yield firings converted to the form's own conventions.
 
     Parameters
@@ -102,9 +107,13 @@ def _found_words(path: Path, found: Conventions) -> str:
 
 
 def _confirmed(
-    rows: Iterator[Firing], first: list[Firing], found: Conventions, path: Path, robot: RobotConfig,
+    rows: Iterator[Firing],
+    first: list[Firing],
+    found: Conventions,
+    path: Path,
+    robot: RobotConfig,
     options: RingLogOptions,
-) -> Iterator[Firing]:  # fmt: skip
+) -> Iterator[Firing]:
     """Yield later rows; raise an error if the rows until then show other conventions than the first ones."""
     seen, due = list(first), 2 * len(first)
     for row in rows:
@@ -138,9 +147,10 @@ def _changes(firings: Iterable[Firing], ring: RingConfig, cycle_s: float) -> Ite
             back = 0.5 * max(0.0, min(dt, cycle_s) - step_s) / dt if dt > 0.0 else 0.0
             here, was = firing.pose, last.pose
             pose = Pose(
-                here.x + back * (was.x - here.x), here.y + back * (was.y - here.y),
+                here.x + back * (was.x - here.x),
+                here.y + back * (was.y - here.y),
                 here.theta + back * wrap_angle(was.theta - here.theta),
-            )  # fmt: skip
+            )
             ring_yaw = firing.ring_yaw + back * wrap_angle(last.ring_yaw - firing.ring_yaw)
             fresh = replace(fresh, pose=pose, ring_yaw=ring_yaw)
         last = firing

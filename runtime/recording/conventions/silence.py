@@ -176,9 +176,12 @@ def _one_value(value: float, finite: Floats) -> Silence:
     is_top = value > 0.0 and float(np.count_nonzero(finite > value)) < GLITCHES * len(finite)
     # Ranges above a greatest value are glitches: they stay what they are.
     return Silence(
-        value, value, is_top=is_top, option=f"{value:.10g}",
+        value,
+        value,
+        is_top=is_top,
+        option=f"{value:.10g}",
         words=f"{100 * share:.0f} % of the ranges are exactly {value:g}, which is taken for silence (inf)",
-    )  # fmt: skip
+    )
 
 
 def _top(finite: Floats) -> Silence | None:

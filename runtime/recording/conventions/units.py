@@ -94,17 +94,24 @@ def find_units(
     choices = [
         Units(t, length, range_)
         for t, length, range_ in itertools.product(
-            _choice(options.time_unit, TIMES), _choice(options.length_unit, LENGTHS),
+            _choice(options.time_unit, TIMES),
+            _choice(options.length_unit, LENGTHS),
             _choice(options.range_unit, LENGTHS),
         )
-    ]  # fmt: skip
+    ]
     if len(choices) == 1:
         return choices[0], {choices[0]: 0.0}
     facts = _Facts.of(table, silence, angle)
     scores = {units: _score(units, facts, robot, ratios) for units in choices}
     best = max(scores, key=scores.__getitem__)
-    default = Units(*(given if given != "auto" else plain for given, plain in zip(
-        (options.time_unit, options.length_unit, options.range_unit), Units(), strict=True)))  # fmt: skip
+    default = Units(
+        *(
+            given if given != "auto" else plain
+            for given, plain in zip(
+                (options.time_unit, options.length_unit, options.range_unit), Units(), strict=True
+            )
+        )
+    )
     if options.angle_unit == "auto" and facts.rate > TURNS_FAST * robot.body.turn_max_rad_s * TIMES[best.time]:
         raise RingLogError(f"{_impossible(facts, robot)}: say --angle-unit deg if it is in degrees")
     if scores[default] > scores[best] - SURE_NAT:

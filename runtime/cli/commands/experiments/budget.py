@@ -40,10 +40,9 @@ def run_budgets(common: Experiment, budgets_ms: Sequence[float], quanta: Sequenc
     from runtime.timing.refinement_budget import CpuTimeBudget, QuantumBudget
 
     settings = long_hall_settings(settings)
-    budgets: list[tuple[float, Callable[[], RefinementBudget]]] = (
-        [(most, partial(QuantumBudget, most)) for most in quanta]
-        or [(most, partial(CpuTimeBudget, 1e-3 * most)) for most in budgets_ms]
-    )  # fmt: skip
+    budgets: list[tuple[float, Callable[[], RefinementBudget]]] = [
+        (most, partial(QuantumBudget, most)) for most in quanta
+    ] or [(most, partial(CpuTimeBudget, 1e-3 * most)) for most in budgets_ms]
     # The first drive pays for what is allocated and loaded on first use.
     drive(settings, 0, lambda: QuantumBudget(1), (0,))
     rows = []

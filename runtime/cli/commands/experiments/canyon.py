@@ -21,14 +21,16 @@ if TYPE_CHECKING:
 
 REFLECTIONS: Final[tuple[Literal["specular", "cone"], ...]] = ("specular", "cone")
 _REACTIVE: Final = ("behaviors.follow_valley.follow_valley_gain=0", "behaviors.leave_canyon.leave_canyon_gain=0")
-SCHEMAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({
-    "leave-canyon": (),
-    "follow-valley": ("behaviors.leave_canyon.leave_canyon_gain=0",),
-    "move-to-goal": _REACTIVE,
-    "… and avoid-past": (*_REACTIVE, "behaviors.avoid_past.avoid_past_gain=1"),
-    "… and noise": (*_REACTIVE, "behaviors.noise.noise_gain=0.5"),
-    "… and swirl": (*_REACTIVE, "behaviors.swirl.swirl_gain=1"),
-})  # fmt: skip
+SCHEMAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "leave-canyon": (),
+        "follow-valley": ("behaviors.leave_canyon.leave_canyon_gain=0",),
+        "move-to-goal": _REACTIVE,
+        "… and avoid-past": (*_REACTIVE, "behaviors.avoid_past.avoid_past_gain=1"),
+        "… and noise": (*_REACTIVE, "behaviors.noise.noise_gain=0.5"),
+        "… and swirl": (*_REACTIVE, "behaviors.swirl.swirl_gain=1"),
+    }
+)
 """The sets of schemas, each beside avoid-static-obstacle, and the settings that make them."""
 
 
@@ -60,9 +62,14 @@ def run_canyons(common: Experiment) -> int:
     for row in rows:
         way = "–" if row["way"] is None else f"{row['way']:.2f}"
         table.add_row(
-            row["schemas"], row["reflection"], f"{row['escaped']}/{row['worlds']}",
-            f"{row['turned']}/{row['deep']}", f"{row['turned_heard']}/{row['heard']}",
-            str(row["entered_again"]), str(row["contacts"]), way,
-        )  # fmt: skip
+            row["schemas"],
+            row["reflection"],
+            f"{row['escaped']}/{row['worlds']}",
+            f"{row['turned']}/{row['deep']}",
+            f"{row['turned_heard']}/{row['heard']}",
+            str(row["entered_again"]),
+            str(row["contacts"]),
+            way,
+        )
     EscapingConsole().print(table)
     return DONE

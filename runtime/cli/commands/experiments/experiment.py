@@ -100,8 +100,9 @@ def experiment(
     if seeds < 1:
         raise UserError(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
     if scene is not None and out is not None:
-        raise UserError("--scene gives perception readings without a run: there is nothing to record in --out",
-                        WRONG_CALL)  # fmt: skip
+        raise UserError(
+            "--scene gives perception readings without a run: there is nothing to record in --out", WRONG_CALL
+        )
     if name == "budget":
         from runtime.cli.commands.experiments.budget import run_budgets
 
@@ -112,15 +113,19 @@ def experiment(
         from runtime.cli.commands.experiments.drift import run_drift
 
         if scene is not None or world is not None or out is not None:
-            raise UserError("experiment drift has a hall of its own and records nothing: leave out --scene, --world "
-                            "and --out", WRONG_CALL)  # fmt: skip
+            raise UserError(
+                "experiment drift has a hall of its own and records nothing: leave out --scene, --world and --out",
+                WRONG_CALL,
+            )
         return run_drift(common)
     if name == "canyon":
         from runtime.cli.commands.experiments.canyon import run_canyons
 
         if scene is not None or world is not None or out is not None:
-            raise UserError("experiment canyon has worlds of its own and records nothing: leave out --scene, --world "
-                            "and --out", WRONG_CALL)  # fmt: skip
+            raise UserError(
+                "experiment canyon has worlds of its own and records nothing: leave out --scene, --world and --out",
+                WRONG_CALL,
+            )
         return run_canyons(common)
     if scene is not None:
         if name != "hallway" or world is not None:

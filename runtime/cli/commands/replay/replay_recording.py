@@ -97,8 +97,9 @@ def replay_recording(
         ("--from, --to, --speed", is_part),
     ):
         if is_given and has_other_settings:
-            raise UserError(f"{option}: for the recorded settings only: leave out --with, --set, --model, --robot",
-                            WRONG_CALL)  # fmt: skip
+            raise UserError(
+                f"{option}: for the recorded settings only: leave out --with, --set, --model, --robot", WRONG_CALL
+            )
     console = plain_console(stderr=True)
     with open_recording(Path(log)) as recording:
         if has_other_settings:

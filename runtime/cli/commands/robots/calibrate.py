@@ -125,10 +125,16 @@ def sensors_table(settings: Settings, found: Calibration) -> Table:
         x, y, angle = found.mounts[i].tolist()
         sigma = math.degrees(found.angle_sigmas_rad[i])
         table.add_row(
-            str(i), str(found.readings[i]), f"{1e3 * x:.1f}", f"{1e3 * y:.1f}",
-            _shown(1e3 * found.place_sigmas_m[i], 1), f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}",
-            f"{math.degrees(angle):.2f}", _shown(sigma, 2), f"{math.degrees(angle - nominal.angle_rad):+.2f}",
-        )  # fmt: skip
+            str(i),
+            str(found.readings[i]),
+            f"{1e3 * x:.1f}",
+            f"{1e3 * y:.1f}",
+            _shown(1e3 * found.place_sigmas_m[i], 1),
+            f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}",
+            f"{math.degrees(angle):.2f}",
+            _shown(sigma, 2),
+            f"{math.degrees(angle - nominal.angle_rad):+.2f}",
+        )
     return table
 
 

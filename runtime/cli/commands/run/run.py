@@ -146,9 +146,11 @@ def run(
     own_files = {"--record": record, "--json": json}
     restart = Restart(restart_refusal({**own_files, "--trace": trace}, force=force, was_chosen=was_chosen))
     check_outputs(
-        {**own_files, "--trace": trace}, (faults, port), force=force,
+        {**own_files, "--trace": trace},
+        (faults, port),
+        force=force,
         appended={"log.file": log_path(settings.log)},
-    )  # fmt: skip
+    )
     log_status = LogStatus()
     with contextlib.ExitStack() as stack:
         for option, path in own_files.items():
@@ -211,12 +213,23 @@ def run(
                     run_settings, control = with_port(settings, emulated.port), emulated.control
                     line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
                 summary = await run_process(
-                    run_settings, log, clock=clock, control=control, view=view, units=units,
-                    recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
-                    foxglove=foxglove, restart=restart, emulated=port is None, preparation=preparation,
+                    run_settings,
+                    log,
+                    clock=clock,
+                    control=control,
+                    view=view,
+                    units=units,
+                    recording=recording,
+                    log_status=log_status,
+                    arm=arm or port is None,
+                    seconds=seconds,
+                    foxglove=foxglove,
+                    restart=restart,
+                    emulated=port is None,
+                    preparation=preparation,
                     line_messages=line_messages,
                     reload=lambda: files.read_again(port_option, None if port else run_settings.link.port),
-                )  # fmt: skip
+                )
                 return summary, recording
 
         summary, recording = asyncio.run(whole_run())

@@ -107,9 +107,14 @@ async def run_process(
 
         observers = recording.observers(on_cycle, log)
         process = RobotProcess(
-            settings, log, observers, clock, stack.enter_context(SdNotifier.from_environment()), preparation,
+            settings,
+            log,
+            observers,
+            clock,
+            stack.enter_context(SdNotifier.from_environment()),
+            preparation,
             line_messages,
-        )  # fmt: skip
+        )
         if view is not None:
             listeners.append(after_each_cycle(process.timing_monitor.timed(VIEW, view.on_cycle)))
         if preparation is not None:
@@ -131,10 +136,18 @@ async def run_process(
 
             page = await stack.enter_async_context(
                 serve_console(
-                    process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units,
-                    reload=reload, restart=restart,
+                    process,
+                    settings,
+                    log,
+                    kernel_loader,
+                    recording,
+                    control,
+                    emulated=emulated,
+                    units=units,
+                    reload=reload,
+                    restart=restart,
                 )
-            )  # fmt: skip
+            )
             log_status.listeners.append(page.hub.on_log)
             stack.callback(log_status.listeners.remove, page.hub.on_log)
             listeners.append(page.on_cycle)

@@ -78,10 +78,17 @@ async def serve_console(
     folder, jobs = recordings_folder(settings.recording), Jobs(units)
     replays = ReplayClient(folder, REPLAY_PROGRAM, current_file)
     console = Console(
-        process, log, prepare, emulated=emulated, units=units, time=control, recording=recording, replay=replays,
+        process,
+        log,
+        prepare,
+        emulated=emulated,
+        units=units,
+        time=control,
+        recording=recording,
+        replay=replays,
         files=RecordingFiles(folder, current_file, jobs),
         settings_files=SettingsFiles(documents_read(), reload, end_and_restart),
-    )  # fmt: skip
+    )
     try:
         async with console.open():
             yield console
