@@ -45,6 +45,8 @@ RESTORED: Final = "the line to the robot was lost and is back: check where the r
 STARTING: Final = "it is being connected again"
 
 HALTED: Final = "halted by the operator; re-arm to continue"
+UNCONFIRMED: Final = f"{WAITING}HALT not confirmed: use the robot's own stop; "
+"""Begins that reason where an operator halted a base that has not answered since."""
 DISARMED: Final = "disarmed by the operator; re-arm to continue"
 HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
 
@@ -165,7 +167,7 @@ def advance(
         return replace(state, arming_run_s=None) if is_known else state.enter(Mode.SAFE_STOP, run_s, fault)
     if inputs.line is not LineState.READY:
         if state.mode is Mode.SAFE_STOP:
-            return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs))
+            return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs, flags))
         lost = LINE_REASONS[inputs.line] if state.mode is Mode.READY else None
         return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem or lost, arming_run_s=None)
     if state.mode is Mode.SAFE_STOP and state.reason is not None and state.reason.startswith(WAITING):
@@ -178,11 +180,14 @@ def advance(
     return _advance_arming(state, inputs, flags, gap_s, clock)
 
 
-def _why_waiting(reason: str | None, inputs: Inputs) -> str:
+def _why_waiting(reason: str | None, inputs: Inputs, flags: Flags) -> str:
     """Return the reason of a SAFE_STOP on a line that is not READY: the newest that is known of it."""
+    known = reason or ""
+    is_unconfirmed = known.startswith((HALTED, UNCONFIRMED)) and not flags & Flags.LATCHED
+    begin = UNCONFIRMED if is_unconfirmed else WAITING
     if inputs.line_problem is not None or inputs.line is not LineState.HANDSHAKE:
-        return WAITING + (inputs.line_problem or LINE_REASONS[inputs.line])
-    return reason if reason is not None and reason.startswith(WAITING) else WAITING + STARTING
+        return begin + (inputs.line_problem or LINE_REASONS[inputs.line])
+    return known if known.startswith(begin) else begin + STARTING
 
 
 def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> str | None:

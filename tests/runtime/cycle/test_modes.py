@@ -298,3 +298,13 @@ def test_the_reason_of_a_stop_follows_the_line_and_says_when_it_is_back() -> Non
     assert "is back" in said[4]
     assert said[5] == said[4]
     assert advance_by(state, ARM).arming_run_s is not None
+
+
+def test_a_halt_that_a_silent_base_never_confirmed_says_so_until_it_is_confirmed() -> None:
+    halted, silent = advance_by(DRIVE, HALT), line(LineState.DOWN, "no answer")
+    unheard = advance_by(advance_by(halted, silent), silent)
+    assert unheard.reason == "waiting for the robot: HALT not confirmed: use the robot's own stop; no answer"
+    again = advance_by(unheard, replace(silent, line=LineState.HANDSHAKE, trouble=None))
+    assert again.reason == unheard.reason
+    assert advance_by(again, replace(silent, flags=Flags.LATCHED)).reason == "waiting for the robot: no answer"
+    assert advance_by(halted, replace(silent, flags=Flags.LATCHED)).reason == "waiting for the robot: no answer"
