@@ -27,6 +27,8 @@ ELSEWHERE: Final = (
 PASSES: Final = 5000
 """How often a line is executed until the probes of all lines seen so far are removed. A probe costs 0.1 µs each time,
 removing them costs 0.1 s, because every function of the product is looked at."""
+COMPILER: Final = ROOT / "perception" / "kernel_compiler.py"
+"""Its byte code is part of each kernel's name in the cache: with probes in it, no run would find a kernel there."""
 KERNEL: Final = re.compile(r"^@(owning_)?kernel$", re.MULTILINE)
 
 
@@ -42,7 +44,7 @@ class MeasuredFiles:
         path = Path(file or "")
         if path.suffix != ".py" or not any(map(path.is_relative_to, self._folders)):
             return False
-        return self._with_kernels or KERNEL.search(path.read_text("utf-8")) is None
+        return self._with_kernels or (path != COMPILER and KERNEL.search(path.read_text("utf-8")) is None)
 
 
 class LineCoverage:

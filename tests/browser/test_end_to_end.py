@@ -48,9 +48,10 @@ async def drive_backwards(robot: Run, opened: Opened) -> None:
     end_s = time.monotonic() + TIMEOUT_S
     while True:
         await drives(robot, opened, "run.state.mode === 'DRIVE'", "DRIVE")
+        pressed = robot.truth.read()[-1]
         await press_pad(opened, 0.0, -0.6)
         while await opened.world("teleoperation.holding"):
-            if robot.truth.read()[-1].v < BACKWARDS_M_S:
+            if any(row.v < BACKWARDS_M_S for row in robot.truth.since(pressed.t_s)):
                 return
             assert time.monotonic() < end_s, "the base never drove backwards"
             await asyncio.sleep(0.01)

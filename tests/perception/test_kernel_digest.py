@@ -10,9 +10,11 @@ from typing import Any, Final
 
 import pytest
 
-from perception import kernel_compiler
+from perception import kernel_compiler, kernel_digest
+from perception.bayes.tracks import refine
 from perception.kernel_digest import KernelDigests, tools_digest
 from runtime.support.child_process import child_environment
+from tests.line_coverage import MeasuredFiles
 
 pytestmark = pytest.mark.compiled
 
@@ -148,3 +150,11 @@ def test_a_program_that_names_no_folder_leaves_no_kernels_where_it_runs(tmp_path
     assert list(tmp_path.glob("*.nbc")) == []
     again = subprocess.run(command, env=environment, cwd=tmp_path, check=True, capture_output=True, text=True)
     assert again.stdout.split() == ["8.5", "1"]
+
+
+def test_no_code_that_digests_cover_has_probes_of_line_coverage() -> None:
+    """Else a run that measures lines would find no kernel in the cache, and compile all of them."""
+    measured = MeasuredFiles(with_kernels=False)
+    assert measured.matches(kernel_digest.__file__)
+    assert not measured.matches(kernel_compiler.__file__)
+    assert not measured.matches(refine.__file__)
