@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
 
+from drivers.emulator import _jit
 from drivers.emulator._jit import kernel
+from tests.hil.machine import TIMEOUT_S
+
+EMULATED = """
+import sys
+import drivers.emulator.server
+from config.load import load_settings
+from drivers.registry import make_device
+
+settings = load_settings(None)
+make_device(settings, settings.world, seed=0).advance(0.5)
+print(sorted({"numba", "llvmlite"} & sys.modules.keys()))
+"""
 
 
 @kernel
@@ -33,6 +49,7 @@ def test_without_a_writable_cache_it_is_compiled_without_one(monkeypatch: pytest
             raise RuntimeError("cannot cache function: no locator available")
         return functions[0]
 
+    monkeypatch.setattr(_jit, "INTERPRETED", False)
     monkeypatch.setattr(numba, "njit", njit)
     assert kernel(len) is len
     assert asked == [{"cache": True}, {}]
@@ -42,6 +59,16 @@ def test_any_other_error_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def njit(**_options: Any) -> Any:
         raise RuntimeError("something else")
 
+    monkeypatch.setattr(_jit, "INTERPRETED", False)
     monkeypatch.setattr(numba, "njit", njit)
     with pytest.raises(RuntimeError, match="something else"):
         kernel(len)
+
+
+def test_without_a_compiler_an_emulator_does_not_import_numba() -> None:
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    run = subprocess.run(
+        [sys.executable, "-c", EMULATED], env=environment, capture_output=True, text=True, timeout=TIMEOUT_S,
+        check=False,
+    )  # fmt: skip
+    assert run.stdout.strip() == "[]", run.stderr
