@@ -50,8 +50,8 @@ from runtime.cycle.step import CycleRecord, State
 NO_LINK_COUNTS: Final = LinkCounts()
 NO_ECHO: Final = -1.0
 """The wire's form of an infinite range, for which JSON has no number."""
-SEGMENTS_EVERY: Final = 2
-"""While the robot runs, every so many frames show the map's new segments and clusters: half of a frame's cost."""
+TURNS: Final = 2
+"""While the robot runs, frames list in turns what costs the most: new segments and clusters, then objects."""
 
 
 class RecordingStatus(NamedTuple):
@@ -139,6 +139,7 @@ class FrameEncoder:
         self._mission = MissionRows()
         self._clusters = ClusterView(settings.perception)
         self._cluster_boxes: list[list[float]] = []
+        self._objects: list[ObjectRow] = []
         self._segment_counts: tuple[int, int] | None = None
         self._is_stale = True
         self._number = 0
@@ -177,7 +178,10 @@ class FrameEncoder:
         """
         self._number += 1
         is_moving = not context.is_paused and context.playback is None
-        segments = self._encode_segments(state, may_wait=is_moving and self._number % SEGMENTS_EVERY > 0)
+        turn, must_list = self._number % TURNS, self._is_stale or not is_moving
+        segments = self._encode_segments(state, may_wait=is_moving and turn > 0)
+        if must_list or turn > 0:
+            self._objects = [_object(detected) for detected in state.perception.labelled_objects()]
         odometry = state.odometry
         robot_s = 0.0 if odometry is None else odometry.robot_s
         link, phases_s, late_s = context.link, context.phases_s, context.late_s
@@ -196,7 +200,7 @@ class FrameEncoder:
             "age": _json_numbers([robot_s - fired_s for fired_s in self._fired_s], 3),
             "cross_paths": self._cross_paths.rows(),
             "clusters": self._cluster_boxes,
-            "objects": [_object(detected) for detected in state.perception.labelled_objects()],
+            "objects": self._objects,
             "areas": [(a.number, round(a.x, 3), round(a.y, 3), a.radius) for a in state.perception.vacant_areas()],
             "canyons": [_canyon(canyon) for canyon in state.perception.canyons()],
             "vectors": [(r.schema, round(r.x, 4), round(r.y, 4)) for r in state.vectors],

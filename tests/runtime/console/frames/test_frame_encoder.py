@@ -17,11 +17,12 @@ from config.load import load_settings
 from drivers.driver import LineState, Received
 from drivers.messages import CrossPaths, Firing, Pose
 from perception.detected_object import DetectedObject
+from perception.edits import PlaceModel
 from perception.localization.drift.drift_correction import SeenObject
 from perception.localization.map_frame import MapFrame
 from perception.percept import Canyon
 from perception.pipeline import Perception
-from runtime.console.frames.frame_encoder import SEGMENTS_EVERY, FrameContext, FrameEncoder, _canyon, _object
+from runtime.console.frames.frame_encoder import TURNS, FrameContext, FrameEncoder, _canyon, _object
 from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.step import Inputs, State
 from tests.polylines import report_bend
@@ -156,8 +157,26 @@ async def test_new_segments_come_with_every_second_frame() -> None:
             case.cycles()
             frame = await page.next("state")
             if frame["segments"]["added"]:
-                with_segments.add(k % SEGMENTS_EVERY)
-        assert with_segments == {SEGMENTS_EVERY - 1}
+                with_segments.add(k % TURNS)
+        assert with_segments == {TURNS - 1}
+
+
+def test_objects_are_listed_in_turns_with_segments_and_at_once_when_edited_or_paused() -> None:
+    settings = load_settings("hallway", ["perception.method=paper"])
+    state = State(Perception(settings.ring, settings.models, settings.perception))
+    encoder = FrameEncoder(settings)
+
+    def shown_after_one_more(*, is_edit: bool = False, is_paused: bool = False) -> int:
+        edit = PlaceModel(settings.models[0].name, float(len(state.perception.labelled_objects())), 0.0, 0.0)
+        state.perception.edit(edit)
+        inputs = Inputs(0.05, LineState.READY, None, Received((), None, rebooted=False), edits=(edit,) * is_edit)
+        encoder.take(SimpleNamespace(inputs=inputs))  # type: ignore[arg-type]
+        head = encoder.frame(state, None, FrameContext(0.0, is_paused=is_paused)).head
+        return len(orjson.loads(head + b"}")["objects"])
+
+    assert [shown_after_one_more() for _ in range(5)] == [1, 1, 3, 3, 5]
+    assert shown_after_one_more(is_edit=True) == 6
+    assert [shown_after_one_more(), shown_after_one_more(is_paused=True)] == [7, 8]
 
 
 async def test_the_way_to_a_goal_and_the_blocked_directions_are_shown() -> None:
