@@ -66,9 +66,9 @@ def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> Non
 @pytest.mark.parametrize(
     ("run", "robot", "seconds", "sets"),
     [
-        ("office", "denning", 48.0, ()),
-        ("room", "p3dx", 36.0, ("perception.grid.method=off",)),
-        ("room", "ears", 24.0, ("perception.grid.method=elfes",)),
+        ("office", "denning", 24.0, ()),
+        ("room", "p3dx", 24.0, ("perception.grid.method=off",)),
+        ("room", "ears", 12.0, ("perception.grid.method=elfes",)),
     ],
 )
 def test_no_keyframe_of_the_shipped_runs_is_refused(
