@@ -7,6 +7,7 @@ as a narrow band at the top.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -28,6 +29,10 @@ BAND: Final = 0.06
 """Half width of a noisy band, as a share of its value."""
 BAND_CONTRAST: Final = 5.0
 """How many times as dense as below it the ranges in the band are."""
+WIDTHS: Final = 4.5
+"""Half width within which a band is looked for, in its standard deviations; beyond it are 7 of a million values."""
+LEAST_SPREAD: Final = 1e-3 / WIDTHS
+"""Least standard deviation of a band, as a share of its value: for what is rounded."""
 RANGES_MIN: Final = 100
 LEAP: Final = 1.25
 """A leap is a range longer than those before and after it by this factor."""
@@ -190,7 +195,7 @@ def _top(finite: Floats) -> Silence | None:
     for _ in range(5):
         near = finite[np.abs(finite - centre) <= BAND * centre]
         centre = float(np.median(near))
-    width = max(4.5 * 1.4826 * float(np.median(np.abs(near - centre))), 1e-3 * centre)
+    width = WIDTHS * max(1.4826 * float(np.median(np.abs(near - centre))), LEAST_SPREAD * centre)
     if width > BAND * centre:
         return None
     inside = int(np.count_nonzero(np.abs(finite - centre) <= width))
@@ -198,7 +203,7 @@ def _top(finite: Floats) -> Silence | None:
     least = BAND_CONTRAST * (1 + below / 2.0)
     if inside < max(least, TOP_SHARE * len(finite), 10):
         return None
-    return _band(centre - width, centre + width, inside / len(finite))
+    return _band(finite, centre, width / WIDTHS, inside)
 
 
 def _spikes(ranges: Floats) -> Silence | None:
@@ -224,14 +229,35 @@ def _spikes(ranges: Floats) -> Silence | None:
     first = int((end - np.arange(len(leaps))).argmax())
     inside = leaps[first : end[first]]
     centre, spread = float(np.median(inside)), 1.4826 * float(np.median(np.abs(inside - np.median(inside))))
-    low, high = centre - max(4.5 * spread, 1e-3 * centre), centre + max(4.5 * spread, 1e-3 * centre)
-    above = np.count_nonzero(leaps > high)
+    spread = max(spread, LEAST_SPREAD * centre)
+    above = np.count_nonzero(leaps > centre + WIDTHS * spread)
     if len(inside) < max(LEAPS_MIN, LEAPS_SHARE * len(leaps)) or above > GLITCHES * ranges.size:
         return None
-    return _band(low, high, float(((finite >= low) & (finite <= high)).mean()))
+    return _band(finite, centre, spread, int(np.count_nonzero(np.abs(finite - centre) <= WIDTHS * spread)))
 
 
-def _band(low: float, high: float, share: float) -> Silence:
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    words = f"{100 * share:.0f} % of the ranges are {middle:.4g} ± {half:.2g} wherever the robot is"
+def _band(finite: Floats, centre: float, spread: float, count: int) -> Silence:
+    """Return the values near a centre that are likelier silence than ranges.
+
+    Silence is normally distributed; ranges are as dense there as they are beside it.
+
+    Parameters
+    ----------
+    finite : (n,) float
+        Ranges.
+    centre, spread : float
+        Mean and standard deviation of silence.
+    count : int
+        Values within `WIDTHS` standard deviations.
+    """
+    width = WIDTHS * spread
+    ends = []
+    for side in (-1.0, 1.0):
+        away = side * (finite - centre)
+        beside = np.count_nonzero((away > width) & (away <= 5.0 * width))
+        ratio = count / (math.sqrt(2.0 * math.pi) * spread) * 4.0 * width / max(int(beside), 1)
+        ends.append(centre + side * spread * min(WIDTHS, math.sqrt(2.0 * math.log(max(ratio, 1.0)))))
+    low, high = ends
+    share = np.count_nonzero((finite >= low) & (finite <= high)) / len(finite)
+    words = f"{100 * share:.0f} % of the ranges are {centre:.4g} ± {spread:.1g} wherever the robot is"
     return Silence(low, high, is_top=True, words=f"{words}, which is taken for silence (inf)", option="max")
