@@ -139,6 +139,13 @@ class LocalMapSearch:
         is_cell = numbers > 0
         return room["cells"][numbers[is_cell] - 1], np.cumsum(~is_cell)[is_cell]
 
+    def contradiction(self) -> str | None:
+        """Return what would take away from the cells what is not in them, None if nothing does."""
+        room = self.local[0]
+        if room["phase"] == CLEAR and room["entered"] > 0:
+            return f"local.entered is {room['entered']}, but its cells are being cleared"
+        return None
+
     def drop_caches(self) -> None:
         """Make the cells again after the memory was overwritten."""
         self._clear_counts()

@@ -165,7 +165,7 @@ def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float
         choose_nodes(room, counts, at, min(at + ORDERED, room.cell_count))
         advance(room, ORDERED, room.cell_count)
     elif room.phase == CLEAR:
-        clear_cells(counts, at, at + CLEARED)
+        clear_cells(counts, at, min(at + CLEARED, CELLS // BLOCK))
         if advance(room, CLEARED, CELLS // BLOCK):
             room.phase = IDLE
     else:

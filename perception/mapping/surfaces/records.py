@@ -20,14 +20,15 @@ from perception.mapping.surfaces.parameters import (
     PIECES_MAX,
     READINGS_MAX,
     SAMPLES,
+    SHARE_BITS,
     SHARES_A_WORD,
     SURFACE_CELLS_MAX,
 )
 from perception.records import Record, Records
 
 WORDS: Final = SAMPLES // SHARES_A_WORD
-ANY: Final = Bound(-(2**63), 2**63 - 1)
-"""Of shares packed into a word."""
+SHARES: Final = Bound(0, 2 ** (SHARES_A_WORD * SHARE_BITS) - 1)
+"""Of shares packed into a word; a further one would belong to no place on the arc."""
 Narrow = NDArray[np.int32]
 """Counts of all readings fit, and twice as many of them fit into the processor's caches."""
 BLOCK: Final = 16
@@ -54,7 +55,7 @@ class KeptReading(Record):
     """Its direction, rad."""
     range_m: Finite
     """10⁶ for silence."""
-    shares: Annotated[Ints, WORDS, ANY]
+    shares: Annotated[Ints, WORDS, SHARES]
     """Shares of the echo of the places on its arc, `SHARES_A_WORD` in each number."""
 
 
@@ -66,7 +67,7 @@ class SurfaceCell(Record):
     j: Annotated[int, up_to(CELLS - 1)]
     strength: Finite
     """Echoes that speak for it."""
-    owner: Annotated[int, Bound(NODE, PIECES_MAX)]
+    owner: Annotated[int, Bound(NODE, PIECES_MAX - 1)]
     """The piece that took it, `FREE` before."""
 
 
@@ -97,7 +98,7 @@ class EchoPoint(Record):
 
     x: Place
     y: Place
-    piece: Annotated[int, Bound(FREE, PIECES_MAX)]
+    piece: Annotated[int, Bound(FREE, PIECES_MAX - 1)]
 
 
 class LocalMap(Record):

@@ -21,6 +21,7 @@ from drivers.messages import Firing
 from perception.bayes.inference.kernel_settings import circle_models
 from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import RIVAL_RADII_M
+from perception.bounds import CONSTANT, bounds
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
@@ -48,6 +49,7 @@ class SurfaceMap(NoSurfaces):
     """
 
     SCRATCH: Final = ("_known", "_near", "_report", "_archived")
+    BOUNDS: Final = bounds(_mounts=CONSTANT)
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: SurfacesConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning

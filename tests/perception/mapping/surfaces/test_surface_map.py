@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -12,9 +13,10 @@ from config.settings import Settings
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject, wall_between
 from perception.mapping.no_surfaces import SurfaceReport
-from perception.mapping.surfaces.quantum import search_is_due
+from perception.mapping.surfaces.quantum import CLEAR, search_is_due
 from perception.mapping.surfaces.surface_map import SurfaceMap
 from perception.pipeline import Perception
+from perception.snapshot import bounds_of, numbers_of, put_back, snapshot_of
 
 pytestmark = pytest.mark.compiled
 
@@ -209,3 +211,56 @@ def test_nothing_is_mapped_in_a_run_unless_the_settings_say_so() -> None:
     assert made.polylines() == ()
     made.reset()
     assert made.surfaces.converged
+
+
+@pytest.fixture(scope="module")
+def moments() -> list[SurfaceMap]:
+    """Return a map in each phase of its work."""
+    settings = perception_settings()
+    surfaces, found = SurfaceMap(settings.ring, (), settings.perception.surfaces), dict[int, SurfaceMap]()
+    silent = np.full(SIDES, math.inf)
+    away = [Firing(20.0 + k, Pose(0.5 * k, 0.0, 0.0), 0.0, silent) for k in range(40)]
+    for firing in drive(100) + away:
+        surfaces.observe(firing)
+        while surfaces.can_refine:
+            phase = int(surfaces._search.local["phase"][0])
+            if phase not in found and surfaces._list.numbered > 0:
+                found[phase] = copy.deepcopy(surfaces)
+            surfaces.refine()
+    return list(found.values())
+
+
+def is_refused(surfaces: SurfaceMap, name: str, number: float, firings: list[Firing]) -> bool:
+    """Put a number everywhere into a field of a map's state, and go on; return whether that ends in an error."""
+    snapshot = snapshot_of(surfaces)
+    values = dict(numbers_of(snapshot))[name]
+    values[...] = number if values.dtype.kind == "f" else int(number)
+    settings = perception_settings()
+    other = SurfaceMap(settings.ring, (), settings.perception.surfaces)
+    try:
+        put_back(other, snapshot)
+        other.drop_caches()
+        for firing in firings:
+            while other.can_refine:
+                other.refine()
+            other.observe(firing)
+    except (ArithmeticError, LookupError, ValueError) as error:
+        if str(error) == "index is out of bounds":
+            raise
+        return True
+    return False
+
+
+@pytest.mark.boundscheck
+def test_each_number_has_a_bound_within_which_it_is_harmless(moments: list[SurfaceMap]) -> None:
+    """A state from a file may have any value within the bounds: no kernel leaves an array for it."""
+    assert len(moments) == CLEAR + 1
+    bounds, firings = bounds_of(moments[0]), drive(3, 160)
+    outcomes = [
+        is_refused(moment, name, number, firings)
+        for moment in moments
+        for name, values in numbers_of(snapshot_of(moment))
+        if values.dtype.kind != "b" and not bounds[name].constant
+        for number in bounds[name][:2]
+    ]
+    assert outcomes.count(True) < 0.1 * len(outcomes)
