@@ -31,23 +31,27 @@ class MemoryLine:
         The run's time at the robot's start.
     on_bytes
         Called with the direction as seen from the host, the run's time, and the bytes.
+    step_s
+        Time between exchanges, s.
     """
 
     def __init__(
-        self, driver: RobotDriver, robot: RobotDevice, start_s: float = 0.0, on_bytes: OnBytes | None = None
-    ) -> None:
+        self, driver: RobotDriver, robot: RobotDevice, start_s: float = 0.0, on_bytes: OnBytes | None = None,
+        step_s: float = STEP_S,
+    ) -> None:  # fmt: skip
         self._driver = driver
         self._robot = robot
         self._start_s = start_s
+        self._step_s = step_s
         self._on_bytes = on_bytes
         self._steps = 0
         self._open = False
 
     def exchange(self, run_s: float) -> None:
         """Move bytes both ways up to the run's time `run_s`; notify the driver when the line opens and closes."""
-        while (self._steps + 1) * STEP_S <= run_s - self._start_s:
+        while (self._steps + 1) * self._step_s <= run_s - self._start_s:
             self._steps += 1
-            self._exchange_at(self._steps * STEP_S)
+            self._exchange_at(self._steps * self._step_s)
         self._exchange_at(run_s - self._start_s)
 
     def _exchange_at(self, emulated_s: float) -> None:

@@ -14,7 +14,7 @@ from typing import Final
 
 from config.settings import Settings
 from config.world import WorldConfig
-from drivers.emulator.memory_transport import MemoryLine, OnBytes
+from drivers.emulator.memory_transport import STEP_S, MemoryLine, OnBytes
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import LinkCounts, Pose
 from drivers.registry import make_device, make_driver
@@ -67,6 +67,7 @@ def simulate(
     on_bytes: OnBytes | None = None,
     operator: Callable[[int, State], OperatorInput] | None = None,
     is_over: Callable[[State], bool] | None = None,
+    line_step_s: float = STEP_S,
 ) -> SimulationResult:
     """Drive through `world` until the leg is done, the robot stops or the time is up, and return the result.
 
@@ -97,11 +98,13 @@ def simulate(
         armed only by that input, and the run lasts for `seconds_max`.
     is_over : callable, optional
         Called with the state after each cycle; the run ends when it returns True.
+    line_step_s : float
+        Time between exchanges on the line, s.
     """
     refinement_budget = QuantumBudget(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
     robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
     driver = make_driver(settings)
-    line = MemoryLine(driver, robot, on_bytes=on_bytes)
+    line = MemoryLine(driver, robot, on_bytes=on_bytes, step_s=line_step_s)
     state = fresh_state(settings)
     start = robot.truth.pose
     began = time.perf_counter()

@@ -13,6 +13,7 @@ from bench.keyframes import (
     METHODS,
     PLACES,
     ROBOTS,
+    SURFACES,
     WORLDS,
     Adopted,
     adopt_all,
@@ -26,6 +27,7 @@ from config.errors import DONE
 from config.load import load_settings
 from perception.snapshot import bounds_of
 from runtime.cycle.preparation import fresh_state
+from runtime.recording.snapshot_bounds import check_snapshot
 
 pytestmark = pytest.mark.compiled
 
@@ -41,13 +43,27 @@ def check(found: Adopted, seconds: float, period_s: float) -> None:
 
 
 def test_any_two_values_meet_in_a_run() -> None:
-    factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS)
+    factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS, SURFACES)
     for (i, some), (j, others) in itertools.combinations(enumerate(factors), 2):
         assert {(row[i], row[j]) for row in ROWS} == set(itertools.product(some, others))
 
 
+def test_the_map_of_surfaces_meets_all_in_runs_that_keep_it() -> None:
+    kept = [row for row in ROWS if row.method == "bayes" and row.surfaces == "always"]
+    for i, values in enumerate((ROBOTS, ("bayes",), GRIDS, PLACES, WORLDS)):
+        assert {row[i] for row in kept} == set(values)
+
+
+def test_each_number_of_each_state_has_a_bound() -> None:
+    for run in ROWS:
+        settings = settings_of(run)
+        perception = fresh_state(settings).perception
+        snapshot = perception.snapshot()
+        check_snapshot(snapshot, snapshot, bounds_of(perception))
+
+
 def test_each_robot_drives_once_and_every_method_meets_every_grid() -> None:
-    factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS)
+    factors = (ROBOTS, METHODS, GRIDS, PLACES, WORLDS, SURFACES)
     assert tuple(run.robot for run in SHORT) == ROBOTS
     assert [set(column) for column in zip(*SHORT, strict=True)] == [set(values) for values in factors]
     assert {(run.method, run.grid) for run in SHORT} == set(itertools.product(METHODS, GRIDS))
