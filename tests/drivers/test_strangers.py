@@ -64,6 +64,8 @@ TEXTS = (
     b"\x1b[0;32mI (31) boot: ESP-IDF v4.4.1 2nd stage bootloader\x1b[0m\r\n",
     b"Traceback (most recent call last):\r\n  File \"main.py\", line 3\r\n>>> ",
     b"login: \r\n",
+    b"SSH-2.0-OpenSSH_9.2p1 Debian-2+deb12u2\r\n",
+    b"\xff\xfd\x18\xff\xfd\x20\xff\xfb\x01\r\nWelcome to the terminal server\r\n\r\nlogin: ",  # telnet
 )  # fmt: skip
 
 
@@ -77,6 +79,32 @@ def test_a_device_that_sends_text_is_quoted(text: bytes, name: str, port: str) -
     assert state is LineState.DOWN
     assert problem.isprintable()
     assert len(problem) < 400
+
+
+ANSWERS = (
+    b"ERROR\r\n",  # a modem
+    b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/html\r\n\r\n<html>Bad Request</html>",
+    b"?SYNTAX\r\n> ",
+)
+
+
+@pytest.mark.parametrize("port", ["/dev/ttyUSB0", "socket://robot:8101"])
+@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("answer", ANSWERS)
+def test_a_device_that_answers_in_text_is_named(answer: bytes, name: str, port: str) -> None:
+    """It says nothing until it is called, as a modem or a server of pages."""
+    said = said_of(lambda _at_s, sent: answer if sent else b"", robot_at(name, port))
+    assert any("a device sends text, as '" in text or "another device is on this port" in text for _, _, text in said)
+    assert said[0][0] <= NAMED_S
+    assert not any("nothing is received" in text for _, _, text in said)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("text", TEXTS[:2])
+def test_text_at_a_speed_that_is_never_tried_is_not_called_silence(text: bytes, name: str) -> None:
+    said = said_of(sketch(0.2, text), robot_at(name, "/dev/ttyUSB0"), baud=1200)
+    assert said[0][0] <= NAMED_S
+    assert not any("nothing is received" in problem for at_s, _, problem in said if at_s > 2.0)
 
 
 @pytest.mark.parametrize("name", FAMILIES)
