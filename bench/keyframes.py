@@ -24,7 +24,7 @@ from config.load import load_model, load_settings, with_known_room
 from config.mission import MissionConfig
 from config.settings import GridConfig, PerceptionConfig, Settings
 from drivers.messages import Pose
-from perception.bounds import PLACE, Bound
+from perception.bounds import COUNT, FINITE, PLACE, Bound
 from perception.snapshot import bounds_of, numbers_of
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
@@ -182,7 +182,7 @@ def adopt_all(settings: Settings, seed: int, seconds: float, period_s: float) ->
 
 def is_far(bound: Bound) -> bool:
     """Return whether a bound is only there to be out of reach."""
-    return bound.high >= PLACE.high and not bound.constant
+    return bound.high in {PLACE.high, COUNT.high, FINITE.high} and not bound.constant
 
 
 def shares_after(seconds: float, adopted: Adopted, settings: Settings) -> list[tuple[float, str]]:
