@@ -101,7 +101,7 @@ def test_a_refused_keyframe_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     bounds = bounds_of(fresh_state(settings).perception)
     narrow = {**bounds, name: bounds[name]._replace(high=3)}
     monkeypatch.setattr("runtime.recording.replayer.bounds_of", lambda _: narrow)
-    found = adopt_all(settings, 0, 2.0, 1.0)
+    found = adopt_all(settings, 0, 3.0, 1.0)
     assert len(found.refused) == 2
     assert name in found.refused[0]
 
