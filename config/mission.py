@@ -152,13 +152,18 @@ def _arrives(use: SchemaUse) -> bool:
     return not isinstance(use, MoveAheadUse) or use.distance_m is not None
 
 
-def _problems(steps: tuple[StepConfig, ...], *, endless: bool) -> Iterator[str]:
-    """Yield what is wrong with the steps as a state machine."""
-    names = [step.name for step in steps]
+def _name_problems(names: list[str]) -> Iterator[str]:
+    """Yield what is wrong with the names of the steps."""
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         yield f"two steps are named {name}: give each a name of its own"
     for name in (name for name in names if name in TARGETS):
         yield f"a step cannot be named {name}, which is what conditions name: choose another name"
+
+
+def _problems(steps: tuple[StepConfig, ...], *, endless: bool) -> Iterator[str]:
+    """Yield what is wrong with the steps as a state machine."""
+    names = [step.name for step in steps]
+    yield from _name_problems(names)
     known, is_complete = (*names, *TARGETS), True
     leads: dict[str, list[str]] = {name: [] for name in names}
     for i, step in enumerate(steps):

@@ -6,6 +6,7 @@ A mission is a value. It moves nothing by itself: each cycle in which the robot 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
@@ -202,27 +203,24 @@ def route(waypoints: tuple[Waypoint, ...], frame: Frame) -> Mission:
     return Mission(route_config(waypoints, frame, ROUTE))
 
 
+def _numbers(progress: Progress) -> Iterator[float]:
+    """Yield every number of a mission's progress that should be small."""
+    poses = [pose for pose in (progress.start, progress.last, progress.anchor) if pose is not None]
+    yield from (n for pose in poses for n in (pose.x, pose.y, pose.theta))
+    for memory in progress.memories:
+        yield from (memory.index, memory.x, memory.y, memory.since_s)
+        yield from (n for place in memory.trail for n in place)
+    yield from (n for visited in progress.visited for n in (visited.x, visited.y))
+    yield from (progress.step_s, progress.way_m, progress.best_m or 0.0, progress.best_s, progress.lost_s)
+    yield from progress.seen_s
+
+
 def progress_problem(mission: Mission) -> str | None:
     """Return why a mission's progress does not belong to its plan, None if it does; a recording may hold anything."""
     progress = mission.progress
     if not 0 <= progress.step < len(mission.plan.step):
         return f"invalid mission: its step is {progress.step}, expected one of {len(mission.plan.step)}"
-    poses = [pose for pose in (progress.start, progress.last, progress.anchor) if pose is not None]
-    numbers = [
-        *(n for pose in poses for n in (pose.x, pose.y, pose.theta)),
-        *(n for memory in progress.memories for n in (memory.index, memory.x, memory.y, memory.since_s)),
-        *(n for memory in progress.memories for place in memory.trail for n in place),
-        *(n for visited in progress.visited for n in (visited.x, visited.y)),
-        *(
-            progress.step_s,
-            progress.way_m,
-            progress.best_m or 0.0,
-            progress.best_s,
-            progress.lost_s,
-            *progress.seen_s,
-        ),
-    ]
-    if not all(abs(number) <= NUMBER_MAX for number in numbers):  # also refuses NaN
+    if not all(abs(number) <= NUMBER_MAX for number in _numbers(progress)):  # also refuses NaN
         return f"invalid mission: a number of its progress is not within ±{NUMBER_MAX:g}"
     if min((memory.index for memory in progress.memories), default=0) < 0 or len(progress.visited) > VISITED_MAX:
         return "invalid mission: a count of its progress is out of range"

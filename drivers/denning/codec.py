@@ -241,14 +241,18 @@ def _decode_tail(layout: _Layout, version: int, tail: bytes) -> tuple[object, ..
         tenths = tuple(tail[_MASK_BYTES:])
         return NakCode.VALUE_OUT_OF_RANGE if any(0 < t < TENTHS_MIN for t in tenths) else (mask, tenths)
     if layout.make is Echo2:
-        if len(tail) < 2 * _MASK_BYTES:
-            return NakCode.WRONG_LENGTH
-        fired, heard = _masks(tail[: 2 * _MASK_BYTES])
-        if len(tail) != 2 * (_MASK_BYTES + fired.bit_count() + heard.bit_count()):
-            return NakCode.WRONG_LENGTH
-        counts = struct.unpack_from(f"<{fired.bit_count() + heard.bit_count()}H", tail, 2 * _MASK_BYTES)
-        return NakCode.VALUE_OUT_OF_RANGE if fired & heard else (fired, heard, counts)
+        return _decode_echo2_tail(tail)
     return NakCode.WRONG_LENGTH if tail else ()
+
+
+def _decode_echo2_tail(tail: bytes) -> tuple[object, ...] | NakCode:
+    if len(tail) < 2 * _MASK_BYTES:
+        return NakCode.WRONG_LENGTH
+    fired, heard = _masks(tail[: 2 * _MASK_BYTES])
+    if len(tail) != 2 * (_MASK_BYTES + fired.bit_count() + heard.bit_count()):
+        return NakCode.WRONG_LENGTH
+    counts = struct.unpack_from(f"<{fired.bit_count() + heard.bit_count()}H", tail, 2 * _MASK_BYTES)
+    return NakCode.VALUE_OUT_OF_RANGE if fired & heard else (fired, heard, counts)
 
 
 def _decode_ident_tail(version: int, tail: bytes) -> tuple[object, ...] | NakCode:

@@ -122,36 +122,60 @@ def weigh_look(
     expected = MOVES * moved + heard * turned + tolerance + NOISE_SHARE * heard + NOISE_M
     agrees = is_stray if r < 0.0 else abs(r - heard) <= expected
     if leads and heard + moved < REACH_SHARE * reach and (is_known or is_stray or r >= 0.0):
-        kind = DOUBTED
-        if is_known:
-            kind = AGAIN if c.silences > 0 else TURNING if turned > TURNING_SHARE * half_angle else STEADY
+        kind = kind_of_look(c, turned > TURNING_SHARE * half_angle) if is_known else DOUBTED
         honest = honest_share(all_of, kind)
         if kind == TURNING:
             honest = min(max(honest, 0.25 * turned / half_angle), HONEST_MISS_MAX)
         evidence = math.log((1.0 - MISSED) / (1.0 - honest)) if agrees else math.log(MISSED / honest)
-        for part in range(HALVES):
-            if part == 0 or is_ahead:
-                all_of.missed_nat[part] = max(0.0, all_of.missed_nat[part] + evidence)
+        add_evidence(all_of, evidence, is_ahead)
         if all_of.missed_nat[0] == 0.0:
             all_of.silent = all_of.elsewhere = 0
         elif not agrees:
             all_of.silent += r < 0.0
             all_of.elsewhere += r >= 0.0
-        all_of.misses[kind] += 0.0 if agrees else 1.0
-        all_of.looks[kind] += 1.0
-        if all_of.looks[kind] > MEMORY_LOOKS:
-            all_of.looks[kind] *= 0.5
-            all_of.misses[kind] *= 0.5
+        learn_misses(all_of, kind, 0.0 if agrees else 1.0)
+    keep_echo(c, r, x, y, axis, leads and agrees, all_of.path_m)
+
+
+@kernel
+def kind_of_look(c: EchoTrace, is_turning: bool) -> int:
+    """Return the kind of a look at an echo that was heard before."""
+    if c.silences > 0:
+        return AGAIN
+    return TURNING if is_turning else STEADY
+
+
+@kernel
+def add_evidence(all_of: RingTrace, evidence: float, is_ahead: bool) -> None:
+    """Add the evidence of a look that the ring misses echoes, for all of it and for what looks ahead."""
+    for part in range(HALVES):
+        if part == 0 or is_ahead:
+            all_of.missed_nat[part] = max(0.0, all_of.missed_nat[part] + evidence)
+
+
+@kernel
+def learn_misses(all_of: RingTrace, kind: int, misses: float) -> None:
+    """Count a look of a kind; old looks are forgotten."""
+    all_of.misses[kind] += misses
+    all_of.looks[kind] += 1.0
+    if all_of.looks[kind] > MEMORY_LOOKS:
+        all_of.looks[kind] *= 0.5
+        all_of.misses[kind] *= 0.5
+
+
+@kernel
+def keep_echo(c: EchoTrace, r: float, x: float, y: float, axis: float, agrees: bool, path_m: float) -> None:
+    """Keep a reading as the sensor's last echo if it is one; `agrees`: it is where that before leads to expect it."""
     if r < 0.0:
         c.silences += 1
         c.is_anchored = 1 if c.is_anchored and c.silences < 2 else 0
     else:
-        c.agreed = c.agreed + 1 if leads and agrees else 0
+        c.agreed = c.agreed + 1 if agrees else 0
         if c.agreed > 0:
-            c.agreed_m, c.agreed_path_m = r, all_of.path_m
+            c.agreed_m, c.agreed_path_m = r, path_m
         c.is_anchored = 1 if c.is_anchored and c.agreed > 0 else 0
         c.silences = 0
-        mark(c.heard, r, x, y, axis, all_of.path_m)
+        mark(c.heard, r, x, y, axis, path_m)
 
 
 @kernel

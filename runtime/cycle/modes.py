@@ -155,9 +155,7 @@ def advance(
         return state
     if state.mode is Mode.DRIVE:
         reason = why_stop(state, inputs, flags, gap_s) or CLOCK_REASONS[clock] or _why_moving(movement)
-        if reason is not None:
-            return state.enter(Mode.SAFE_STOP, run_s, reason)
-        return state.enter(Mode.READY, run_s, DISARMED) if request is Request.DISARM else state
+        return _advance_drive(state, inputs, reason)
     if state.mode is Mode.SAFE_STOP and movement is Movement.UNSTOPPED:
         return state.enter(Mode.FAULT, run_s, NOT_HALTED)
     if request is Request.HALT:
@@ -166,17 +164,13 @@ def advance(
         is_known = state.mode is Mode.SAFE_STOP and state.reason == fault and request is None
         return replace(state, arming_run_s=None) if is_known else state.enter(Mode.SAFE_STOP, run_s, fault)
     if inputs.line is not LineState.READY:
-        if state.mode is Mode.SAFE_STOP:
-            return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs, flags))
-        lost = LINE_REASONS[inputs.line] if state.mode is Mode.READY else None
-        return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem or lost, arming_run_s=None)
+        return _wait_for_line(state, inputs, flags)
     if state.mode is Mode.SAFE_STOP and state.reason is not None and state.reason.startswith(WAITING):
         state = replace(state, reason=f"{RESTORED} (what was wrong: {state.reason.removeprefix(WAITING)})")
     if state.mode is Mode.CONNECTING:
         state = state.enter(Mode.READY, run_s)
     if movement in {Movement.UNCOMMANDED, Movement.UNSTOPPED}:
-        is_known = state.mode is Mode.SAFE_STOP and state.reason == MOVES and state.arming_run_s is None
-        return state if is_known else state.enter(Mode.SAFE_STOP, run_s, MOVES)
+        return _stop_moving(state, run_s)
     return _advance_arming(state, inputs, flags, gap_s, clock)
 
 
@@ -253,6 +247,27 @@ def _why_latched(flags: Flags) -> str | None:
     if flags & Flags.LATCHED:
         return "the base latched without a HALT from here: check its emergency stop, then re-arm"
     return None
+
+
+def _advance_drive(state: ModeState, inputs: Inputs, reason: str | None) -> ModeState:
+    """Return the mode of a robot that drives, and that must stop for a reason other than None."""
+    if reason is not None:
+        return state.enter(Mode.SAFE_STOP, inputs.run_s, reason)
+    return state.enter(Mode.READY, inputs.run_s, DISARMED) if inputs.request is Request.DISARM else state
+
+
+def _stop_moving(state: ModeState, run_s: float) -> ModeState:
+    """Return the mode of a robot that moves although it must not."""
+    is_known = state.mode is Mode.SAFE_STOP and state.reason == MOVES and state.arming_run_s is None
+    return state if is_known else state.enter(Mode.SAFE_STOP, run_s, MOVES)
+
+
+def _wait_for_line(state: ModeState, inputs: Inputs, flags: Flags) -> ModeState:
+    """Return the mode of a robot that does not drive and whose line does not work."""
+    if state.mode is Mode.SAFE_STOP:
+        return replace(state, arming_run_s=None, reason=_why_waiting(state.reason, inputs, flags))
+    lost = LINE_REASONS[inputs.line] if state.mode is Mode.READY else None
+    return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem or lost, arming_run_s=None)
 
 
 def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float, clock: ClockState) -> ModeState:

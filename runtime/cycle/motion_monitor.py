@@ -160,11 +160,7 @@ class MotionMonitor:
             seen = replace(self, commands=commands, odometry=odometry, directions=directions)
             return replace(seen, modelled=modelled, modelled_run_s=run_s)
         passed_s, (along, turned) = odometry.robot_s - last.robot_s, _between(last.pose, odometry.pose)
-        has_leapt = (
-            abs(along) >= GAIN * body.speed_max_m_s * passed_s + LEAP.along
-            or abs(turned) >= GAIN * body.turn_max_rad_s * passed_s + LEAP.turned
-        )
-        if has_leapt or not 0.0 < passed_s <= GAP_MAX_S:
+        if _has_leapt(along, turned, passed_s, body) or not 0.0 < passed_s <= GAP_MAX_S:
             seen = replace(self, movement=fine, commands=commands, odometry=odometry)
             seen = replace(seen, modelled=modelled, modelled_run_s=run_s)
             return replace(seen, still=None, still_s=0.0, asked_s=0.0, asked_turn_s=0.0, asked=NOTHING)
@@ -311,6 +307,14 @@ def _direction(
     greatest = explained if explained > before.explained else before.explained
     excess = before.excess + moved - (GAIN * greatest + noise) * passed_s
     return Direction(explained, excess if excess > 0.0 else 0.0)
+
+
+def _has_leapt(along: float, turned: float, passed_s: float, body: BodyConfig) -> bool:
+    """Return whether no base of these limits moves so far in the time."""
+    return (
+        abs(along) >= GAIN * body.speed_max_m_s * passed_s + LEAP.along
+        or abs(turned) >= GAIN * body.turn_max_rad_s * passed_s + LEAP.turned
+    )
 
 
 def _between(before: Pose, after: Pose) -> tuple[float, float]:

@@ -134,11 +134,7 @@ def match_objects(
     models = list(models)
     is_round = {model.name: model.arc_radius_m is not None for model in models}
     known = [s for s in seen if s.model in is_round]
-    radii = [model.arc_radius_m for model in models if model.arc_radius_m is not None]
-    wanted = [d for d in world.drum if not radii or any(abs(d.radius_m - r) < RADIUS_TOLERANCE_M for r in radii)]
-    spokes = [_spokes(model.vertices_m) for model in models if model.arc_radius_m is None]
-    polygons = [p for p in world.polygon if any(_are_alike(_spokes(p.vertices_m), of) for of in spokes)]
-    world = world.model_copy(update={"drum": tuple(wanted), "polygon": tuple(polygons)})
+    world = _looked_for(world, models)
     drums, false_drums = match_drums(world, [(s.x, s.y) for s in known if is_round[s.model]])
     middles = {model.name: np.mean(model.vertices_m, axis=0).tolist() for model in models}
     angular = [_about_its_middle(s, *middles[s.model]) for s in known if not is_round[s.model]]
@@ -146,18 +142,30 @@ def match_objects(
     match = nearest_pairs(places, [(s.x, s.y) for s in angular])
     boxes: list[BoxRow] = []
     for i, place in enumerate(places):
-        found = angular[match[i]] if i in match else None
-        boxes.append(
-            {
-                "truth": place,
-                "estimate": None if found is None else (found.x, found.y),
-                "error": None if found is None else math.dist(place, (found.x, found.y)),
-                "angle_error": (
-                    None if found is None or i >= len(world.box) else angle_error(world.box[i], found.theta)
-                ),
-            }
-        )
+        box = world.box[i] if i < len(world.box) else None
+        boxes.append(_box_row(place, box, angular[match[i]] if i in match else None))
     return drums, boxes, false_drums + len(angular) - len(match)
+
+
+def _looked_for(world: WorldConfig, models: Sequence[ModelConfig]) -> WorldConfig:
+    """Return the world without the drums and polygons that look like none of the models."""
+    radii = [model.arc_radius_m for model in models if model.arc_radius_m is not None]
+    drums = [d for d in world.drum if not radii or any(abs(d.radius_m - r) < RADIUS_TOLERANCE_M for r in radii)]
+    spokes = [_spokes(model.vertices_m) for model in models if model.arc_radius_m is None]
+    polygons = [p for p in world.polygon if any(_are_alike(_spokes(p.vertices_m), of) for of in spokes)]
+    return world.model_copy(update={"drum": tuple(drums), "polygon": tuple(polygons)})
+
+
+def _box_row(place: tuple[float, float], box: BoxConfig | None, found: DetectedObject | None) -> BoxRow:
+    """Return the row of a box, or of a polygon (None), and of what was found there."""
+    if found is None:
+        return {"truth": place, "estimate": None, "error": None, "angle_error": None}
+    return {
+        "truth": place,
+        "estimate": (found.x, found.y),
+        "error": math.dist(place, (found.x, found.y)),
+        "angle_error": None if box is None else angle_error(box, found.theta),
+    }
 
 
 def _spokes(vertices: Sequence[tuple[float, float]]) -> list[float]:
@@ -204,6 +212,11 @@ def run_scene(settings: Settings, name: SceneName, seed: int) -> list[HallOutcom
     return [run_hall(settings, hall, seed * 1000 + i) for i, hall in enumerate(halls(name, seed))]
 
 
+def _mean(values: Sequence[float]) -> float | None:
+    """Return the mean, None of nothing."""
+    return sum(values) / len(values) if values else None
+
+
 def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterable[ModelConfig]) -> SceneOutcome:
     """Return the summary over all drives.
 
@@ -223,16 +236,16 @@ def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterab
     boxes = [row for outcome in outcomes for row in outcome.boxes] if with_boxes else []
     errors = [e for rows in (drums, boxes) for row in rows if (e := row["error"]) is not None]
     elapsed_s = sum(outcome.cycle_stats.total_s for outcome in outcomes)
-    inside = [is_inside for outcome in outcomes for is_inside in outcome.inside]
+    inside = [float(is_inside) for outcome in outcomes for is_inside in outcome.inside]
     return {
         "scene": name,
         "halls": len(outcomes),
-        "inside_95": sum(inside) / len(inside) if inside else None,
+        "inside_95": _mean(inside),
         "first_fix": summarise_fixes([fix for outcome in outcomes for fix in outcome.fixes]),
         "drums": drums,
         "boxes": boxes,
         "false": sum(outcome.false for outcome in outcomes),
-        "mean_error": sum(errors) / len(errors) if errors else None,
+        "mean_error": _mean(errors),
         "max_error": max(errors, default=None),
         "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / elapsed_s if elapsed_s else 0.0,
         "cycle_us": worst_of([outcome.cycle_stats.cycle_us() for outcome in outcomes]),

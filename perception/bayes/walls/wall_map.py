@@ -194,6 +194,40 @@ def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
 
 
 @kernel
+def is_from_named(room: WallMap, tracks: CircleTracks, of: int, q: Reading, p: SettingsRecord) -> bool:
+    """Return whether an echo, which `of` explains (see `Scratch.explained_by`), is one of a named object."""
+    if of >= len(tracks) or (of >= 0 and tracks[of].is_named == 1):
+        return True
+    return is_from_circle(room, tracks, q, p, ONLY_NAMED)
+
+
+@kernel
+def explain(room: WallMap, q: Reading, p: SettingsRecord, is_known: bool) -> tuple[int, int, bool]:
+    """Return the wall that explains an echo (−1: none), its kind of echo, and whether a point of walls does.
+
+    An echo that is known already, as that of an object, makes no wall longer. A wall either ends or goes on: that is
+    taken which explains the echo better, and an echo of the end passed where the wall would have been.
+    """
+    own, kind, error = explaining_wall(room, q, p, 0.0)
+    if own >= 0 and is_known and not is_on_straight_span(room.walls[own], contact(room.walls[own], q, p)[2]):
+        own = -1
+    if own >= 0:
+        return own, kind, False
+    if not is_known:
+        own, kind, error = explaining_wall(room, q, p, GROWTH_M)
+    error_of_point = enter_point(room, q, p, error)
+    is_point = error_of_point < 1.0
+    if not is_point:
+        return own, kind, False
+    if own >= 0:
+        lead = 0.5 * EXPLAINED_SIGMAS**2 * (error**2 - error_of_point**2)
+        b = bin_of(contact(room.walls[own], q, p)[2])
+        if 0 <= b < WALL_BINS:
+            enter_pass(room.walls[own], b, min(lead, 1.0))
+    return -1, kind, True
+
+
+@kernel
 def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> int:
     """Enter a firing's readings; return the place of a recent echo that nothing explains, or −1.
 
@@ -214,28 +248,13 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
     for i in range(m):
         q = scratch.fired[i]
         of = scratch.explained_by[i]
-        is_named = of >= len(tracks) or (of >= 0 and tracks[of].is_named == 1)
-        is_named = is_named or is_from_circle(room, tracks, q, p, ONLY_NAMED)
+        is_named = is_from_named(room, tracks, of, q, p)
         # A wall's side and a large round object are alike until the object is named.
         is_known = is_named or q.range_m >= FAR or (of >= 0 and tracks[of].radius < THIN_M)
         own = -1
         is_point = False
         if q.range_m < FAR and not is_named:
-            own, kind, error = explaining_wall(room, q, p, 0.0)
-            if own >= 0 and is_known and not is_on_straight_span(room.walls[own], contact(room.walls[own], q, p)[2]):
-                own = -1
-            if own < 0:
-                # A wall either ends or goes on: what explains the echo better.
-                if not is_known:
-                    own, kind, error = explaining_wall(room, q, p, GROWTH_M)
-                error_of_point = enter_point(room, q, p, error)
-                is_point = error_of_point < 1.0
-                if is_point and own >= 0:
-                    lead = 0.5 * EXPLAINED_SIGMAS**2 * (error**2 - error_of_point**2)
-                    b = bin_of(contact(room.walls[own], q, p)[2])
-                    if 0 <= b < WALL_BINS:
-                        enter_pass(room.walls[own], b, min(lead, 1.0))
-                    own = -1
+            own, kind, is_point = explain(room, q, p, is_known)
             if own >= 0:
                 if kind == FOOT:
                     expected, along = distance_and_foot(room.walls[own], q.x, q.y)

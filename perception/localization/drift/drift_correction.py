@@ -74,6 +74,11 @@ class SeenObject(NamedTuple):
     radius: float
 
 
+def _failed(numbers: Iterable[int], failures: Iterable[int]) -> set[int]:
+    """Return the landmarks that have failed so often that they have moved."""
+    return {number for number, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX}
+
+
 class LandmarkPlace(NamedTuple):
     """A landmark's place (m) and its covariance xx, xy, yy (m²)."""
 
@@ -185,9 +190,8 @@ class DriftCorrection:
         numbers, failures, xs, ys = self._tracker.landmarks("number", "failures", "x", "y")
         here_x, here_y, range_max = self.e[0].x, self.e[0].y, self._tracker.range_max_m
         is_near = [math.hypot(x - here_x, y - here_y) < range_max for x, y in zip(xs, ys, strict=True)]
-        moved = {number for number, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX}
-        if moved and self._tracker.is_doubtful and not self._stands_firm:
-            moved = set()  # rather the robot slipped
+        may_move = not self._tracker.is_doubtful or self._stands_firm  # otherwise rather the robot slipped
+        moved = _failed(numbers, failures) if may_move else set()
         for i in range(len(numbers) - 1, -1, -1):
             if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
                 for tracker in self._trackers():

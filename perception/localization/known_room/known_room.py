@@ -277,6 +277,19 @@ class KnownRoom:
             self.shares.learn(track.best, readings)
         return track.entered > before
 
+    def _is_sure(self, tracked: PoseTrack) -> bool:
+        """Return whether what is tracked is the place so surely that another one must overcome a search's chance."""
+        return float(tracked.best.share) * tracked.explains > (PLACE_DOUBT if self._is_named else PLACE_SURE)
+
+    def _are_one(self, tracked: PoseTrack, found: PoseTrack) -> bool:
+        """Return whether two tracks are at the same place."""
+        if not len(tracked):
+            return False
+        at = self._at_last_firing()
+        one, other = tracked.pose(at), found.pose(at)
+        turn = abs(wrap_angle(one.theta - other.theta))
+        return math.hypot(one.x - other.x, one.y - other.y) <= MERGE_M and turn <= MERGE_RAD
+
     def _conclude_search(self) -> None:
         """Take what a search found if it explains its readings better than what is tracked; or confirm that.
 
@@ -285,16 +298,9 @@ class KnownRoom:
         the operator named another one is no chance.
         """
         tracked, found = self._tracked, self._candidates
-        is_same = False
-        if len(tracked):
-            at = self._at_last_firing()
-            one, other = tracked.pose(at), found.pose(at)
-            turn = abs(wrap_angle(one.theta - other.theta))
-            is_same = math.hypot(one.x - other.x, one.y - other.y) <= MERGE_M and turn <= MERGE_RAD
+        is_same = self._are_one(tracked, found)
         begin = max(self._search_begin, self._named_at)
-        is_sure = len(tracked) > 0 and float(tracked.best.share) * tracked.explains > (
-            PLACE_DOUBT if self._is_named else PLACE_SURE
-        )
+        is_sure = len(tracked) > 0 and self._is_sure(tracked)
         heard_before = found.gained_since(self._search_begin) - found.gained_since(begin)
         is_chance = heard_before <= -self._search_evidence
         lead = LEAD_LOG - (self._search_evidence if is_sure and is_chance else 0.0)

@@ -18,7 +18,7 @@ from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.settings import Settings
-from drivers.messages import Firing, LinkCounts, Pose
+from drivers.messages import Firing, LinkCounts, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
 from perception.percept import Canyon
@@ -32,6 +32,7 @@ from runtime.console.frames.state_message import (
     CanyonRow,
     GoalRow,
     LegsRow,
+    LinkRow,
     LocalizedRow,
     MissionRow,
     ObjectRow,
@@ -184,7 +185,7 @@ class FrameEncoder:
             self._objects = [_object(detected) for detected in state.perception.labelled_objects()]
         odometry = state.odometry
         robot_s = 0.0 if odometry is None else odometry.robot_s
-        link, phases_s, late_s = context.link, context.phases_s, context.late_s
+        phases_s, late_s = context.phases_s, context.late_s
         head: StateHead = {
             "type": "state",
             **robot_status(state, context),
@@ -213,18 +214,14 @@ class FrameEncoder:
             "late": context.late,
             "quanta": 0 if record is None else record.quanta,
             "refinement": "nothing" if record is None else record.refinement,
-            "link": None if link is None else {"frames": link.frames, "bad": link.bad, "lost": link.lost},
+            "link": _link(context.link),
             "waiting": state.perception.counts.waiting,
             "localized": _localized(state.perception),
             "sensors": [(r.sensor, r.fault, r.reason) for r in state.perception.sensor_reports()],
             "playback": context.playback,
         }
         if odometry is not None:
-            twist = odometry.twist
-            head["pose"] = _rounded(odometry.pose)
-            head["ring_yaw"] = round(odometry.ring_yaw, 5)
-            head["twist"] = (round(twist.v, 4), round(twist.w, 4))
-            head["flags"] = [str(flag.name) for flag in odometry.flags]
+            _set_odometry(head, odometry)
         self._fired.clear()
         changes = b'"segments":%b' % segments
         if self._archived.update(state.perception.archived_objects()):
@@ -363,6 +360,19 @@ def _canyon(canyon: Canyon) -> CanyonRow:
         "depth": round(canyon.depth_m, 3),
         "probability": round(canyon.probability, 3),
     }
+
+
+def _link(counts: LinkCounts | None) -> LinkRow | None:
+    return None if counts is None else {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost}
+
+
+def _set_odometry(head: StateHead, odometry: Odometry) -> None:
+    """Write what the odometry reports."""
+    twist = odometry.twist
+    head["pose"] = _rounded(odometry.pose)
+    head["ring_yaw"] = round(odometry.ring_yaw, 5)
+    head["twist"] = (round(twist.v, 4), round(twist.w, 4))
+    head["flags"] = [str(flag.name) for flag in odometry.flags]
 
 
 def _valley(drive: GoalDrive) -> ValleyRow:

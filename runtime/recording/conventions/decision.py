@@ -123,9 +123,7 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     silence = find_silence(table, options.silence, set_size)
     if silence.words:
         said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
-    ranges = np.array([silence.applied(row) for row in table.ranges])
-    if (ranges < 0.0).any():
-        raise RingLogError(f"has ranges below 0, as {float(np.nanmin(ranges)):g}; correct them, or say --silence -1")
+    ranges = _shown(table.ranges, silence)
     table = table._replace(ranges=ranges if columns is None else ranges[:, columns])
     period = find_repeats(table, set_size) if options.latched == "auto" else 1.0
     is_latched = options.latched == "yes" or period > 1.0
@@ -143,17 +141,13 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     likely = max(motion, key=motion.__getitem__)
     units, scores = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
     given = (options.time_unit, options.length_unit, options.range_unit)
-    if any(g == "auto" and u != plain for g, u, plain in zip(given, units, Units(), strict=True)):
+    if _are_unusual(units, given):
         said.append((units.words, units.options))
     angles = _find_angles(table, robot, options, units, motion, is_related=is_related)
     if is_related and options.sensor_order == "auto":
         reach = LENGTHS[units.range_]
         check_shift(table, robot, angles, reach, LENGTHS[units.length] / reach)
-    asked = Angles(
-        "ccw" if options.heading == "auto" else options.heading,
-        "rad" if options.angle_unit == "auto" else options.angle_unit,
-    )
-    if angles != asked:
+    if angles != _asked_angles(options):
         said.append((angles.words, angles.options))
     if options.silence == "auto":
         check_near(table.ranges, LENGTHS[units.range_], robot.ring.range_min_m, silence.option)
@@ -167,10 +161,7 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
             return found[angles]
 
         check_scale(units, scores, echoes)
-    cycle_s = None
-    if is_latched:
-        row_s = TIMES[units.time] * float(np.median(np.diff(table.t))) if len(table.t) > 1 else 0.0
-        cycle_s = max(pattern_s, period * row_s if period > 1 else 0.0)
+    cycle_s = max(pattern_s, _period_s(table, units, period)) if is_latched else None
     return Conventions(silence, not_fired, units, angles, columns, cycle_s, tuple(said))
 
 
@@ -203,6 +194,34 @@ def _ratios(table: Table, robot: RobotConfig, likely: Angles) -> Floats:
     return best
 
 
+def _are_unusual(units: Units, given: tuple[str, ...]) -> bool:
+    """Return whether a unit that was found is not that of the form."""
+    return any(g == "auto" and u != plain for g, u, plain in zip(given, units, Units(), strict=True))
+
+
+def _asked_angles(options: RingLogOptions) -> Angles:
+    """Return how headings are counted by the options, or by the form where these leave it open."""
+    return Angles(
+        "ccw" if options.heading == "auto" else options.heading,
+        "rad" if options.angle_unit == "auto" else options.angle_unit,
+    )
+
+
+def _period_s(table: Table, units: Units, period: float) -> float:
+    """Return the time for which a value is repeated, s; 0 where none is."""
+    if len(table.t) < 2 or period <= 1.0:
+        return 0.0
+    return period * (TIMES[units.time] * float(np.median(np.diff(table.t))))
+
+
+def _shown(ranges: Floats, silence: Silence) -> Floats:
+    """Return the ranges with inf for silence; all are at least 0."""
+    shown = np.array([silence.applied(row) for row in ranges])
+    if (shown < 0.0).any():
+        raise RingLogError(f"has ranges below 0, as {float(np.nanmin(shown)):g}; correct them, or say --silence -1")
+    return shown
+
+
 def _find_angles(
     table: Table,
     robot: RobotConfig,
@@ -216,32 +235,59 @@ def _find_angles(
     if len(motion) == 1:
         return next(iter(motion))
     default = next(one for one in motion)  # ccw and rad come first, or what is given
-    most = max(motion.values())
-    # Without motion the unit stays: angles in another one hardly turn the ring, and then even noise agrees.
-    near = [one for one in motion if (motion[one] > most - NEAR_NAT if is_related else one.unit == default.unit)]
-    backward = {} if not is_related else {opposite(one): one for one in near if opposite(one) in motion}
-    near += [one for one in backward if one not in near]  # a robot may drive backward all the time
-    reach, length = LENGTHS[units.range_], LENGTHS[units.length]
-    echoes = echo_scores(table, robot, list(dict.fromkeys([default, *near])), reach, length / reach)
-    clearest = max(echoes, key=lambda one: float(echoes[one].mean()))
-    left = [one for one in echoes if sureness(echoes[clearest], echoes[one]) < SURE]
+    near, backward = _near_angles(motion, default, is_related=is_related)
+    echoes = _opened(table, robot, units, list(dict.fromkeys([default, *near])))
+    left = list(echoes)
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
         return default
-    if default in left:
-        is_alike = all(sureness(echoes[default], echoes[one]) == 0.0 for one in fits)
-        if not is_alike:
-            fits = [default, *fits]
-    fits = [one for one in fits if backward.get(one) not in fits or one == default]
-    plain = [one for one in fits if one.heading == "ccw"]
-    if plain and default not in fits:
-        fits = plain
+    fits = _plainest(fits, default, echoes, backward)
     is_open = options.heading == options.sensor_order == "auto"
     is_mirrored = is_open and any(HEADINGS[one.heading].hand < 0 for one in fits)
     is_backward = len(fits) == 1 and fits[0] in backward and options.heading == "auto"
     if len(fits) == 1 and not (is_mirrored or is_backward):
         return fits[0]
-    names = [f"{one.words} ({one.options})" for one in fits[:4] or left[:4]]
+    names = _names(fits or left, is_mirrored=is_mirrored, is_backward=is_backward)
+    raise RingLogError(
+        f"the robot's motion and the ranges leave open how headings are counted: {', or '.join(names)}"
+    )
+
+
+def _near_angles(
+    motion: dict[Angles, float], default: Angles, *, is_related: bool
+) -> tuple[list[Angles], dict[Angles, Angles]]:
+    """Return the ways that fit the motion about as well as the best; and those of a robot that drives backward."""
+    if not is_related:
+        # The unit stays: angles in another one hardly turn the ring, and then even noise agrees.
+        return [one for one in motion if one.unit == default.unit], {}
+    most = max(motion.values())
+    near = [one for one in motion if motion[one] > most - NEAR_NAT]
+    backward = {opposite(one): one for one in near if opposite(one) in motion}
+    return [*near, *(one for one in backward if one not in near)], backward
+
+
+def _plainest(
+    fits: list[Angles], default: Angles, echoes: dict[Angles, Floats], backward: dict[Angles, Angles]
+) -> list[Angles]:
+    """Return the form's own way where echoes and motion disagree, and of the others those that are most usual."""
+    if default in echoes and any(sureness(echoes[default], echoes[one]) != 0.0 for one in fits):
+        fits = [default, *fits]
+    fits = [one for one in fits if backward.get(one) not in fits or one == default]
+    plain = [one for one in fits if one.heading == "ccw"]
+    return plain if plain and default not in fits else fits
+
+
+def _opened(table: Table, robot: RobotConfig, units: Units, asked: list[Angles]) -> dict[Angles, Floats]:
+    """Return the likelihoods of the echoes by those of the ways asked for that they leave open."""
+    reach = LENGTHS[units.range_]
+    echoes = echo_scores(table, robot, asked, reach, LENGTHS[units.length] / reach)
+    clearest = max(echoes, key=lambda one: float(echoes[one].mean()))
+    return {one: scores for one, scores in echoes.items() if sureness(echoes[clearest], scores) < SURE}
+
+
+def _names(fits: list[Angles], *, is_mirrored: bool, is_backward: bool) -> list[str]:
+    """Return the ways that are left, each with the options that choose it."""
+    names = [f"{one.words} ({one.options})" for one in fits[:4]]
     if is_mirrored:
         other = mirror_image(next(one for one in fits if HEADINGS[one.heading].hand < 0))
         said = f"the sensors are numbered the other way round, and {other.words}"
@@ -251,6 +297,4 @@ def _find_angles(
             f"the robot drives backward and {names[0]}",
             "the ring is turned by 180° (write its sensors into the robot file)",
         ]
-    raise RingLogError(
-        f"the robot's motion and the ranges leave open how headings are counted: {', or '.join(names)}"
-    )
+    return names

@@ -117,11 +117,15 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
         return _one_value(float(negative[0]), finite)
     if np.isposinf(ranges).any():
         return Silence()
-    moved = ranges[table.moved]
-    finite_moved = moved[np.isfinite(moved)]
     zeros = int(np.count_nonzero(finite == 0.0))
     if zeros > TOP_SHARE * len(finite):
         return _one_value(0.0, finite)
+    return _most_frequent(ranges[table.moved], finite)
+
+
+def _most_frequent(moved: Floats, finite: Floats) -> Silence:
+    """Return the value that stands for silence by how often it came while the robot moved."""
+    finite_moved = moved[np.isfinite(moved)]
     if len(finite_moved) < RANGES_MIN:
         return Silence()
     values, counts = np.unique(finite_moved, return_counts=True)

@@ -95,9 +95,14 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
             return best[1]
         if said and not answer.has_answered and answer.problem is not None:
             break  # the port cannot be opened
+    return Finding(None, _lines(said, strangers))
+
+
+def _lines(said: dict[str, list[str]], strangers: list[str]) -> tuple[str, ...]:
+    """Return the problems, each with the robots that had it; without one, a line on a stranger."""
     known = [stranger for stranger in strangers if stranger != NO_FRAME]
     lines = [f"as {', '.join(names)}: {text}" if names else text for text, names in said.items()]
-    return Finding(None, tuple(lines or (known or strangers or [NOTHING])[:1]))
+    return tuple(lines or (known or strangers or [NOTHING])[:1])
 
 
 def run_it(port: str, robot: str) -> str:
