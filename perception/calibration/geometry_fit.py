@@ -217,11 +217,13 @@ def fit_geometry(
             return picked.range_m - g.scales.range * distance[surface, np.arange(len(surface))]
 
         here = misfits(at)
+        _, bearing = geometry.surfaces.distances(beams.x[chosen], beams.y[chosen])
+        towards = bearing[surface, np.arange(len(surface))] - path.yaw[picked.firing]
         # A noise below the misfit of a sensor whose place is not yet found would make its readings outliers.
         noise = _range_noise(picked.range_m, here) if k >= len(GATES_M) else RangeNoise(GATES_M[k] / GATE_SIGMAS, 0.0)
         range_sigma = noise.sigmas(echoes.range_m)
         expected = range_sigma[chosen]
-        jacobian = _jacobian(vector, at, misfits, here, geometry, path, picked, surface, beams, chosen)
+        jacobian = _jacobian(vector, at, misfits, here, geometry, picked.sensor, towards)
         weight = np.minimum(1.0, HUBER_SIGMAS * expected / np.maximum(np.abs(here), 1e-12)) / expected**2
         information = jacobian.T @ (weight[:, None] * jacobian) + np.diag(sigma**-2)
         gradient = jacobian.T @ (weight * here) + (at - prior) / sigma**2
@@ -292,22 +294,20 @@ def _jacobian(
     misfits: Callable[[Floats], Floats],
     here: Floats,
     geometry: Geometry,
-    path: Path,
-    picked: Echoes,
-    surface: NDArray[np.intp],
-    beams: Beams,
-    chosen: NDArray[np.intp],
+    sensor: NDArray[np.intp],
+    towards: Floats,
 ) -> Floats:
-    """Return the derivatives of the misfits, shape (readings, parameters)."""
+    """Return the derivatives of the misfits, shape (readings, parameters).
+
+    Each reading is that of a `sensor`, whose surface lies in the direction `towards` from the ring's front, rad.
+    """
     jacobian = np.zeros((len(here), len(at)))
     for i in range(vector.common):
         moved = at.copy()
         moved[i] += STEP
         jacobian[:, i] = (misfits(moved) - here) / STEP
-    _, bearing = geometry.surfaces.distances(beams.x[chosen], beams.y[chosen])
     # The distance falls by as much as the sensor moves towards the surface.
-    towards = bearing[surface, np.arange(len(surface))] - path.yaw[picked.firing]
-    rows, column = np.arange(len(here)), vector.common + 2 * picked.sensor
+    rows, column = np.arange(len(here)), vector.common + 2 * sensor
     jacobian[rows, column] = geometry.scales.range * np.cos(towards)
     jacobian[rows, column + 1] = geometry.scales.range * np.sin(towards)
     return jacobian

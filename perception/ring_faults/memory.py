@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Final, TypeAlias
 
 from perception.bounds import FINITE, PLACE, POSITIVE, Count, Flag, Place
 from perception.kernel import Floats
@@ -16,6 +16,12 @@ QUARTERS: Final = 3
 """Quarter turns, counter-clockwise, by which a ring may be mounted wrongly."""
 LOOK_KINDS: Final = 4
 """Kinds of looks at a known echo, each with a rate of misses of its own."""
+
+
+Look: TypeAlias = tuple[float, float, float, float]
+"""A reading (m; `NO_ECHO_M` without an echo), the sensor's place (x, y, m), and its axis (rad)."""
+Reception: TypeAlias = tuple[float, float, float]
+"""Half the beam's width (rad), the difference of equal readings (m), and how far the ring listens (m)."""
 
 
 class SensorPlace(Record):

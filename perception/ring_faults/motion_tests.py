@@ -14,7 +14,16 @@ from perception.angles import wrapped
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.ring_faults.changes import NO_CHANGE, NOISE_M, Expected, weigh_changes
-from perception.ring_faults.memory import HALVES, LOOK_KINDS, NO_ECHO_M, QUARTERS, EchoTrace, RingTrace
+from perception.ring_faults.memory import (
+    HALVES,
+    LOOK_KINDS,
+    NO_ECHO_M,
+    QUARTERS,
+    EchoTrace,
+    Look,
+    Reception,
+    RingTrace,
+)
 from perception.ring_faults.repeats import (
     STEP_MIN_M,
     is_parallel_wall,
@@ -83,18 +92,7 @@ def honest_share(all_of: RingTrace, kind: int) -> float:
 
 
 @kernel
-def weigh_look(
-    c: EchoTrace,
-    r: float,
-    x: float,
-    y: float,
-    axis: float,
-    is_ahead: bool,
-    half_angle: float,
-    tolerance: float,
-    reach: float,
-    all_of: RingTrace,
-) -> None:
+def weigh_look(c: EchoTrace, look: Look, is_ahead: bool, reception: Reception, all_of: RingTrace) -> None:
     """Test whether a reading is where the sensor's last echo leads to expect it.
 
     How often an honest ring misses an echo is learned on the way, for each kind of look.
@@ -103,17 +101,17 @@ def weigh_look(
     ----------
     c : record
         What is remembered of the sensor. Updated.
-    r : float
-        Its reading, m; `NO_ECHO_M` without an echo.
-    x, y, axis : float
-        Its place (m) and the direction of its axis (rad).
+    look : Look
+        Its reading, place and direction.
     is_ahead : bool
         Whether it looks in the direction of travel.
-    half_angle, tolerance, reach
-        As for `check_motion`.
+    reception : Reception
+        What the ring hears.
     all_of : record
         What is remembered of the ring. Updated.
     """
+    r, x, y, axis = look
+    half_angle, tolerance, reach = reception
     heard = c.heard.range_m
     moved, turned = math.hypot(x - c.heard.x, y - c.heard.y), abs(axis - c.heard.axis)
     leads = heard > 0.0 and all_of.path_m - c.heard.path_m <= LEADS_M and turned < half_angle
@@ -134,7 +132,7 @@ def weigh_look(
             all_of.silent += r < 0.0
             all_of.elsewhere += r >= 0.0
         learn_misses(all_of, kind, 0.0 if agrees else 1.0)
-    keep_echo(c, r, x, y, axis, leads and agrees, all_of.path_m)
+    keep_echo(c, look, leads and agrees, all_of.path_m)
 
 
 @kernel
@@ -164,8 +162,9 @@ def learn_misses(all_of: RingTrace, kind: int, misses: float) -> None:
 
 
 @kernel
-def keep_echo(c: EchoTrace, r: float, x: float, y: float, axis: float, agrees: bool, path_m: float) -> None:
+def keep_echo(c: EchoTrace, look: Look, agrees: bool, path_m: float) -> None:
     """Keep a reading as the sensor's last echo if it is one; `agrees`: it is where that before leads to expect it."""
+    r, x, y, axis = look
     if r < 0.0:
         c.silences += 1
         c.is_anchored = 1 if c.is_anchored and c.silences < 2 else 0
@@ -181,15 +180,10 @@ def keep_echo(c: EchoTrace, r: float, x: float, y: float, axis: float, agrees: b
 @kernel
 def weigh_change(
     i: int,
-    r: float,
-    x: float,
-    y: float,
-    axis: float,
+    look: Look,
     yaw: float,
     mounts: Floats,
-    half_angle: float,
-    tolerance: float,
-    reach: float,
+    reception: Reception,
     echoes: Records[EchoTrace],
     all_of: RingTrace,
 ) -> None:
@@ -204,14 +198,14 @@ def weigh_change(
     ----------
     i : int
         The sensor.
-    r : float
-        Its echo's range, m.
-    x, y, axis, half_angle, tolerance, reach, all_of
-        As for `weigh_look`.
+    look, reception, all_of
+        As for `weigh_look`; the look has an echo.
     yaw, mounts, echoes
         As for `check_motion`.
     """
     c = echoes[i]
+    r, x, y, axis = look
+    half_angle, tolerance, _ = reception
     if not c.is_anchored or abs(axis - c.anchor.axis) > 0.5 * half_angle:
         c.is_anchored = 1
         mark(c.anchor, r, x, y, axis, all_of.path_m)
@@ -220,7 +214,7 @@ def weigh_change(
     moved = math.hypot(dx, dy)
     if moved < 2.0 * max(STEP_MIN_M, 3.0 * tolerance):
         return
-    if is_parallel_wall(i, r, dx, dy, yaw, mounts, half_angle, tolerance, LEAN_RAD, reach, echoes, all_of.path_m):
+    if is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, LEAN_RAD, echoes, all_of.path_m):
         mark(c.anchor, r, x, y, axis, all_of.path_m)
         return
     change, error, path = r - c.anchor.range_m, tolerance + 0.03 * r, math.atan2(dy, dx)
@@ -323,6 +317,7 @@ def check_motion(
         all_of.path_m += moved
     all_of.x, all_of.y = x, y
     c, s = math.cos(yaw), math.sin(yaw)
+    reception = (half_angle, tolerance, reach)
     replayed = 0.0
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
@@ -337,13 +332,14 @@ def check_motion(
         mark(echoes[i].before, then.range_m, then.x, then.y, then.axis, then.path_m)
         mark(then, r, x, y, axis, all_of.path_m)
         learn_noise(echoes[i], r, x, y, axis, tolerance, all_of)
-        weigh_repeat(i, r, own_x, own_y, axis, yaw, is_ahead, mounts, half_angle, tolerance, reach, echoes, ring)
+        look = (r, own_x, own_y, axis)
+        weigh_repeat(i, look, yaw, is_ahead, mounts, reception, echoes, ring)
         heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_ECHO_M
-        nats = weigh_replay(i, r, heard_before, own_x, own_y, axis, half_angle, tolerance, past, looks, replayed_nat)
+        nats = weigh_replay(i, look, heard_before, reception, past, looks, replayed_nat)
         replayed = max(replayed, nats)
-        weigh_look(echoes[i], r, own_x, own_y, axis, is_ahead, half_angle, tolerance, reach, all_of)
+        weigh_look(echoes[i], look, is_ahead, reception, all_of)
         if r >= 0.0:
-            weigh_change(i, r, own_x, own_y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of)
+            weigh_change(i, look, yaw, mounts, reception, echoes, all_of)
     found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)
     if found == NOTHING:
         missed = honest_share(all_of, STEADY)

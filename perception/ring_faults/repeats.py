@@ -8,7 +8,7 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_faults.memory import EchoTrace, RingTrace, SensorPlace
+from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace
 from perception.sensor_faults.wall import NOISE_SHARE
 
 REPEAT_NAT: Final = math.log(100.0)
@@ -40,14 +40,11 @@ def mark(place: SensorPlace, r: float, x: float, y: float, axis: float, path_m: 
 def is_parallel_wall(
     i: int,
     r: float,
-    dx: float,
-    dy: float,
+    way: tuple[float, float],
     yaw: float,
     mounts: Floats,
-    half_angle: float,
-    tolerance: float,
+    reception: Reception,
     lean: float,
-    reach: float,
     echoes: Records[EchoTrace],
     path_m: float,
 ) -> bool:
@@ -63,18 +60,19 @@ def is_parallel_wall(
         The sensor.
     r : float
         Its echo's range, m.
-    dx, dy : float
+    way : (float, float)
         By how much it has moved, m.
     yaw : float
         Direction of the ring, rad.
-    mounts, half_angle, tolerance, reach, echoes
-        As for `check_motion`.
+    mounts, reception, echoes
+        As for `changes_due`.
     lean : float
         Angle between wall and path, rad, up to which the wall counts as along the path.
     path_m : float
         The ring's way so far, m.
     """
-    path = math.atan2(dy, dx)
+    half_angle, tolerance, reach = reception
+    path = math.atan2(way[1], way[0])
     forward, left = math.sin(yaw - path), math.cos(yaw - path)
     axis = wrapped(yaw + mounts[i, 2] - path)
     for turn in range(2):
@@ -97,17 +95,7 @@ def is_parallel_wall(
 
 @kernel
 def changes_due(
-    i: int,
-    x: float,
-    y: float,
-    axis: float,
-    yaw: float,
-    mounts: Floats,
-    half_angle: float,
-    tolerance: float,
-    reach: float,
-    echoes: Records[EchoTrace],
-    path_m: float,
+    i: int, look: Look, yaw: float, mounts: Floats, reception: Reception, echoes: Records[EchoTrace], path_m: float
 ) -> float:
     """Return how many times sensor `i` should have changed the reading that it repeats.
 
@@ -118,13 +106,17 @@ def changes_due(
     ----------
     i : int
         The sensor.
-    x, y, axis : float
-        Its place (m) and the direction of its axis (rad).
-    yaw, mounts, half_angle, tolerance, reach, echoes
+    look : Look
+        Its reading, place and direction.
+    yaw, mounts, echoes
         As for `check_motion`.
+    reception : Reception
+        What the ring hears.
     path_m : float
         The ring's way so far, m.
     """
+    half_angle, tolerance, _ = reception
+    _, x, y, axis = look
     c = echoes[i]
     r = c.latest.range_m
     dx, dy, turned = x - c.repeated.x, y - c.repeated.y, axis - c.repeated.axis
@@ -136,7 +128,7 @@ def changes_due(
         if due < 1:
             return 0.0
         lean = min(1.0, tolerance / math.hypot(dx, dy))  # the range stays within the tolerance for so long
-        if is_parallel_wall(i, r, dx, dy, yaw, mounts, half_angle, tolerance, lean, reach, echoes, path_m):
+        if is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, lean, echoes, path_m):
             return 0.0
         return min(REPEATS_MAX, float(due))
     nearest, off = -1, half_angle
@@ -185,16 +177,11 @@ def learn_noise(c: EchoTrace, r: float, x: float, y: float, axis: float, toleran
 @kernel
 def weigh_repeat(
     i: int,
-    r: float,
-    x: float,
-    y: float,
-    axis: float,
+    look: Look,
     yaw: float,
     is_ahead: bool,
     mounts: Floats,
-    half_angle: float,
-    tolerance: float,
-    reach: float,
+    reception: Reception,
     echoes: Records[EchoTrace],
     ring: Records[RingTrace],
 ) -> None:
@@ -204,16 +191,18 @@ def weigh_repeat(
     ----------
     i : int
         The sensor.
-    r : float
-        Its reading, m, entered in `echoes`; `SILENCE_M` without an echo.
-    x, y, axis : float
-        Its place (m) and the direction of its axis (rad).
-    yaw, mounts, half_angle, tolerance, reach, echoes, ring
+    look : Look
+        Its reading, entered in `echoes`, its place and direction.
+    yaw, mounts, echoes, ring
         As for `check_motion`.
+    reception : Reception
+        What the ring hears.
     is_ahead : bool
         Whether it looks in the direction of travel.
     """
     c, all_of = echoes[i], ring[0]
+    r, x, y, axis = look
+    tolerance = reception[1]
     if not c.is_known or r != c.before.range_m:
         if c.is_known and is_ahead:
             all_of.standstill += 1
@@ -227,9 +216,7 @@ def weigh_repeat(
         c.standstill, c.repeated_nat, c.equal_nat = all_of.standstill, 0.0, 0.0
         mark(c.repeated, r, x, y, axis, all_of.path_m)
     elif r >= 0.0 and c.repeated_nat < SENSOR_NAT:
-        due = REPEAT_NAT * changes_due(
-            i, x, y, axis, yaw, mounts, half_angle, tolerance, reach, echoes, all_of.path_m
-        )
+        due = REPEAT_NAT * changes_due(i, look, yaw, mounts, reception, echoes, all_of.path_m)
         if due > c.repeated_nat:
             all_of.repeated_nat += due - c.repeated_nat
             c.repeated_nat = due

@@ -12,6 +12,7 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, Ints, kernel
+from perception.ring_faults.memory import Look, Reception
 from perception.ring_faults.repeats import STEP_MIN_M
 
 PAST_LOOKS: Final = 64
@@ -24,17 +25,7 @@ DIFFERS: Final = 0.05
 
 @kernel
 def weigh_replay(
-    i: int,
-    r: float,
-    before: float,
-    x: float,
-    y: float,
-    axis: float,
-    half_angle: float,
-    tolerance: float,
-    past: Floats,
-    looks: Ints,
-    replayed_nat: Floats,
+    i: int, look: Look, before: float, reception: Reception, past: Floats, looks: Ints, replayed_nat: Floats
 ) -> float:
     """Compare a reading with those of each lag before, and keep it; return the greatest evidence of a lag, nat.
 
@@ -45,12 +36,12 @@ def weigh_replay(
     ----------
     i : int
         The sensor.
-    r, before : float
-        Its reading and the one before, m; below zero without an echo.
-    x, y, axis : float
-        Its place (m) and the direction of its axis (rad).
-    half_angle, tolerance
-        As for `motion_tests.check_motion`.
+    look : Look
+        Its reading, place and direction.
+    before : float
+        The reading before, m; below zero without an echo.
+    reception : Reception
+        What the ring hears.
     past : (n, PAST_LOOKS, PAST_FIELDS) float
         The last looks of each sensor, the oldest overwritten first. Updated.
     looks : (n,) int
@@ -58,6 +49,8 @@ def weigh_replay(
     replayed_nat : (PAST_LOOKS,) float
         Evidence that the ring replays what it heard so many looks before. Updated.
     """
+    r, x, y, axis = look
+    half_angle, tolerance, _ = reception
     size = past.shape[1]
     is_new = r >= 0.0 and before >= 0.0 and r != before
     chance = tolerance / (tolerance + abs(r - before)) if is_new else 0.0

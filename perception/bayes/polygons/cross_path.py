@@ -30,6 +30,18 @@ def height(side: PolygonSide, x: float, y: float) -> float:
 
 
 @kernel
+def corner_nat(sides: Records[PolygonSide], before: int, after: int, is_closed: bool, range_m: float) -> float:
+    """Return what the answer of the corner between two sides costs, nat: more beyond the reach of a convex edge."""
+    price = DOUBTFUL_ANSWER_NAT
+    if is_closed and EDGE_REACH_M < range_m < NO_ANSWER_M:
+        first = sides[before]
+        second = sides[after % len(sides)]
+        if first.tangent_x * second.tangent_y - first.tangent_y * second.tangent_x > 0.0:
+            price += EDGE_NAT_PER_M * (range_m - EDGE_REACH_M)
+    return price
+
+
+@kernel
 def predict_cross(
     q: Reading,
     x: float,
@@ -110,13 +122,7 @@ def predict_cross(
     nearest = min(foot, corner, edge)
     if foot < NO_ANSWER_M:
         return foot, 0.0, nearest
-    price = DOUBTFUL_ANSWER_NAT
-    if is_closed and EDGE_REACH_M < corner < NO_ANSWER_M:
-        first = sides[before]
-        second = sides[after % len(sides)]
-        if first.tangent_x * second.tangent_y - first.tangent_y * second.tangent_x > 0.0:
-            price += EDGE_NAT_PER_M * (corner - EDGE_REACH_M)
-    return corner, price, nearest
+    return corner, corner_nat(sides, before, after, is_closed, corner), nearest
 
 
 @kernel

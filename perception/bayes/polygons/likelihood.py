@@ -18,9 +18,6 @@ from perception.bayes.memory.job_records import PoseSearch
 from perception.bayes.memory.parameters import DROP_OUT_NAT, DROP_OUT_SHARE
 from perception.bayes.memory.polygon_parameters import (
     AXES,
-    DOUBTFUL_ANSWER_NAT,
-    EDGE_NAT_PER_M,
-    EDGE_REACH_M,
     GRAZING_COS,
     SEARCH_FINEST_M,
     SEARCH_GAIN_MIN_NAT,
@@ -30,7 +27,7 @@ from perception.bayes.memory.polygon_parameters import (
 )
 from perception.bayes.memory.scratch import Score
 from perception.bayes.memory.settings_record import PolygonSide, SettingsRecord
-from perception.bayes.polygons.cross_path import NO_ANSWER_M, score_crosses
+from perception.bayes.polygons.cross_path import NO_ANSWER_M, corner_nat, score_crosses
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -125,13 +122,7 @@ def predict(
     must = foot_must or (must and nearest < NO_ANSWER_M)
     if foot < NO_ANSWER_M:
         return foot, foot_must, 0.0, nearest, must
-    price = DOUBTFUL_ANSWER_NAT
-    if is_closed and EDGE_REACH_M < corner < NO_ANSWER_M:
-        first = sides[before]
-        second = sides[after % len(sides)]
-        if first.tangent_x * second.tangent_y - first.tangent_y * second.tangent_x > 0.0:
-            price += EDGE_NAT_PER_M * (corner - EDGE_REACH_M)
-    return corner, False, price, nearest, must
+    return corner, False, corner_nat(sides, before, after, is_closed, corner), nearest, must
 
 
 @kernel

@@ -240,6 +240,17 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     return np.asarray(sure)
 
 
+def _extend(owners: list[Straight], places: list[tuple[float, float, tuple[int, int]]], *, is_reached: bool) -> bool:
+    """Move the ends of walls to their corner if it `is_reached` from near it; return whether all end there."""
+    are_met = True
+    for owner, (along, gap, at) in zip(owners, places, strict=True):
+        end = owner.ends[at]
+        if is_reached and -CORNER_INSIDE_M < gap < CORNER_BEYOND_M and not owner.is_passed(along, end):
+            owner.ends[at] = along
+        are_met = are_met and abs(owner.ends[at] - along) < CORNER_MET_M
+    return are_met
+
+
 def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the corners in which they end, unless ranges passed there.
 
@@ -268,12 +279,7 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors
         is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
-        is_met = len(owners) == 2
-        for owner, (along, gap, at) in zip(owners, places, strict=True):
-            end = owner.ends[at]
-            if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_BEYOND_M and not owner.is_passed(along, end):
-                owner.ends[at] = along
-            is_met = is_met and abs(owner.ends[at] - along) < CORNER_MET_M
+        is_met = _extend(owners, places, is_reached=is_heard or is_near) and len(owners) == 2
         far = float(corner["far_echoes"])
         lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
         is_proven = far >= ALONE_ECHOES and far > lead * passes and corner["is_edge"] != are_mirrors

@@ -28,6 +28,7 @@ from perception.ring_faults.repeats import (
 MOUNTS = np.array([[0.0, 0.0, math.radians(15.0 * k)] for k in range(24)])
 HALF = math.radians(12.0)
 TOLERANCE = 0.005
+RECEPTION = (HALF, TOLERANCE, 5.0)
 
 
 def heard(*ranges: tuple[int, float]) -> Records[EchoTrace]:
@@ -41,7 +42,7 @@ def heard(*ranges: tuple[int, float]) -> Records[EchoTrace]:
 
 def due(echoes: Records[EchoTrace], i: int, x: float, turned: float = 0.0) -> float:
     axis = MOUNTS[i, 2] + turned
-    return changes_due(i, x, 0.0, axis, turned, MOUNTS, HALF, TOLERANCE, 5.0, echoes, x)
+    return changes_due(i, (0.0, x, 0.0, axis), turned, MOUNTS, RECEPTION, echoes, x)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -50,10 +51,10 @@ def test_a_rough_wall_beside_the_path_explains_what_sensors_hear_of_it(side: int
     at_edge = 1.2 / math.sin(math.radians(57.0))
     echoes = heard((square, 1.2), (oblique, at_edge))
     for r, explained in ((at_edge, True), (0.7, False), (2.5, False)):
-        found = is_parallel_wall(oblique, r, 0.3, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, 0.01, 5.0, echoes, 0.3)
+        found = is_parallel_wall(oblique, r, (0.3, 0.0), 0.0, MOUNTS, RECEPTION, 0.01, echoes, 0.3)
         assert bool(found) is explained
     echoes = heard((oblique, at_edge))
-    assert not is_parallel_wall(oblique, at_edge, 0.3, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, 0.01, 5.0, echoes, 0.3)
+    assert not is_parallel_wall(oblique, at_edge, (0.3, 0.0), 0.0, MOUNTS, RECEPTION, 0.01, echoes, 0.3)
 
 
 def test_a_sensor_that_looks_ahead_should_change_with_the_way() -> None:
@@ -78,7 +79,7 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
         axis = MOUNTS[i, 2]
         echoes[i].before.range_m = echoes[i].latest.range_m
         mark(echoes[i].latest, r, x, 0.0, axis, x)
-        weigh_repeat(i, r, x, 0.0, axis, 0.0, i != 12, MOUNTS, HALF, TOLERANCE, 5.0, echoes, ring)
+        weigh_repeat(i, (r, x, 0.0, axis), 0.0, i != 12, MOUNTS, RECEPTION, echoes, ring)
 
     for x in (0.0, 0.01, 0.08):
         fire(0, 2.0, x)
@@ -107,7 +108,7 @@ def test_walls_along_the_path_do_not_explain_readings_without_noise_besides_one_
             axis = MOUNTS[i, 2]
             mark(echoes[i].latest, r, x, 0.0, axis, x)
             echoes[i].agreed_m, echoes[i].agreed_path_m = r, x
-            weigh_repeat(i, r, x, 0.0, axis, 0.0, i != 12, MOUNTS, HALF, TOLERANCE, 5.0, echoes, ring)
+            weigh_repeat(i, (r, x, 0.0, axis), 0.0, i != 12, MOUNTS, RECEPTION, echoes, ring)
     equal = -math.log(EQUAL_PRIOR)
     assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * REPEAT_NAT)
     assert repeat_evidence(all_of) == pytest.approx(all_of.repeated_nat + equal, abs=0.1)

@@ -32,7 +32,13 @@ class Ring:
             for i, r in enumerate(ranges.tolist()):
                 x = step_m * int(self.looks[i])
                 nats = weigh_replay(
-                    i, r, float(self.before[i]), x, 0.0, 0.0, HALF, TOLERANCE, self.past, self.looks, self.nats
+                    i,
+                    (r, x, 0.0, 0.0),
+                    float(self.before[i]),
+                    (HALF, TOLERANCE, 5.0),
+                    self.past,
+                    self.looks,
+                    self.nats,
                 )
                 self.most = max(self.most, float(nats))
             self.before[:] = ranges
