@@ -29,7 +29,7 @@ CROSS_HISTORY: Final = 438 * CROSS_EVERY
 """Cross paths kept of all sensors: those of the last metre or two."""
 CROSSES_MAX: Final = 192
 """Cross paths compared at a time."""
-READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + CROSSES_MAX + 64
+COMPARED_MAX: Final = BEARING_BINS * BIN_CAPACITY + CROSSES_MAX + 64
 """Readings compared at a time: a reservoir's, cross paths, and some more of the sensors' histories."""
 ATTRACTING_MAX: Final = 16
 """Outline segments that may attract a hypothesis."""

@@ -10,10 +10,10 @@ from perception.bayes.memory.elements import (
     ATTRACTING_MAX,
     BEARING_BINS,
     BIN_CAPACITY,
+    COMPARED_MAX,
     CROSS_HISTORY,
     GRID_CELLS,
     PAIRS_PER_SENSOR,
-    READINGS_MAX,
     MappedSegment,
     Pose,
     Reading,
@@ -64,14 +64,14 @@ class LinearReading(Record):
 class Predictions(Record):
     """What a circle predicts of each reading, field by field, so that the processor computes several at a time."""
 
-    error: Annotated[Floats, READINGS_MAX]
+    error: Annotated[Floats, COMPARED_MAX]
     """Range, or half a cross path, less the predicted one, m."""
-    slope_x: Annotated[Floats, READINGS_MAX]
+    slope_x: Annotated[Floats, COMPARED_MAX]
     """Derivatives of the predicted range by the circle's centre."""
-    slope_y: Annotated[Floats, READINGS_MAX]
-    distance: Annotated[Floats, READINGS_MAX]
+    slope_y: Annotated[Floats, COMPARED_MAX]
+    distance: Annotated[Floats, COMPARED_MAX]
     """Of the centre from the sensor that fired, m."""
-    ahead: Annotated[Floats, READINGS_MAX]
+    ahead: Annotated[Floats, COMPARED_MAX]
     """The same along the sensor's axis, m."""
 
 
@@ -208,10 +208,10 @@ class Scratch(Record):
     """Whether the bin before is covered: 1 if so where this one is open, plus 2 if so where this one is covered."""
     segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
     """The segments of this firing."""
-    readings: Annotated[Records[Reading], READINGS_MAX]
+    readings: Annotated[Records[Reading], COMPARED_MAX]
     """The readings of one object."""
-    face_readings: Annotated[Records[Reading], READINGS_MAX]
-    facing: Annotated[Ints, READINGS_MAX]
+    face_readings: Annotated[Records[Reading], COMPARED_MAX]
+    facing: Annotated[Ints, COMPARED_MAX]
     """Places of those readings that end near the circle with which a corner is compared."""
     others: Annotated[Records[OtherCircle], TRACKS_MAX]
     """The established circles other than one."""
@@ -219,7 +219,7 @@ class Scratch(Record):
     """Of the circle that was last asked for."""
     own: Predictions
     """Of the circle that is refined, where it is now."""
-    linear: Annotated[Records[LinearReading], READINGS_MAX]
+    linear: Annotated[Records[LinearReading], COMPARED_MAX]
     cells: Annotated[Floats, GRID_CELLS]
     """Log likelihood of each cell of a posterior's grid, nat."""
     sides: Annotated[Ints, BEARING_BINS]

@@ -15,7 +15,7 @@ from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import find_others, is_relevant
 from perception.bayes.inference.range_fit import FAR, score_circle
 from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
-from perception.bayes.memory.elements import READINGS_MAX, Reading
+from perception.bayes.memory.elements import COMPARED_MAX, Reading
 from perception.bayes.memory.scratch import OtherCircle, Predictions, Score
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, Memory, StateRecord
@@ -45,7 +45,7 @@ def circle_evidence(
         Memory, circles and settings.
     t : int
         The track.
-    readings : (READINGS_MAX,) Reading
+    readings : (COMPARED_MAX,) Reading
         Out: the readings.
     score : (1,) Score
         Scratch.
@@ -53,7 +53,7 @@ def circle_evidence(
         Scratch.
     others : (≥ number of tracks,) OtherCircle
         Scratch.
-    nats : (READINGS_MAX,) float
+    nats : (COMPARED_MAX,) float
         Out: the evidence of each, nat.
     """
     track = tracks[t]
@@ -121,7 +121,7 @@ def evidence_of(
     labels : tuple of str
         Names of the alternatives of a circle.
     """
-    heard, nats = zeros(Reading, READINGS_MAX), np.zeros(READINGS_MAX)
+    heard, nats = zeros(Reading, COMPARED_MAX), np.zeros(COMPARED_MAX)
     readings, score = records(Reading, heard), records(Score, zeros(Score, 1))
     t, rivals = row - len(memory.circles), tuple[tuple[str, float], ...]()
     if t < 0:

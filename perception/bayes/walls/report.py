@@ -240,6 +240,13 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     return np.asarray(sure)
 
 
+def _is_proven(corner: np.void, passes: float, *, are_mirrors: bool) -> bool:
+    """Return whether its echoes from afar prove a corner, whatever is known of its walls."""
+    far = float(corner["far_echoes"])
+    lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
+    return far >= ALONE_ECHOES and far > lead * passes and bool(corner["is_edge"] != are_mirrors)
+
+
 def _extend(owners: list[Straight], places: list[tuple[float, float, tuple[int, int]]], *, is_reached: bool) -> bool:
     """Move the ends of walls to their corner if it `is_reached` from near it; return whether all end there."""
     are_met = True
@@ -280,10 +287,7 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
         is_met = _extend(owners, places, is_reached=is_heard or is_near) and len(owners) == 2
-        far = float(corner["far_echoes"])
-        lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
-        is_proven = far >= ALONE_ECHOES and far > lead * passes and corner["is_edge"] != are_mirrors
-        if is_proven or (is_met and (is_heard or is_near)):
+        if _is_proven(corner, passes, are_mirrors=are_mirrors) or (is_met and (is_heard or is_near)):
             # Ranges that end at both walls speak for their corner, whether it answers or not.
             found.append(_point(corner, max(echoes, CORNER_PASSED_SHARE * ended) if is_met and is_near else echoes))
     return found

@@ -9,7 +9,7 @@ import pytest
 
 from perception.bayes.inference import cross_path
 from perception.bayes.inference.prediction import predict_circle
-from perception.bayes.memory.elements import READINGS_MAX
+from perception.bayes.memory.elements import COMPARED_MAX
 from tests.perception.bayes.cross_cases import crosses
 from tests.perception.bayes.random_tracks import examples, predictions
 
@@ -19,7 +19,7 @@ def test_many_readings_are_predicted_as_each_is_alone(examples: int) -> None:
     """Echoes alone, cross paths alone, and both in any order: any number of them, as a processor takes eight."""
     rng, out = np.random.default_rng(81), predictions()
     for _ in range(examples):
-        n, kinds = int(rng.choice([0, 1, 7, 8, 9, 60, READINGS_MAX])), int(rng.integers(3))
+        n, kinds = int(rng.choice([0, 1, 7, 8, 9, 60, COMPARED_MAX])), int(rng.integers(3))
         rows = np.column_stack([rng.uniform(-0.4, 0.4, (n, 2)), rng.normal(0, 1, (n, 2)), rng.uniform(0.5, 2, n)])
         across = rng.uniform(-0.3, 0.3, (n, 2)) * rng.choice([[0, 0], [1, 1], [0, 1]][kinds], n)[:, None]
         x, y, radius = rng.uniform(1.2, 2.0), rng.uniform(-1, 1), float(rng.choice([0.0, 0.1067, 0.3048, 0.67]))

@@ -10,10 +10,10 @@ from perception.bayes.memory.state import CircleTrack, PolygonTrack, State
 def test_the_readings_of_any_track_fit_where_they_are_copied_to() -> None:
     circle, polygon, state = CircleTrack.DTYPE, PolygonTrack.DTYPE, State.DTYPE
     kept = [dtype["bins"].shape[0] * dtype["bins"].base["readings"].shape[0] for dtype in (circle, polygon)]
-    assert kept[0] == elements.BEARING_BINS * elements.BIN_CAPACITY <= elements.READINGS_MAX
-    assert kept[1] <= elements.READINGS_MAX
+    assert kept[0] == elements.BEARING_BINS * elements.BIN_CAPACITY <= elements.COMPARED_MAX
+    assert kept[1] <= elements.COMPARED_MAX
     assert kept[1] == state["job_readings"].shape[0]
-    assert state["scratch"]["readings"].shape[0] == elements.READINGS_MAX
+    assert state["scratch"]["readings"].shape[0] == elements.COMPARED_MAX
 
 
 def test_the_map_is_hashed_by_a_mask_so_its_buckets_are_a_power_of_two() -> None:

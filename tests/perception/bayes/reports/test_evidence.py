@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference.likelihood import level_of, log_likelihood
-from perception.bayes.memory.elements import READINGS_MAX
+from perception.bayes.memory.elements import COMPARED_MAX
 from perception.bayes.memory.scratch import OtherCircle, Predictions, Score
 from perception.bayes.memory.state import ESTABLISHED
 from perception.bayes.reports.evidence import circle_evidence, evidence_of, polygon_evidence
@@ -40,7 +40,7 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
         random_track(rng, memory, 0, ESTABLISHED)
         place, rho = place_of(memory, 0), float(memory.circles["radius"][0])
         keep(memory, 0, around(rng, 40, place, rho))
-        readings, nats = readings_of(np.zeros((READINGS_MAX, 5))), np.zeros(READINGS_MAX)
+        readings, nats = readings_of(np.zeros((COMPARED_MAX, 5))), np.zeros(COMPARED_MAX)
         scores, predicted = records(Score, zeros(Score, 1)), records(Predictions, zeros(Predictions, 1))
         scratch = scores, predicted, records(OtherCircle, zeros(OtherCircle, TRACKS))
         assert circle_evidence(memory.s, memory.tracks, P, 0, readings, *scratch, nats) == 40
@@ -76,7 +76,7 @@ def test_the_evidence_of_each_reading_for_a_polygon_equals_its_oracle() -> None:
     for j, q in enumerate(w):
         held = memory.polygons["bins"][1, j]
         held["readings"][0], held["count"] = (*q, 0.0, 0.0), 1
-    heard, nats = readings_of(np.zeros((READINGS_MAX, 5))), np.zeros(READINGS_MAX)
+    heard, nats = readings_of(np.zeros((COMPARED_MAX, 5))), np.zeros(COMPARED_MAX)
     score = records(Score, zeros(Score, 1))
     assert polygon_evidence(memory.s, box_readings.P, 1, heard, score, nats) == 24
     settings, expected = box_readings.P[0], []
