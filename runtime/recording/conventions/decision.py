@@ -240,8 +240,12 @@ def _find_angles(
     left = list(echoes)
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
-        return default
-    fits = _plainest(fits, default, echoes, backward)
+        doubts = [one for one in left if sureness(echoes[one], echoes[default]) > 0.5 * SURE]
+        if not doubts:
+            return default
+        fits = [default, *doubts]
+    else:
+        fits = _plainest(fits, default, echoes, backward)
     is_open = options.heading == options.sensor_order == "auto"
     is_mirrored = is_open and any(HEADINGS[one.heading].hand < 0 for one in fits)
     is_backward = len(fits) == 1 and fits[0] in backward and options.heading == "auto"

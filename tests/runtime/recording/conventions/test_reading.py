@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
+from typing import Final
 
 import numpy as np
 import pytest
@@ -105,7 +106,11 @@ def try_case(case: Case, path: Path) -> str:
     return outcome
 
 
-@pytest.mark.parametrize("seed", range(1000, 1008))
+DOUBTFUL: Final = 3149
+"""Sensors the other way round, by 4.4 standard errors: too few to be sure, too many for the form's own order."""
+
+
+@pytest.mark.parametrize("seed", [*range(1000, 1008), DOUBTFUL])
 def test_a_table_in_any_convention_is_right_or_refused_with_the_option(seed: int, tmp_path: Path) -> None:
     try_case(draw(seed), tmp_path / "table.csv")
 
