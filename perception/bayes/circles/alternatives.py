@@ -1,7 +1,8 @@
 """Alternative explanations of the readings of a circle track, each fitted with its own best pose.
 
 Explanations can be compared only on the same readings. One that was fitted to other readings would win or lose by
-readings that it was not scored on.
+readings that it was not scored on. Each is heard as the scratch says (`perception.bayes.inference.beam`), whose log
+prior counts.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from perception.bayes.circles.alternatives import bearing_if_near
+from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line
 from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.inference.range_fit import fit_reading_line
@@ -51,6 +52,10 @@ def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
     face : LineFit
         Unit normal and distance of the face from the origin.
     """
+    if face.rays > 0 and not is_crossed(q):
+        away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
+        half, _ = ray_over_line(q, face.normal_x, face.normal_y, away, face.half_angle, face.rays)
+        return q.range_m - half
     if is_crossed(q):
         away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
         half, _, _ = over_line(q, face.normal_x, face.normal_y, away)
@@ -85,7 +90,7 @@ def is_of_face(
         e1 += CORNER_OUT_OF_BEAM_GATES * gate
     if (e0 <= e1) != (side == 0):
         return False
-    if not has_edge:
+    if not has_edge or first.rays > 0:
         return True
     ex = corner.edge_x - q.x
     ey = corner.edge_y - q.y
@@ -233,6 +238,8 @@ def score_corner(
     readings = scratch.readings[:n]
     corner = scratch.corner_fit
     cos_may, gate = p[0].cos_may_answer, p[0].gate_m
+    if corner.faces[0].rays > 0:
+        cos_may = GRAZING_MIN  # a ray meets a face at any angle
     count, sx, sy = find_facing(readings, scratch.own, cx, cy, gate, scratch.facing)
     if count < CORNER_READINGS_MIN:
         return IMPOSSIBLE_NAT
@@ -252,7 +259,7 @@ def score_corner(
             face = corner.faces[side]
             if face.normal_x * q.axis_x + face.normal_y * q.axis_y >= cos_may:
                 v = max(v, log_likelihood(p, level, face_error(q, cx, cy, face)))
-        if has_edge:
+        if has_edge and corner.faces[0].rays == 0:  # a ray misses an edge
             ex = corner.edge_x - q.x
             ey = corner.edge_y - q.y
             d = math.sqrt(ex * ex + ey * ey)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 
 from perception.bayes.circles.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
+from perception.bayes.circles.heard_rays import try_other_rays
+from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.lines import enter_line
 from perception.bayes.inference.noise_estimation import noise_variance
@@ -103,6 +105,8 @@ def reset_circle(track: CircleTrack) -> None:
     clear_track(track)
     track.kind = 0
     track.alternative = 0
+    track.other_rays = 0
+    track.rays_leads[:] = 0.0
     track.is_named = 0
     track.radius = 0.0
     track.root_xx = 0.0
@@ -190,11 +194,17 @@ def gather_relevant(
     return keep_relevant(s, tracks, p, gather_history(s, p, x, y, radius), x, y, radius, -1)
 
 
+UNTRIED, SETTLED, UNSUPPORTED = range(3)
+"""Outcomes of a hypothesis: too few readings; a track, or a reason for none; the readings do not support it."""
+
+
 @kernel
 def initiate_circle(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float, nx: float, ny: float
 ) -> int:  # fmt: skip
     """Try a circle behind a segment and start a track if the readings support it; return 1 if that took work.
+
+    Where they do not, it is tried by another number of rays at times, which may be how the place is heard.
 
     Parameters
     ----------
@@ -205,19 +215,37 @@ def initiate_circle(
     x, y, nx, ny : float
         The segment's middle (m) and unit normal, away from the sensors.
     """
-    scratch = s[0].scratch
-    fit = scratch.circle_fit
     radius = p[0].circles[kind].radius_m
-    hypothesis = scratch.hypothesis
+    hypothesis = s[0].scratch.hypothesis
     hypothesis.x = x + radius * nx
     hypothesis.y = y + radius * ny
     hypothesis.heading = 0.0
     if is_known(tracks, p, hypothesis.x, hypothesis.y, radius, nx, ny):
         return 0
     relax_onto_map(s, p, kind)
+    outcome = try_circle(s, tracks, p, kind, nx, ny)
+    if outcome == UNSUPPORTED and try_other_rays(s, tracks, p, kind):
+        try_circle(s, tracks, p, kind, nx, ny)
+    return min(outcome, 1)
+
+
+@kernel
+def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, nx: float, ny: float) -> int:
+    """Start a track at the scratch's hypothesis if the readings support it; return which of the outcomes it is.
+
+    Parameters
+    ----------
+    s, tracks, p, kind, nx, ny
+        As for `initiate_circle`.
+    """
+    scratch = s[0].scratch
+    fit = scratch.circle_fit
+    radius = p[0].circles[kind].radius_m
+    hypothesis = scratch.hypothesis
+    assume_rays(s, p, s[0].rays)
     n = gather_relevant(s, tracks, p, hypothesis.x, hypothesis.y, radius)
     if n < CIRCLE_READINGS_MIN:
-        return 0
+        return UNTRIED
     var0, rel2 = noise_variance(s, p)
     if not fit_circle(
         scratch.readings[:n],
@@ -232,19 +260,19 @@ def initiate_circle(
         scratch.predicted,
         fit,
     ):
-        return 0
+        return UNTRIED
     n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
     if not fit_circle(
         scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, scratch.predicted,
         fit,
     ):  # fmt: skip
-        return 0
+        return UNTRIED
     x, y = fit.x, fit.y
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
     llr = score(s, p, n, x, y, radius)
     near = scratch.score.near
     if scratch.score.hits < CIRCLE_READINGS_MIN or llr < CIRCLE_EVIDENCE_MIN_NAT:
-        return 1
+        return UNSUPPORTED
     prior = p[0].model_prior_nat
     ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     own = llr + (prior if kind < p[0].model_count else 0.0)
@@ -252,7 +280,7 @@ def initiate_circle(
         line = scratch.line_score
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             enter_line(s, scratch.line_fit, x, y, line)
-        return 1
+        return UNSUPPORTED
     chosen = kind
     best = own
     best_x = x
@@ -268,14 +296,14 @@ def initiate_circle(
                 best_x = fit.x
                 best_y = fit.y
     if chosen == kind and llr < p[0].unknown_nat * near:
-        return 1
+        return UNSUPPORTED
     if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:
-        return 1
+        return UNSUPPORTED
     if is_known(tracks, p, best_x, best_y, -1.0, nx, ny) or is_rejected(s, best_x, best_y, chosen, best):
-        return 1
+        return SETTLED
     t = start_circle(s, tracks, chosen, p[0].circles[chosen].radius_m, best_x, best_y, n)
     if t < 0:
-        return 1
+        return SETTLED
     det = h00 * h11 - h01 * h01
     track = tracks[t]
     track.log_likelihood_ratio = llr
@@ -283,4 +311,4 @@ def initiate_circle(
     track.covariance_yy = min(h00 / det, CENTRE_VARIANCE_MAX_M2) if det > 0.0 else CENTRE_VARIANCE_MAX_M2
     track.root_xx = math.sqrt(track.covariance_xx)
     track.root_yy = math.sqrt(track.covariance_yy)
-    return 1
+    return SETTLED

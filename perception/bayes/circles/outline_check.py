@@ -67,6 +67,11 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
             continue
         dx = track.x - q.x
         dy = track.y - q.y
+        per_slope = 1.0
+        if own.rays > 0 and not is_crossed(q):  # the deviation of the surface, where the ray meets it
+            dx, dy = own.slope_x[j], own.slope_y[j]
+            per_slope = 1.0 / math.sqrt(dx * dx + dy * dy)
+        e *= per_slope
         bearing = scratch.bearings[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * BEARING_BINS) % BEARING_BINS]
         k = bearing.count
         if k == BIN_CAPACITY:
@@ -76,7 +81,7 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
             k -= 1
         bearing.errors[k] = e
         bearing.count += 1
-        bearing.variance += var0 + rel2 * q.range_m * q.range_m
+        bearing.variance += (var0 + rel2 * q.range_m * q.range_m) * per_slope * per_slope
 
 
 @kernel
@@ -173,7 +178,8 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         most = OUTLINE_CLIP_SIGMAS * math.sqrt(variance)
         e = min(most, max(-most, e))
         ux, uy = own.slope_x[j], own.slope_y[j]
-        along = math.sqrt(ux * ux + uy * uy) if is_crossed(q) else 1.0  # fall of the range with the radius
+        is_slant = is_crossed(q) or own.rays > 0
+        along = math.sqrt(ux * ux + uy * uy) if is_slant else 1.0  # fall of the range with the radius
         xx += ux * ux / variance
         xy += ux * uy / variance
         yy += uy * uy / variance

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.inference.cross_path import circle_error, is_crossed, is_near_circle
+from perception.bayes.inference.beam import answer
+from perception.bayes.inference.cross_path import is_crossed, is_near_circle
 from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.inference.prediction import predict_circle
 from perception.bayes.inference.reservoir import copy_reading
@@ -51,6 +52,7 @@ def find_others(
     cx: float,
     cy: float,
     radius: float,
+    rays: int,
     others: Records[OtherCircle],
 ) -> int:
     """Write the established circles other than `own`, and return their number.
@@ -65,6 +67,8 @@ def find_others(
         The circle whose readings are asked for; −1 where it has no track yet.
     cx, cy, radius : float
         That circle, m.
+    rays : int
+        By how many rays circles are heard; see `perception.bayes.inference.beam`.
     others : (≥ n,) OtherCircle
         Out.
     """
@@ -78,6 +82,7 @@ def find_others(
         other.y = track.y
         other.radius = track.radius
         other.root_xx = track.root_xx
+        other.rays = rays
         other.is_named = track.is_named
         is_of_polygon = p[0].polygon_count > 0 and track.kind >= p[0].model_count
         is_rival = not is_of_polygon and is_elsewhere(track, p, cx, cy, radius)
@@ -142,12 +147,15 @@ def is_explained_elsewhere(
         dx = other.x - q.x
         dy = other.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        if dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d:
+        if other.rays == 0 and dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d:
             continue
         tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * other.root_xx
-        if not is_near_circle(q, d, other.radius, tight):
+        if other.rays == 0 and not is_near_circle(q, d, other.radius, tight):
             continue
-        if abs(circle_error(q, dx, dy, d, other.radius)) < (tight if other.takes == TAKES_ALL else min(off, tight)):
+        e, ahead = answer(q, dx, dy, d, other.radius, p[0].half_angle_rad, other.rays)
+        if ahead < p[0].cos_may_answer * d:
+            continue
+        if abs(e) < (tight if other.takes == TAKES_ALL else min(off, tight)):
             return True
     return False
 
@@ -237,7 +245,7 @@ def keep_relevant(
     var0, rel2 = noise_variance(s, p)
     scratch = s[0].scratch
     readings, predicted = scratch.readings, scratch.predicted
-    others = scratch.others[: find_others(tracks, own, p, cx, cy, radius, scratch.others)]
+    others = scratch.others[: find_others(tracks, own, p, cx, cy, radius, predicted.rays, scratch.others)]
     predict_circle(readings[:n], cx, cy, radius, predicted)
     kept = 0
     for j in range(n):

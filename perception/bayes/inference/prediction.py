@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.inference.beam import ray_over_circle
 from perception.bayes.inference.cross_path import SURFACE_NEAREST_M, over_circle
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import Predictions
@@ -35,6 +36,22 @@ def predict_echoes(readings: Records[Reading], x: float, y: float, radius: float
         out.slope_y[j] = dy * per_d
         out.distance[j] = d
         out.ahead[j] = dx * q.axis_x + dy * q.axis_y
+
+
+@kernel
+def predict_by_rays(readings: Records[Reading], x: float, y: float, radius: float, out: Predictions) -> None:
+    """Write what a circle that rays meet predicts of readings among which there is no cross path."""
+    for j in range(len(readings)):
+        q = readings[j]
+        dx = x - q.x
+        dy = y - q.y
+        d = math.sqrt(dx * dx + dy * dy)
+        r, slope_x, slope_y, ahead = ray_over_circle(q, dx, dy, d, radius, out.half_angle, out.rays)
+        out.error[j] = q.range_m - r
+        out.slope_x[j] = slope_x
+        out.slope_y[j] = slope_y
+        out.distance[j] = d
+        out.ahead[j] = ahead
 
 
 @loop_kernel
@@ -80,10 +97,13 @@ def predict_circle(readings: Records[Reading], x: float, y: float, radius: float
     x, y, radius : float
         Centre and radius, m.
     out : Predictions
-        Its first n are written.
+        Its first n are written, for the rays it gives.
     """
     k = leading_echoes(readings)
-    predict_echoes(readings[:k], x, y, radius, out)
+    if out.rays > 0:
+        predict_by_rays(readings[:k], x, y, radius, out)
+    else:
+        predict_echoes(readings[:k], x, y, radius, out)
     predict_any(
         readings[k:], x, y, radius, out.error[k:], out.slope_x[k:], out.slope_y[k:], out.distance[k:], out.ahead[k:]
     )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line
 from perception.bayes.inference.cross_path import is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.inference.prediction import predict_circle
@@ -254,7 +255,7 @@ def fit_reading_line(
     cos_may, gate : float
         Cosine of the angle off the axis within which a reading may be answered, and how far off it may be, m.
     fit : LineFit
-        Out: unit normal and c (m).
+        Out: unit normal and c (m), for the rays it gives.
     """
     alpha = math.atan2(ny, nx)
     c = distance
@@ -270,13 +271,23 @@ def fit_reading_line(
             q = readings[j]
             px = q.x - ox
             py = q.y - oy
-            half, by_own, by_listener = over_line(q, nx, ny, c - nx * px - ny * py)
+            away = c - nx * px - ny * py
+            half, by_own, by_listener = over_line(q, nx, ny, away)
+            slant = 0.0
+            least = cos_may
+            by_ray = fit.rays > 0 and not is_crossed(q)
+            if by_ray:
+                half, slant = ray_over_line(q, nx, ny, away, fit.half_angle, fit.rays)
+                least = GRAZING_MIN
             e = q.range_m - half
-            if abs(e) > gate or nx * q.axis_x + ny * q.axis_y < cos_may:
+            if abs(e) > gate or nx * q.axis_x + ny * q.axis_y < least:
                 continue
             g = robust_weight(e, var0 + rel2 * q.range_m * q.range_m, soft)
             lever = ny * px - nx * py  # the range's derivative by the normal's direction, …
             slope = 1.0  # … and by the distance
+            if by_ray:
+                slope = math.sqrt(1.0 + slant * slant)
+                lever = slope * (lever + away * slant)
             if is_crossed(q):
                 slope = by_own + by_listener
                 lever = slope * lever + by_listener * (ny * q.listener_x - nx * q.listener_y)
@@ -329,6 +340,8 @@ def score_line(
     misses = 0.0
     low = NONE_YET
     high = -NONE_YET
+    if line.rays > 0:
+        cos_may = cos_half = cos_must = GRAZING_MIN  # a ray meets a line at any angle
     for j in range(len(readings)):
         q = readings[j]
         ahead = nx * q.axis_x + ny * q.axis_y
@@ -336,7 +349,11 @@ def score_line(
             continue
         px = q.x - ox
         py = q.y - oy
-        half, _, _ = over_line(q, nx, ny, c - nx * px - ny * py)
+        away = c - nx * px - ny * py
+        half, _, _ = over_line(q, nx, ny, away)
+        slant = 0.0
+        if line.rays > 0 and not is_crossed(q):
+            half, slant = ray_over_line(q, nx, ny, away, line.half_angle, line.rays)
         e = q.range_m - half
         if abs(e) < gate:
             v = log_likelihood(p, level_of(p, noise, q.range_m), e)
@@ -345,7 +362,7 @@ def score_line(
             llr += v
             if v > 0.0:
                 hits += 1.0
-                foot = -ny * px + nx * py
+                foot = -ny * px + nx * py - away * slant
                 low = min(low, foot)
                 high = max(high, foot)
     for j in range(len(readings)):
@@ -354,9 +371,13 @@ def score_line(
             continue
         px = q.x - ox
         py = q.y - oy
-        predicted = c - nx * px - ny * py
+        away = c - nx * px - ny * py
+        predicted = away
+        slant = 0.0
+        if line.rays > 0:
+            predicted, slant = ray_over_line(q, nx, ny, away, line.half_angle, line.rays)
         if predicted > 0.0 and q.range_m - predicted > gate and nx * q.axis_x + ny * q.axis_y >= cos_must:
-            foot = -ny * px + nx * py
+            foot = -ny * px + nx * py - away * slant
             if low < foot < high:
                 llr += missed
                 misses += 1.0

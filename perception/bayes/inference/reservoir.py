@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.inference.beam import answer
 from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.memory.elements import (
     BEARING_BINS,
@@ -143,6 +144,8 @@ def add_crosses(
 def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float, radius: float) -> int:
     """Copy the remembered readings that bear on a circle, hits and silences, to the scratch; return their number.
 
+    It is heard as the scratch's `predicted` says.
+
     Parameters
     ----------
     s, p
@@ -152,6 +155,7 @@ def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float
     """
     readings = s[0].scratch.readings
     cos_may, range_max = p[0].cos_may_answer, p[0].range_max_m
+    rays = s[0].scratch.predicted.rays
     n = 0
     for i in range(s[0].sensor_count):
         sensor = s[0].sensors[i]
@@ -163,6 +167,11 @@ def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float
             if dot <= 0.0:
                 continue
             d = math.sqrt(dx * dx + dy * dy)
+            if rays > 0:
+                beside = abs(q.axis_x * dy - q.axis_y * dx)
+                if beside * p[0].cos_half_angle - dot * p[0].sin_half_angle > radius + HYPOTHESIS_MARGIN_M:
+                    continue  # the whole circle lies outside the beam
+                _, dot = answer(q, dx, dy, d, radius, p[0].half_angle_rad, rays)
             if dot < cos_may * d - HYPOTHESIS_MARGIN_M or d - radius > range_max:
                 continue
             if n >= BEARING_BINS * BIN_CAPACITY:

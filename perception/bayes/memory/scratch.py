@@ -64,6 +64,10 @@ class LinearReading(Record):
 class Predictions(Record):
     """What a circle predicts of each reading, field by field, so that the processor computes several at a time."""
 
+    rays: int
+    """By how many rays the circle is heard, 0 by its nearest point. Given, like …"""
+    half_angle: float
+    """… half the beam's opening, rad, where there are rays."""
     error: Annotated[Floats, COMPARED_MAX]
     """Range, or half a cross path, less the predicted one, m."""
     slope_x: Annotated[Floats, COMPARED_MAX]
@@ -98,6 +102,8 @@ class OtherCircle(Record):
     radius: float
     root_xx: float
     """As in `CircleTrack`, m."""
+    rays: int
+    """As in `Predictions`."""
     is_named: int
     takes: int
     """Which readings it takes from that circle; see `TAKES_NOTHING`."""
@@ -148,6 +154,9 @@ class LineFit(Record):
     normal_x: float
     normal_y: float
     distance: float
+    rays: int
+    """As in `Predictions`; given."""
+    half_angle: float
 
 
 class CornerFit(Record):

@@ -58,6 +58,9 @@ from perception.bounds import (
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records, records, zeros
 
+RAYS_MAX: Final = 3
+"""Greatest number of rays that is distinguished from a whole beam. By 4 and more drums are found by their nearest
+points; and 5 in an office led by 58 nat, where nearest points are heard."""
 FREE, TENTATIVE, ESTABLISHED = range(3)
 """Values of `Track.status`."""
 CONFIRMED: Final = 1
@@ -172,6 +175,10 @@ class CircleTrack(Track):
     """Index of the alternative that was compared last."""
     is_named: Flag
     """1 while it is reported as a model."""
+    other_rays: Annotated[int, up_to(RAYS_MAX)]
+    """By how many rays it was compared last, …"""
+    rays_leads: Annotated[Floats, RAYS_MAX + 1, FINITE]
+    """… and the lead of each; see `circles.heard_rays.compare_rays`."""
     radius: Annotated[float, RADIUS]
     root_xx: Finite
     """Lower Cholesky root of the covariance from which the next grid starts, m."""
@@ -272,6 +279,12 @@ class State(Record):
     """Evidence of the readings' roughness for each noise."""
     residuals_nat: Annotated[Floats, NOISES, FINITE]
     """Evidence of all objects' residuals for each noise."""
+    rays: Annotated[int, up_to(RAYS_MAX)]
+    """By how many rays bodies are heard here, 0: by their nearest points; see `inference.beam`, …"""
+    tried_rays: Annotated[int, up_to(RAYS_MAX)]
+    """… by how many one that failed was tried last, …"""
+    untried: Count
+    """… and how many since then were not."""
     crosses: Annotated[Records[Reading], CROSS_HISTORY]
     """A ring buffer of cross paths."""
     sensors: Annotated[Records[Sensor], SENSORS_MAX]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.cross_path import over_line
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.lines import off_and_along, reaches
@@ -118,6 +119,7 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float
     if length == 0.0:
         return -math.inf
     var0, rel2 = noise_variance(s, p)
+    assume_rays(s, p, s[0].rays)
     best = -math.inf
     for k in range(p[0].circle_count):
         radius = p[0].circles[k].radius_m

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from perception.bayes.inference.cross_path import circle_error
+from perception.bayes.inference.beam import answer
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import find_others, is_relevant
 from perception.bayes.inference.range_fit import FAR, score_circle
@@ -60,12 +60,14 @@ def circle_evidence(
     var0, rel2 = noise_variance(s, p)
     n = copy_reservoir(track, readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, readings, n)
-    known = others[: find_others(tracks, t, p, track.x, track.y, track.radius, others)]
+    known = others[: find_others(tracks, t, p, track.x, track.y, track.radius, s[0].rays, others)]
+    predicted[0].rays = s[0].rays
+    predicted[0].half_angle = p[0].half_angle_rad
     for j in range(n):
         nats[j] = 0.0
         q = readings[j]
         d = math.hypot(track.x - q.x, track.y - q.y)
-        e = circle_error(q, track.x - q.x, track.y - q.y, d, track.radius)
+        e, _ = answer(q, track.x - q.x, track.y - q.y, d, track.radius, p[0].half_angle_rad, s[0].rays)
         if is_relevant(known, p, q, track.x, track.y, track.radius, d, e, var0, rel2):
             score_circle(
                 readings[j : j + 1], track.x, track.y, track.radius, p, s[0].noise_level, predicted[0], score[0]

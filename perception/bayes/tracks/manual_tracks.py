@@ -14,6 +14,7 @@ from perception.bayes.circles.initiation import (
     restart_circle,
     start_circle,
 )
+from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.reservoir import copy_reservoir, gather_history
 from perception.bayes.inference.track_labels import assign_number, free_track
@@ -98,6 +99,7 @@ def place_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
     settle_circle(s, p, kind, x, y)
     x = s[0].scratch.hypothesis.x
     y = s[0].scratch.hypothesis.y
+    assume_rays(s, p, s[0].rays)
     n = gather_relevant(s, tracks, p, x, y, radius)
     t = start_circle(s, tracks, kind, radius, x, y, n)
     if t >= 0:
@@ -122,6 +124,7 @@ def move_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int,
     kind = track.kind
     radius = track.radius
     settle_circle(s, p, kind, x, y)
+    assume_rays(s, p, s[0].rays)
     x = s[0].scratch.hypothesis.x
     y = s[0].scratch.hypothesis.y
     if math.hypot(x - track.x, y - track.y) < radius + p[0].gate_m:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 from perception.bayes.circles.initiation import initiate_circle
-from perception.bayes.inference.cross_path import circle_error, is_crossed, is_near_circle
+from perception.bayes.inference.beam import answer
+from perception.bayes.inference.cross_path import is_crossed, is_near_circle
 from perception.bayes.inference.lines import update_lines
 from perception.bayes.inference.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.inference.occlusion import is_elsewhere
@@ -62,12 +63,15 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
             dy = track.y - q.y
             dot = dx * q.axis_x + dy * q.axis_y
             d = math.sqrt(dx * dx + dy * dy)
-            if dot <= 0.0 or dot < p[0].cos_may_answer * d - ASSOCIATION_MARGIN_M:
+            if dot <= 0.0 or (s[0].rays == 0 and dot < p[0].cos_may_answer * d - ASSOCIATION_MARGIN_M):
                 continue
             tolerance = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx
-            if not is_near_circle(q, d, track.radius, tolerance):
+            if s[0].rays == 0 and not is_near_circle(q, d, track.radius, tolerance):
                 continue
-            e = abs(circle_error(q, dx, dy, d, track.radius))
+            e, ahead = answer(q, dx, dy, d, track.radius, p[0].half_angle_rad, s[0].rays)
+            if ahead < p[0].cos_may_answer * d - ASSOCIATION_MARGIN_M:
+                continue
+            e = abs(e)
             if e < best and e < tolerance:
                 best = e
                 s[0].scratch.explained_by[i] = t
@@ -75,7 +79,7 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
 
 @kernel
 def bears_on_circle(
-    q: Reading, cx: float, cy: float, radius: float, is_free: bool, is_own: bool, p: SettingsRecord
+    q: Reading, cx: float, cy: float, radius: float, rays: int, is_free: bool, is_own: bool, p: SettingsRecord
 ) -> bool:  # fmt: skip
     """Return whether a reading is evidence for or against a circle.
 
@@ -85,6 +89,8 @@ def bears_on_circle(
         The reading.
     cx, cy, radius : float
         Centre and radius, m.
+    rays : int
+        By how many rays it is heard, as in `CircleTrack`.
     is_free, is_own : bool
         Whether no other object explains it; whether a hit on this circle would be associated with it.
     p : (1,) Settings
@@ -96,11 +102,13 @@ def bears_on_circle(
     if dot <= 0.0:
         return False
     d = math.sqrt(dx * dx + dy * dy)
-    if dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
+    if rays == 0 and dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
         return False
     if is_crossed(q) and not is_near_circle(q, d, radius, p[0].gate_m):
         return False
-    e = circle_error(q, dx, dy, d, radius)
+    e, dot = answer(q, dx, dy, d, radius, p[0].half_angle_rad, rays)
+    if dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
+        return False
     if is_crossed(q) and abs(e) > p[0].gate_m:
         return False
     if e < -p[0].gate_m:
@@ -139,7 +147,7 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
             is_own = owner in (UNEXPLAINED, t) or (owner < 0 and track.status != TENTATIVE)
             if 0 <= owner < len(tracks) and not is_own:  # a part of the same body answered
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
-            if bears_on_circle(q, cx, cy, track.radius, owner == UNEXPLAINED, is_own, p):
+            if bears_on_circle(q, cx, cy, track.radius, s[0].rays, owner == UNEXPLAINED, is_own, p):
                 is_kept = i < m or (i + offset) % CROSS_EVERY == 0
                 if is_kept:
                     keep_reading(track, cx, cy, q)

@@ -11,9 +11,11 @@ import math
 
 from perception.bayes.circles.alternatives import fit_other_circle, fit_other_line, mean_bearing, score
 from perception.bayes.circles.corner_model import score_corner
+from perception.bayes.circles.heard_rays import compare_rays, decide_rays
 from perception.bayes.circles.lateral_search import search_across
 from perception.bayes.circles.outline_check import other_bodies, outline_lead, round_lead
 from perception.bayes.circles.posterior import posterior_circle
+from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.lines import enter_line, is_in_wall
 from perception.bayes.inference.noise_estimation import add_residuals, noise_variance
@@ -309,6 +311,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     track = tracks[t]
     n = copy_reservoir(track, s[0].scratch.readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, s[0].scratch.readings, n)
+    assume_rays(s, p, s[0].rays)
     n = keep_relevant(s, tracks, p, n, track.x, track.y, track.radius, t)
     track.reservoir = n
     track.unseen = 0
@@ -325,6 +328,8 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     prior = update_score(s, p, track, n)
     if not compare_alternatives(s, p, track, n, prior) and drop_track(track):
         return
+    if s[0].rays > 0:
+        compare_rays(s, p, track, n)
     careful = is_careful(s, p)
     add_residuals(s, tracks, p, t, n, careful)
     is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
@@ -367,6 +372,8 @@ def quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: 
             track.final_refinements -= 1
         was_named, x, y = track.status == ESTABLISHED and track.is_named == 1, track.x, track.y
         refine(s, tracks, p, t)
+        if s[0].rays > 0:
+            decide_rays(s, tracks, p)
         if was_named:
             count_names(s, tracks, p, t, x, y)
     return is_waiting(tracks, p, threshold)

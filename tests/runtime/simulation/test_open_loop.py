@@ -7,11 +7,18 @@ import math
 import pytest
 
 from config.load import load_model, load_settings
-from config.world import BoxConfig
+from config.world import AcousticsConfig, BoxConfig
 from perception.pipeline import DetectedObject
 from runtime.simulation.evaluation import DrumRow
-from runtime.simulation.open_loop import angle_error, inside_ellipse, match_objects, run_scene, summarise_scene
-from runtime.simulation.scenes import halls
+from runtime.simulation.open_loop import (
+    angle_error,
+    inside_ellipse,
+    match_objects,
+    run_hall,
+    run_scene,
+    summarise_scene,
+)
+from runtime.simulation.scenes import Hall, halls
 
 FT = 0.3048
 
@@ -79,3 +86,16 @@ def test_a_scene_is_summed_up() -> None:
     errors = [row["error"] for row in outcome.drums if row["error"] is not None]
     assert summary["max_error"] == max(errors)
     assert summary["mean_error"] == pytest.approx(sum(errors) / 6)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("robot", ["denning", "p3dx"])
+@pytest.mark.parametrize("rays", [1, 3, 10])
+def test_drums_are_found_by_any_number_of_rays(robot: str, rays: int) -> None:
+    settings = load_settings("hallway", ["perception.method=bayes"], robot=robot)
+    (hall,) = halls("clean")
+    world = hall.world.model_copy(update={"acoustics": AcousticsConfig(model="rays", rays=rays)})
+    outcome = run_hall(settings, Hall(hall.name, world), 0)
+    errors = [math.inf if row["error"] is None else row["error"] for row in outcome.drums]
+    assert outcome.false == 0
+    assert max(errors) < 0.033 * FT
