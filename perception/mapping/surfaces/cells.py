@@ -36,7 +36,7 @@ from perception.mapping.surfaces.parameters import (
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import BLOCK, WORDS, CellCounts, KeptReading, LocalMap
+from perception.mapping.surfaces.records import BLOCK, RIM, WORDS, CellCounts, KeptReading, LocalMap
 from perception.records import Records
 
 BLUR: Final = 16.0
@@ -55,8 +55,6 @@ BORDER_COS: Final = math.cos(DIRECTION_RAD)
 BORDER_SIN: Final = math.sin(DIRECTION_RAD)
 CELLS_A_M: Final = 1.0 / CELL_M
 """To multiply is several times as fast as to divide."""
-RIM: Final = 2
-"""Cells at the map's rim that are not used, so that each cell has neighbours."""
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, Ints, kernel, loop_kernel
-from perception.mapping.surfaces.cells import CELLS_A_M, RIM, cell_of, greatest_strength, strength_of
+from perception.mapping.surfaces.cells import CELLS_A_M, cell_of, greatest_strength, strength_of
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
@@ -19,7 +19,17 @@ from perception.mapping.surfaces.parameters import (
     SURFACE_CELLS_MAX,
     TAKEN_M,
 )
-from perception.mapping.surfaces.records import ANGLES, BLOCK, DIGITS, FREE, CellCounts, LocalMap, Piece, SurfaceCell
+from perception.mapping.surfaces.records import (
+    ANGLES,
+    BLOCK,
+    DIGITS,
+    FREE,
+    RIM,
+    CellCounts,
+    LocalMap,
+    Piece,
+    SurfaceCell,
+)
 from perception.records import Records
 
 ROW_PARTS: Final = CELLS * CELLS // BLOCK

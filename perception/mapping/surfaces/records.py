@@ -31,6 +31,8 @@ SHARES: Final = Bound(0, 2 ** (SHARES_A_WORD * SHARE_BITS) - 1)
 """Of shares packed into a word; a further one would belong to no place on the arc."""
 Narrow = NDArray[np.int32]
 """Counts of all readings fit, and twice as many of them fit into the processor's caches."""
+RIM: Final = 2
+"""Cells at the map's rim that are not used, so that each cell has neighbours."""
 BLOCK: Final = 16
 """Cells along the edge of a block: where nothing was heard, none of its cells is looked at."""
 CHAIN_MAX: Final = 64
@@ -62,9 +64,9 @@ class KeptReading(Record):
 class SurfaceCell(Record):
     """An occupied cell, while pieces are sought."""
 
-    i: Annotated[int, up_to(CELLS - 1)]
-    """Row and column."""
-    j: Annotated[int, up_to(CELLS - 1)]
+    i: Annotated[int, up_to(CELLS - 1 - RIM)]
+    """Row and column; 0 of one that is over."""
+    j: Annotated[int, up_to(CELLS - 1 - RIM)]
     strength: Finite
     """Echoes that speak for it."""
     owner: Annotated[int, Bound(NODE, PIECES_MAX - 1)]
