@@ -30,7 +30,7 @@ LEFTOVER_M: Final = 0.2
 """So near what is known a piece may be what is left of its echoes. Share of pieces so near: 0.91 and more in
 generated rooms, 0.51 and less on drives; within 0.1 m it is 0.66 and 0.39."""
 UNSURE: Final = -1
-FAR: Final = 0
+AWAY: Final = 0
 NEAR: Final = 1
 ALONG: Final = 2
 ON_BODY: Final = 3
@@ -103,7 +103,7 @@ def beside_known(rows: NDArray[Any], near: NDArray[np.int64], prior: float) -> S
     is_piece = rows["number"] < 0
     length = lengths(rows)
     evidence = rows["evidence"].clip(None, STRAIGHT_NAT) + prior
-    free = near < ON_BODY if prior > 0.0 else (near >= FAR) & (near < ALONG)
+    free = near < ON_BODY if prior > 0.0 else (near >= AWAY) & (near < ALONG)
     is_wall = is_piece & (evidence > 0.0)
     straight = rows[is_wall]
     numbers = zip(*(straight[name].tolist() for name in ENDS + SIZES), evidence[is_wall].tolist(), strict=True)
@@ -133,10 +133,10 @@ def wall_prior(rows: NDArray[Any], near: NDArray[np.int64]) -> float:
         As for `beside_known`.
     """
     length = lengths(rows)
-    known_m = float(length @ (near > FAR).mean(axis=1)) + UNKNOWN_M
+    known_m = float(length @ (near > AWAY).mean(axis=1)) + UNKNOWN_M
     known_share = known_m / (float(length.sum()) + UNKNOWN_M)
     # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls.
-    is_long = (length >= STRAIGHT_M) & (near == FAR).all(axis=1)
+    is_long = (length >= STRAIGHT_M) & (near == AWAY).all(axis=1)
     straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
     return KNOWN_NAT * (straight_share * (1.0 - known_share) / (1.0 - KNOWN_SHARE) - 1.0)
 
