@@ -167,7 +167,7 @@ def _line_for_people(event: Mapping[str, Any], *, has_colours: bool) -> str:
     level = f"{event['level']:7}"
     if has_colours:
         level = f"{COLOURS.get(event['level'], '')}{level}{COLOUR_END}"
-    line = f"{str(event['timestamp'])[:SECONDS]}Z {level} {one_line(sentence(shown['event'], rest))}\n"
+    line = f"{str(event['timestamp'])[:SECONDS]}Z [{level}] {one_line(sentence(shown['event'], rest))}\n"
     return line + "".join(f"{one_line(part)}\n" for part in str(event.get("exception", "")).splitlines())
 
 

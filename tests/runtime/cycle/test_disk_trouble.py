@@ -170,8 +170,8 @@ def test_a_full_disk_under_the_log_and_the_recording(
     assert log.lost >= 3
     assert log.last_error == "No space left on device"
     shown = capfd.readouterr().err
-    assert "log lines are missing in the file" in shown, "where lines still arrive"
-    assert "the recording is incomplete" in shown
+    assert "Log lines are missing in the file" in shown, "where lines still arrive"
+    assert "The recording is incomplete" in shown
     with pytest.raises(UserError, match=r"--record: the recording is incomplete: .*No space left") as caught:
         recording.raise_if_incomplete()
     assert caught.value.exit_code == FAILED

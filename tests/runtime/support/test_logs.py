@@ -33,7 +33,7 @@ def test_each_line_of_the_file_is_json(tmp_path: Path, capsys: pytest.CaptureFix
     shown = capsys.readouterr()
     assert shown.out == ""
     assert [line.partition("Z ")[2] for line in shown.err.splitlines()] == [
-        r'info    Mode DRIVE: "two\nlines and \"quotes\"" (cycle 3)', "warning Odd (path a/b, number nan)"
+        r'[info   ] Mode DRIVE: "two\nlines and \"quotes\"" (cycle 3)', "[warning] Odd (path a/b, number nan)"
     ]  # fmt: skip
     assert "\x1b" not in shown.err, "no colours without a terminal"
 
