@@ -101,16 +101,17 @@ def perceived(drive: RealDrive, firings: Iterable[Firing]) -> Perception:
     return replayer.perception
 
 
-def score_image(drive: RealDrive) -> Row:
+def score_image(drive: RealDrive, perception: Perception) -> Row:
     """Return what is false of the exported image of a drive: occupied pixels and laser points in free ones."""
-    perception, ring = perceived(drive, drive.firings), drive.settings.ring
+    settings, mapped = drive.settings, drive.settings.perception.maps_surfaces
+    ring, radius_m = settings.ring, settings.body.radius_m
     seen = (*perception.labelled_objects(), *perception.archived_objects())
     walls = np.array([(*wall.begin, *wall.end) for wall in reported_walls(seen)]).reshape(-1, 4)
     bodies = [one for one in seen if one.ends is None]
-    world = world_of(bodies, walls, drive.settings.models, perception.polylines())
+    world = world_of(bodies, walls, settings.models, perception.polylines())
     way = np.array([(firing.pose.x, firing.pose.y) for firing in drive.firings])
     echoes = echoes_of(drive.firings, placed_ring(ring))
-    image = occupancy_image(world, echoes, ring, way, drive.settings.body.radius_m, surfaces_mapped=True)
+    image = occupancy_image(world, echoes, ring, way, radius_m, surfaces_mapped=mapped)
     pixels, corner = image.pixels[::-1], (image.x_m, image.y_m)
     rows, columns = np.nonzero(pixels == OCCUPIED)
     occupied = np.column_stack([columns + 0.5, rows + 0.5]) * RESOLUTION_M + corner
@@ -121,9 +122,8 @@ def score_image(drive: RealDrive) -> Row:
     return {"image false": float((away > NEAR_M).mean()), "points in free": float(is_free.sum() / len(drive.points))}
 
 
-def score(drive: RealDrive, firings: Iterable[Firing]) -> Row:
-    """Return what is explained of a drive, and what is false, after its firings were perceived."""
-    perception = perceived(drive, firings)
+def score(drive: RealDrive, perception: Perception) -> Row:
+    """Return what is explained of a drive, and what is false, after perception was given its firings."""
     seen = (*perception.labelled_objects(), *perception.archived_objects())
     walls, lines = reported_walls(seen), reported_lines(perception)
     away = away_from(drive.echoes, walls, reported_corners(seen))
@@ -162,13 +162,14 @@ def measure(folders: Iterable[Path], roundings: int, report: Callable[[str], Non
     for folder in folders:
         report(f"real rooms: {folder.name}")
         drive = read_drive(folder)
-        row = score(drive, drive.firings)
+        perception = perceived(drive, drive.firings)
+        row = score(drive, perception) | score_image(drive, perception)
         others = [row["explained"]]
         for k in range(roundings):
             report(f"real rooms: {folder.name}, rounded {k + 1} of {roundings}")
             steps = tuple((1.0 + 0.1 * (k // len(ROUNDINGS))) * step for step in ROUNDINGS[k % len(ROUNDINGS)])
-            others.append(score(drive, rounded(drive.firings, (steps[0], steps[1], steps[2])))["explained"])
+            again = perceived(drive, rounded(drive.firings, (steps[0], steps[1], steps[2])))
+            others.append(score(drive, again)["explained"])
         row["spread"] = max(others) - min(others)
-        row |= score_image(drive)
         rows[folder.name] = row
     return rows

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -33,6 +34,8 @@ from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
 HALF_ANGLE_MAX: Final = math.radians(45.0)
+RIVALS_M: Final = MappingProxyType({round_label(radius): radius for radius in RIVAL_RADII_M if radius > 0.0})
+"""Radii of the round bodies that are no models, by their labels, m."""
 
 
 class SurfaceMap(NoSurfaces):
@@ -61,10 +64,9 @@ class SurfaceMap(NoSurfaces):
         self._forget_derived()
 
     def _name_sizes(self, models: Sequence[ModelConfig]) -> None:
-        rivals = {round_label(radius): radius for radius in RIVAL_RADII_M if radius > 0.0}
-        self._reach_m = rivals | {one.name: one.reach_m for one in models}
+        self._reach_m = RIVALS_M | {one.name: one.reach_m for one in models}
         radii, names = circle_models(models)
-        self._radius_m = rivals | dict(zip(names, radii, strict=True))
+        self._radius_m = RIVALS_M | dict(zip(names, radii, strict=True))
 
     def _forget_derived(self) -> None:
         self._known: tuple[DetectedObject, ...] = ()
@@ -213,5 +215,4 @@ class SurfaceMap(NoSurfaces):
 
 def round_radii(models: Sequence[ModelConfig]) -> Floats:
     """Return the radii of the round models, and of what is round besides, m."""
-    rivals = [radius for radius in RIVAL_RADII_M if radius > 0.0]
-    return np.array(sorted({*rivals, *circle_models(models)[0]}))
+    return np.array(sorted({*RIVALS_M.values(), *circle_models(models)[0]}))

@@ -115,9 +115,15 @@ def map_run(
             scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
             way = scans if view is None else view.way
             with progress(console, "drawing the map"):
-                method, radius_m = settings.perception.grid.method, settings.body.radius_m
-                mapped = len(polylines) > 0
-                image = occupancy_image(world, echoes, settings.ring, way, radius_m, method, mapped)
+                image = occupancy_image(
+                    world,
+                    echoes,
+                    settings.ring,
+                    way,
+                    settings.body.radius_m,
+                    settings.perception.grid.method,
+                    surfaces_mapped=settings.perception.maps_surfaces,
+                )
         except ValueError as error:
             raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
         with writing("--grid", grid):
