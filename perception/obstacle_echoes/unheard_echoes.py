@@ -214,13 +214,14 @@ class UnheardEchoes:
         x, y (m), direction (rad) of each sensor in the ring's frame.
     """
 
-    SCRATCH: Final = ("records",)
-    """Not part of a snapshot: a view of an array that is."""
+    SCRATCH: Final = ("records", "_places")
+    """Not part of a snapshot: views of an array that is."""
     BOUNDS: Final = bounds(_echoes=UnheardEcho.BOUNDS, silences=COUNT)
 
     def __init__(self, mounts: Floats) -> None:
         self._echoes = zeros(UnheardEcho, len(mounts))
         self.records = records(UnheardEcho, self._echoes)
+        self._places = self._echoes[["state", "x", "y"]]
         self.silences = np.zeros(2, np.int64)
 
     def falls_silent(self, which: int) -> bool:
@@ -233,9 +234,12 @@ class UnheardEchoes:
 
         Of a ring that repeats what it hears, several must have been lost.
         """
-        count, alone = len(self._echoes), int((self._echoes["state"] == ALONE).sum())
+        count = len(self._echoes)
+        if 2 * int(self.silences[UNCHANGED]) < count:
+            return False
         least = 1 if 2 * int(self.silences[SILENT]) >= count else SUDDEN_MIN
-        return 2 * int(self.silences[UNCHANGED]) >= count and alone >= least
+        alone = [state for state, _, _ in self._places.tolist() if state == ALONE]
+        return len(alone) >= least
 
     @property
     def has_been_silent(self) -> bool:
@@ -244,8 +248,8 @@ class UnheardEchoes:
 
     def points(self, least: int = KEPT) -> Floats:
         """Return the places of what is kept, or with `ALONE` of what was lost since the ring heard: (k, 2), m."""
-        found = self._echoes[self._echoes["state"] >= least]
-        return np.stack([found["x"], found["y"]], axis=1)
+        kept = [(x, y) for state, x, y in self._places.tolist() if state >= least]  # numpy's calls would take longer
+        return np.array(kept, float).reshape(-1, 2)
 
     def take_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
         """Return how far ahead the nearest one of a silent ring stands, m; all are then forgotten: the robot stops.

@@ -15,7 +15,7 @@ Small errors of the rate are the driver's to find, over minutes (`drivers.robot_
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
@@ -79,7 +79,7 @@ class Lead:
         """Return the lead after another reading."""
         if run_s - self.begin_run_s >= PERIOD_S:
             return Lead(run_s, lead_s, (*self.before_s, self.newest_s)[-PERIODS:])
-        return self if lead_s <= self.newest_s else replace(self, newest_s=lead_s)
+        return self if lead_s <= self.newest_s else Lead(self.begin_run_s, lead_s, self.before_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from behaviors.avoid_past import Trail
 from behaviors.move_ahead import Leg
@@ -83,5 +83,8 @@ class DriveState:
 
     def take_over(self, after: DriveState) -> None:
         """Go on from the state that a cycle left."""
-        for one in fields(DriveState):
-            setattr(self, one.name, getattr(after, one.name))
+        for name in CARRIED_OVER:
+            setattr(self, name, getattr(after, name))
+
+
+CARRIED_OVER: Final = tuple(one.name for one in fields(DriveState))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
@@ -60,15 +60,14 @@ NO_WAY: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class DriveResult:
+class DriveResult(NamedTuple):
     """What a drive request led to in one cycle."""
 
     decision: Decision
     vectors: tuple[Response, ...]
     """The schemas' responses and, last, their sum under the name `SUM`."""
     state: DriveState
-    """For the next cycle."""
+    """For the next cycle; made in this one."""
     hold_reason: str | None = None
     """Why the robot does not move although it may drive, for the operator."""
 
@@ -111,24 +110,30 @@ def drive(state: DriveState, percept: Percept, settings: Settings, now: Moment) 
         now.run_s,
         settings.behaviors.move_ahead,
     )
-    after = replace(after, leg=leg, drive_memory=DriveMemory(memory.commitment, progress))
-    return replace(result, state=after, hold_reason=result.hold_reason or stalled)
+    after.leg, after.drive_memory = leg, DriveMemory(memory.commitment, progress)
+    return result._replace(hold_reason=result.hold_reason or stalled)
 
 
-def commit(result: DriveResult, twist: Twist, requested_run_s: float, run_s: float) -> tuple[Twist, DriveResult]:
-    """Return the velocity to command, without speed where a start waits, and the result with what that commits to.
+def commit(after: DriveState, twist: Twist, requested_run_s: float, run_s: float) -> tuple[Twist, str | None]:
+    """Return the velocity to command, without speed where a start waits, and why it waits.
 
-    `twist` is the velocity after all limits; the times are those of `drive`, s.
+    Parameters
+    ----------
+    after : DriveState
+        For the next cycle. Updated by what the velocity commits to.
+    twist : Twist
+        The velocity after all limits.
+    requested_run_s, run_s : float
+        When the request was made, and now, by the run's clock, s.
     """
-    request, requested, before = result.state.drive_request, 0, result.state.drive_memory.commitment
+    request, requested, before = after.drive_request, 0, after.drive_memory.commitment
     if isinstance(request, Teleoperate):  # each message is a request: only another direction is a new one
         requested = (request.v > 0.0) - (request.v < 0.0)
     elif before.started_run_s is not None and before.started_run_s < requested_run_s:
         before = replace(before, started_run_s=None, side=0, turned_run_s=None)
     decided, (twist, commitment) = twist, before.commit(twist, run_s, requested)
-    hold_reason = result.hold_reason or (WAITS_TO_START if twist == STANDSTILL != decided else None)
-    memory = replace(result.state.drive_memory, commitment=commitment)
-    return twist, replace(result, state=replace(result.state, drive_memory=memory), hold_reason=hold_reason)
+    after.drive_memory = DriveMemory(commitment, after.drive_memory.progress)
+    return twist, WAITS_TO_START if twist == STANDSTILL != decided else None
 
 
 def _teleoperate(

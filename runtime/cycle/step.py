@@ -358,19 +358,15 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
             reason, decision = decision.reason, Drive(STANDSTILL)
     if isinstance(decision, Drive):
-        unheard = state.perception.unheard
-        twist, slowed = limit_unheard(
-            decision.twist, percept, unheard.points(), settings, is_ring_silent=unheard.is_ring_silent
-        )
+        twist, slowed = limit_unheard(decision.twist, percept, state.perception.unheard, settings)
         if zones is not None:
             commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
             last = commands[-1].twist if commands else STANDSTILL
             twist, by_zone = zones.applied(twist, last, result.state.drive_request, odometry, age_s, settings)
             slowed = slowed or by_zone
-        result = replace(result, hold_reason=reason or slowed)
-        twist, result = commit(result, twist, state.requested_run_s, inputs.run_s)
-        decision = Drive(twist)
-    state.vectors, state.hold_reason = result.vectors, result.hold_reason
+        twist, waits = commit(result.state, twist, state.requested_run_s, inputs.run_s)
+        decision, reason = Drive(twist), reason or slowed or waits
+    state.vectors, state.hold_reason = result.vectors, reason
     state.take_over(result.state)
     return decision
 

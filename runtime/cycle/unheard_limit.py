@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final
 
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from config.settings import Settings
-from drivers.messages import Twist
-from perception.percept import Floats, Percept
+from drivers.messages import Pose, Twist
+from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
+from perception.percept import Percept
 
 CREEP_M_S: Final = 0.04
 """Speed that is always left, m/s: most of what falls silent is a mirror that left the beam, and a bumper bears it."""
@@ -24,7 +24,7 @@ UNHEARD: Final = (
 
 
 def limit_unheard(
-    twist: Twist, percept: Percept, unheard: Floats, settings: Settings, *, is_ring_silent: bool
+    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings
 ) -> tuple[Twist, str | None]:
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
 
@@ -35,19 +35,18 @@ def limit_unheard(
     percept
         Of this cycle.
     unheard
-        Places of the echoes, m.
+        The echoes. Where the whole ring has heard nothing since, it is slow everywhere, as a wall goes on beside its
+        last echo.
     settings
         The base's limits and the arbiter's clearance.
-    is_ring_silent
-        Whether the ring has heard nothing since; then it is slow everywhere, as a wall goes on beside its last echo.
     """
-    if abs(twist.v) <= CREEP_M_S or not len(unheard):
+    if abs(twist.v) <= CREEP_M_S or not len(points := unheard.points()):
         return twist, None
-    limit = CREEP_M_S
+    limit, is_ring_silent = CREEP_M_S, unheard.is_ring_silent
     if not is_ring_silent:
         pose, arbiter = percept.pose, settings.behaviors.arbiter
         heading = pose.theta if twist.v > 0.0 else pose.theta + math.pi
-        ahead = replace(percept, pose=replace(pose, theta=heading), obstacles=unheard)
+        ahead = Percept(Pose(pose.x, pose.y, heading), points, percept.field_of_view)
         stoppable = stoppable_speed_m_s(ahead, settings.body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
         limit = max(CREEP_M_S, stoppable)
     slow = twist.at_most(limit)

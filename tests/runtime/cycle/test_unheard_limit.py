@@ -10,6 +10,7 @@ import pytest
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from config.load import load_settings
 from drivers.messages import Twist
+from perception.obstacle_echoes.unheard_echoes import ALONE, UnheardEchoes
 from perception.percept import Percept, Pose
 from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard
 from tests.behaviors.views import EVERYWHERE
@@ -20,8 +21,11 @@ RIM_M = SETTINGS.body.radius_m
 
 def limited(twist: Twist, *places: tuple[float, float], silent: bool = False) -> tuple[Twist, str | None]:
     percept = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
-    unheard = np.array([(1.0 + x, y) for x, y in places]).reshape(-1, 2)
-    return limit_unheard(twist, percept, unheard, SETTINGS, is_ring_silent=silent)
+    unheard = UnheardEchoes(np.zeros((max(1, len(places)), 3)))
+    for echo, (x, y) in zip(unheard.records, places, strict=False):
+        echo.state, echo.x, echo.y = ALONE, 1.0 + x, y
+    unheard.silences[:] = len(unheard.records) if silent else 0
+    return limit_unheard(twist, percept, unheard, SETTINGS)
 
 
 @pytest.mark.parametrize("v", [0.3, -0.3])
