@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,16 @@ from numpy.typing import NDArray
 from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.kernel import Floats, kernel
+
+RingPose: TypeAlias = tuple[float, float, float]
+"""Place x, y (m) and direction (rad) of a ring in the odometry's frame, as kernels take it."""
+SensorPose: TypeAlias = tuple[float, float, float]
+"""The same of a sensor."""
+
+
+def ring_pose(firing: Firing) -> RingPose:
+    """Return where the ring was at a firing, and its direction."""
+    return float(firing.pose.x), float(firing.pose.y), float(firing.ring_yaw)
 
 
 def mounts_array(mounts: Sequence[tuple[float, float, float]]) -> Floats:

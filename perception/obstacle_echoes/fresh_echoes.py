@@ -37,7 +37,7 @@ from perception.obstacle_echoes.unheard_echoes import (
     lose_echo,
 )
 from perception.records import Records
-from perception.sensor_mounts import mounts_at
+from perception.sensor_mounts import RingPose, mounts_at, ring_pose
 
 LOOKS_REMEMBERED: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
@@ -54,17 +54,35 @@ TOLERANCE_M: Final = 0.005
 """A reading within this of the ring's reach is a silence: so some rings report it, m."""
 
 
+class KeptLooks(NamedTuple):
+    """The last looks of each sensor, the newest anywhere among them."""
+
+    points: Floats
+    """(n, looks, 2): places of the echoes, m."""
+    bearings: Floats
+    """(n, looks): directions in which each sensor looked, rad."""
+    times: Floats
+    """(n, looks): when it did, s; −inf where none is kept."""
+    heard: NDArray[np.bool_]
+    """(n, looks): whether it heard an echo then."""
+    steady: NDArray[np.bool_]
+    """(n, looks): whether another look agreed with that echo."""
+
+
 @kernel
-def is_steady(points: Floats, times: Floats, heard: NDArray[np.bool_], px: float, py: float, t: float) -> bool:
+def is_steady(kept: KeptLooks, px: float, py: float, t: float) -> bool:
     """Return whether a look not long before put an echo near a place.
 
     Parameters
     ----------
-    points, times, heard, t
-        As in `record_echoes`.
+    kept : KeptLooks
+        The looks.
     px, py : float
         The place, m.
+    t : float
+        Time of the firing, s.
     """
+    points, times, heard = kept.points, kept.times, kept.heard
     for j in range(times.shape[0]):
         for k in range(times.shape[1]):
             is_young = heard[j, k] and t - times[j, k] <= STEADY_S
@@ -82,7 +100,7 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
     bearing, same
         Direction of the new look, and the angle up to which others are in the same one, rad.
     bearings, times, heard : (looks,)
-        As in `record_echoes`, of this sensor. Updated.
+        As in `KeptLooks`, of this sensor. Updated.
     """
     oldest = 0  # of all
     first = -1  # the oldest in the same direction, and the one after it
@@ -110,17 +128,11 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
 def record_echoes(
     ranges: Floats,
     mounts: Floats,
-    x: float,
-    y: float,
-    yaw: float,
+    pose: RingPose,
     t: float,
     same: float,
     reach: float,
-    points: Floats,
-    bearings: Floats,
-    times: Floats,
-    heard: NDArray[np.bool_],
-    steady: NDArray[np.bool_],
+    kept: KeptLooks,
     agreed: NDArray[np.bool_],
     unheard: Records[UnheardEcho],
 ) -> None:
@@ -132,27 +144,23 @@ def record_echoes(
         As in a `Firing`, m.
     mounts : (n, 3) float
         x, y (m), direction (rad) of each sensor in the ring's frame.
-    x, y, yaw, t : float
-        Place (m) and direction (rad) of the ring, time of the firing (s).
+    pose : RingPose
+        Place (m) and direction (rad) of the ring.
+    t : float
+        Time of the firing, s.
     same : float
         Angle up to which a new look replaces the echo of an older one of the same sensor, rad.
     reach : float
         Range up to which the ring listens, m; a reading there is a silence to `unheard`.
-    points : (n, looks, 2) float
-        Places of each sensor's echoes, m. Updated.
-    bearings : (n, looks) float
-        Directions in which it looked, rad. Updated.
-    times : (n, looks) float
-        When it did, s; −inf where none is kept. Updated.
-    heard : (n, looks) bool
-        Whether it heard an echo then. Updated.
-    steady : (n, looks) bool
-        Whether another look agreed with that echo. Updated.
+    kept : KeptLooks
+        The looks. Updated.
     agreed : (n,) bool
         Whether another look agrees with the echo of this firing. Overwritten.
     unheard : (n,) records
         The echoes that a silence removed. Updated.
     """
+    x, y, yaw = pose
+    points, bearings, times, heard, steady = kept
     c = math.cos(yaw)
     s = math.sin(yaw)
     for i in range(ranges.shape[0]):
@@ -165,7 +173,7 @@ def record_echoes(
         away = r if is_echo else 0.0
         px = x + c * mounts[i, 0] - s * mounts[i, 1] + away * math.cos(bearing)
         py = y + s * mounts[i, 0] + c * mounts[i, 1] + away * math.sin(bearing)
-        agreed[i] = is_echo and is_steady(points, times, heard, px, py, t)
+        agreed[i] = is_echo and is_steady(kept, px, py, t)
         if r >= reach:
             for k in range(times.shape[1]):
                 if heard[i, k] and abs(wrapped(bearing - bearings[i, k])) <= same:
@@ -182,10 +190,7 @@ def record_echoes(
 
 @kernel
 def select_looks(
-    bearings: Floats,
-    times: Floats,
-    heard: NDArray[np.bool_],
-    points: Floats,
+    kept: KeptLooks,
     robot_s: float,
     age_max_s: float,
     fresh: Floats,
@@ -197,8 +202,8 @@ def select_looks(
 
     Parameters
     ----------
-    bearings, times, heard, points : (n, looks) float, bool; (n, looks, 2) float
-        As in `record_echoes`.
+    kept : KeptLooks
+        The looks.
     robot_s : float
         The robot's time now, s.
     age_max_s : float
@@ -215,6 +220,7 @@ def select_looks(
     (int, int)
         k and h, the numbers of looks and of echoes.
     """
+    points, bearings, times, heard, _ = kept
     k = 0
     h = 0
     for i in range(times.shape[0]):
@@ -261,8 +267,8 @@ class FreshEchoes:
         Range up to which the ring listens, m.
     """
 
-    SCRATCH: Final = ("_agreed",)
-    """Not part of a snapshot: overwritten before each use."""
+    SCRATCH: Final = ("_agreed", "_kept")
+    """Not part of a snapshot: overwritten before each use, or arrays that are."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
@@ -284,6 +290,7 @@ class FreshEchoes:
         self._times = np.full((len(mounts), LOOKS_REMEMBERED), -math.inf)
         self._heard = np.zeros((len(mounts), LOOKS_REMEMBERED), dtype=np.bool_)
         self._steady = np.zeros((len(mounts), LOOKS_REMEMBERED), dtype=np.bool_)
+        self._kept = KeptLooks(self._points, self._bearings, self._times, self._heard, self._steady)
         self._agreed = np.zeros(len(mounts), dtype=np.bool_)
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.unheard = UnheardEchoes(mounts)
@@ -292,32 +299,23 @@ class FreshEchoes:
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
-        pose = firing.pose
+        pose, core = ring_pose(firing), 0.5 * self._half_angle
         mounts = mounts_at(firing, self._mounts, self._turning)
-        x, y, yaw, core = float(pose.x), float(pose.y), float(firing.ring_yaw), 0.5 * self._half_angle
         record_echoes(
             firing.ranges_m,
             mounts,
-            x,
-            y,
-            yaw,
+            pose,
             float(firing.robot_s),
             core,
             self._heard_reach_m,
-            self._points,
-            self._bearings,
-            self._times,
-            self._heard,
-            self._steady,
+            self._kept,
             self._agreed,
             self.unheard.records,
         )
         contradict_echoes(
             firing.ranges_m,
             mounts,
-            x,
-            y,
-            yaw,
+            pose,
             core,
             self._heard_reach_m,
             self._radius_m,
@@ -327,7 +325,7 @@ class FreshEchoes:
         )
         if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
             since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
-            keep_sudden(self._points, self._times, self._heard, since, x, y, self.unheard.records)
+            keep_sudden(self._points, self._times, self._heard, since, pose[0], pose[1], self.unheard.records)
         if self._blind_walls is not None:
             self._blind_walls.update(firing)
 
@@ -346,10 +344,7 @@ class FreshEchoes:
         fresh, ages, points = np.empty(size), np.empty(size), np.empty((size, 2))
         sensor_ages = np.empty(len(self._times))
         k, h = select_looks(
-            self._bearings,
-            self._times,
-            self._heard,
-            self._points,
+            self._kept,
             float(robot_s),
             float(age_max_s),
             fresh,

@@ -24,6 +24,7 @@ from drivers.messages import Pose
 from perception.bounds import COUNT, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Record, Records, records, zeros
+from perception.sensor_mounts import RingPose
 
 COME_NEARER_M: Final = 1e-3
 """A robot that has come nearer by this since a sensor looked last has moved, m."""
@@ -83,12 +84,34 @@ def lose_echo(c: UnheardEcho, px: float, py: float, is_steady: bool, x: float, y
 
 
 @kernel
+def reaches(r: float, mount: Floats, pose: RingPose, core: float, one: UnheardEcho) -> bool:
+    """Return whether a sensor heard an echo from where a lost one stands, or from behind it.
+
+    Parameters
+    ----------
+    r : float
+        The range that it heard, m.
+    mount : (3,) float
+        x, y (m), direction (rad) of the sensor in the ring's frame.
+    pose, core
+        As in `contradict_echoes`.
+    one : record
+        The lost echo.
+    """
+    x, y, yaw = pose
+    c, s = math.cos(yaw), math.sin(yaw)
+    axis = yaw + mount[2]
+    own_x, own_y = x + c * mount[0] - s * mount[1], y + s * mount[0] + c * mount[1]
+    dx, dy = one.x - own_x, one.y - own_y
+    ahead, across = dx * math.cos(axis) + dy * math.sin(axis), abs(dy * math.cos(axis) - dx * math.sin(axis))
+    return bool(0.0 < ahead < r + SPREAD_M and across < ahead * math.tan(core))
+
+
+@kernel
 def contradict_echoes(
     ranges: Floats,
     mounts: Floats,
-    x: float,
-    y: float,
-    yaw: float,
+    pose: RingPose,
     core: float,
     reach: float,
     radius: float,
@@ -100,7 +123,7 @@ def contradict_echoes(
 
     Parameters
     ----------
-    ranges, mounts, x, y, yaw, reach
+    ranges, mounts, pose, reach
         As in `fresh_echoes.record_echoes`.
     core : float
         A sensor whose axis is this near to the direction of a place would have heard it, rad.
@@ -113,7 +136,7 @@ def contradict_echoes(
     silences : (2,) int
         Looks since the ring last heard anything, and since it heard anything new. Updated.
     """
-    c, s = math.cos(yaw), math.sin(yaw)
+    x, y, _ = pose
     kept = 0
     hears = False
     is_new = False
@@ -149,14 +172,7 @@ def contradict_echoes(
             continue
         one.state = KEPT if one.state >= KEPT else NOT_KEPT
         for i in range(ranges.shape[0]):
-            r = ranges[i]
-            if not (r < reach and agreed[i]):
-                continue
-            axis = yaw + mounts[i, 2]
-            own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
-            dx, dy = one.x - own_x, one.y - own_y
-            ahead, across = dx * math.cos(axis) + dy * math.sin(axis), abs(dy * math.cos(axis) - dx * math.sin(axis))
-            if 0.0 < ahead < r + SPREAD_M and across < ahead * math.tan(core):
+            if ranges[i] < reach and agreed[i] and reaches(ranges[i], mounts[i], pose, core, one):
                 one.state = NOT_KEPT
                 break
 

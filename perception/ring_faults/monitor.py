@@ -41,9 +41,9 @@ from perception.ring_faults.motion_tests import (
     VANISHED,
     check_motion,
 )
-from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
-from perception.sensor_mounts import mounts_array, turn_mounts
+from perception.sensor_mounts import mounts_array, ring_pose, turn_mounts
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
@@ -82,7 +82,7 @@ class RingMonitor:
         The sensors.
     """
 
-    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned", "_expected")
+    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned", "_expected", "_past_looks")
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
@@ -115,29 +115,24 @@ class RingMonitor:
         self._past = np.zeros((len(ring.mounts), PAST_LOOKS, PAST_FIELDS))
         self._looks = np.zeros(len(ring.mounts), np.int64)
         self._replayed_nat = np.zeros(PAST_LOOKS)
+        self._past_looks = PastLooks(self._past, self._looks, self._replayed_nat)
         self._found = NOTHING
 
     def observe(self, firing: Firing) -> None:
         """Test a firing, in which sensors that are masked have no readings."""
-        pose, mounts = firing.pose, self._mounts
+        mounts = self._mounts
         if self._turns:
             mounts = self._turned
-            turn_mounts(self._mounts, self._turning, float(pose.theta - firing.ring_yaw), mounts)
+            turn_mounts(self._mounts, self._turning, float(firing.pose.theta - firing.ring_yaw), mounts)
         found = check_motion(
             firing.ranges_m,
-            float(pose.x),
-            float(pose.y),
-            float(firing.ring_yaw),
+            ring_pose(firing),
             mounts,
-            self._half_angle,
-            self._tolerance,
-            self._reach_m,
+            (self._half_angle, self._tolerance, self._reach_m),
             self._echo_records,
             self._ring_records,
             self._expected,
-            self._past,
-            self._looks,
-            self._replayed_nat,
+            self._past_looks,
         )
         if found != NOTHING:
             self._found = int(found)

@@ -11,7 +11,7 @@ import math
 from typing import Final
 
 from perception.angles import wrapped
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.changes import NO_CHANGE, NOISE_M, Expected, weigh_changes
 from perception.ring_faults.memory import (
@@ -32,8 +32,9 @@ from perception.ring_faults.repeats import (
     repeat_evidence,
     weigh_repeat,
 )
-from perception.ring_faults.replays import PAST_LOOKS, weigh_replay
+from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
 from perception.sensor_faults.wall import NOISE_SHARE
+from perception.sensor_mounts import RingPose
 
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
 """A sum of evidence that convicts the ring, nat: a day has some 10⁷ readings, and at most two days in a
@@ -261,19 +262,13 @@ def begin_evidence(all_of: RingTrace) -> None:
 @kernel
 def check_motion(
     ranges: Floats,
-    x: float,
-    y: float,
-    yaw: float,
+    pose: RingPose,
     mounts: Floats,
-    half_angle: float,
-    tolerance: float,
-    reach: float,
+    reception: Reception,
     echoes: Records[EchoTrace],
     ring: Records[RingTrace],
     expected: Records[Expected],
-    past: Floats,
-    looks: Ints,
-    replayed_nat: Floats,
+    past: PastLooks,
 ) -> int:
     """Test the readings of a firing; return what is wrong, `NOTHING` where nothing is.
 
@@ -281,25 +276,23 @@ def check_motion(
     ----------
     ranges : (n,) float
         As in a `Firing`, m; NaN for sensors that are masked as well.
-    x, y, yaw : float
+    pose : RingPose
         Place (m) and direction (rad) of the ring.
     mounts : (n, 3) float
         Place x, y (m) and direction (rad) of each sensor in the ring's frame.
-    half_angle : float
-        Half the beam's width, rad.
-    tolerance : float
-        Readings that differ by no more than this are equal, m.
-    reach : float
-        Range up to which the ring listens, m; a reading there is a silence.
+    reception : Reception
+        What the ring hears; a reading at its reach is a silence.
     echoes : (n,) records
         What is remembered of each sensor. Updated.
     ring : (1,) record
         What is remembered of the ring. Updated. After a finding the evidence is dropped.
     expected : (n,) records
         Overwritten.
-    past, looks, replayed_nat
+    past : PastLooks
         As for `replays.weigh_replay`. Updated.
     """
+    x, y, yaw = pose
+    half_angle, tolerance, reach = reception
     if not math.isfinite(x + y + yaw):
         return NOTHING
     all_of = ring[0]
@@ -307,8 +300,8 @@ def check_motion(
     if not all_of.is_started or moved > RESTART_M:
         all_of.is_started = 1
         begin_evidence(all_of)
-        replayed_nat[:] = 0.0
-        looks[:] = 0
+        past.replayed_nat[:] = 0.0
+        past.counts[:] = 0
         for i in range(len(echoes)):
             echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
             echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
@@ -317,7 +310,6 @@ def check_motion(
         all_of.path_m += moved
     all_of.x, all_of.y = x, y
     c, s = math.cos(yaw), math.sin(yaw)
-    reception = (half_angle, tolerance, reach)
     replayed = 0.0
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
@@ -335,7 +327,7 @@ def check_motion(
         look = (r, own_x, own_y, axis)
         weigh_repeat(i, look, yaw, is_ahead, mounts, reception, echoes, ring)
         heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_ECHO_M
-        nats = weigh_replay(i, look, heard_before, reception, past, looks, replayed_nat)
+        nats = weigh_replay(i, look, heard_before, reception, past)
         replayed = max(replayed, nats)
         weigh_look(echoes[i], look, is_ahead, reception, all_of)
         if r >= 0.0:
@@ -348,7 +340,7 @@ def check_motion(
             found = CHANGED + change
     if found != NOTHING:
         begin_evidence(all_of)
-        replayed_nat[:] = 0.0
+        past.replayed_nat[:] = 0.0
         for i in range(len(echoes)):
             echoes[i].is_compared = 0
     return found

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from perception.bounds import FINITE, FLAG, PLACE, Count, Place, Share, index_of, up_to
 from perception.kernel import Floats, Ints
@@ -129,3 +132,24 @@ class RingMemory(Record):
     """Looks of all sensors at something that others heard from both sides, …"""
     misses: Count
     """… and those of them without an echo."""
+
+
+class RingSetup(NamedTuple):
+    """What is known of the ring before it reads anything."""
+
+    mounts: Floats
+    """(n, 3): place x, y (m) and direction (rad) of each sensor in the ring."""
+    turns: Floats
+    """(n,): by how much each sensor's part has turned in the ring by now, rad."""
+    neighbours: Ints
+    """(n, 2): each sensor's neighbours, −1 for a sensor that has not two."""
+    expected: NDArray[np.bool_]
+    """(n,): whether each sensor fires at all."""
+    half_angle: float
+    """Half the beam's width, rad."""
+    tolerance: float
+    """Readings that differ by no more than this are equal, m."""
+    least: float
+    """Ranges below this cannot be measured, m."""
+    near: float
+    """What is farther away is not compared between sensors, m."""

@@ -35,11 +35,11 @@ from drivers.messages import CrossPaths, Firing
 from perception.bounds import CONSTANT, COUNT, FLAG, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
-from perception.sensor_faults.memory import SETS_MAX, RingMemory, SensorMemory
+from perception.sensor_faults.memory import SETS_MAX, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.reading_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
 from perception.sensor_faults.report import SILENT, SensorReport, describe_fault
 from perception.sensor_faults.silence import miss_share
-from perception.sensor_mounts import mounts_array
+from perception.sensor_mounts import mounts_array, ring_pose
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
 """Largest angle between neighbours' axes, two places of a ring of 24 and some slack; beyond it sensors see different
@@ -122,7 +122,7 @@ class SensorMonitor:
         How often a sensor's faults have changed.
     """
 
-    SCRATCH: Final = ("_trusted", "_possible", "_turns", "_sensor_records", "_ring_records")
+    SCRATCH: Final = ("_trusted", "_possible", "_turns", "_setup", "_sensor_records", "_ring_records")
     """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
     BOUNDS: Final = bounds(
         changes=COUNT,
@@ -150,6 +150,16 @@ class SensorMonitor:
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
         self._least = LEAST_SHARE * ring.range_min_m
         self._near = NEAR_SHARE * ring.range_max_m
+        self._setup = RingSetup(
+            mounts,
+            self._turns,
+            self._neighbours,
+            self._expected,
+            self._half_angle,
+            self._tolerance,
+            self._least,
+            self._near,
+        )
         self._sensors = zeros(SensorMemory, count)
         self._sensor_records = records(SensorMemory, self._sensors)
         self._ring = zeros(RingMemory, 1)
@@ -169,17 +179,8 @@ class SensorMonitor:
             self._turns[self._turning] = pose.theta - firing.ring_yaw
         changed = check_firing(
             firing.ranges_m,
-            float(pose.x),
-            float(pose.y),
-            float(firing.ring_yaw),
-            self._mounts,
-            self._turns,
-            self._neighbours,
-            self._expected,
-            self._half_angle,
-            self._tolerance,
-            self._least,
-            self._near,
+            ring_pose(firing),
+            self._setup,
             self._sensor_records,
             self._ring_records,
             self._sets,

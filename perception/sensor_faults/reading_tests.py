@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.sensor_faults.crosstalk import count_short_readings, find_set, is_doubtful
-from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, SensorMemory
+from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 from perception.sensor_faults.silence import weigh_silence
 from perception.sensor_faults.turning import follow_turn, repeats_through_turn
 from perception.sensor_faults.wall import NOISE_SHARE, is_along_wall
+from perception.sensor_mounts import RingPose
 
 # The thresholds below were tuned on the simulated halls of tests/perception/sensor_faults/test_monitor.py: no healthy
 # sensor is masked in any hall, and every faulty one is found.
@@ -199,9 +200,7 @@ def update_run_faults(
     x: float,
     y: float,
     axis: float,
-    half_angle: float,
-    tolerance: float,
-    neighbours: Ints,
+    setup: RingSetup,
     sensors: Records[SensorMemory],
     ring: Records[RingMemory],
 ) -> None:
@@ -213,20 +212,21 @@ def update_run_faults(
         The sensor.
     r : float
         Its new reading, m.
-    x, y, axis, half_angle, neighbours, sensors
+    x, y, axis, sensors
         As for `is_stuck`.
-    tolerance : float
-        Readings that differ by no more than this are equal, m.
+    setup : RingSetup
+        What is known of the ring beforehand.
     ring : (1,) record
         What is remembered of the ring.
     """
     c = sensors[i]
     if c.faults & STUCK:
-        c.off_stuck = 0 if abs(r - c.stuck_m) <= tolerance else c.off_stuck + 1
+        c.off_stuck = 0 if abs(r - c.stuck_m) <= setup.tolerance else c.off_stuck + 1
         if c.off_stuck >= RECOVERY_READINGS:
             c.faults &= ~STUCK
     elif math.isfinite(r) and (
-        is_stuck(i, x, y, axis, half_angle, neighbours, sensors) or repeats_through_turn(i, r, sensors, ring)
+        is_stuck(i, x, y, axis, setup.half_angle, setup.neighbours, sensors)
+        or repeats_through_turn(i, r, sensors, ring)
     ):
         c.faults |= STUCK
         c.stuck_m, c.off_stuck = c.run_m, 0
@@ -246,19 +246,60 @@ def count_too_near(c: SensorMemory, is_too_near: bool) -> None:
 
 
 @kernel
+def follow_run(
+    i: int,
+    r: float,
+    pose: RingPose,
+    setup: RingSetup,
+    sensors: Records[SensorMemory],
+    ring: Records[RingMemory],
+) -> None:
+    """Count a reading to the run of equal readings of sensor `i`, or begin another run.
+
+    A run also begins anew where a healthy sensor goes on reading the same: once it has turned, and along a wall.
+
+    Parameters
+    ----------
+    i, r, pose, setup, sensors, ring
+        As for `check_firing`; `r` is the reading of sensor `i`. Its run is updated.
+    """
+    x, y, yaw = pose
+    own_yaw = yaw + setup.turns[i]
+    c = sensors[i]
+    if c.run_length == 0 or not (r == c.run_m or abs(r - c.run_m) <= setup.tolerance):
+        c.run_firing = ring[0].firings
+        begin_run(i, r, x, y, own_yaw, setup.neighbours, sensors)
+    elif abs(own_yaw - c.run_yaw) > 0.5 * setup.half_angle or is_along_wall(i, x, y, own_yaw, yaw, setup, sensors):
+        begin_run(i, c.run_m, x, y, own_yaw, setup.neighbours, sensors)
+    else:
+        c.run_length += 1
+
+
+@kernel
+def lost_trust(c: SensorMemory, r: float, fired_set: int, least: float) -> int:
+    """Return the bits `LESS_TRUSTED` and `LESS_POSSIBLE` of a reading, by the faults of its sensor.
+
+    Parameters
+    ----------
+    c : record
+        What is remembered of the sensor.
+    r : float
+        Its reading, m.
+    fired_set : int
+        The set that fired, as of `find_set`.
+    least : float
+        Ranges below this cannot be measured, m.
+    """
+    if c.faults & (STUCK | TOO_NEAR) or c.is_crossed[fired_set]:
+        return LESS_TRUSTED | LESS_POSSIBLE
+    return LESS_TRUSTED if r < least or (c.faults & SILENT and not math.isfinite(r)) else 0
+
+
+@kernel
 def check_firing(
     ranges: Floats,
-    x: float,
-    y: float,
-    yaw: float,
-    mounts: Floats,
-    turns: Floats,
-    neighbours: Ints,
-    expected: NDArray[np.bool_],
-    half_angle: float,
-    tolerance: float,
-    least: float,
-    near: float,
+    pose: RingPose,
+    setup: RingSetup,
     sensors: Records[SensorMemory],
     ring: Records[RingMemory],
     sets: NDArray[np.uint8],
@@ -271,24 +312,10 @@ def check_firing(
     ----------
     ranges : (n,) float
         As in a `Firing`, m.
-    x, y, yaw : float
+    pose : RingPose
         Place (m) and direction (rad) of the ring.
-    mounts : (n, 3) float
-        Place x, y (m) and direction (rad) of each sensor in the ring.
-    turns : (n,) float
-        By how much each sensor's part has turned in the ring, rad.
-    neighbours : (n, 2) int
-        Each sensor's neighbours, −1 for a sensor that has not two.
-    expected : (n,) bool
-        Whether each sensor fires at all.
-    half_angle : float
-        Half the beam's width, rad.
-    tolerance : float
-        Readings that differ by no more than this are equal, m.
-    least : float
-        Ranges below this cannot be measured, m.
-    near : float
-        What is farther away is not compared between sensors, m.
+    setup : RingSetup
+        What is known of the ring beforehand.
     sensors : (n,) records
         What is remembered of each sensor. Updated.
     ring : (1,) record
@@ -298,6 +325,8 @@ def check_firing(
     trusted, possible : (n,) float
         Out: the readings that are trusted; those and the doubtful ones, m. NaN for the others.
     """
+    x, y, yaw = pose
+    mounts, half_angle = setup.mounts, setup.half_angle
     fired = 0
     for i in range(ranges.shape[0]):
         trusted[i] = possible[i] = ranges[i]
@@ -316,32 +345,24 @@ def check_firing(
             c.run_length = 0
         before = c.faults
         r = ranges[i]
-        own_yaw = yaw + turns[i]
         if math.isnan(r):
             c.missed += 1
-            if expected[i] and c.missed >= MISSED_FIRINGS_MAX:
+            if setup.expected[i] and c.missed >= MISSED_FIRINGS_MAX:
                 c.faults |= FAILING
             if c.faults != before:
                 changed |= FAULTS_CHANGED
             continue
         c.missed = 0
         c.faults &= ~FAILING
-        count_changes(c, r, tolerance)
-        if c.run_length == 0 or not (r == c.run_m or abs(r - c.run_m) <= tolerance):
-            c.run_firing = ring[0].firings
-            begin_run(i, r, x, y, own_yaw, neighbours, sensors)
-        elif abs(own_yaw - c.run_yaw) > 0.5 * half_angle or is_along_wall(
-            i, x, y, own_yaw, yaw, mounts, turns, half_angle, tolerance, neighbours, sensors
-        ):
-            begin_run(i, c.run_m, x, y, own_yaw, neighbours, sensors)
-        else:
-            c.run_length += 1
+        count_changes(c, r, setup.tolerance)
+        follow_run(i, r, pose, setup, sensors, ring)
+        own_yaw = yaw + setup.turns[i]
         axis = own_yaw + mounts[i, 2]
-        update_run_faults(i, r, x, y, axis, half_angle, tolerance, neighbours, sensors, ring)
+        update_run_faults(i, r, x, y, axis, setup, sensors, ring)
         cos, sin = math.cos(own_yaw), math.sin(own_yaw)
         own_x, own_y = x + cos * mounts[i, 0] - sin * mounts[i, 1], y + sin * mounts[i, 0] + cos * mounts[i, 1]
         c.faults &= ~SILENT
-        if weigh_silence(i, r, own_x, own_y, axis, half_angle, near, sensors, ring):
+        if weigh_silence(i, r, own_x, own_y, axis, half_angle, setup.near, sensors, ring):
             c.faults |= SILENT
         if ring[0].regularity >= REGULARITY_MIN:
             count_short_readings(c, r, fired_set)
@@ -356,13 +377,13 @@ def check_firing(
         for k in range(sets.shape[0]):
             if c.is_crossed[k]:
                 c.faults |= CROSSTALK
-        count_too_near(c, r < least)
-        if c.faults & (STUCK | TOO_NEAR) or c.is_crossed[fired_set]:
-            trusted[i] = possible[i] = math.nan
-            changed |= LESS_TRUSTED | LESS_POSSIBLE
-        elif r < least or (c.faults & SILENT and not math.isfinite(r)):
+        count_too_near(c, r < setup.least)
+        lost = lost_trust(c, r, fired_set, setup.least)
+        if lost & LESS_TRUSTED:
             trusted[i] = math.nan
-            changed |= LESS_TRUSTED
+        if lost & LESS_POSSIBLE:
+            possible[i] = math.nan
+        changed |= lost
         if c.faults != before:
             changed |= FAULTS_CHANGED
     return changed

@@ -6,9 +6,9 @@ import math
 from typing import Final
 
 from perception.angles import wrapped
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.sensor_faults.memory import SensorMemory
+from perception.sensor_faults.memory import RingSetup, SensorMemory
 
 BESIDE_MIN_M: Final = 0.5
 """Stuck: a wall along the path is looked for once the base has moved so far, m."""
@@ -23,11 +23,7 @@ def is_along_wall(
     y: float,
     own_yaw: float,
     yaw: float,
-    mounts: Floats,
-    turns: Floats,
-    half_angle: float,
-    tolerance: float,
-    neighbours: Ints,
+    setup: RingSetup,
     sensors: Records[SensorMemory],
 ) -> bool:
     """Return whether a wall along the path explains the run of sensor `i`, as a neighbour hears the same wall.
@@ -44,22 +40,20 @@ def is_along_wall(
         Place of the ring, m.
     own_yaw, yaw : float
         Direction of the sensor's part and of the ring, rad.
-    mounts : (n, 3) float
-        Place x, y (m) and direction (rad) of each sensor in the ring.
-    turns, half_angle, tolerance, neighbours, sensors
+    setup, sensors
         As for `check_firing`.
     """
-    c = sensors[i]
+    c, mounts, half_angle = sensors[i], setup.mounts, setup.half_angle
     dx, dy = x - c.run_x, y - c.run_y
     if not math.isfinite(c.run_m) or math.hypot(dx, dy) < BESIDE_MIN_M:
         return False
     path = math.atan2(dy, dx)
     side = 1.0 if math.sin(own_yaw + mounts[i, 2] - path) > 0.0 else -1.0
     beside = beside_m(c.run_m, own_yaw - path, side, mounts[i], half_angle)
-    for k in neighbours[i]:
+    for k in setup.neighbours[i]:
         if k >= 0 and math.isfinite(sensors[k].steady_m):
-            heard = beside_m(sensors[k].steady_m, yaw + turns[k] - path, side, mounts[k], half_angle)
-            if abs(heard - beside) <= tolerance + NOISE_SHARE * min(c.run_m, sensors[k].steady_m):
+            heard = beside_m(sensors[k].steady_m, yaw + setup.turns[k] - path, side, mounts[k], half_angle)
+            if abs(heard - beside) <= setup.tolerance + NOISE_SHARE * min(c.run_m, sensors[k].steady_m):
                 return True
     return False
 

@@ -21,7 +21,7 @@ from perception.ring_faults.motion_tests import (
     VANISHED,
     check_motion,
 )
-from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
 
 COUNT = 24
 MOUNTS = np.array([[0.0, 0.0, math.tau * k / COUNT] for k in range(COUNT)])
@@ -41,10 +41,15 @@ class Ring:
 
     def fire(self, ranges: Floats) -> int:
         found = check_motion(
-            ranges, self.x, 0.0, 0.0, MOUNTS, HALF, TOLERANCE, REACH, records(EchoTrace, self.echoes),
-            records(RingTrace, self.memory), records(Expected, self.expected),
-            self.past, self.looks, self.replayed_nat,
-        )  # fmt: skip
+            ranges,
+            (self.x, 0.0, 0.0),
+            MOUNTS,
+            (HALF, TOLERANCE, REACH),
+            records(EchoTrace, self.echoes),
+            records(RingTrace, self.memory),
+            records(Expected, self.expected),
+            PastLooks(self.past, self.looks, self.replayed_nat),
+        )
         self.x += STEP_M
         return int(found)
 

@@ -10,7 +10,7 @@ import pytest
 
 from perception.ring_faults.memory import NO_ECHO_M
 from perception.ring_faults.motion_tests import REPLAY_NAT
-from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, weigh_replay
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks, weigh_replay
 
 SENSORS = 8
 HALF, TOLERANCE = math.radians(15.0), 0.005
@@ -36,9 +36,7 @@ class Ring:
                     (r, x, 0.0, 0.0),
                     float(self.before[i]),
                     (HALF, TOLERANCE, 5.0),
-                    self.past,
-                    self.looks,
-                    self.nats,
+                    PastLooks(self.past, self.looks, self.nats),
                 )
                 self.most = max(self.most, float(nats))
             self.before[:] = ranges

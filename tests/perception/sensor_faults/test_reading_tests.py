@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
-from perception.sensor_faults.memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, SensorMemory
+from perception.sensor_faults.memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.reading_tests import (
     EQUAL_READINGS_MIN,
     FAULTS_CHANGED,
@@ -34,6 +35,7 @@ NEIGHBOURS = np.array([[1, 3], [2, 0], [3, 1], [0, 2]])
 ALONE = np.full((COUNT, 2), -1)
 MOUNTS = np.array([[0.0, 0.0, 0.5 * math.pi * k] for k in range(COUNT)])
 HALF = math.radians(12.0)
+EACH = np.ones(COUNT, np.bool_)
 
 
 def sensors() -> Records[SensorMemory]:
@@ -42,6 +44,10 @@ def sensors() -> Records[SensorMemory]:
 
 def ring() -> Records[RingMemory]:
     return records(RingMemory, zeros(RingMemory, 1))
+
+
+def setup(expected: NDArray[np.bool_]) -> RingSetup:
+    return RingSetup(MOUNTS, np.zeros(COUNT), NEIGHBOURS, expected, HALF, tolerance=0.01, least=0.1, near=3.0)
 
 
 def run_of(memory: Records[SensorMemory], length: int, changes: int, leaps: int) -> None:
@@ -105,11 +111,11 @@ def test_stuck_needs_a_way_equal_readings_and_neighbours_that_change(
 def test_a_stuck_sensor_recovers_after_several_other_readings() -> None:
     memory = sensors()
     run_of(memory, PASSED_READINGS_MIN, 20, 20)
-    update_run_faults(0, 2.0, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory, ring())
+    update_run_faults(0, 2.0, 3.0, 0.0, 0.0, setup(EACH), memory, ring())
     assert memory[0].faults == STUCK
     for k in range(RECOVERY_READINGS):
         assert memory[0].faults == STUCK
-        update_run_faults(0, 3.0 + k, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory, ring())
+        update_run_faults(0, 3.0 + k, 3.0, 0.0, 0.0, setup(EACH), memory, ring())
     assert memory[0].faults == 0
 
 
@@ -119,13 +125,19 @@ class Checker:
     def __init__(self) -> None:
         self.sensors, self.ring, self.sets = sensors(), ring(), np.zeros((SETS_MAX, COUNT), np.uint8)
         self.trusted, self.possible = np.zeros(COUNT), np.zeros(COUNT)
-        self.expected = np.ones(COUNT, np.bool_)
+        self.expected = EACH.copy()
 
     def __call__(self, ranges: Floats, x: float = 0.0, yaw: float = 0.0) -> int:
         return check_firing(
-            ranges, x, 0.0, yaw, MOUNTS, np.zeros(COUNT), NEIGHBOURS, self.expected, HALF, 0.01, 0.1, 3.0,
-            self.sensors, self.ring, self.sets, self.trusted, self.possible,
-        )  # fmt: skip
+            ranges,
+            (x, 0.0, yaw),
+            setup(self.expected),
+            self.sensors,
+            self.ring,
+            self.sets,
+            self.trusted,
+            self.possible,
+        )
 
 
 def test_a_sensor_that_never_answers_is_failing_until_it_does() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from perception.kernel import Floats
 from perception.records import records, zeros
-from perception.sensor_faults.memory import SensorMemory
+from perception.sensor_faults.memory import RingSetup, SensorMemory
 from perception.sensor_faults.wall import BESIDE_MIN_M, beside_m, is_along_wall
 
 HALF = math.radians(12.0)
@@ -44,5 +44,7 @@ def test_a_neighbour_must_hear_the_same_wall_and_the_robot_must_have_moved(
     memory[0].run_m = heard_m(float(AXES[0]), 1.0)
     memory[1].steady_m = heard_m(float(AXES[1]), neighbour_m)
     memory[2].steady_m = math.inf
-    turns = np.zeros(3)
-    assert is_along_wall(0, moved_m, 0.0, 0.0, 0.0, MOUNTS, turns, HALF, 0.03, NEIGHBOURS, memory) == explains
+    setup = RingSetup(
+        MOUNTS, np.zeros(3), NEIGHBOURS, np.ones(3, np.bool_), HALF, tolerance=0.03, least=0.1, near=3.0
+    )
+    assert is_along_wall(0, moved_m, 0.0, 0.0, 0.0, setup, memory) == explains
