@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
@@ -10,8 +11,10 @@ from drivers.arcos.driver import ArcosDriver
 from drivers.arcos.firmware import Firmware
 from drivers.arcos.wire_units import discs_of
 from drivers.driver import RobotDriver
-from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
+
+if TYPE_CHECKING:
+    from drivers.emulator.faults import Fault
 
 
 def make_driver(config: RobotConfig) -> RobotDriver:

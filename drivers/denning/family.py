@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.denning.driver import DenningDriver
 from drivers.driver import RobotDriver
-from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
+
+if TYPE_CHECKING:
+    from drivers.emulator.faults import Fault
 
 
 def make_driver(config: RobotConfig) -> RobotDriver:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.driver import RobotDriver
-from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
 from drivers.rflex.driver import RflexDriver
+
+if TYPE_CHECKING:
+    from drivers.emulator.faults import Fault
 
 
 def make_driver(config: RobotConfig) -> RobotDriver:

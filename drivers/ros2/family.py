@@ -13,11 +13,11 @@ from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.denning.driver import DenningDriver
 from drivers.driver import DriverError, RobotDriver
-from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
 from drivers.ros2.gateway_port import GatewayPort
 
 if TYPE_CHECKING:
+    from drivers.emulator.faults import Fault
     from drivers.registry import LineOptions
 
 OPEN_TIMEOUT_S = 30.0
