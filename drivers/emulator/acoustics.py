@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.emulator._jit import kernel
+from drivers.emulator.scene import Scene
 from drivers.emulator.surfaces import CONE, RAYS, SPECULAR, Records, answers_by, first_hit, models_present
 
 MOUNT: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("angle", "f8")]))
@@ -43,27 +44,21 @@ BESIDE_RAD = 1e-7
 
 @kernel
 def first_echoes(
-    x: float,
-    y: float,
-    yaw: float,
+    pose: tuple[float, float, float],
     mounts: Records,
     fired: NDArray[np.bool_],
     half_angle: float,
     model: int,
     rays: int,
-    edge_reach: float,
-    slack: float,
-    circles: Records,
-    segments: Records,
-    corners: Records,
+    scene: Scene,
     out: Records,
 ) -> None:
     """Find the first echo of every sensor that fires.
 
     Parameters
     ----------
-    x, y, yaw
-        Place and direction of the ring in the world, m and rad.
+    pose
+        Place x, y and direction of the ring in the world, m and rad.
     mounts
         The sensors: `MOUNT`, shape (sensors,).
     fired
@@ -74,13 +69,13 @@ def first_echoes(
         How surfaces answer that do not say it themselves: `CONE`, `SPECULAR` or `RAYS`.
     rays
         Number of rays in the beam.
-    edge_reach, slack
-        `CONVEX_EDGE_REACH_M` and `SIGHT_SLACK_M`, m.
-    circles, segments, corners
-        The surfaces: `CIRCLE`, `SEGMENT` and `CORNER`, shape (n,) each; see `drivers.emulator.scene.Scene`.
+    scene
+        The surfaces.
     out
         The echoes: `ECHO`, shape (sensors,), overwritten; none for a sensor that did not fire.
     """
+    x, y, yaw = pose
+    circles, segments, _ = scene
     c, s = math.cos(yaw), math.sin(yaw)
     present = models_present(model, circles, segments)
     for i in range(mounts.shape[0]):
@@ -93,11 +88,11 @@ def first_echoes(
         sy = y + s * mounts[i].x + c * mounts[i].y
         axis = yaw + mounts[i].angle
         if present & (1 << SPECULAR):
-            _first_mirror(sx, sy, axis, half_angle, model, edge_reach, slack, circles, segments, corners, out[i])
+            _first_mirror(sx, sy, axis, half_angle, model, scene, out[i])
         if present == 1 << CONE:
             _nearest_in_cone(sx, sy, axis, half_angle, circles, segments, out[i])
         elif present & (1 << CONE):
-            _nearest_in_sight(sx, sy, axis, half_angle, model, slack, circles, segments, corners, out[i])
+            _nearest_in_sight(sx, sy, axis, half_angle, model, scene, out[i])
         if present & (1 << RAYS):
             for k in range(rays):
                 share = 0.5 if rays == 1 else k / (rays - 1)
@@ -111,16 +106,14 @@ def _nearest_in_sight(
     axis: float,
     half_angle: float,
     model: int,
-    slack: float,
-    circles: Records,
-    segments: Records,
-    corners: Records,
+    scene: Scene,
     best: np.record,
 ) -> None:
     """Keep the nearest point in the beam of the surfaces that answer from each of their points, and that is in sight.
 
     That is the nearest point of one, or one on the beam's edge, or one right beside the end of what hides the rest.
     """
+    circles, segments, corners = scene
     ux, uy = math.cos(axis), math.sin(axis)
     cos_half = math.cos(half_angle)
     for side in (-1.0, 1.0):
@@ -138,13 +131,11 @@ def _nearest_in_sight(
             and cx * ux + cy * uy >= centre * cos_half
         ):
             px, py = sx + cx / centre * gap, sy + cy / centre * gap
-            if not hidden(sx, sy, px, py, slack, circles, segments):
+            if not hidden(sx, sy, px, py, SIGHT_SLACK_M, circles, segments):
                 _keep_nearer(gap, px, py, best)
         to_edge, edge = math.asin(radius / centre), math.sqrt(centre * centre - radius * radius)
         for side in (-1.0, 1.0):
-            _look_beside(
-                sx, sy, math.atan2(cy, cx) + side * to_edge, edge, axis, half_angle, model, circles, segments, best
-            )
+            _look_beside(sx, sy, math.atan2(cy, cx) + side * to_edge, edge, axis, half_angle, model, scene, best)
     for k in range(segments.shape[0]):
         ax, ay = segments[k].x1 - sx, segments[k].y1 - sy
         dx, dy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1
@@ -156,17 +147,15 @@ def _nearest_in_sight(
             and foot < best.distance
             and answers_by(CONE, segments[k].surface, model)
             and px * ux + py * uy >= foot * cos_half
-            and not hidden(sx, sy, sx + px, sy + py, slack, circles, segments)
+            and not hidden(sx, sy, sx + px, sy + py, SIGHT_SLACK_M, circles, segments)
         ):
             _keep_nearer(foot, sx + px, sy + py, best)
         for end in (0.0, 1.0):
             ex, ey = ax + end * dx, ay + end * dy
-            _look_beside(
-                sx, sy, math.atan2(ey, ex), math.hypot(ex, ey), axis, half_angle, model, circles, segments, best
-            )
+            _look_beside(sx, sy, math.atan2(ey, ex), math.hypot(ex, ey), axis, half_angle, model, scene, best)
     for k in range(corners.shape[0]):
         ex, ey = corners[k].x - sx, corners[k].y - sy
-        _look_beside(sx, sy, math.atan2(ey, ex), math.hypot(ex, ey), axis, half_angle, model, circles, segments, best)
+        _look_beside(sx, sy, math.atan2(ey, ex), math.hypot(ex, ey), axis, half_angle, model, scene, best)
 
 
 @kernel
@@ -178,8 +167,7 @@ def _look_beside(
     axis: float,
     half_angle: float,
     model: int,
-    circles: Records,
-    segments: Records,
+    scene: Scene,
     best: np.record,
 ) -> None:
     """Keep what a ray hits on either side of the end of a surface, if the end is in the beam and not too far."""
@@ -187,7 +175,7 @@ def _look_beside(
     if reach < best.distance and abs(off) <= half_angle:
         for side in (-1.0, 1.0):
             if abs(off + side * BESIDE_RAD) <= half_angle:
-                _keep_hit(sx, sy, direction + side * BESIDE_RAD, CONE, model, circles, segments, best)
+                _keep_hit(sx, sy, direction + side * BESIDE_RAD, CONE, model, scene.circles, scene.segments, best)
 
 
 @kernel
@@ -268,13 +256,10 @@ def _first_mirror(
     axis: float,
     half_angle: float,
     model: int,
-    edge_reach: float,
-    slack: float,
-    circles: Records,
-    segments: Records,
-    corners: Records,
+    scene: Scene,
     best: np.record,
 ) -> None:
+    circles, segments, corners = scene
     ux, uy = math.cos(axis), math.sin(axis)
     cos_half = math.cos(half_angle)
     for k in range(circles.shape[0]):
@@ -285,7 +270,7 @@ def _first_mirror(
         elif answers_by(SPECULAR, circles[k].surface, model) and cx * ux + cy * uy >= centre * cos_half:
             gap = centre - radius
             px, py = sx + cx / centre * gap, sy + cy / centre * gap
-            if gap < best.distance and not hidden(sx, sy, px, py, slack, circles, segments):
+            if gap < best.distance and not hidden(sx, sy, px, py, SIGHT_SLACK_M, circles, segments):
                 _keep_nearer(gap, px, py, best)
     for k in range(segments.shape[0]):
         ax, ay = segments[k].x1 - sx, segments[k].y1 - sy
@@ -298,23 +283,31 @@ def _first_mirror(
                 foot < best.distance
                 and answers_by(SPECULAR, segments[k].surface, model)
                 and px * ux + py * uy >= foot * cos_half
-                and not hidden(sx, sy, sx + px, sy + py, slack, circles, segments)
+                and not hidden(sx, sy, sx + px, sy + py, SIGHT_SLACK_M, circles, segments)
             ):
                 _keep_nearer(foot, sx + px, sy + py, best)
     for k in range(corners.shape[0]):
         px, py = corners[k].x - sx, corners[k].y - sy
         reach = math.hypot(px, py)
-        side = (math.atan2(-py, -px) - corners[k].start) % (2.0 * math.pi)
         if (
-            side < corners[k].opening
-            and (corners[k].opening < math.pi or reach <= edge_reach)
-            and reach < best.distance
-            and answers_by(SPECULAR, corners[k].surface, model)
-            and answers_by(SPECULAR, corners[k].beside, model)
+            reach < best.distance
+            and _corner_answers(corners[k], px, py, reach, model)
             and px * ux + py * uy >= reach * cos_half
-            and not hidden(sx, sy, corners[k].x, corners[k].y, slack, circles, segments)
+            and not hidden(sx, sy, corners[k].x, corners[k].y, SIGHT_SLACK_M, circles, segments)
         ):
             _keep_nearer(reach, corners[k].x, corners[k].y, best)
+
+
+@kernel
+def _corner_answers(corner: np.record, px: float, py: float, reach: float, model: int) -> bool:
+    """Return whether a corner, at a place and a distance from a sensor, scatters into the sector the sensor is in."""
+    side = (math.atan2(-py, -px) - corner.start) % (2.0 * math.pi)
+    return (
+        side < corner.opening
+        and (corner.opening < math.pi or reach <= CONVEX_EDGE_REACH_M)
+        and answers_by(SPECULAR, corner.surface, model)
+        and answers_by(SPECULAR, corner.beside, model)
+    )
 
 
 @kernel

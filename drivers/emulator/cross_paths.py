@@ -12,38 +12,37 @@ either sensor silences it.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.emulator._jit import kernel
-from drivers.emulator.acoustics import hidden
+from drivers.emulator.acoustics import CONVEX_EDGE_REACH_M, SIGHT_SLACK_M, hidden
+from drivers.emulator.scene import Scene
 from drivers.emulator.surfaces import CONE, RAYS, SPECULAR, Records, answers_by
+
+Ear: TypeAlias = "tuple[float, float, float, float]"
+"""A sensor that emits or listens: place x, y (m), direction of its axis, and half the width of its beam, rad."""
 
 
 @kernel
 def first_cross_paths(
-    x: float,
-    y: float,
-    yaw: float,
+    pose: tuple[float, float, float],
     mounts: Records,
     heard: NDArray[np.bool_],
     half_angle: float,
     lobe: float,
     model: int,
-    edge_reach: float,
-    slack: float,
-    circles: Records,
-    segments: Records,
-    corners: Records,
+    scene: Scene,
     out: NDArray[np.float64],
 ) -> None:
     """Find half the shortest way over a surface to each sensor, from any of the others that it can hear.
 
     Parameters
     ----------
-    x, y, yaw
-        Place and direction of the ring in the world, m and rad.
+    pose
+        Place x, y and direction of the ring in the world, m and rad.
     mounts
         The sensors: `acoustics.MOUNT`, shape (sensors,).
     heard
@@ -52,13 +51,12 @@ def first_cross_paths(
         How far off its axis a sensor emits, and how far it hears another one's pulse, rad; `half_angle` is below π/2.
     model
         How surfaces answer that do not say it themselves.
-    edge_reach, slack
-        `acoustics.CONVEX_EDGE_REACH_M`, of half a path, and `acoustics.SIGHT_SLACK_M`, m.
-    circles, segments, corners
-        The surfaces: `acoustics.CIRCLE`, `SEGMENT` and `CORNER`, shape (n,) each.
+    scene
+        The surfaces.
     out
         Half the shortest path to each listener, shape (sensors,), m, overwritten; +inf where there is none.
     """
+    x, y, yaw = pose
     c, s = math.cos(yaw), math.sin(yaw)
     for i in range(mounts.shape[0]):
         shortest = math.inf
@@ -66,40 +64,28 @@ def first_cross_paths(
         for j in range(mounts.shape[0]):
             if heard[j, i]:
                 transmitter = _placed(x, y, yaw, c, s, mounts[j], half_angle)
-                shortest = _over_mirrors(
-                    transmitter, listener, model, 2.0 * edge_reach, slack, circles, segments, corners, shortest
-                )
-                shortest = _in_both_beams(transmitter, listener, model, slack, circles, segments, shortest)
+                shortest = _over_mirrors(transmitter, listener, model, scene, shortest)
+                shortest = _in_both_beams(transmitter, listener, model, scene, shortest)
         out[i] = 0.5 * shortest
 
 
 @kernel
-def _placed(
-    x: float, y: float, yaw: float, c: float, s: float, mount: np.record, half_angle: float
-) -> tuple[float, float, float, float]:
+def _placed(x: float, y: float, yaw: float, c: float, s: float, mount: np.record, half_angle: float) -> Ear:
     """Return a sensor's place in the world, the direction of its axis, and half the width of its beam."""
     return x + c * mount.x - s * mount.y, y + s * mount.x + c * mount.y, yaw + mount.angle, min(half_angle, math.pi)
 
 
 @kernel
-def _is_in_beam(sensor: tuple[float, float, float, float], px: float, py: float, margin: float) -> bool:
+def _is_in_beam(sensor: Ear, px: float, py: float, margin: float) -> bool:
     dx, dy = px - sensor[0], py - sensor[1]
     ahead = dx * math.cos(sensor[2]) + dy * math.sin(sensor[2])
     return ahead >= (math.cos(sensor[3]) - margin) * math.hypot(dx, dy)
 
 
 @kernel
-def _over_mirrors(
-    transmitter: tuple[float, float, float, float],
-    listener: tuple[float, float, float, float],
-    model: int,
-    edge_path: float,
-    slack: float,
-    circles: Records,
-    segments: Records,
-    corners: Records,
-    shortest: float,
-) -> float:
+def _over_mirrors(transmitter: Ear, listener: Ear, model: int, scene: Scene, shortest: float) -> float:
+    """Return the shortest way over what answers as a mirror, or `shortest` if that is shorter."""
+    circles, segments, corners = scene
     tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
     for k in range(circles.shape[0]):
         least = _least_over_circle(tx, ty, lx, ly, circles[k])
@@ -108,75 +94,80 @@ def _over_mirrors(
         if least <= 0.0:  # a sensor inside the circle always reports the shortest range
             return 0.0
         px, py, path = mirror_on_circle(tx, ty, lx, ly, circles[k].x, circles[k].y, circles[k].radius)
-        if path < shortest and _answers(transmitter, px, py, listener, px, py, slack, circles, segments):
+        if path < shortest and _answers(transmitter, px, py, listener, px, py, scene):
             shortest = path
     for k in range(segments.shape[0]):
         if not answers_by(SPECULAR, segments[k].surface, model):
             continue
         px, py, path = _mirror_on_side(tx, ty, lx, ly, segments[k])
-        if path < shortest and _answers(transmitter, px, py, listener, px, py, slack, circles, segments):
+        if path < shortest and _answers(transmitter, px, py, listener, px, py, scene):
             shortest = path
     for k in range(corners.shape[0]):
-        if not (answers_by(SPECULAR, corners[k].surface, model) and answers_by(SPECULAR, corners[k].beside, model)):
-            continue
-        vx, vy, start, opening = corners[k].x, corners[k].y, corners[k].start, corners[k].opening
-        from_t, from_l = math.hypot(tx - vx, ty - vy), math.hypot(lx - vx, ly - vy)
-        t_angle = (math.atan2(ty - vy, tx - vx) - start) % (2.0 * math.pi)
-        l_angle = (math.atan2(ly - vy, lx - vx) - start) % (2.0 * math.pi)
-        if t_angle >= opening or l_angle >= opening:
-            continue
-        # Unfolded, the sound goes straight through both walls; round the corner it turns by this angle, either way.
-        one, other = 2.0 * opening + l_angle - t_angle, 2.0 * opening + t_angle - l_angle
-        if opening < math.pi and min(one, other) < math.pi:
-            for to_end in (True, False):
-                turn = one if to_end else other
-                if turn >= math.pi:
-                    continue
-                path = math.sqrt(from_t**2 + from_l**2 - 2.0 * from_t * from_l * math.cos(turn))
-                to_first = opening - t_angle if to_end else t_angle
-                first = _on_chord(from_t, from_l, turn, to_first)
-                second = _on_chord(from_t, from_l, turn, to_first + opening)
-                first_wall = start + opening if to_end else start
-                second_wall = start if to_end else start + opening
-                px, py = vx + first * math.cos(first_wall), vy + first * math.sin(first_wall)
-                qx, qy = vx + second * math.cos(second_wall), vy + second * math.sin(second_wall)
-                if (
-                    path < shortest
-                    and _is_on_side(px, py, slack, segments)
-                    and _is_on_side(qx, qy, slack, segments)
-                    and _answers(transmitter, px, py, listener, qx, qy, slack, circles, segments)
-                    and not _is_parted(px, py, qx, qy, slack, circles, segments)
-                ):
-                    shortest = path
-            continue
-        path = from_t + from_l
-        if (
-            path < shortest
-            and (opening < math.pi or path <= edge_path)
-            and _answers(transmitter, vx, vy, listener, vx, vy, slack, circles, segments)
-        ):
-            shortest = path
+        if answers_by(SPECULAR, corners[k].surface, model) and answers_by(SPECULAR, corners[k].beside, model):
+            shortest = _over_corner(transmitter, listener, corners[k], scene, shortest)
+    return shortest
+
+
+@kernel
+def _over_corner(transmitter: Ear, listener: Ear, corner: np.record, scene: Scene, shortest: float) -> float:
+    """Return the shortest way over a corner, or `shortest` if that is shorter: over both walls, or over its point."""
+    tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
+    vx, vy, start, opening = corner.x, corner.y, corner.start, corner.opening
+    from_t, from_l = math.hypot(tx - vx, ty - vy), math.hypot(lx - vx, ly - vy)
+    t_angle = (math.atan2(ty - vy, tx - vx) - start) % (2.0 * math.pi)
+    l_angle = (math.atan2(ly - vy, lx - vx) - start) % (2.0 * math.pi)
+    if t_angle >= opening or l_angle >= opening:
+        return shortest
+    # Unfolded, the sound goes straight through both walls; round the corner it turns by this angle, either way.
+    one, other = 2.0 * opening + l_angle - t_angle, 2.0 * opening + t_angle - l_angle
+    if opening < math.pi and min(one, other) < math.pi:
+        for to_end in (True, False):
+            turn = one if to_end else other
+            if turn >= math.pi:
+                continue
+            path = math.sqrt(from_t**2 + from_l**2 - 2.0 * from_t * from_l * math.cos(turn))
+            to_first = opening - t_angle if to_end else t_angle
+            first = _on_chord(from_t, from_l, turn, to_first)
+            second = _on_chord(from_t, from_l, turn, to_first + opening)
+            first_wall = start + opening if to_end else start
+            second_wall = start if to_end else start + opening
+            px, py = vx + first * math.cos(first_wall), vy + first * math.sin(first_wall)
+            qx, qy = vx + second * math.cos(second_wall), vy + second * math.sin(second_wall)
+            if (
+                path < shortest
+                and _is_on_side(px, py, scene.segments)
+                and _is_on_side(qx, qy, scene.segments)
+                and _answers(transmitter, px, py, listener, qx, qy, scene)
+                and not _is_parted(px, py, qx, qy, scene)
+            ):
+                shortest = path
+        return shortest
+    path = from_t + from_l
+    if (
+        path < shortest
+        and (opening < math.pi or path <= 2.0 * CONVEX_EDGE_REACH_M)
+        and _answers(transmitter, vx, vy, listener, vx, vy, scene)
+    ):
+        return path
     return shortest
 
 
 @kernel
 def _answers(
-    transmitter: tuple[float, float, float, float],
+    transmitter: Ear,
     px: float,
     py: float,
-    listener: tuple[float, float, float, float],
+    listener: Ear,
     qx: float,
     qy: float,
-    slack: float,
-    circles: Records,
-    segments: Records,
+    scene: Scene,
 ) -> bool:
     """Return whether the first point lies in the transmitter's beam and sight, and the last in the listener's."""
     return (
         _is_in_beam(transmitter, px, py, 0.0)
         and _is_in_beam(listener, qx, qy, 0.0)
-        and not hidden(transmitter[0], transmitter[1], px, py, slack, circles, segments)
-        and not hidden(listener[0], listener[1], qx, qy, slack, circles, segments)
+        and not _is_out_of_sight(transmitter, px, py, scene)
+        and not _is_out_of_sight(listener, qx, qy, scene)
     )
 
 
@@ -187,24 +178,25 @@ def _on_chord(from_t: float, from_l: float, turn: float, angle: float) -> float:
 
 
 @kernel
-def _is_on_side(px: float, py: float, slack: float, segments: Records) -> bool:
+def _is_on_side(px: float, py: float, segments: Records) -> bool:
     for k in range(segments.shape[0]):
         ax, ay = segments[k].x1 - px, segments[k].y1 - py
         dx, dy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1
         t = min(1.0, max(0.0, -(ax * dx + ay * dy) / (dx * dx + dy * dy)))
-        if math.hypot(ax + t * dx, ay + t * dy) < slack:
+        if math.hypot(ax + t * dx, ay + t * dy) < SIGHT_SLACK_M:
             return True
     return False
 
 
 @kernel
-def _is_parted(px: float, py: float, qx: float, qy: float, slack: float, circles: Records, segments: Records) -> bool:
+def _is_parted(px: float, py: float, qx: float, qy: float, scene: Scene) -> bool:
     """Return whether a surface lies between two points of surfaces."""
     apart = math.hypot(qx - px, qy - py)
-    if apart <= 2.0 * slack:
+    if apart <= 2.0 * SIGHT_SLACK_M:
         return False
-    share = slack / apart
-    return hidden(px + share * (qx - px), py + share * (qy - py), qx, qy, slack, circles, segments)
+    share = SIGHT_SLACK_M / apart
+    from_x, from_y = px + share * (qx - px), py + share * (qy - py)
+    return hidden(from_x, from_y, qx, qy, SIGHT_SLACK_M, scene.circles, scene.segments)
 
 
 @kernel
@@ -301,82 +293,93 @@ def _answers_everywhere(surface: int, model: int) -> bool:
 
 
 @kernel
-def _in_both_beams(
-    transmitter: tuple[float, float, float, float],
-    listener: tuple[float, float, float, float],
-    model: int,
-    slack: float,
-    circles: Records,
-    segments: Records,
-    shortest: float,
-) -> float:
+def _in_both_beams(transmitter: Ear, listener: Ear, model: int, scene: Scene, shortest: float) -> float:
+    """Return the shortest way over what answers from each of its points, or `shortest` if that is shorter."""
     tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
-    for k in range(circles.shape[0]):
-        least = _least_over_circle(tx, ty, lx, ly, circles[k])
-        if least >= shortest or not _answers_everywhere(circles[k].surface, model):
+    for k in range(scene.circles.shape[0]):
+        circle = scene.circles[k]
+        least = _least_over_circle(tx, ty, lx, ly, circle)
+        if least >= shortest or not _answers_everywhere(circle.surface, model):
             continue
         if least <= 0.0:
             return 0.0
-        cx, cy, radius = circles[k].x, circles[k].y, circles[k].radius
-        px, py, path = mirror_on_circle(tx, ty, lx, ly, cx, cy, radius)
-        if math.isinf(path):
-            continue
-        if not _are_in_beams(transmitter, listener, px, py):
-            path = math.inf
-            for edge in range(4):
-                sensor = transmitter if edge < 2 else listener
-                direction = sensor[2] + (sensor[3] if edge % 2 else -sensor[3])
-                ex, ey = math.cos(direction), math.sin(direction)
-                along = (cx - sensor[0]) * ex + (cy - sensor[1]) * ey
-                off = (cx - sensor[0]) * ey - (cy - sensor[1]) * ex
-                if along <= 0.0 or abs(off) > radius:
-                    continue
-                reach = along - math.sqrt(radius * radius - off * off)
-                qx, qy = sensor[0] + reach * ex, sensor[1] + reach * ey
-                there = math.hypot(qx - tx, qy - ty) + math.hypot(qx - lx, qy - ly)
-                # Both see the point if they lie on the outer side of the tangent there.
-                t_side = (tx - qx) * (qx - cx) + (ty - qy) * (qy - cy)
-                l_side = (lx - qx) * (qx - cx) + (ly - qy) * (qy - cy)
-                is_seen = min(t_side, l_side) >= -_ROUNDING
-                if there < path and is_seen and _are_in_beams(transmitter, listener, qx, qy):
-                    px, py, path = qx, qy, there
-        if path < shortest and _is_seen_by_both(transmitter, listener, px, py, slack, circles, segments):
+        px, py, path = _nearest_on_circle(transmitter, listener, circle)
+        if path < shortest and _is_seen_by_both(transmitter, listener, px, py, scene):
             shortest = path
-    for k in range(segments.shape[0]):
-        t_along, t_off, l_along, l_off, length = _beside(tx, ty, lx, ly, segments[k])
-        if t_off * l_off <= 0.0 or not _answers_everywhere(segments[k].surface, model):
+    for k in range(scene.segments.shape[0]):
+        if not _answers_everywhere(scene.segments[k].surface, model):
             continue
-        x1, y1 = segments[k].x1, segments[k].y1
-        dx, dy = segments[k].x2 - x1, segments[k].y2 - y1
-        px, py, path = math.nan, math.nan, math.inf
-        for candidate in range(7):  # the mirror point, both ends, and where the edges of both beams meet the side
-            if candidate == 0:
-                share = (t_along * abs(l_off) + l_along * abs(t_off)) / (abs(t_off) + abs(l_off)) / length
-            elif candidate <= 2:
-                share = candidate - 1.0
-            else:
-                sensor = transmitter if candidate <= 4 else listener
-                direction = sensor[2] + (sensor[3] if candidate % 2 else -sensor[3])
-                ex, ey = math.cos(direction), math.sin(direction)
-                across = ex * dy - ey * dx
-                if across == 0.0:
-                    continue
-                share = (ey * (x1 - sensor[0]) - ex * (y1 - sensor[1])) / across
-            if not 0.0 <= share <= 1.0:
-                continue
-            qx, qy = x1 + share * dx, y1 + share * dy
-            there = math.hypot(qx - tx, qy - ty) + math.hypot(qx - lx, qy - ly)
-            if there < path and _are_in_beams(transmitter, listener, qx, qy):
-                px, py, path = qx, qy, there
-        if path < shortest and _is_seen_by_both(transmitter, listener, px, py, slack, circles, segments):
+        px, py, path = _nearest_on_side(transmitter, listener, scene.segments[k])
+        if path < shortest and _is_seen_by_both(transmitter, listener, px, py, scene):
             shortest = path
     return shortest
 
 
 @kernel
+def _nearest_on_circle(transmitter: Ear, listener: Ear, circle: np.record) -> tuple[float, float, float]:
+    """Return the point of a circle in both beams with the shortest way, and that way's length; +inf if none."""
+    tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
+    cx, cy, radius = circle.x, circle.y, circle.radius
+    px, py, path = mirror_on_circle(tx, ty, lx, ly, cx, cy, radius)
+    if math.isinf(path) or _are_in_beams(transmitter, listener, px, py):
+        return px, py, path
+    path = math.inf
+    for edge in range(4):
+        sensor = transmitter if edge < 2 else listener
+        direction = sensor[2] + (sensor[3] if edge % 2 else -sensor[3])
+        ex, ey = math.cos(direction), math.sin(direction)
+        along = (cx - sensor[0]) * ex + (cy - sensor[1]) * ey
+        off = (cx - sensor[0]) * ey - (cy - sensor[1]) * ex
+        if along <= 0.0 or abs(off) > radius:
+            continue
+        reach = along - math.sqrt(radius * radius - off * off)
+        qx, qy = sensor[0] + reach * ex, sensor[1] + reach * ey
+        there = math.hypot(qx - tx, qy - ty) + math.hypot(qx - lx, qy - ly)
+        # Both see the point if they lie on the outer side of the tangent there.
+        t_side = (tx - qx) * (qx - cx) + (ty - qy) * (qy - cy)
+        l_side = (lx - qx) * (qx - cx) + (ly - qy) * (qy - cy)
+        is_seen = min(t_side, l_side) >= -_ROUNDING
+        if there < path and is_seen and _are_in_beams(transmitter, listener, qx, qy):
+            px, py, path = qx, qy, there
+    return px, py, path
+
+
+@kernel
+def _nearest_on_side(transmitter: Ear, listener: Ear, side: np.record) -> tuple[float, float, float]:
+    """Return the point of a side in both beams with the shortest way, and that way's length; +inf if none."""
+    tx, ty, lx, ly = transmitter[0], transmitter[1], listener[0], listener[1]
+    t_along, t_off, l_along, l_off, length = _beside(tx, ty, lx, ly, side)
+    px, py, path = math.nan, math.nan, math.inf
+    if t_off * l_off <= 0.0:
+        return px, py, path
+    x1, y1 = side.x1, side.y1
+    dx, dy = side.x2 - x1, side.y2 - y1
+    for candidate in range(7):  # the mirror point, both ends, and where the edges of both beams meet the side
+        if candidate == 0:
+            share = (t_along * abs(l_off) + l_along * abs(t_off)) / (abs(t_off) + abs(l_off)) / length
+        elif candidate <= 2:
+            share = candidate - 1.0
+        else:
+            sensor = transmitter if candidate <= 4 else listener
+            direction = sensor[2] + (sensor[3] if candidate % 2 else -sensor[3])
+            ex, ey = math.cos(direction), math.sin(direction)
+            across = ex * dy - ey * dx
+            if across == 0.0:
+                continue
+            share = (ey * (x1 - sensor[0]) - ex * (y1 - sensor[1])) / across
+        if not 0.0 <= share <= 1.0:
+            continue
+        qx, qy = x1 + share * dx, y1 + share * dy
+        there = math.hypot(qx - tx, qy - ty) + math.hypot(qx - lx, qy - ly)
+        if there < path and _are_in_beams(transmitter, listener, qx, qy):
+            px, py, path = qx, qy, there
+    return px, py, path
+
+
+@kernel
 def _are_in_beams(
-    transmitter: tuple[float, float, float, float],
-    listener: tuple[float, float, float, float],
+    transmitter: Ear,
+    listener: Ear,
     px: float,
     py: float,
 ) -> bool:
@@ -385,14 +388,15 @@ def _are_in_beams(
 
 @kernel
 def _is_seen_by_both(
-    transmitter: tuple[float, float, float, float],
-    listener: tuple[float, float, float, float],
+    transmitter: Ear,
+    listener: Ear,
     px: float,
     py: float,
-    slack: float,
-    circles: Records,
-    segments: Records,
+    scene: Scene,
 ) -> bool:
-    return not hidden(transmitter[0], transmitter[1], px, py, slack, circles, segments) and not hidden(
-        listener[0], listener[1], px, py, slack, circles, segments
-    )
+    return not _is_out_of_sight(transmitter, px, py, scene) and not _is_out_of_sight(listener, px, py, scene)
+
+
+@kernel
+def _is_out_of_sight(sensor: Ear, px: float, py: float, scene: Scene) -> bool:
+    return hidden(sensor[0], sensor[1], px, py, SIGHT_SLACK_M, scene.circles, scene.segments)

@@ -8,7 +8,7 @@ another wall, or crosses it, makes corners as well.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,23 +33,15 @@ _Side = tuple[_Point, _Point, int]
 """Both ends of a straight surface, and how it answers: a model of `surfaces`, or `AS_WORLD`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
-    """What reflects sound and stops the body, in world coordinates; types of records as in `surfaces`.
-
-    Attributes
-    ----------
-    circles
-        `CIRCLE`, shape (circles,).
-    segments
-        `SEGMENT`, shape (segments,).
-    corners
-        `CORNER`, shape (sectors,).
-    """
+class Scene(NamedTuple):
+    """What reflects sound and stops the body, in world coordinates, as kernels take it; records as in `surfaces`."""
 
     circles: Records
+    """`CIRCLE`, shape (circles,)."""
     segments: Records
+    """`SEGMENT`, shape (segments,)."""
     corners: Records
+    """`CORNER`, shape (sectors,)."""
 
 
 def compile_scene(world: WorldConfig, later: int = 0) -> Scene:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from config.world import AcousticsConfig
-from drivers.emulator.acoustics import CONVEX_EDGE_REACH_M, ECHO, MOUNT, SIGHT_SLACK_M, first_echoes
+from drivers.emulator.acoustics import ECHO, MOUNT, first_echoes
 from drivers.emulator.cross_paths import first_cross_paths
 from drivers.emulator.scene import Scene
 from drivers.emulator.surfaces import CONE, SILENT, SURFACES, Records
@@ -131,11 +131,11 @@ class Sonar:
         chance, share = self._rng.random((2, len(fired)))
         is_late = fired & np.isinf(distances) & (chance < self._acoustics.late)
         if is_late.any():
-            circles, segments = self._scene.circles.copy(), self._scene.segments.copy()
-            for surfaces in (circles, segments):
+            rough = self._scene._replace(circles=self._scene.circles.copy(), segments=self._scene.segments.copy())
+            for surfaces in (rough.circles, rough.segments):
                 surfaces["surface"][surfaces["surface"] != SILENT] = CONE
             nearest = np.empty(len(fired), dtype=ECHO)
-            self._find(pose, ring_yaw, is_late, circles, segments, nearest)
+            self._find(pose, ring_yaw, is_late, rough, nearest)
             farther = LATE_M[0] + share * (LATE_M[1] - LATE_M[0])
             distances[is_late] = (nearest["distance"] + farther)[is_late]
 
@@ -156,28 +156,20 @@ class Sonar:
         Records
             `acoustics.ECHO`, shape (sensors,); the next call overwrites it.
         """
-        self._find(pose, ring_yaw, fired, self._scene.circles, self._scene.segments, self._echoes)
+        self._find(pose, ring_yaw, fired, self._scene, self._echoes)
         return self._echoes
 
-    def _find(
-        self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_], circles: Records, segments: Records, out: Records
-    ) -> None:
-        """Find the first echoes from some surfaces."""
+    def _find(self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_], scene: Scene, out: Records) -> None:
+        """Find the first echoes from the surfaces of a scene."""
         self._turn_mounts(pose.theta - ring_yaw)
         first_echoes(
-            pose.x,
-            pose.y,
-            ring_yaw,
+            (float(pose.x), float(pose.y), float(ring_yaw)),
             self._mounts,
             fired,
             self._half_angle,
             SURFACES[self._acoustics.model],
             self._acoustics.rays,
-            CONVEX_EDGE_REACH_M,
-            SIGHT_SLACK_M,
-            circles,
-            segments,
-            self._scene.corners,
+            scene,
             out,
         )
 
@@ -208,19 +200,13 @@ class Sonar:
         self._turn_mounts(pose.theta - ring_yaw)
         out = np.empty(len(self._mounts))
         first_cross_paths(
-            pose.x,
-            pose.y,
-            ring_yaw,
+            (float(pose.x), float(pose.y), float(ring_yaw)),
             self._mounts,
             heard,
             self._half_angle,
             LISTENING_LOBE * self._half_angle,
             SURFACES[self._acoustics.model],
-            CONVEX_EDGE_REACH_M,
-            SIGHT_SLACK_M,
-            self._scene.circles,
-            self._scene.segments,
-            self._scene.corners,
+            self._scene,
             out,
         )
         return out

@@ -66,19 +66,13 @@ def echoes(world: WorldConfig, sensors: list[tuple[complex, float]], half_angle:
     mounts = np.array([(s.real, s.imag, axis) for s, axis in sensors], dtype=MOUNT)
     out = np.empty(len(sensors), dtype=ECHO)
     first_echoes(
-        0.0,
-        0.0,
-        0.0,
+        (0.0, 0.0, 0.0),
         mounts,
         np.ones(len(sensors), dtype=np.bool_),
         half_angle,
         SURFACES[model],
         RAYS,
-        CONVEX_EDGE_REACH_M,
-        SIGHT_SLACK_M,
-        scene.circles,
-        scene.segments,
-        scene.corners,
+        scene,
         out,
     )
     return out

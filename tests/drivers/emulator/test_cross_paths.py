@@ -33,10 +33,15 @@ def half_paths(
     mounts = np.array([(s.real, s.imag, axis) for s, axis in sensors], dtype=MOUNT)
     out = np.empty(len(sensors))
     first_cross_paths(
-        0.0, 0.0, 0.0, mounts, ~np.eye(len(sensors), dtype=np.bool_) if heard is None else heard, half_angle,
-        LOBE * half_angle, SPECULAR if specular else CONE, CONVEX_EDGE_REACH_M, SIGHT_SLACK_M, scene.circles,
-        scene.segments, scene.corners, out,
-    )  # fmt: skip
+        (0.0, 0.0, 0.0),
+        mounts,
+        ~np.eye(len(sensors), dtype=np.bool_) if heard is None else heard,
+        half_angle,
+        LOBE * half_angle,
+        SPECULAR if specular else CONE,
+        scene,
+        out,
+    )
     return out
 
 
