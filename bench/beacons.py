@@ -146,7 +146,7 @@ def track(recording: Recording) -> Track:
             found.append((float(known[k, 0]), float(e[0].x), float(e[0].y)))
             k += 1
         turn_variance, place_variance = TURN_WALK * abs(way), PLACE_WALK * abs(way)
-        propagate(e, covariance, way, 0.0, 0.0, turn, turn, turn_variance, 0.0, place_variance)
+        propagate(e, covariance, way, 0.0, 0.0, turn, turn, (turn_variance, 0.0, place_variance))
     beacons = {n: (float(e[0].landmarks[i].x), float(e[0].landmarks[i].y)) for n, i in index.items()}
     return Track(np.array(found), beacons, float(e[0].range_scale), np.array(squared))
 

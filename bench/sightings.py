@@ -138,8 +138,8 @@ def track(recording: Recording) -> Found:
     ):
         begin_s = time.thread_time()
         half, variance = 0.5 * step.turn, 0.5 * step.turn_variance
-        propagate(e, covariance, 0.0, 0.0, 0.0, half, half, variance, 0.0, 0.0)
-        propagate(e, covariance, step.forward, step.left, 0.0, half, half, variance, 0.0, step.place_variance)
+        propagate(e, covariance, 0.0, 0.0, 0.0, half, half, (variance, 0.0, 0.0))
+        propagate(e, covariance, step.forward, step.left, 0.0, half, half, (variance, 0.0, step.place_variance))
         if number in index:
             squared.append(_enter(e, covariance, index[number], distance, bearing))
         else:

@@ -90,46 +90,28 @@ def cells_near(
         left, low = column + 0.5 - left, row + 0.5 - low
     # Copies, since a kernel is compiled for one layout in memory.
     part, echoes = np.array(part, np.float32, order="C"), np.array(percept.obstacles, np.float64, order="C")
-    dx, dy, distances, certainties = np.empty((4, part.size + len(echoes)))
+    found = np.empty((4, part.size + len(echoes)))
     count = fill_cells(
         part,
-        left,
-        low,
-        cell_m,
+        (left, low, cell_m),
         echoes,
-        float(x),
-        float(y),
-        float(reach_m),
-        *only_heard,
-        config.occupied_probability,
-        config.sure_probability,
-        dx,
-        dy,
-        distances,
-        certainties,
+        (float(x), float(y), float(reach_m)),
+        only_heard,
+        (config.occupied_probability, config.sure_probability),
+        found,
     )
-    return Cells(dx[:count], dy[:count], distances[:count], certainties[:count])
+    return Cells(*found[:, :count])
 
 
 @kernel
 def fill_cells(
     part: NDArray[np.float32],
-    left: float,
-    low: float,
-    cell_m: float,
+    raster: tuple[float, float, float],
     echoes: Floats,
-    x: float,
-    y: float,
-    reach_m: float,
-    heard_dx: float,
-    heard_dy: float,
-    heard_m: float,
-    occupied: float,
-    sure: float,
-    dx: Floats,
-    dy: Floats,
-    distances: Floats,
-    certainties: Floats,
+    near: tuple[float, float, float],
+    only_heard: tuple[float, float, float],
+    probabilities: tuple[float, float],
+    found: Floats,
 ) -> int:
     """Write the cells, row by row, and the echoes within a distance of a place; return their number.
 
@@ -137,21 +119,24 @@ def fill_cells(
     ----------
     part : (rows, columns) float32
         Probabilities of the evidence grid around the place.
-    left, low : float
-        From the place to the middle of the part's first cell, in cells.
-    cell_m : float
-        Side of a cell, m.
+    raster : (float, float, float)
+        From the place to the middle of the part's first cell, in cells, and the side of a cell, m.
     echoes : (n, 2) float
         In odometry's frame, m.
-    x, y, reach_m : float
+    near : (float, float, float)
         The place and the distance, m.
-    heard_dx, heard_dy, heard_m : float
-        `only_heard` of `cells_near`.
-    occupied, sure : float
-        From which probability on a cell counts, and from which it is sure.
-    dx, dy, distances, certainties : (k,) float
-        Out: as of `Cells`.
+    only_heard : (float, float, float)
+        As for `cells_near`.
+    probabilities : (float, float)
+        From which one on a cell counts, and from which it is sure.
+    found : (4, k) float
+        Out: the fields of `Cells`.
     """
+    left, low, cell_m = raster
+    x, y, reach_m = near
+    heard_dx, heard_dy, heard_m = only_heard
+    occupied, sure = probabilities
+    dx, dy, distances, certainties = found[0], found[1], found[2], found[3]
     count = 0
     for row in range(part.shape[0]):
         for column in range(part.shape[1]):

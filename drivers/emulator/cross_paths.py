@@ -153,15 +153,7 @@ def _over_corner(transmitter: Ear, listener: Ear, corner: np.record, scene: Scen
 
 
 @kernel
-def _answers(
-    transmitter: Ear,
-    px: float,
-    py: float,
-    listener: Ear,
-    qx: float,
-    qy: float,
-    scene: Scene,
-) -> bool:
+def _answers(transmitter: Ear, px: float, py: float, listener: Ear, qx: float, qy: float, scene: Scene) -> bool:
     """Return whether the first point lies in the transmitter's beam and sight, and the last in the listener's."""
     return (
         _is_in_beam(transmitter, px, py, 0.0)
@@ -377,23 +369,12 @@ def _nearest_on_side(transmitter: Ear, listener: Ear, side: np.record) -> tuple[
 
 
 @kernel
-def _are_in_beams(
-    transmitter: Ear,
-    listener: Ear,
-    px: float,
-    py: float,
-) -> bool:
+def _are_in_beams(transmitter: Ear, listener: Ear, px: float, py: float) -> bool:
     return _is_in_beam(transmitter, px, py, _ROUNDING) and _is_in_beam(listener, px, py, _ROUNDING)
 
 
 @kernel
-def _is_seen_by_both(
-    transmitter: Ear,
-    listener: Ear,
-    px: float,
-    py: float,
-    scene: Scene,
-) -> bool:
+def _is_seen_by_both(transmitter: Ear, listener: Ear, px: float, py: float, scene: Scene) -> bool:
     return not _is_out_of_sight(transmitter, px, py, scene) and not _is_out_of_sight(listener, px, py, scene)
 
 

@@ -18,7 +18,7 @@ from perception.bounds import CONSTANT, COUNT, PLACE, bounds, index_of, up_to
 from perception.edits import Segments
 from perception.kernel import Floats, Ints, kernel
 from perception.paper.parameters import PINNED_SHARE_MAX
-from perception.sensor_mounts import mounts_at
+from perception.sensor_mounts import RingPose, mounts_at, ring_pose
 
 EMPTY, PRESENT, PINNED = range(3)
 """Values of `OutlineMap.status`."""
@@ -32,9 +32,7 @@ def erase_contradicted(
     count: int,
     ranges: Floats,
     mounts: Floats,
-    pose_x: float,
-    pose_y: float,
-    yaw: float,
+    pose: RingPose,
     half_angle: float,
     margin: float,
 ) -> int:
@@ -51,7 +49,7 @@ def erase_contradicted(
         `PRESENT` for a segment that may be contradicted. Updated.
     start, count : int
         Oldest slot and number of slots in use, circular.
-    ranges, mounts, pose_x, pose_y, yaw, half_angle
+    ranges, mounts, pose, half_angle
         The firing, as in `perception.paper.segments.pair_readings`.
     margin : float
         By how much farther than the segment the echo must be, m.
@@ -61,6 +59,7 @@ def erase_contradicted(
     int
         How many were removed.
     """
+    pose_x, pose_y, yaw = pose
     capacity = segments.shape[0]
     c = math.cos(yaw)
     s = math.sin(yaw)
@@ -248,9 +247,7 @@ class OutlineMap:
             self.count,
             firing.ranges_m,
             mounts_at(firing, self._mounts, self._turning),
-            firing.pose.x,
-            firing.pose.y,
-            firing.ring_yaw,
+            ring_pose(firing),
             self._half_angle,
             self._config.contradiction_margin_m,
         )

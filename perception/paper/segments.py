@@ -7,7 +7,7 @@ tangent of both arcs is the best estimate of the surface that returned both echo
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from perception.bounds import CONSTANT, RANGE, Place, bounds, index_of, up_to
 from perception.kernel import Floats, kernel
 from perception.paper.parameters import READING_SPACING, SENSOR_READINGS_KEPT
 from perception.records import Record, Records, records, zeros
-from perception.sensor_mounts import mounts_array, mounts_at
+from perception.sensor_mounts import RingPose, mounts_array, mounts_at, ring_pose
 
 
 class KeptReading(Record):
@@ -86,20 +86,20 @@ def tangent(
     return found, normal
 
 
+Apart: TypeAlias = tuple[float, float, float, float]
+"""Least and greatest distance between the two readings of a pair (m), the longest time between them (s), and the
+least distance between kept readings (m)."""
+
+
 @kernel
 def pair_readings(
     ranges: Floats,
     mounts: Floats,
-    pose_x: float,
-    pose_y: float,
-    yaw: float,
+    pose: RingPose,
     t: float,
     sensors: Records[SensorReadings],
     half_angle: float,
-    baseline_min: float,
-    baseline_max: float,
-    gap_max: float,
-    spacing: float,
+    apart: Apart,
     out: Floats,
 ) -> int:
     """Pair each echo of a firing with the last kept one far enough back; return the number of segments.
@@ -110,18 +110,16 @@ def pair_readings(
         As in a `Firing`, m: NaN did not fire, inf heard nothing. Neither is paired.
     mounts : (n, 3) float
         x, y (m) and direction (rad) of each sensor in the ring's frame.
-    pose_x, pose_y, yaw, t : float
-        Place of the ring (m), direction of its sensor 0 (rad), time of the firing (s).
+    pose : RingPose
+        Place of the ring (m) and direction of its sensor 0 (rad).
+    t : float
+        Time of the firing, s.
     sensors : (n,) records
         Each sensor's last readings. Updated.
     half_angle : float
         Half the beam's width, rad.
-    baseline_min, baseline_max : float
-        Least and greatest distance between the two readings of a pair, m.
-    gap_max : float
-        Longest time between them, s.
-    spacing : float
-        Least distance between kept readings, m.
+    apart : Apart
+        How far apart readings are that are paired.
     out : (n, 5) float
         Out: the segments' end points x1, y1, x2, y2 (m) and direction of the normal (rad).
 
@@ -130,6 +128,8 @@ def pair_readings(
     int
         How many segments were written to `out`.
     """
+    pose_x, pose_y, yaw = pose
+    baseline_min, baseline_max, gap_max, spacing = apart
     count = 0
     c = math.cos(yaw)
     s = math.sin(yaw)
@@ -204,16 +204,16 @@ class SegmentExtractor:
         count = pair_readings(
             firing.ranges_m,
             mounts_at(firing, self._mounts, self._turning),
-            firing.pose.x,
-            firing.pose.y,
-            firing.ring_yaw,
-            firing.robot_s,
+            ring_pose(firing),
+            float(firing.robot_s),
             self._sensor_records,
             self._half_angle,
-            config.baseline_min_m,
-            config.baseline_max_m,
-            config.gap_max_s,
-            READING_SPACING * config.baseline_min_m,
+            (
+                config.baseline_min_m,
+                config.baseline_max_m,
+                config.gap_max_s,
+                READING_SPACING * config.baseline_min_m,
+            ),
             self._out,
         )
         return self._out[:count]

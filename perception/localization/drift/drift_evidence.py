@@ -14,16 +14,12 @@ from typing import Final
 
 from config.robot import RingConfig
 from perception.kernel import Floats, kernel
+from perception.localization.drift.landmark_association import MARGIN_RAD, MARGIN_SIGMAS, OWN_M, bearing_variance
 from perception.localization.drift.landmark_filter import innovation_variance, rows_used
-from perception.localization.drift.landmark_ranges import (
-    MARGIN_RAD,
-    MARGIN_SIGMAS,
-    OWN_M,
-    bearing_variance,
-    has_moved_since,
-)
-from perception.localization.drift.landmark_state import FIRST, EstimateRecord
+from perception.localization.drift.landmark_ranges import has_moved_since
+from perception.localization.drift.landmark_state import FIRST, EstimateRecord, SonarModel
 from perception.localization.drift.landmark_tracker import LandmarkTracker
+from perception.sensor_mounts import RingPose
 
 OTHER_PER_M: Final = 0.05
 """Density (1/m) of the ranges that are of something else than the landmarks in the beam, under both hypotheses: it
@@ -93,14 +89,8 @@ def compare_firing(
     exact_covariance: Floats,
     mounts: Floats,
     ranges: Floats,
-    px: float,
-    py: float,
-    yaw: float,
-    var0: float,
-    rel2: float,
-    half_angle: float,
-    range_min: float,
-    range_max: float,
+    pose: RingPose,
+    sonar: SonarModel,
 ) -> None:
     """Add the evidence of a firing's ranges to `drift_nat` of the landmarks of `exact`, before they are entered.
 
@@ -112,9 +102,11 @@ def compare_firing(
         The means with drift, and with exact odometry, of the same landmarks in the same order.
     covariance, exact_covariance : (rows, rows) float
         Of them.
-    mounts, ranges, px, py, yaw, var0, rel2, half_angle, range_min, range_max
+    mounts, ranges, pose, sonar
         As for `perception.localization.drift.landmark_ranges.update_with_firing`.
     """
+    px, py, yaw = pose
+    var0, rel2, half_angle, range_min, range_max = sonar
     est, fixed = e[0], exact[0]
     c, s = math.cos(yaw), math.sin(yaw)
     c1, s1 = math.cos(est.heading), math.sin(est.heading)

@@ -85,9 +85,7 @@ def propagate(
     travel: float,
     ring_turn: float,
     travel_turn: float,
-    turn_variance: float,
-    offset_variance: float,
-    place_variance: float,
+    variances: tuple[float, float, float],
 ) -> None:
     """Move the ring by what odometry reports.
 
@@ -103,11 +101,11 @@ def propagate(
         Reported angle from the ring's direction to the direction of travel before it, rad.
     ring_turn, travel_turn : float
         Reported turn of the ring, and of the direction of travel, rad.
-    turn_variance, offset_variance : float
-        Variance of the turn's error that ring and wheels share, and of that of the wheels alone, rad².
-    place_variance : float
-        Variance of the displacement on each axis, m².
+    variances : (float, float, float)
+        Variance of the turn's error that ring and wheels share, and of that of the wheels alone, rad²; and of the
+        displacement on each axis, m².
     """
+    turn_variance, offset_variance, place_variance = variances
     est = e[0]
     n = rows_used(e)
     direction = est.heading + travel + est.offset

@@ -10,31 +10,37 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
+from perception.localization.drift.landmark_association import (
+    NO_LANDMARK,
+    associate,
+    bearing_variance,
+    is_landmark_hidden,
+    may_answer_instead,
+)
 from perception.localization.drift.landmark_filter import correct, innovation_variance, rows_used
-from perception.localization.drift.landmark_state import FIRST, STRAY_MAX, STRAY_MIN, EstimateRecord, LastUse, X, Y
+from perception.localization.drift.landmark_state import (
+    FIRST,
+    STRAY_MAX,
+    STRAY_MIN,
+    EstimateRecord,
+    LastUse,
+    SonarModel,
+)
+from perception.sensor_mounts import RingPose, SensorPose
 
-GATE: Final = 10.8
-"""χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
 SOFT: Final = 6.25
 """Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
-OWN_M: Final = 0.15
-"""A range farther than this from a landmark's is of something else, however uncertain the landmark is."""
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
 FRESH_M: Final = 0.02
 FRESH_RAD: Final = math.radians(1.0)
 """A sensor's readings that are nearer together repeat one error of rounding; only the first is used."""
-MARGIN_RAD: Final = math.radians(1.0)
-MARGIN_SIGMAS: Final = 3.0
-"""This far inside the beam a landmark must answer, and this far outside it may: a fixed part, and standard deviations
-of its bearing."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
 NOISE_MAX: Final = 25.0
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
-NO_LANDMARK: Final = -1
 UNHEARD: Final = -1.0
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
@@ -50,8 +56,6 @@ WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
 """With less, as a share of the squared slope, nothing would change."""
-HIDING_RADII: Final = 1.1
-"""A line of sight this near to a landmark's centre is hidden by it."""
 PASSED_M: Final = 0.3
 """A range this much beyond a landmark's has passed it."""
 
@@ -80,73 +84,6 @@ def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> boo
         return False
     last.x, last.y, last.axis, last.is_known = x, y, axis, 1
     return True
-
-
-@kernel
-def bearing_variance(covariance: Floats, i: int, dx: float, dy: float) -> float:
-    """Return the variance of the bearing of landmark `i`, at (dx, dy) m from a sensor, relative to the ring, rad²."""
-    row = FIRST + 2 * i
-    u, v, d2 = -dy, dx, dx * dx + dy * dy
-    xx = covariance[row, row] - 2.0 * covariance[row, X] + covariance[X, X]
-    xy = covariance[row, row + 1] - covariance[row, Y] - covariance[X, row + 1] + covariance[X, Y]
-    yy = covariance[row + 1, row + 1] - 2.0 * covariance[row + 1, Y] + covariance[Y, Y]
-    variance: float = (u * u * xx + 2.0 * u * v * xy + v * v * yy) / (d2 * d2)
-    return variance
-
-
-@kernel
-def is_landmark_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
-    """Return whether another landmark stands between a sensor at (x, y) (m) and the centre of landmark `i`."""
-    est = e[0]
-    dx, dy = est.landmarks[i].x - x, est.landmarks[i].y - y
-    d = math.sqrt(dx * dx + dy * dy)
-    for k in range(est.count):
-        other = est.landmarks[k]
-        ox, oy = other.x - x, other.y - y
-        along = (ox * dx + oy * dy) / d
-        if k != i and 0.0 < along < d and abs(ox * dy - oy * dx) < HIDING_RADII * other.radius * d:
-            return True
-    return False
-
-
-@kernel
-def may_answer_instead(
-    e: EstimateRecord, i: int, x: float, y: float, ax: float, ay: float, half_angle: float, r: float
-) -> bool:
-    """Return whether a range may be of another landmark than `i`, of which any visible part is in the beam.
-
-    Where drums answer with any part that is in the beam, the nearest point of one whose centre is outside is farther
-    than that of the drum, by up to the distance of its horizon.
-
-    Parameters
-    ----------
-    e : (1,) Estimate
-        The mean.
-    i : int
-        The landmark.
-    x, y : float
-        The sensor's place, m.
-    ax, ay : float
-        Direction of its axis.
-    half_angle : float
-        Half the beam's width, rad.
-    r : float
-        Range, m.
-    """
-    est = e[0]
-    for k in range(est.count):
-        other = est.landmarks[k]
-        dx, dy = other.x - x, other.y - y
-        d = math.sqrt(dx * dx + dy * dy)
-        if k == i or d <= other.radius:
-            continue
-        off = abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy))
-        horizon = math.sqrt(d * d - other.radius * other.radius)
-        if off < half_angle + math.asin(other.radius / d) + MARGIN_RAD and (
-            d - other.radius - OWN_M < r / est.range_scale < horizon + OWN_M
-        ):
-            return True
-    return False
 
 
 @kernel
@@ -244,86 +181,20 @@ def update_with_edge(
 
 
 @kernel
-def update_with_range(
-    e: EstimateRecord,
-    covariance: Floats,
-    mx: float,
-    my: float,
-    axis: float,
-    r: float,
-    var0: float,
-    rel2: float,
-    half_angle: float,
-    range_max: float,
-) -> int:
-    """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
-
-    The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
-    explain it, it is not used.
+def correct_with_range(
+    e: EstimateRecord, covariance: Floats, best: int, best_nis: float, mount: SensorPose, r: float, sonar: SonarModel
+) -> None:
+    """Correct the estimate with a range that one landmark explains, and learn the ranges' noise from it.
 
     Parameters
     ----------
-    e : (1,) Estimate
-        Updated.
-    covariance : (rows, rows) float
-        Updated.
-    mx, my, axis : float
-        The sensor's mount in the ring's frame, m and rad.
-    r : float
-        Range, m; inf: no echo.
-    var0, rel2 : float
-        Nominal variance of a range: var0 (m²) + rel2 · r².
-    half_angle, range_max : float
-        Half the beam's width, rad; greatest range of the ring, m.
+    best, best_nis
+        The landmark, and the square of its distance in standard deviations, as of `associate`.
+    e, covariance, mount, r, sonar
+        As for `update_with_range`.
     """
+    mx, my, axis = mount
     est = e[0]
-    n = rows_used(e)
-    c, s = math.cos(est.heading), math.sin(est.heading)
-    x = est.x + c * mx - s * my
-    y = est.y + s * mx + c * my
-    ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
-    best = second = first = NO_LANDMARK
-    best_nis = second_nis = GATE
-    nearest = math.inf
-    is_expected = False
-    for i in range(est.count):
-        landmark = est.landmarks[i]
-        dx, dy = landmark.x - x, landmark.y - y
-        d = math.sqrt(dx * dx + dy * dy)
-        if d <= landmark.radius or dx * ax + dy * ay < 0.0:
-            continue
-        inside = half_angle - abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy))
-        margin = MARGIN_RAD + MARGIN_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
-        if inside < -margin:
-            continue
-        predicted = est.range_scale * (d - landmark.radius)
-        if predicted < nearest:
-            nearest, first, is_expected = predicted, i, inside > margin
-        if abs(r - predicted) > OWN_M:
-            continue
-        u, v = est.range_scale * dx / d, est.range_scale * dy / d
-        variance = innovation_variance(covariance, n, FIRST + 2 * i, u, v, d - landmark.radius, est.gain)
-        nis = (r - predicted) ** 2 / (variance + est.noise * (var0 + rel2 * predicted * predicted))
-        if nis < best_nis:
-            second, second_nis = best, best_nis
-            best, best_nis = i, nis
-        elif nis < second_nis:
-            second, second_nis = i, nis
-    if (
-        is_expected
-        and best == NO_LANDMARK
-        and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
-    ):
-        is_expected = False
-    if is_expected:
-        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
-    is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < range_max
-    if is_missed and not is_landmark_hidden(e, first, x, y):
-        update_with_edge(e, covariance, first, mx, my, axis, half_angle, UNHEARD)
-    elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
-        est.landmarks[first].failures += 1
-    if best == NO_LANDMARK or second != NO_LANDMARK:
-        return NO_LANDMARK
     c, s = math.cos(est.heading), math.sin(est.heading)
     x = est.x + c * mx - s * my
     y = est.y + s * mx + c * my
@@ -335,8 +206,8 @@ def update_with_range(
     longer = 0.5 * d * bearing_variance(covariance, best, dx, dy)
     predicted = est.range_scale * (d + longer - landmark.radius)
     innovation = r - predicted
-    variance = innovation_variance(covariance, n, FIRST + 2 * best, u, v, d - landmark.radius, est.gain)
-    nominal = var0 + rel2 * predicted * predicted  # by its own range, one that is short by chance would count more
+    variance = innovation_variance(covariance, rows_used(e), FIRST + 2 * best, u, v, d - landmark.radius, est.gain)
+    nominal = sonar.var0 + sonar.rel2 * predicted * predicted
     noise = est.noise * nominal
     if best_nis > SOFT:
         noise *= math.sqrt(best_nis / SOFT)
@@ -349,15 +220,65 @@ def update_with_range(
     landmark.hits += 1
     total = variance + noise
     fits = math.exp(-0.5 * innovation * innovation / total) / math.sqrt(2.0 * math.pi * total)
-    update_with_edge(e, covariance, best, mx, my, axis, half_angle, WILD_PER_M / fits)
+    update_with_edge(e, covariance, best, mx, my, axis, sonar.half_angle, WILD_PER_M / fits)
+
+
+@kernel
+def update_with_range(
+    e: EstimateRecord,
+    covariance: Floats,
+    mount: SensorPose,
+    r: float,
+    sonar: SonarModel,
+) -> int:
+    """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
+
+    The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
+    explain it, it is not used.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    covariance : (rows, rows) float
+        Updated.
+    mount : SensorPose
+        The sensor's mount in the ring's frame, m and rad.
+    r : float
+        Range, m; inf: no echo.
+    sonar : SonarModel
+        What is known of the sensors.
+    """
+    mx, my, axis = mount
+    half_angle = sonar.half_angle
+    est = e[0]
+    c, s = math.cos(est.heading), math.sin(est.heading)
+    x, y = est.x + c * mx - s * my, est.y + s * mx + c * my
+    ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
+    best, best_nis, is_ambiguous, first, nearest, is_expected = associate(e, covariance, (x, y, ax, ay), r, sonar)
+    if (
+        is_expected
+        and best == NO_LANDMARK
+        and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
+    ):
+        is_expected = False
+    if is_expected:
+        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
+    is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
+    if is_missed and not is_landmark_hidden(e, first, x, y):
+        update_with_edge(e, covariance, first, mx, my, axis, half_angle, UNHEARD)
+    elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
+        est.landmarks[first].failures += 1
+    if best == NO_LANDMARK or is_ambiguous:
+        return NO_LANDMARK
+    correct_with_range(e, covariance, best, best_nis, mount, r, sonar)
     return best
 
 
 @kernel
 def update_with_firing(
-    e: EstimateRecord, covariance: Floats, mounts: Floats, ranges: Floats, px: float, py: float, yaw: float,
-    var0: float, rel2: float, half_angle: float, range_min: float, range_max: float,
-) -> int:  # fmt: skip
+    e: EstimateRecord, covariance: Floats, mounts: Floats, ranges: Floats, pose: RingPose, sonar: SonarModel
+) -> int:
     """Enter the ranges of a firing; return how many were used.
 
     Parameters
@@ -370,24 +291,23 @@ def update_with_firing(
         x, y (m), direction (rad) of each sensor in the ring's frame.
     ranges : (n,) float
         m; NaN: the sensor did not fire, inf: no echo.
-    px, py, yaw : float
-        The ring's pose by odometry, m and rad.
-    var0, rel2, half_angle
-        As for `update_with_range`.
-    range_min, range_max : float
-        Ranges of the ring; one at either end is no measurement, m.
+    pose : RingPose
+        The ring's by odometry, m and rad.
+    sonar : SonarModel
+        What is known of the sensors; a range at either end is no measurement.
     """
+    px, py, yaw = pose
     used = 0
     c, s = math.cos(yaw), math.sin(yaw)
     for i in range(len(ranges)):
         r = ranges[i]
-        if not r > range_min or e[0].count == 0:  # also true for NaN
+        if not r > sonar.range_min or e[0].count == 0:  # also true for NaN
             continue
         mx, my, axis = mounts[i, 0], mounts[i, 1], mounts[i, 2]
         if not has_moved(e, i, px + c * mx - s * my, py + s * mx + c * my, yaw + axis):
             continue
-        if r >= range_max:
+        if r >= sonar.range_max:
             r = math.inf
-        if update_with_range(e, covariance, mx, my, axis, r, var0, rel2, half_angle, range_max) != NO_LANDMARK:
+        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_LANDMARK:
             used += 1
     return used

@@ -8,7 +8,7 @@ has observed the heading of the whole map. Lengths are metres, angles radians.
 
 from __future__ import annotations
 
-from typing import Annotated, Final, TypeAlias
+from typing import Annotated, Final, NamedTuple, TypeAlias
 
 from perception.bounds import FINITE, Bound, Count, Finite, Flag, Place, up_to
 from perception.kernel import Floats
@@ -32,6 +32,19 @@ FIRST: Final = 7
 """Row of the first landmark's x."""
 ROWS_MAX: Final = FIRST + 2 * LANDMARKS_MAX
 """Rows of the state: that of the robot, and the place of each landmark."""
+
+
+class SonarModel(NamedTuple):
+    """What the filter knows of the sensors."""
+
+    var0: float
+    rel2: float
+    """Nominal variance of a range: var0 (m²) + rel2 · r²."""
+    half_angle: float
+    """Half the beam's width, rad."""
+    range_min: float
+    range_max: float
+    """Ranges of the ring; one at either end is no measurement, m."""
 
 
 class Landmark(Record):

@@ -22,12 +22,13 @@ from perception.localization.drift.landmark_state import (
     ROWS_MAX,
     TURN,
     Estimate,
+    SonarModel,
     X,
     Y,
 )
 from perception.localization.drift.walk_rates import WalkRates
 from perception.records import records, zeros
-from perception.sensor_mounts import mounts_array, turned_mounts
+from perception.sensor_mounts import RingPose, mounts_array, turned_mounts
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
 ODOMETER_SIGMA: Final = 0.03
@@ -64,8 +65,8 @@ POSE: Final = 4
 TURNED_RAD: Final = 1e-9
 """A ring that turns otherwise than the wheels, by more than this, is one of a synchro drive."""
 
-Readings: TypeAlias = tuple[Floats, Floats, float, float, float, float, float, float, float, float]
-"""Mounts, ranges (m), the ring's pose by odometry (m, rad), and the numbers of `LandmarkTracker._ring`."""
+Readings: TypeAlias = tuple[Floats, Floats, RingPose, SonarModel]
+"""Mounts, ranges (m), the ring's pose by odometry (m, rad), and what is known of the sensors."""
 
 
 class LandmarkTracker:
@@ -120,7 +121,7 @@ class LandmarkTracker:
                 ring.range_max_m,
             ]
         )
-        """What `update_with_firing` takes after the pose."""
+        """The numbers of a `SonarModel`."""
         self.estimate = zeros(Estimate, 1)
         self.e = records(Estimate, self.estimate)
         self.covariance = np.zeros((ROWS_MAX, ROWS_MAX))
@@ -188,8 +189,7 @@ class LandmarkTracker:
         """Return a firing as `perception.localization.drift.landmark_ranges.update_with_firing` takes it."""
         x, y, theta, yaw = row[:POSE].tolist()
         mounts = turned_mounts(self._mounts, self._turning, theta - yaw)
-        var0, rel2, half_angle, range_min, range_max = self._ring.tolist()
-        return mounts, row[POSE:], x, y, yaw, var0, rel2, half_angle, range_min, range_max
+        return mounts, row[POSE:], (x, y, yaw), SonarModel(*self._ring.tolist())
 
     @property
     def is_doubtful(self) -> bool:
@@ -247,9 +247,11 @@ class LandmarkTracker:
             theta_before - yaw_before,
             ring_turn,
             travel_turn,
-            (0.0 if self.is_synchro else turn_variance) + slip_rad2,
-            turn_variance if self.is_synchro else 0.0,
-            place_variance + slip_m2,
+            (
+                (0.0 if self.is_synchro else turn_variance) + slip_rad2,
+                turn_variance if self.is_synchro else 0.0,
+                place_variance + slip_m2,
+            ),
         )
 
     def _renew_walk(self, way: float) -> None:

@@ -159,7 +159,7 @@ def test_contradiction_equals_its_oracle() -> None:
         for i, segment in enumerate(as_segments(rows)):
             if i in used and any(naive.contradicted(segment, r, 0.4, 0.2) for r in readings):
                 expected[i] = 0
-        n = erase_contradicted(rows, status, start, count, ranges, mounts, x, y, yaw, 0.4, 0.2)
+        n = erase_contradicted(rows, status, start, count, ranges, mounts, (x, y, yaw), 0.4, 0.2)
         np.testing.assert_array_equal(status, expected)
         erased += n
     assert erased > 75

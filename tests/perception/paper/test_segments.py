@@ -66,7 +66,7 @@ def test_pairing_equals_its_oracle_along_random_drives() -> None:
             ranges = base + rng.uniform(-0.05, 0.05, 6)
             ranges[rng.uniform(size=6) < 0.1] = math.nan
             ranges[rng.uniform(size=6) < 0.1] = math.inf
-            n = pair_readings(ranges, mounts, x, y, yaw, t, sensors, 0.6, 0.2, 0.4, 2.0, spacing, out)
+            n = pair_readings(ranges, mounts, (x, y, yaw), t, sensors, 0.6, (0.2, 0.4, 2.0, spacing), out)
             expected = []
             for i in range(6):
                 if not math.isfinite(ranges[i]):

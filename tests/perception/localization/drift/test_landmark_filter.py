@@ -87,7 +87,7 @@ def test_the_filter_agrees_with_whole_matrices(seed: int) -> None:
         reported, travel = rng.uniform(-0.2, 0.2, 2), float(rng.uniform(-1.0, 1.0))
         ring_turn, travel_turn = (0.0, 0.3) if step % 5 == 0 else (0.1, 0.1)
         variances = (0.0 if step % 5 == 0 else 1e-4, 2e-4, 1e-5)
-        kernels.propagate(e, covariance, reported[0], reported[1], travel, ring_turn, travel_turn, *variances)
+        kernels.propagate(e, covariance, reported[0], reported[1], travel, ring_turn, travel_turn, variances)
         naive.propagate(reported, travel, ring_turn, travel_turn, variances)
         measure_both(rng, e, covariance, naive)
         assert_same(e, covariance, naive)
@@ -125,7 +125,7 @@ def test_ranges_do_not_observe_the_heading_of_the_map() -> None:
     for _ in range(3):
         add_both(rng, e, covariance, naive)
     for _ in range(30):
-        kernels.propagate(e, covariance, 0.1, 0.0, 0.0, 0.05, 0.05, 1e-6, 0.0, 1e-6)
+        kernels.propagate(e, covariance, 0.1, 0.0, 0.0, 0.05, 0.05, (1e-6, 0.0, 1e-6))
         naive.propagate(np.array([0.1, 0.0]), 0.0, 0.05, 0.05, (1e-6, 0.0, 1e-6))
         measure_both(rng, e, covariance, naive)
     assert covariance[0, 0] > 1.0

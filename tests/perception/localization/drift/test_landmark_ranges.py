@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from perception.localization.drift import landmark_ranges as kernels
+from perception.localization.drift.landmark_association import NO_LANDMARK, is_landmark_hidden
 from perception.localization.drift.landmark_filter import add_landmark, propagate
 from perception.localization.drift.landmark_state import (
     FIRST,
@@ -18,6 +19,7 @@ from perception.localization.drift.landmark_state import (
     ROWS_MAX,
     TURN,
     Estimate,
+    SonarModel,
     X,
     Y,
 )
@@ -46,21 +48,21 @@ def new_filter(landmarks: list[tuple[float, float]], sigma: float = 0.02) -> tup
 
 def enter(e: Records[Estimate], covariance: Array, r: float) -> int:
     """Enter a range of the sensor that looks ahead."""
-    return kernels.update_with_range(e, covariance, *AHEAD, r, *VARIANCES, HALF_ANGLE, RANGE_MAX_M)
+    return kernels.update_with_range(e, covariance, AHEAD, r, SonarModel(*VARIANCES, HALF_ANGLE, 0.2, RANGE_MAX_M))
 
 
 def test_a_reading_is_from_the_landmark_it_fits() -> None:
     e, covariance = new_filter([(2.0, 0.0), (3.5, 0.1), (0.0, 2.0)])
     assert enter(e, covariance, 2.0 - 0.4 - RADIUS_M) == 0
     assert enter(e, covariance, 3.5 - 0.4 - RADIUS_M) == 1
-    assert enter(e, covariance, 2.4) == kernels.NO_LANDMARK
-    assert enter(e, covariance, math.inf) == kernels.NO_LANDMARK
+    assert enter(e, covariance, 2.4) == NO_LANDMARK
+    assert enter(e, covariance, math.inf) == NO_LANDMARK
 
 
 def test_a_reading_that_two_landmarks_explain_is_not_used() -> None:
     e, covariance = new_filter([(2.0, 0.1), (2.0, -0.1)])
     before = covariance.copy()
-    assert enter(e, covariance, 1.3) == kernels.NO_LANDMARK
+    assert enter(e, covariance, 1.3) == NO_LANDMARK
     np.testing.assert_array_equal(covariance, before)
 
 
@@ -92,7 +94,7 @@ def test_an_echo_at_the_edge_of_the_beam_moves_the_landmark_in_and_silence_out(i
     off = side * HALF_ANGLE
     e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma=0.05)
     r = 2.0 - RADIUS_M if is_heard else math.inf
-    assert enter(e, covariance, r) == (0 if is_heard else kernels.NO_LANDMARK)
+    assert enter(e, covariance, r) == (0 if is_heard else NO_LANDMARK)
     at = e[0].landmarks[0]
     bearing = math.atan2(at.y - e[0].y, at.x - e[0].x - 0.4)
     assert (abs(bearing) < HALF_ANGLE) == is_heard
@@ -145,8 +147,8 @@ def test_a_range_that_is_short_by_chance_counts_no_more_than_a_long_one() -> Non
     for sign in (1.0, -1.0):
         e, covariance = new_filter([(2.4, 0.0)], sigma=1e-5)
         covariance[RANGE, RANGE] = 1e-4
-        kernels.update_with_range(e, covariance, *AHEAD, (2.0 - RADIUS_M) * (1.0 + 0.05 * sign), 1e-6, 0.05**2,
-                                  HALF_ANGLE, RANGE_MAX_M)  # fmt: skip
+        sonar = SonarModel(1e-6, 0.05**2, HALF_ANGLE, 0.2, RANGE_MAX_M)
+        kernels.update_with_range(e, covariance, AHEAD, (2.0 - RADIUS_M) * (1.0 + 0.05 * sign), sonar)
         found.append(e[0].range_scale - 1.0)
     assert found[0] == pytest.approx(-found[1], rel=1e-3)
 
@@ -217,21 +219,7 @@ def test_a_range_of_a_farther_landmark_says_that_the_nearer_one_is_outside_the_b
 def test_a_landmark_outside_the_beam_may_answer_if_its_bearing_is_uncertain(sigma: float, is_heard: bool) -> None:
     off = HALF_ANGLE + math.radians(4.0)
     e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma)
-    assert enter(e, covariance, 2.0 - RADIUS_M) == (0 if is_heard else kernels.NO_LANDMARK)
-
-
-def test_the_variance_of_a_bearing_is_that_of_the_whole_covariance() -> None:
-    rng = np.random.default_rng(5)
-    _, covariance = new_filter([(2.0, 0.3), (1.0, 1.5)])
-    n = FIRST + 4
-    root = 0.05 * rng.standard_normal((n, n))
-    covariance[:n, :n] = root @ root.T
-    dx, dy = 0.7, 1.4
-    jacobian = np.zeros(n)
-    jacobian[FIRST + 2 : FIRST + 4] = np.array([-dy, dx]) / (dx * dx + dy * dy)
-    jacobian[X : Y + 1] = -jacobian[FIRST + 2 : FIRST + 4]
-    naive = jacobian @ covariance[:n, :n] @ jacobian
-    assert kernels.bearing_variance(covariance, 1, dx, dy) == pytest.approx(naive, rel=1e-9)
+    assert enter(e, covariance, 2.0 - RADIUS_M) == (0 if is_heard else NO_LANDMARK)
 
 
 def test_landmarks_at_hardly_known_places_do_not_change_the_estimate_of_the_noise() -> None:
@@ -245,10 +233,10 @@ def test_landmarks_at_hardly_known_places_do_not_change_the_estimate_of_the_nois
 def test_a_hidden_landmark_is_not_missed() -> None:
     near, far = (1.1, 0.33), (3.0, 0.62)
     e, covariance = new_filter([far, near])
-    assert kernels.is_landmark_hidden(e, 0, 0.4, 0.0)
-    assert not kernels.is_landmark_hidden(e, 1, 0.4, 0.0)
+    assert is_landmark_hidden(e, 0, 0.4, 0.0)
+    assert not is_landmark_hidden(e, 1, 0.4, 0.0)
     before = covariance.copy()
-    assert enter(e, covariance, math.inf) == kernels.NO_LANDMARK
+    assert enter(e, covariance, math.inf) == NO_LANDMARK
     np.testing.assert_array_equal(covariance[FIRST : FIRST + 2], before[FIRST : FIRST + 2])
 
 
@@ -256,7 +244,7 @@ def test_a_sensor_that_stands_still_is_used_once() -> None:
     e, covariance = new_filter([(2.0, 0.0)])
     ranges = np.full(len(MOUNTS), np.nan)
     ranges[0] = 1.3
-    args = (0.0, 0.0, 0.0, *VARIANCES, HALF_ANGLE, 0.2, RANGE_MAX_M)
+    args = (0.0, 0.0, 0.0), SonarModel(*VARIANCES, HALF_ANGLE, 0.2, RANGE_MAX_M)
     used = [kernels.update_with_firing(e, covariance, MOUNTS, ranges, *args) for _ in range(5)]
     assert used == [1, 0, 0, 0, 0]
 
@@ -283,7 +271,7 @@ def circle_run(seed: int, steps: int) -> tuple[Records[Estimate], Array, dict[st
         x, y = np.array([x, y]) + moved + math.sqrt(slip * step) * rng.standard_normal(2)
         heading += turn
         reported = step / (1.0 + turn_scale)
-        propagate(e, covariance, step * odometer, 0.0, 0.0, reported, reported, walk * step, 0.0, slip * step)
+        propagate(e, covariance, step * odometer, 0.0, 0.0, reported, reported, (walk * step, 0.0, slip * step))
         ranges = np.full(len(MOUNTS), np.nan)
         for i in range(k % 3, len(MOUNTS), 3):
             mx, my, axis = MOUNTS[i]
@@ -295,9 +283,8 @@ def circle_run(seed: int, steps: int) -> tuple[Records[Estimate], Array, dict[st
             ranges[i] = (
                 range_scale * (heard.min() - RADIUS_M) + SIGMA_M * rng.standard_normal() if len(heard) else math.inf
             )
-        kernels.update_with_firing(
-            e, covariance, MOUNTS, ranges, e[0].x, e[0].y, e[0].heading, *VARIANCES, HALF_ANGLE, 0.05, RANGE_MAX_M
-        )  # fmt: skip
+        sonar = SonarModel(*VARIANCES, HALF_ANGLE, 0.05, RANGE_MAX_M)
+        kernels.update_with_firing(e, covariance, MOUNTS, ranges, (e[0].x, e[0].y, e[0].heading), sonar)
     truth = {"x": x, "y": y, "heading": heading, "odometer": odometer, "range": range_scale}
     return e, covariance, truth
 
