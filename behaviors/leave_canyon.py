@@ -167,12 +167,16 @@ def leave_canyon(
     virtual = [between(*canyon.mouth) for canyon in percept.canyons if is_closed(canyon, pose, goal, config)]
     if detour.block is not None:
         virtual.append(outline(detour.block))
-    detour = replace(detour, near=remember(detour.near, echoes, pose, detour.driven_m, body_radius_m))
-    if to_goal < detour.nearest_m - NEARER_M:
-        detour = replace(detour, nearest_m=to_goal, nearest_driven_m=detour.driven_m)
     held = [canyon for canyon in percept.canyons if holds(canyon, pose, goal, config)]
     leaving = _leaving(held, detour.leaving, pose, room)
-    detour = replace(detour, leaving=leaving)
+    is_nearer = to_goal < detour.nearest_m - NEARER_M
+    detour = replace(
+        detour,
+        near=remember(detour.near, echoes, pose, detour.driven_m, body_radius_m),
+        nearest_m=to_goal if is_nearer else detour.nearest_m,
+        nearest_driven_m=detour.driven_m if is_nearer else detour.nearest_driven_m,
+        leaving=leaving,
+    )
     is_held = leaving is not None or len(held) > 0
     waits = waits and detour.side == 0 and detour.driven_m - detour.nearest_driven_m < STALL_M
     if waits and not virtual and not is_held:  # only echoes could close the way

@@ -87,15 +87,16 @@ def drive_to_goal(
     behaviors, body = settings.behaviors, settings.body
     distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
     now = GoalDrive(Progress.starting_at(percept.pose, distance_m, run_s)) if before is None else before
-    if forbidden is not None and now.progress.given_up is None:
+    progress, valley, detour, last_rad_s = now.progress, now.valley, now.detour, now.turn_rad_s
+    if forbidden is not None and progress.given_up is None:
         why = f"the goal is unreachable: it lies in or beside {forbidden}"
-        now = replace(now, progress=replace(now.progress, given_up=why, fault="unreachable"))
+        progress = replace(progress, given_up=why, fault="unreachable")
     response, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
     around, hold_reason, room_m = None, None, None
     if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:
-        has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
+        has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and valley.direction_rad is not None
         stands_s = STANDS_S + math.pi / min(behaviors.move_to_goal.turn_rate_max_rad_s, body.turn_max_rad_s)
-        stood_s = run_s - now.progress.moved_run_s
+        stood_s = run_s - progress.moved_run_s
         around, detour = leave_canyon(
             percept,
             (goal.x, goal.y),
@@ -103,34 +104,34 @@ def drive_to_goal(
             body.radius_m,
             behaviors.leave_canyon,
             waits=has_valley and stood_s < stands_s,
-            last_rad=now.valley.direction_rad,
+            last_rad=valley.direction_rad,
         )
         # A detour for a robot that stands gets its own time to turn before that robot counts as stuck.
         if now.detour.side == 0 != detour.side and stood_s >= stands_s:
-            now = replace(now, progress=replace(now.progress, moved_run_s=run_s))
-        now = replace(now, detour=detour)
+            progress = replace(progress, moved_run_s=run_s)
     if around is not None:
         length, direction_rad = math.hypot(around.x, around.y), math.atan2(around.y, around.x)
-        now = replace(now, valley=replace(now.valley, direction_rad=direction_rad))
+        valley = Valley(valley.blocked, direction_rad)
         driven_rad = held(percept.pose.theta, direction_rad)
         response = Response(around.schema, length * math.cos(driven_rad), length * math.sin(driven_rad))
         room_m = behaviors.leave_canyon.room_m
-        if now.detour.rounds < ROUNDS_MAX:
-            now = replace(now, progress=replace(now.progress, excused_run_s=run_s))
+        if detour.rounds < ROUNDS_MAX:
+            progress = replace(progress, excused_run_s=run_s)
     elif behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
-        now = _with_search(now, goal, percept, run_s, settings)
-        response, valley = follow_valley(
-            percept, response, distance_m, now.valley, now.search, body.radius_m, behaviors.follow_valley
+        now = _with_search(
+            GoalDrive(progress, valley, now.search, now.searched_run_s), goal, percept, run_s, settings
         )
-        now = replace(now, valley=valley)
+        progress = now.progress
+        response, valley = follow_valley(
+            percept, response, distance_m, valley, now.search, body.radius_m, behaviors.follow_valley
+        )
         hold_reason = NO_VALLEY if valley.direction_rad is None else None
         room_m = behaviors.follow_valley.safety_m
     responses = (response, _pushes(percept, room_m, settings), *beside)
-    decision = _arbitrate(responses, percept, now.turn_rad_s, settings, commitment)
-    now = replace(now, turn_rad_s=decision.twist.w if isinstance(decision, Drive) else 0.0)
+    decision = _arbitrate(responses, percept, last_rad_s, settings, commitment)
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
-            now.progress,
+            progress,
             percept.pose,
             distance_m,
             run_s,
@@ -139,9 +140,10 @@ def drive_to_goal(
             is_blocked=not now.search.reaches,
             is_occupied=_is_occupied(percept, goal, distance_m, settings),
         )
-        now = replace(now, progress=progress)
-        if progress.given_up is not None:
-            return goal, now, responses, Drive(STANDSTILL), progress.given_up
+    turn_rad_s = decision.twist.w if isinstance(decision, Drive) else 0.0
+    now = GoalDrive(progress, valley, now.search, now.searched_run_s, turn_rad_s, detour)
+    if isinstance(decision, Drive) and not goal.reached and progress.given_up is not None:
+        return goal, now, responses, Drive(STANDSTILL), progress.given_up
     return goal, now, responses, decision, hold_reason
 
 

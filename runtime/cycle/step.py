@@ -8,7 +8,7 @@ of the callables give the same record, bit for bit; replay relies on that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Annotated, Final, Literal, TypeAlias
 
@@ -338,8 +338,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
     percept = Percept(odometry.pose, obstacles, view, objects)
     if needs_space(state.drive_request):
-        percept = replace(
-            percept,
+        percept = Percept(
+            odometry.pose,
+            obstacles,
+            view,
+            objects,
             occupancy=state.perception.occupancy(),
             canyons=state.perception.canyons(),
             steady=state.perception.steady_obstacles(now_s, age_max_s),

@@ -163,7 +163,7 @@ class EvidenceGrid:
         lines, holds = SightLines(self.window, self.ring), self.window.rolled(holding)
         for firing, bearings, place in firings:
             lines.observe(firing, bearings, place, holds)
-        return self.window.unrolled(lines.crossed(self.method.mirrors, self.sight_lines.trust))
+        return lines.crossed(self.method.mirrors, self.sight_lines.trust)
 
     @property
     def silence_m(self) -> float:
@@ -192,7 +192,7 @@ class EvidenceGrid:
         x, y = (cell_m * float(number) for number in self.window.corner)
         occupied = self.method.probability(seen_from)
         if seen_from is None:
-            occupied[(occupied < EVEN) & ~self.window.unrolled(self.sight_lines.crossed(self.method.mirrors))] = EVEN
+            np.maximum(occupied, EVEN, out=occupied, where=~self.sight_lines.crossed(self.method.mirrors))
         return OccupancyWindow(occupied, x, y, cell_m)
 
     def drop_caches(self) -> None:

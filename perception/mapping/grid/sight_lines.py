@@ -242,6 +242,28 @@ def enter_sights(
                         kept[LINE] = 1
 
 
+@kernel
+def fill_crossed(sights: NDArray[np.int16], corner: Ints, places: int, units: float, out: Flags) -> None:
+    """Write which cells a line of sight has crossed.
+
+    Parameters
+    ----------
+    sights, corner
+        As of `enter_sights`; nothing is updated.
+    places : int
+        From so many places echoes passed such a cell, or …
+    units : float
+        … so many units of lines are expected to have crossed it.
+    out : (n, n) bool
+        Out: row by row from the smallest y.
+    """
+    mask = out.shape[0] - 1
+    for row in range(out.shape[0]):
+        for column in range(out.shape[1]):
+            kept = sights[(corner[1] + row) & mask, (corner[0] + column) & mask]
+            out[row, column] = kept[COUNT] >= places or kept[LINE] == 1 or int(kept[LINES]) + kept[NOW] >= units
+
+
 class SightLines:
     """The cells that lines of sight have crossed.
 
@@ -314,7 +336,7 @@ class SightLines:
         return max(0.0, 1.0 - over_share / OVER_MAX) * max(0.0, 1.0 - explained_share / EXPLAINED_MAX)
 
     def crossed(self, mirrors: float, trust: float | None = None) -> Flags:
-        """Return which cells of the torus a line of sight has crossed.
+        """Return which cells a line of sight has crossed: (n, n), row by row from the smallest y.
 
         Parameters
         ----------
@@ -325,10 +347,10 @@ class SightLines:
         """
         trust = self.trust if trust is None else trust
         least = PLACES_MIN if mirrors < MIRRORS_MIN else COUNT_MAX + 1
-        found = (self.sights[..., COUNT] >= least) | (self.sights[..., LINE] == 1)
-        if trust > 0.0:
-            found |= self.sights[..., LINES] + self.sights[..., NOW] >= UNITS_PER_LINE * LINES_MIN / trust
-        return np.asarray(found)
+        units = UNITS_PER_LINE * LINES_MIN / trust if trust > 0.0 else math.inf
+        out = np.empty(self.sights.shape[:2], np.bool_)
+        fill_crossed(self.sights, self._window.corner, least, units, out)
+        return out
 
     def clear(self) -> None:
         """Forget everything."""
