@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -15,6 +16,9 @@ _VALUE = re.compile(rf"\s*({_KEY})\s*=")
 _PARTS = re.compile(_PART)
 _PLACE = re.compile(r"line (\d+)(?:, column (\d+))?[^:]*: ")
 _SETTING = re.compile(rf"({_KEY})(?= = |: )")
+_NO_SUCH = re.compile(r'\w+ "(.+?)": no such ')
+_NO_FILE = re.compile(r"(.+?): .*; named by ")
+_STRING = re.compile(r'"([^"]*)"|\'([^\']*)\'')
 
 
 class Problem(NamedTuple):
@@ -41,11 +45,24 @@ def located(problem: str, name: str, text: str) -> Problem:
     said = problem.removeprefix(f"{one_line(name)}: ")
     if (place := _PLACE.match(said)) is not None:
         return Problem(int(place[1]), said[place.end() :])
+    for pattern in (_NO_SUCH, _NO_FILE):
+        if (named := pattern.match(said)) is not None:
+            return Problem(_line_that_names(named[1], text), said)
     if said == problem or (setting := _SETTING.match(said)) is None:  # of another file, or of the text as a whole
         return Problem(None, said)
     wanted = _parts(setting[1])
     around = [(len(at), -number) for number, at in _locations(text) if at == wanted[: len(at)]]
     return Problem(-max(around)[1] if around else None, said)
+
+
+def _line_that_names(name: str, text: str) -> int | None:
+    """Return the first line with a string that is this name, or a path that leads to a file of this name."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        for quoted in _STRING.findall(line.partition("#")[0]):
+            said = os.path.normpath("".join(quoted))
+            if name == said or name.endswith(f"{os.sep}{said.lstrip('./')}"):
+                return number
+    return None
 
 
 def _parts(key: str) -> tuple[str, ...]:

@@ -116,6 +116,7 @@ class TimingMonitor:
         self._callbacks = {name: Series(is_touched=True) for name in callbacks}
         self._echo_wait = Series(is_touched=True)
         self._spans: list[Span] = []
+        self._phases_s: dict[str, float] = {}
         self._busy_s = 0.0
         self._start: CycleStart | None = None
         self._begin: ClockSample | None = None
@@ -160,6 +161,7 @@ class TimingMonitor:
         self._following += is_following
         self._period_s = period_s
         self._spans.clear()
+        self._phases_s = {}
         self._busy_s = 0.0
         self._start, self._begin, self._mark = start, now, now
         self._resume(now)
@@ -169,7 +171,8 @@ class TimingMonitor:
         begin = self._mark
         if begin is not None:
             self._mark = now = self._read_after(begin)
-            self._phases[phase].add(now.host_s - begin.host_s)
+            took_s = self._phases_s[_NAMES[phase]] = now.host_s - begin.host_s
+            self._phases[phase].add(took_s)
             self._add_span(Span(_NAMES[phase], begin, now))
 
     def end(self) -> None:
@@ -203,9 +206,11 @@ class TimingMonitor:
         return max(self._causes_in_a_row, key=lambda name: self._causes_in_a_row[name], default="")
 
     def last_cycle(self) -> LastCycle:
-        """Return the timing of the newest cycle, with the phases that have ended."""
-        phases_s = {s.name: s.took_s for s in self._spans if s.name in self._phases}
-        return LastCycle(phases_s, 0.0 if self._start is None else self._start.late_s)
+        """Return the timing of the newest cycle, with the phases that have ended.
+
+        Not of the spans: the oldest of them make room in a long pause.
+        """
+        return LastCycle(dict(self._phases_s), 0.0 if self._start is None else self._start.late_s)
 
     def summary(self) -> TimingSummary:
         """Return the timing of the run so far."""

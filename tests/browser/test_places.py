@@ -93,6 +93,12 @@ async def operate(case: ConsoleCase, opener: Opener, folder: Path) -> None:
     assert (there.x_m, there.y_m, there.heading_deg) == pytest.approx((3.0, 0.0, 90.0), abs=1.0)
     await opened.save_screenshot("places")
 
+    await page.locator("#places-name").fill("A name")
+    await page.locator("#places-name").press("Enter")
+    await opened.says("#places-error", "small letters")
+    await page.locator("#places-row-no_go_line-0").click()
+    await expect(page.locator("#places-error")).to_have_text("")
+
     await drag(opened, (2.0, 1.5), (2.4, 1.9))
     await until(lambda: has_corner(case, (2.4, 1.9)), "a moved corner")
     await page.locator("#map-front").press("Control+z")

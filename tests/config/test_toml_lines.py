@@ -55,6 +55,30 @@ def test_a_misspelt_key_of_any_shipped_file_is_found_in_its_line(kind: Kind, tmp
 
 
 @pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        (1, 'robot "nope"'), (3, "missing.toml"), (5, "m.toml"), (7, 'mission "dok"'),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("folder", ["", "there"])
+def test_a_name_of_nothing_is_found_in_the_line_that_names_it(
+    folder: str, line: int, problem: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = Path(folder) / "run.toml"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(
+        text
+        := 'robot = \'nope\'\n# "./missing.toml"\nworld = "./missing.toml"\nmodels = [\n  "drum", "./m.toml",\n]\n'
+        'mission = "dok"\n'
+    )
+    with pytest.raises(ConfigError) as caught:
+        load_any(path)
+    (said,) = (one for one in caught.value.problems if problem in one)
+    assert located(said, str(path), text).line == line
+
+
+@pytest.mark.parametrize(
     ("problem", "line"),
     [
         ("f: robot.foo: unknown key", 2), ('f: robot.name = "x": too short', 3), ("f: ring.sensors.0.x = 1: bad", 5),

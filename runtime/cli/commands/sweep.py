@@ -89,7 +89,7 @@ def sweep(
         require_package(module, package, EXTRA)
     folder = sweep_folder(f"{Path(study).stem}-sweep" if out is None else out)
     console = EscapingConsole(stderr=True)
-    with file_lock(folder / LOCK, f"--out {folder}"):
+    with file_lock(folder / LOCK, f"--out {folder}"), keeping_what_is_done(folder, console):
         unfinished = make_runs(runs, folder, console, scheduler=scheduler, workers=processes, retries=retries)
         combinations = write_results(Path(study).stem, chosen, runs, folder, unfinished)
     output = plain_console()
@@ -148,7 +148,7 @@ def make_runs(
     console : Console
         For progress.
     scheduler, workers, retries
-        As of `run_sweep`.
+        As of `sweep`.
     """
     from runtime.batch.cluster import connected
     from runtime.batch.dispatch import dispatch
@@ -162,14 +162,11 @@ def make_runs(
         console.print(f"{len(finished)} of {len(runs)} runs are finished already")
     if not left:
         return []
+    workers = min(workers, len(left))
+    say_start(len(left), scheduler, workers, console)
     if scheduler is None:
         compile_kernels(left, console)
-    workers = min(workers, len(left))
-    with (
-        connected(scheduler, workers, folder / LOG) as pool,
-        progress(console, "running", len(left)) as step,
-        keeping_what_is_done(folder, console),
-    ):
+    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "running", len(left)) as step:
         lines = ProgressLines(console, len(left), time.monotonic)
 
         def on_row(row: Row) -> None:
@@ -179,6 +176,22 @@ def make_runs(
             lines.step()
 
         return dispatch(left, pool, on_row, retries)
+
+
+def say_start(runs: int, scheduler: str | None, workers: int, console: Console) -> None:
+    """Say what begins: Dask, the kernels and the processes take seconds before the first run.
+
+    Parameters
+    ----------
+    runs : int
+        To make, at most.
+    scheduler, workers
+        As of `sweep`.
+    console : Console
+        Gets the line.
+    """
+    here = f"{workers} process{'es' * (workers > 1)} of this machine"
+    console.print(f"starting {runs} runs on {here if scheduler is None else scheduler}", soft_wrap=True)
 
 
 @contextlib.contextmanager

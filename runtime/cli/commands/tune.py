@@ -21,6 +21,7 @@ from runtime.cli.commands.sweep import (
     ProgressLines,
     compile_kernels,
     keeping_what_is_done,
+    say_start,
     sweep_folder,
     worker_processes,
 )
@@ -98,10 +99,9 @@ def tune(
     searched = trial_runs(chosen, base, [{}], held_out=False)
     held_out = trial_runs(chosen, base, [{}], held_out=True)
     total = len(searched) * (1 + trials + len(chosen.vary)) + 2 * len(held_out)
-    if scheduler is None:
-        compile_kernels(searched, console)
     with (
         file_lock(folder / LOCK, f"--out {folder}"),
+        keeping_what_is_done(folder, console),
         run_maker(
             folder, console, total, unfinished, scheduler=scheduler, workers=processes, retries=retries
         ) as make,
@@ -149,11 +149,8 @@ def run_maker(
     from runtime.batch.rows import RowFolder
 
     rows, prepared = RowFolder(folder), set[str]()
-    with (
-        connected(scheduler, workers, folder / LOG) as pool,
-        progress(console, "tuning", total) as step,
-        keeping_what_is_done(folder, console),
-    ):
+    say_start(total, scheduler, workers, console)
+    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "tuning", total) as step:
         lines = ProgressLines(console, total, time.monotonic)
 
         def make(runs: Sequence[Run]) -> dict[str, Row]:

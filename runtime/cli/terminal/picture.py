@@ -33,9 +33,10 @@ FAULTS_SHOWN: Final = 3
 WARNINGS_MAX: Final = 3
 ROOMY_ROWS: Final = 14
 """From so many lines left on, the counts are all shown beside the objects."""
-TALL_ROWS: Final = 20
-REASON_LINES_MAX: Final = 3
-"""Of a reason that does not fit beside the mode, on a terminal of so many lines."""
+HEAD_ROWS: Final = 3
+"""Mode, keys, and the line that a terminal keeps for its cursor."""
+REASON_SHARE: Final = 2
+"""A reason that does not fit beside the mode takes at most this part of the lines: its end says what to do."""
 PLAN_ROWS_MIN: Final = 4
 """A plan of fewer lines shows nothing."""
 LEGEND: Final = "→ robot   • outline segments   o objects   = walls"
@@ -153,12 +154,12 @@ class Picture:
             head.append(" PAUSED ", style="bold black on cyan")
         head.append("" if snapshot.twist is None else f" {twist(snapshot.twist.v, snapshot.twist.w, self._units)}")
         reason, room = snapshot.reason or "", width - len(head.plain) - 2
-        more = list[str]()
-        if len(reason) > room and self._console.height >= TALL_ROWS:
-            more, reason = wrap(reason, width, max_lines=REASON_LINES_MAX, placeholder=" …"), ""
-        head.append(f"  {reason}" if reason else "")
         url = snapshot.console_url or ""
         address = [Text(url[k : k + width], style="bold") for k in range(0, len(url), width)]
+        more, left = list[str](), (self._console.height - len(address) - HEAD_ROWS) // REASON_SHARE
+        if len(reason) > room and left > 0:
+            more, reason = wrap(reason, width, max_lines=left, placeholder=" …"), ""
+        head.append(f"  {reason}" if reason else "")
         return [
             head,
             *map(Text, more),

@@ -97,7 +97,10 @@ export class PlacesPanel extends Panel {
       ),
       el("output", { class: "error", id: "places-error" }),
     );
-    places.on("changed", () => this.#refresh());
+    places.on("changed", () => {
+      setText(byId("places-error"), ""); // it was about what has changed since
+      this.#refresh();
+    });
     run.on("state", () => this.#refresh());
     units.on("changed", () => this.#refresh());
     this.#refresh();
@@ -157,7 +160,7 @@ export class PlacesPanel extends Panel {
         ? this.units.place(row.x_m, row.y_m)
         : "speed_max_m_s" in row
           ? `at most ${row.speed_max_m_s} m/s`
-          : `${KINDS[kind]}, ${cornersOf(row).length} corners`;
+          : `${row.name ? `${KINDS[kind]}, ` : ""}${cornersOf(row).length} corners`;
     const choose = button([el("strong", {}, name), ` ${what}`], () => places.select(isSelected ? null : [kind, i]), {
       class: "place",
       id: `places-row-${kind}-${i}`,

@@ -67,10 +67,15 @@ export function placesTool({ places, view, redraw }) {
     get canFinish() {
       return draft.length >= CORNERS_MIN[kind];
     },
-    finish() {
+    async finish() {
       if (!tool.canFinish) return;
-      places.add(kind, draft);
+      const drawn = draft,
+        drawnKind = kind;
       draft = [];
+      changed();
+      const refused = (await places.add(kind, drawn)) !== null;
+      if (!refused || draft.length > 0 || kind !== drawnKind) return;
+      draft = drawn; // to be mended by taking corners back
       changed();
     },
     // Takes back the last corner of what is being drawn; false where nothing is.

@@ -30,9 +30,12 @@ class Alerts:
         self._place: tuple[Status, int, int] = ("localizing", 0, 0)
         """Of the known room: status, places refuted, rivals."""
         self._ring_problems: set[str] = set()
+        self.news: list[str] = []
+        """Of the last update: what is well again, and needs nobody."""
+        self._good: set[str] = set()
 
     def update(self, received: Received, state: State, run_s: float) -> list[str]:
-        """Return a line for each new fact: what happened, likely cause, next action.
+        """Return a line for each new fact that asks for attention: what happened, likely cause, next action.
 
         Parameters
         ----------
@@ -43,7 +46,8 @@ class Alerts:
         run_s : float
             The cycle's beginning; a robot that causes too many lines has the excess counted in the next one.
         """
-        lines = []
+        lines, self.news = list[str](), []
+        self._good.clear()
         facts = self._new_facts(received, state.perception)
         if (problem := state.ring_problem) is not None and state.mode.reason != problem:
             facts += [] if problem in self._ring_problems else [f"while the robot does not drive: {problem}"]
@@ -51,7 +55,9 @@ class Alerts:
         for line in facts:
             left_out = self._limit.take(run_s)
             if left_out is not None:
-                lines.append(f"{line} ({left_out} such lines were left out before)" if left_out else line)
+                (self.news if line in self._good else lines).append(
+                    f"{line} ({left_out} such lines were left out before)" if left_out else line
+                )
         return lines
 
     def _new_facts(self, received: Received, perception: Perception) -> list[str]:
@@ -61,7 +67,9 @@ class Alerts:
         self._changes = perception.sensor_monitor.changes
         now = {report.sensor: report for report in perception.sensor_reports()}
         lines += [report.reason for sensor, report in now.items() if self._is_new(report)]
-        lines += [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
+        lines += self._well(
+            [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
+        )
         self._reported = now
         return lines
 
@@ -86,12 +94,17 @@ class Alerts:
             )
         if room.status == "tracking" != status:
             here = room.localized().pose
-            lines.append(f"the robot's place is known: ({here.x:.2f} m, {here.y:.2f} m) in the map")
+            lines += self._well([f"the robot's place is known: ({here.x:.2f} m, {here.y:.2f} m) in the map"])
         if room.rivals > rivals == 0:
             lines.append(
                 f"the readings fit {room.rivals + 1} places of this room alike: drive to where they differ, or say "
                 "where the robot is"
             )
+        return lines
+
+    def _well(self, lines: list[str]) -> list[str]:
+        """Return lines, noted as good news."""
+        self._good.update(lines)
         return lines
 
     def _is_new(self, report: SensorReport) -> bool:

@@ -21,7 +21,7 @@ from runtime.timing.cycle_stats import CAUSES_MAX, OTHERS, CycleStats
 from runtime.timing.pacing import CycleStart, Pacer
 from runtime.timing.phases import Phase
 from runtime.timing.stall_sampler import StackSample
-from runtime.timing.timing_monitor import OUTSIDE, THREAD, UNTIMED, TimingMonitor
+from runtime.timing.timing_monitor import OUTSIDE, SPANS_MAX, THREAD, UNTIMED, TimingMonitor
 
 US = 1e-6
 PERIOD_US, LATE_US = 50_000, 5_000
@@ -254,6 +254,19 @@ class SlowPerception(Perception):
     def refine(self) -> int:
         self.machine.work(self.refine_us)
         return 1
+
+
+def test_the_phases_of_the_newest_cycle_stay_in_a_long_pause() -> None:
+    machine = Machine()
+    monitor = TimingMonitor(CycleStats(LATE_US * US), machine.read, callbacks=("receive",))
+    monitor.begin(machine.read(), CycleStart(BEGIN_US * US, 0.0, 0, None), 1e3, is_following=False)
+    machine.work(PHASE_US)
+    monitor.mark(Phase.PERCEIVE)
+    monitor.end()
+    receive = monitor.timed("receive", lambda: machine.work(RECEIVE_US))
+    for _ in range(2 * SPANS_MAX):
+        receive()
+    assert {name: round(s / US) for name, s in monitor.last_cycle().phases_s.items()} == {"perceive": PHASE_US}
 
 
 @pytest.mark.parametrize("observe_us", [0, 7_000])

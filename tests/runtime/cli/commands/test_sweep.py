@@ -79,6 +79,17 @@ def sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sweep:
     return call
 
 
+def test_an_interrupt_before_the_first_run_is_answered_too(
+    sweep: Sweep, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Kernels and workers take seconds, in which the command has said what it starts."""
+    monkeypatch.setattr("runtime.cli.commands.sweep.prepare_kernels", lambda *_: signal.raise_signal(signal.SIGINT))
+    with ending_in_order(), pytest.raises(SystemExit):
+        sweep(LocalPool(0))
+    err = capsys.readouterr().err
+    assert err.index("starting 6 runs on ") < err.index("interrupted: what is done is kept in study-sweep; ")
+
+
 def test_a_sweep_that_was_stopped_makes_only_what_is_left(sweep: Sweep, capsys: pytest.CaptureFixture[str]) -> None:
     first, second, third = LocalPool(4), LocalPool(99), LocalPool(0)
     with ending_in_order(), pytest.raises(SystemExit):

@@ -97,10 +97,10 @@ def test_what_a_person_needs_fits_the_terminal(size: tuple[int, int]) -> None:
     assert URL in "".join(line.rstrip() for line in lines)
     assert any("space halt" in line or "␣ halt" in line for line in lines)
     assert sum(line.startswith("masked") for line in lines) == 2
+    assert "check the ring's power and cable; then re-arm" in " ".join(map(str.strip, lines[:4])), "with the action"
     if height > 10:
         assert any("3 semicircle" in line and "> 99 %" in line for line in lines)
     if height >= 24:
-        assert "check the ring's power and cable; then re-arm" in " ".join(lines[:2]), "with the action"
         assert any("20 post" in line and "hidden" in line for line in lines), "the wall is between"
         text = "\n".join(lines)
         for piece in (

@@ -51,7 +51,8 @@ def test_each_fact_is_reported_once() -> None:
     perception.report(report(7, "failing"), report(5, "stuck"))
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is stuck"]
     perception.report(report(5, "crosstalk"))
-    assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is crosstalk", "sensor 7 works again and is used"]
+    assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is crosstalk"]
+    assert alerts.news == ["sensor 7 works again and is used"], "no warning"
     perception.report(report(5, "crosstalk"), report(7, "failing"))
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 7 is failing"], "a fault that returned is a new fact"
 
@@ -121,6 +122,8 @@ def test_what_is_new_of_the_place_in_a_known_room_is_reported_once() -> None:
     ):
         vars(perception.known_room).update(change)
         lines = alerts.update(NOTHING, seen, 1.0)
+        assert (len(lines) == 0) == (said is None or "known" in said), "good news are no warning"
+        lines += alerts.news
         assert len(lines) == (said is not None)
         assert not lines or lines[0].startswith(said or "")
         assert alerts.update(NOTHING, seen, 1.0) == []
