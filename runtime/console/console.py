@@ -207,7 +207,7 @@ class Console:
         remote = {} if self.tunnel is None else {"from_elsewhere": self.tunnel}
         if self._config.port not in {0, port}:
             self._replaced_port = self._config.port
-            self._log.warning(f"console.port {self._config.port} is in use, so the console has port {port}")
+            self._log.warning(f"port {self._config.port} of console.port is in use, so the console has port {port}")
         self._log.info("console", url=address_url, start_url=self.url, **remote)
         if self.tunnel is None:
             self._log.warning(

@@ -49,6 +49,10 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     await opened.steady()
     await opened.page.get_by_role("option").nth(1).click()  # the picked object's readings are a layer too
     await opened.says("#evidence", "12 readings")
+    bars = await opened.page.locator("#evidence .track").evaluate_all(
+        "all => all.map((bar) => Math.round(bar.getBoundingClientRect().width))"
+    )
+    assert len(set(bars)) == 1, "for and against have one scale"
     await opened.tab("Layers")
     await fall_silent(server, opened)
     boxes = opened.page.locator("#layers input")

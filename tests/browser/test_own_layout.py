@@ -159,6 +159,21 @@ async def spans(opened: Opened) -> set[str]:
     return {label.rsplit(" in ", 1)[1] for label in labels}
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "marks"),
+    [
+        (-0.0076, 0.2, ["0.0", "0.1", "0.2"]), (-0.5, 0.5, ["−0.5", "0.0", "0.5"]), (-180, 180, ["−100", "0", "100"]),
+        (1234, 1300, ["1240", "1260", "1280", "1300"]), (2.5, 3.5, ["2.5", "3.0", "3.5"]),
+    ],
+)  # fmt: skip
+async def test_an_axis_of_values_is_marked_at_round_numbers(
+    server: FakeServer, opener: Opener, low: float, high: float, marks: list[str]
+) -> None:
+    opened = await opener.open(server.url)
+    draw = "async ([low, high]) => (await import('/page/plot_draw.js')).valueMarks(low, high).map(([, text]) => text)"
+    assert await opened.page.evaluate(draw, [low, high]) == marks
+
+
 async def test_all_plots_share_a_time_axis_that_zooms_and_moves(server: FakeServer, opener: Opener) -> None:
     opened = await plots(server, opener)
     page = opened.page
@@ -178,6 +193,8 @@ async def test_all_plots_share_a_time_axis_that_zooms_and_moves(server: FakeServ
     await page.mouse.up()
     assert await spans(opened) == {shown}, "a drag moves it and keeps its length"
     await opened.save_screenshot("plot-zoomed")
+    await page.mouse.move(0, 0)
+    await expect(page.locator("#plot-read")).to_have_text(re.compile(r"s before$")), "the values are of what is shown"
     await page.locator("#plot-follow").click()
     assert await spans(opened) == {"30 s"}
 
@@ -201,6 +218,9 @@ async def test_a_plot_has_two_axes_a_rate_and_a_difference(server: FakeServer, o
     speed = await first.nth(3).inner_text()
     assert speed.endswith(" ft/s")
     assert float(speed.split()[0]) == pytest.approx(0.98, abs=0.05), "the rate of x is the speed along x"
+    derived = await page.get_by_label("Combine rate of pose x", exact=True).locator("option").all_inner_texts()
+    assert "its rate" not in derived
+    assert not [one for one in derived if one.startswith("minus")], "what is derived is not derived from again"
     await opened.save_screenshot("plot-combined")
     async with page.expect_download() as saved:
         await page.get_by_role("button", name="Save as CSV").click()
@@ -215,18 +235,3 @@ async def test_a_plot_has_two_axes_a_rate_and_a_difference(server: FakeServer, o
     assert (await names.all_inner_texts())[0] == both
     await page.get_by_label("Combine speed", exact=True).select_option(label="pose x apart")
     assert (await names.all_inner_texts())[0] == "speed"
-
-
-async def test_a_mark_on_an_axis_that_is_zero_but_for_rounding_reads_zero(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
-    marks = await opened.page.evaluate(
-        """async () => {
-            const { valueAxis } = await import('/page/plot_draw.js');
-            const texts = [], nothing = () => undefined;
-            const ctx = { beginPath: nothing, moveTo: nothing, lineTo: nothing, stroke: nothing,
-                fillText: (text) => texts.push(text) };
-            valueAxis(ctx, { font: nothing }, (v) => v, [-0.54, 1.4e-14, 0.54], { right: false, width: 9 });
-            return texts;
-        }"""
-    )
-    assert marks == ["−0.54", "0", "0.54"]

@@ -18,6 +18,15 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 SQUARE = ((1.0, 0.5), (2.0, 0.5), (2.0, 1.5), (1.0, 1.5))
 
+REFUSE_ONCE = """async () => {
+    const { connection } = await import('/page/main.js'), request = connection.request;
+    connection.request = (message, ...more) => {
+        if (message.type !== 'set_places') return request.call(connection, message, ...more);
+        connection.request = request;
+        return Promise.reject(new Error('not now'));
+    };
+}"""
+
 
 async def beats(case: ConsoleCase) -> None:
     """Run cycles of a robot that stands, so that the page has states."""
@@ -70,7 +79,12 @@ async def operate(case: ConsoleCase, opener: Opener, folder: Path) -> None:
     await opened.says("#places-text", "There is no map")
 
     await page.locator("#places-kind").select_option("no_go_area")
-    await click(opened, *SQUARE, SQUARE[0])
+    await click(opened, *SQUARE)
+    await page.evaluate(REFUSE_ONCE)
+    await page.locator("#places-finish").click()
+    await opened.says("#toasts", "not now")
+    await expect(page.locator("#places-finish")).to_be_enabled()  # what was drawn is not lost
+    await page.locator("#places-finish").click()
     await expect(rows).to_have_count(1)
     assert np.allclose(settings.current.places.no_go_area[0].vertices_m, SQUARE, atol=0.02)
     await page.locator("#places-kind").select_option("no_go_line")

@@ -6,6 +6,7 @@ import { ticks } from "./plot_time.js";
 export const LEFT = 46;
 export const FOOT = 14; // the time below a lane
 const GAP_S = 2.5; // a line is broken where frames are missing
+const STEPS_MIN = 2; // of an axis of values, at least
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {Theme} theme @param {Span} span
@@ -27,9 +28,22 @@ export function timeAxis(ctx, theme, span, x, height) {
   }
 }
 
+// The values to mark between two, at steps of 1, 2 or 5 times a power of ten, with their texts.
+/** @param {number} low @param {number} high @returns {Array<[number, string]>} */
+export function valueMarks(low, high) {
+  const rough = (high - low) / STEPS_MIN,
+    power = Math.floor(Math.log10(rough));
+  const step = (rough >= 5 * 10 ** power ? 5 : rough >= 2 * 10 ** power ? 2 : 1) * 10 ** power;
+  /** @type {Array<[number, string]>} */
+  const marks = [];
+  for (let k = Math.ceil(low / step); k * step <= high; k++)
+    marks.push([k * step, (k * step).toFixed(Math.max(0, -power)).replace(/^-(0[.0]*$)?/, (_, zero) => zero ?? "−")]);
+  return marks;
+}
+
 /**
  * @param {CanvasRenderingContext2D} ctx @param {Theme} theme
- * @param {(value: number) => number} y @param {number[]} marks
+ * @param {(value: number) => number} y @param {Array<[number, string]>} marks
  * @param {{ right: boolean; width: number; colour: string }} how
  */
 export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
@@ -37,8 +51,7 @@ export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
   ctx.textAlign = right ? "left" : "right";
   ctx.textBaseline = "middle";
   ctx.lineWidth = 1;
-  const least = 1e-9 * Math.max(...marks.map(Math.abs)); // below are rounding errors of a zero
-  for (const mark of marks) {
+  for (const [mark, text] of marks) {
     const at = Math.round(y(mark)) + 0.5;
     if (!right) {
       ctx.strokeStyle = theme.line;
@@ -48,7 +61,7 @@ export function valueAxis(ctx, theme, y, marks, { right, width, colour }) {
       ctx.stroke();
     }
     ctx.fillStyle = right ? colour : theme.muted;
-    ctx.fillText(digits(Math.abs(mark) < least ? 0 : mark), right ? width + 5 : LEFT - 5, at);
+    ctx.fillText(text, right ? width + 5 : LEFT - 5, at);
   }
 }
 
@@ -75,7 +88,8 @@ export function bounds(values) {
   const low = Math.min(...values),
     high = Math.max(...values);
   if (values.length === 0) return [0, 1];
-  return high > low ? [low - 0.04 * (high - low), high + 0.04 * (high - low)] : [low - 0.5, high + 0.5];
+  const least = 1e-9 * Math.max(Math.abs(low), Math.abs(high)); // less are rounding errors
+  return high - low > least ? [low - 0.04 * (high - low), high + 0.04 * (high - low)] : [low - 0.5, high + 0.5];
 }
 
 /** @param {number} value */

@@ -43,7 +43,7 @@ export const difference = (path, other) => `minus|${path}|${other}`;
 /** @param {string} path */
 const parts = (path) => path.split("|");
 /** @param {string} path */
-const isDerived = (path) => path.includes("|");
+export const isDerived = (path) => path.includes("|");
 
 /** @param {string} path @returns {string} */
 export function fieldName(path) {

@@ -4,8 +4,8 @@
 
 import { button, byId, download, el, setAttribute, setText } from "./dom.js";
 import { History, numericFields } from "./history.js";
-import { bounds, digits, FOOT, LEFT, linePath, timeAxis, valueAxis } from "./plot_draw.js";
-import { difference, fieldName, rateOf, seriesOf, shownAs } from "./plot_fields.js";
+import { bounds, digits, FOOT, LEFT, linePath, timeAxis, valueAxis, valueMarks } from "./plot_draw.js";
+import { difference, fieldName, isDerived, rateOf, seriesOf, shownAs } from "./plot_fields.js";
 import { PlotTime } from "./plot_time.js";
 import { prefer, preferred } from "./preferences.js";
 import { fitted } from "./theme.js";
@@ -166,19 +166,20 @@ export class Plots {
     for (const [one, lane] of this.#lanes) this.#offerCombinations(one, lane);
   }
 
-  // What a lane can be combined with: the fields of the other lanes.
+  // What a lane can be combined with: the fields of the other lanes. What is derived is not derived from again.
   /** @param {string} path @param {Lane} lane */
   #offerCombinations(path, { combine, second }) {
     const others = [...this.#lanes]
       .filter(([other, lane]) => other !== path && lane.second === null)
       .map(([other]) => other);
+    const plain = others.filter((one) => !isDerived(one) && !isDerived(path));
     const options = [
       ["", "combine…"],
-      ["rate", "its rate"],
+      ...(isDerived(path) ? [] : [["rate", "its rate"]]),
       ...(second === null
         ? others.map((one) => [`axis ${one}`, `${fieldName(one)} on the right`])
         : [["apart", `${fieldName(second)} apart`]]),
-      ...others.map((one) => [`minus ${one}`, `minus ${fieldName(one)}`]),
+      ...plain.map((one) => [`minus ${one}`, `minus ${fieldName(one)}`]),
     ];
     combine.replaceChildren(...options.map(([value, text]) => el("option", { value }, text)));
   }
@@ -246,7 +247,7 @@ export class Plots {
     if (!this.shown()) return;
     const span = this.#span,
       share = Number(this.at.value) / Number(this.at.max);
-    const read = share >= 1 ? span.now : span.from + share * (span.to - span.from);
+    const read = share >= 1 && !this.#time.isHeld ? span.now : span.from + share * (span.to - span.from);
     const back = read - span.now;
     const words = back === 0 ? "now" : `${Math.abs(back).toFixed(1)} s ${back < 0 ? "before" : "after"}`;
     setAttribute(this.at, "aria-valuetext", words);
@@ -280,7 +281,7 @@ export class Plots {
       const [low, high] = bounds(known);
       /** @param {number} one */
       const y = (one) => height - FOOT - 4 - ((one - low) / (high - low)) * (height - FOOT - 12);
-      valueAxis(ctx, this.theme, y, known.length > 0 ? [low, (low + high) / 2, high] : [], {
+      valueAxis(ctx, this.theme, y, known.length > 0 ? valueMarks(low, high) : [], {
         right: i === 1,
         width: width - margins + LEFT,
         colour,
