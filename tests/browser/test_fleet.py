@@ -14,7 +14,7 @@ from playwright.async_api import Locator, Page, expect
 
 from runtime.bridges.fleet import Fleet
 from runtime.bridges.fleet_server import serve_fleet
-from tests.browser.open_page import Opener, until
+from tests.browser.open_page import PHONE, Opener, until
 from tests.browser.real_run import Run, run
 from tests.hil.machine import TIMEOUT_S
 from tests.hil.running import ARM_AGAIN_S
@@ -53,6 +53,22 @@ async def test_halt_one_halt_all_and_a_frozen_run(tmp_path: Path, opener: Opener
         opened = await opener.open(url, real_time=True, live=False)
         await operate(opened.page, runs)
         await opened.save_screenshot("fleet")
+
+
+async def test_the_page_fits_a_phone(opener: Opener) -> None:
+    async with fleet_page([]) as url:
+        opened = await opener.open(url, PHONE, real_time=True, live=False)
+        await expect(opened.page.locator("#fleet-none")).to_be_visible()
+        await opened.save_screenshot("fleet-phone")
+        wide = await opened.page.evaluate(
+            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        )
+        assert wide == 0
+        for part in ("#halt-all", "#fleet-url", "#fleet-add button"):
+            box = await opened.page.locator(part).bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= PHONE[0]
 
 
 async def drives(one: Run, card: Locator) -> None:

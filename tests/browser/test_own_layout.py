@@ -194,7 +194,7 @@ async def test_all_plots_share_a_time_axis_that_zooms_and_moves(server: FakeServ
     assert await spans(opened) == {shown}, "a drag moves it and keeps its length"
     await opened.save_screenshot("plot-zoomed")
     await page.mouse.move(0, 0)
-    await expect(page.locator("#plot-read")).to_have_text(re.compile(r"s before$")), "the values are of what is shown"
+    await expect(page.locator("#plot-read")).to_have_text(re.compile(r"s before$"))  # of what is shown
     await page.locator("#plot-follow").click()
     assert await spans(opened) == {"30 s"}
 

@@ -25,7 +25,9 @@ async def test_a_port_that_another_program_has_is_replaced_with_a_word() -> None
             assert case.url.port != busy
             assert f"console.port {busy} is in use by another program" in case.console.hints()
             (warning,) = [line for line in case.log if line["level"] == "warning"]
-            assert warning["event"] == f"port {busy} of console.port is in use, so the console has port {case.url.port}"
+            assert (
+                warning["event"] == f"port {busy} of console.port is in use, so the console has port {case.url.port}"
+            )
 
 
 async def test_a_console_open_to_other_machines_warns() -> None:
