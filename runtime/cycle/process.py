@@ -322,7 +322,7 @@ class RobotProcess:
         self._object_log.observe(self._state.perception, record.inputs.run_s, is_edited=bool(record.inputs.edits))
         for line in self._alerts.update(received, self._state, record.inputs.run_s):
             self._log.warning(line)
-        for line in self._alerts.news:
+        for line in self._alerts.recovered:
             self._log.info(line)
         if on_firing is not None:
             for firing in received.firings:

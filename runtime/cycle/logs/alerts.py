@@ -30,7 +30,7 @@ class Alerts:
         self._place: tuple[Status, int, int] = ("localizing", 0, 0)
         """Of the known room: status, places refuted, rivals."""
         self._ring_problems: set[str] = set()
-        self.news: list[str] = []
+        self.recovered: list[str] = []
         """Of the last update: what is well again, and needs nobody."""
         self._good: set[str] = set()
 
@@ -46,7 +46,7 @@ class Alerts:
         run_s : float
             The cycle's beginning; a robot that causes too many lines has the excess counted in the next one.
         """
-        lines, self.news = list[str](), []
+        lines, self.recovered = list[str](), []
         self._good.clear()
         facts = self._new_facts(received, state.perception)
         if (problem := state.ring_problem) is not None and state.mode.reason != problem:
@@ -55,7 +55,7 @@ class Alerts:
         for line in facts:
             left_out = self._limit.take(run_s)
             if left_out is not None:
-                (self.news if line in self._good else lines).append(
+                (self.recovered if line in self._good else lines).append(
                     f"{line} ({left_out} such lines were left out before)" if left_out else line
                 )
         return lines
@@ -103,7 +103,7 @@ class Alerts:
         return lines
 
     def _well(self, lines: list[str]) -> list[str]:
-        """Return lines, noted as good news."""
+        """Return lines, noted as no warnings."""
         self._good.update(lines)
         return lines
 

@@ -52,7 +52,7 @@ def test_each_fact_is_reported_once() -> None:
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is stuck"]
     perception.report(report(5, "crosstalk"))
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is crosstalk"]
-    assert alerts.news == ["sensor 7 works again and is used"], "no warning"
+    assert alerts.recovered == ["sensor 7 works again and is used"], "no warning"
     perception.report(report(5, "crosstalk"), report(7, "failing"))
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 7 is failing"], "a fault that returned is a new fact"
 
@@ -122,8 +122,8 @@ def test_what_is_new_of_the_place_in_a_known_room_is_reported_once() -> None:
     ):
         vars(perception.known_room).update(change)
         lines = alerts.update(NOTHING, seen, 1.0)
-        assert (len(lines) == 0) == (said is None or "known" in said), "good news are no warning"
-        lines += alerts.news
+        assert (len(lines) == 0) == (said is None or "known" in said), "what is well again is no warning"
+        lines += alerts.recovered
         assert len(lines) == (said is not None)
         assert not lines or lines[0].startswith(said or "")
         assert alerts.update(NOTHING, seen, 1.0) == []
