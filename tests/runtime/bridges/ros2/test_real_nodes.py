@@ -80,9 +80,8 @@ def test_others_see_the_robot_within_two_seconds(measured: Callable[[str], None]
         worst_s = max(node.first_s.values())
         assert worst_s < 2.0
         parents = {f.child: f.parent for t in ("/tf", "/tf_static") for f in ros_tf.decode(node.newest[t])}
-        assert [parents[name] for name in ("sonar_05", "ring", "base_link", "odom")] == [
-            "ring", "base_link", "odom", "map"
-        ]  # fmt: skip
+        assert [parents[name] for name in ("sonar_05", "ring", "base_link")] == ["ring", "base_link", "odom"]
+        assert "odom" not in parents, "nothing localizes this run, so it has no map"
         assert max(node.newest["grid"].data) > 50
         assert any(marker.type == 3 for marker in node.newest["objects"].markers)
         measured(f"24 ranges, odometry, frames, objects, grid and diagnostics seen within {worst_s:.2f} s")
