@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from io import BufferedReader
 from pathlib import Path
+from types import MappingProxyType
 from typing import BinaryIO, Final, TextIO
 
 import numpy as np
@@ -33,6 +34,9 @@ _RANGE: Final = "metres ≥ 0, 'inf' (fired, no echo) or an empty cell (did not 
 _CROSS: Final = re.compile(r"x(\d{2,3})_(\d{2,3})")
 """A column of half paths: transmitter, listener."""
 _NAME_PAIRS: Final = "name the pairs of all its cross paths"
+_SEPARATORS: Final = MappingProxyType({";": "semicolons", "\t": "tabs", " ": "spaces"})
+_NO_NUMBER: Final = frozenset({"", "none", "null", "na", "n/a", "#n/a"})
+"""What programs write for a number that they do not have."""
 _SPELT_INF: Final = re.compile(r"\s*\+?inf(inity)?\s*", re.IGNORECASE)
 
 
@@ -179,6 +183,12 @@ def _cross_paths(pairs: Sequence[tuple[int, int]], cells: Sequence[str]) -> Cros
 
 def _check_header(names: Sequence[str], path: Path, row: int) -> tuple[int, int, list[tuple[int, int]]]:
     """Return the columns at which ranges and half paths begin, and the pair of sensors of each of the latter."""
+    for mark, what in _SEPARATORS.items():
+        if len(names) == 1 and "theta" in names[0].split(mark):
+            hint = f"separate them by commas, and write decimals with a point; {_FORM}"
+            raise _error(path, row, f"separates its columns by {what}", hint)
+    if any(names) and all(not name or _is_number(name) for name in names):
+        raise _error(path, row, "holds numbers where the header belongs", f"write it above them; {_FORM}")
     for name, times in Counter(names).items():
         if times > 1:
             raise _error(path, row, f"names the column {_shown(name)} {times} times", f"each name once; {_FORM}")
@@ -186,7 +196,9 @@ def _check_header(names: Sequence[str], path: Path, row: int) -> tuple[int, int,
         if name not in names:
             raise _error(path, row, f"lacks the column {name!r}", _FORM)
     lead = [*REQUIRED, RING_YAW] if RING_YAW in names else [*REQUIRED]
-    first_cross = next((i for i, name in enumerate(names) if i > len(lead) and name.startswith("x")), len(names))
+    first_cross = next(
+        (i for i, name in enumerate(names) if i > len(lead) and name.startswith("x") and name != "x"), len(names)
+    )
     count = first_cross - len(lead)
     if count == 0:
         raise _error(path, row, "has no sensor column", _FORM)
@@ -248,6 +260,10 @@ def _any_range(cell: str) -> float:
     return -math.inf if cell and math.isnan(value) else value
 
 
+def _is_number(cell: str) -> bool:
+    return not _is_refused(_number, cell)
+
+
 def _is_refused(parse: Callable[[str], float], cell: str) -> bool:
     try:
         parse(cell)
@@ -264,9 +280,16 @@ def _cell_error(
         (_finite if i < first_range else _range if names[i].startswith("x") else parse) for i in range(len(cells))
     )
     column = next(i for i, (of, cell) in enumerate(zip(parsers, cells, strict=True)) if _is_refused(of, cell))
-    allowed = _FINITE if column < first_range else _RANGE
-    found = f"is {_shown(cells[column])}" if cells[column] else "is empty"
-    return _error(path, row, f"column {names[column]!r} {found}", f"allowed is {allowed}; correct or delete the row")
+    cell, is_stamp = cells[column], column < first_range
+    allowed, action = (_FINITE if is_stamp else _RANGE), "correct or delete the row"
+    if not _is_refused(parse, cell.replace(",", ".")):
+        action = "write decimals with a point, and nothing between thousands"
+    elif names[column] == "t" and cell.count(":") > 0:
+        action = "write the time in seconds, from any start, as 1764354000.25"
+    elif not is_stamp and cell.strip(" -+.").casefold() in _NO_NUMBER:
+        action = "write one of these in its place, in the whole file"
+    found = f"is {_shown(cell)}" if cell else "is empty"
+    return _error(path, row, f"column {names[column]!r} {found}", f"allowed is {allowed}; {action}")
 
 
 def _cells_hint(cells: Sequence[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +17,7 @@ from runtime.recording.conventions.headings import (
     NEAR_NAT,
     SURE,
     Angles,
+    Motion,
     echo_scores,
     mirror_image,
     motion_scores,
@@ -137,14 +139,15 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
                     "--latched yes, or no if all are fresh",
                 )
             )
-    motion, is_related = motion_scores(table, options)
-    likely = max(motion, key=motion.__getitem__)
-    units, scores = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
+    motion = motion_scores(table, options)
+    likely = max(motion.scores, key=motion.scores.__getitem__)
+    unit = likely.unit if motion.is_related else next(one.unit for one in motion.scores)
+    units, scores = find_units(table, silence, robot, options, unit, _ratios(table, robot, likely))
     given = (options.time_unit, options.length_unit, options.range_unit)
     if _are_unusual(units, given):
         said.append((units.words, units.options))
-    angles = _find_angles(table, robot, options, units, motion, is_related=is_related)
-    if is_related and options.sensor_order == "auto":
+    angles = _find_angles(table, robot, options, units, motion)
+    if motion.is_related and options.sensor_order == "auto":
         reach = LENGTHS[units.range_]
         check_shift(table, robot, angles, reach, LENGTHS[units.length] / reach)
     if angles != _asked_angles(options):
@@ -222,22 +225,22 @@ def _shown(ranges: Floats, silence: Silence) -> Floats:
     return shown
 
 
-def _find_angles(
-    table: Table,
-    robot: RobotConfig,
-    options: RingLogOptions,
-    units: Units,
-    motion: dict[Angles, float],
-    *,
-    is_related: bool,
-) -> Angles:
+def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, units: Units, motion: Motion) -> Angles:
     """Return how headings are counted: the form's own way unless motion or ranges contradict it."""
-    if len(motion) == 1:
-        return next(iter(motion))
-    default = next(one for one in motion)  # ccw and rad come first, or what is given
-    near, backward = _near_angles(motion, default, is_related=is_related)
+    ways = motion.scores
+    if len(ways) == 1:
+        return next(iter(ways))
+    default = next(one for one in ways)  # ccw and rad come first, or what is given
+    if motion.turned is not None:
+        _check_turned(table, robot, units, default, motion.turned)
+    near, backward = _near_angles(motion, default)
     echoes = _opened(table, robot, units, list(dict.fromkeys([default, *near])))
     left = list(echoes)
+    if len(left) > 1 and options.heading == "auto" and _is_aimless(table, robot, units, motion):
+        raise RingLogError(
+            "the robot's steps do not follow theta, and the ranges do not show how headings are counted; "
+            f"correct theta, or say {default.options} if {default.words}"
+        )
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
         doubts = [one for one in left if sureness(echoes[one], echoes[default]) > 0.5 * SURE]
@@ -257,16 +260,42 @@ def _find_angles(
     )
 
 
-def _near_angles(
-    motion: dict[Angles, float], default: Angles, *, is_related: bool
-) -> tuple[list[Angles], dict[Angles, Angles]]:
+def _is_aimless(table: Table, robot: RobotConfig, units: Units, motion: Motion) -> bool:
+    """Return whether a robot that can drive only along its heading drove elsewhere, and farther than its radius."""
+    far_m = LENGTHS[units.length] * float(np.ptp(table.pose[:, :2], axis=0).max())
+    is_unrelated = motion.is_known and not motion.is_related
+    return is_unrelated and not robot.body.synchro and far_m > robot.body.radius_m
+
+
+def _check_turned(
+    table: Table, robot: RobotConfig, units: Units, default: Angles, turned: tuple[Angles, float]
+) -> None:
+    """Raise an error if the way follows theta at an angle, unless the echoes show that the robot drove aslant."""
+    one, offset_rad = turned
+    pose = table.pose.copy()
+    pose[:, 2:] += offset_rad / (HEADINGS[one.heading].turn * ANGLES[one.unit])
+    reach = LENGTHS[units.range_]
+    scale = LENGTHS[units.length] / reach
+    own = echo_scores(table, robot, [default], reach, scale)[default]
+    echoes = echo_scores(table._replace(pose=pose), robot, [one, mirror_image(one)], reach, scale)
+    if all(sureness(own, scores) > SURE for scores in echoes.values()):
+        return
+    by = math.degrees(offset_rad)
+    raise RingLogError(
+        f"the robot moves at {by:.0f}° from its heading, where {one.words}: theta counts from another direction. "
+        f"Turn theta and ring_yaw by {by:.0f}°, or say {default.options} if the robot drives so"
+    )
+
+
+def _near_angles(motion: Motion, default: Angles) -> tuple[list[Angles], dict[Angles, Angles]]:
     """Return the ways that fit the motion about as well as the best; and those of a robot that drives backward."""
-    if not is_related:
+    ways = motion.scores
+    if not motion.is_related:
         # The unit stays: angles in another one hardly turn the ring, and then even noise agrees.
-        return [one for one in motion if one.unit == default.unit], {}
-    most = max(motion.values())
-    near = [one for one in motion if motion[one] > most - NEAR_NAT]
-    backward = {opposite(one): one for one in near if opposite(one) in motion}
+        return [one for one in ways if one.unit == default.unit], {}
+    most = max(ways.values())
+    near = [one for one in ways if ways[one] > most - NEAR_NAT]
+    backward = {opposite(one): one for one in near if opposite(one) in ways}
     return [*near, *(one for one in backward if one not in near)], backward
 
 

@@ -30,6 +30,8 @@ LEAP: Final = 10.0
 RELATED_NAT: Final = 0.5
 """Gain a step over random directions, from which the motion is along the heading at all. A robot that drives sideways
 as often as forward has none."""
+TURNS: Final = 72
+"""Angles at which directions may follow theta that are looked at: each is off by less than their spread."""
 ECHOES: Final = 1500
 BLOCKS: Final = 20
 KERNEL_M: Final = 0.15
@@ -80,8 +82,22 @@ def _named(one: Angles, wanted: HeadingRule) -> Angles:
     raise ValueError(one.heading)  # all turns, quarters and hands have a name
 
 
-def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, float], bool]:
-    """Return the log-likelihood of the way's directions under each convention, and whether they follow theta at all.
+class Motion(NamedTuple):
+    """What the directions of the way say about each convention."""
+
+    scores: dict[Angles, float]
+    """Log-likelihoods, against any direction being as likely."""
+    is_known: bool
+    """Whether the robot moved enough."""
+    is_related: bool
+    """Whether the directions follow theta at all."""
+    turned: tuple[Angles, float] | None = None
+    """A convention, and the angle (rad, in the file's frame) by which the directions are off from it, where they
+    follow theta at an angle that no convention has."""
+
+
+def motion_scores(table: Table, options: RingLogOptions) -> Motion:
+    """Return how well each convention explains the directions of the way.
 
     Parameters
     ----------
@@ -93,30 +109,59 @@ def motion_scores(table: Table, options: RingLogOptions) -> tuple[dict[Angles, f
     headings = list(HEADINGS) if options.heading == "auto" else [options.heading]
     units = list(ANGLES) if options.angle_unit == "auto" else [options.angle_unit]
     choices = [Angles(heading, unit) for heading in headings for unit in units]
+    directions, angles = _directions(table)
+    if len(directions) < STEPS_MIN:
+        return Motion(dict.fromkeys(choices, 0.0), is_known=False, is_related=False)
+    scores = {}
+    for one in choices:
+        rule, unit = HEADINGS[one.heading], ANGLES[one.unit]
+        scores[one] = _score(directions - rule.turn * _middle(unit * angles) - rule.offset_rad)
+    best = max(scores.values())
+    turned = None
+    if options.heading == "auto":
+        offsets = np.linspace(-math.pi, math.pi, TURNS, endpoint=False)
+        alone = max(_score(directions - offset) for offset in offsets)
+        found = {
+            (one, offset): _score(
+                directions - HEADINGS[one.heading].turn * _middle(ANGLES[one.unit] * angles) - offset
+            )
+            for one in choices
+            if one.heading in {"ccw", "cw"}
+            for offset in offsets
+        }
+        likely = max(found, key=found.__getitem__)
+        if found[likely] > max(best, alone, RELATED_NAT * len(directions)) + NEAR_NAT:
+            turned = likely[0], float(likely[1])
+    return Motion(scores, is_known=True, is_related=best > RELATED_NAT * len(directions), turned=turned)
+
+
+def _directions(table: Table) -> tuple[Floats, Floats]:
+    """Return the directions of steps of equal length, (n,), and the angles of the file at their ends, (n, 2)."""
     x, y, theta = table.pose[:, 0], table.pose[:, 1], table.pose[:, 2]
     steps = np.hypot(np.diff(x), np.diff(y))
     if not steps.any():
-        return dict.fromkeys(choices, 0.0), False
+        return np.empty(0), np.empty((0, 2))
     steps = np.minimum(steps, LEAP * np.median(steps[steps > 0.0]))
     way = np.concatenate([[0.0], np.cumsum(steps)])
     a = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], STEPS, endpoint=False)))
     a, b = a[:-1], a[1:]
     dx, dy = x[b] - x[a], y[b] - y[a]
-    length = np.hypot(dx, dy)
-    moved = length > 0.5 * way[-1] / STEPS
-    a, b, direction = a[moved], b[moved], np.arctan2(dy, dx)[moved]
-    if len(a) < STEPS_MIN:
-        return dict.fromkeys(choices, 0.0), False
-    scores = {}
-    for one in choices:
-        rule, unit = HEADINGS[one.heading], ANGLES[one.unit]
-        turn = np.angle(np.exp(1j * unit * (theta[b] - theta[a])))
-        off = direction - rule.turn * (unit * theta[a] + 0.5 * turn) - rule.offset_rad
-        off = np.abs(np.angle(np.exp(1j * off)))
-        fits = np.exp(-0.5 * (off / SPREAD_RAD) ** 2) + 0.3 * np.exp(-0.5 * ((math.pi - off) / SPREAD_RAD) ** 2)
-        density = 0.8 * fits / (1.3 * SPREAD_RAD * math.sqrt(2.0 * math.pi)) + 0.2 / math.pi
-        scores[one] = float(np.log(density * math.pi).sum())
-    return scores, max(scores.values()) > RELATED_NAT * len(a)
+    moved = np.hypot(dx, dy) > 0.5 * way[-1] / STEPS
+    return np.arctan2(dy, dx)[moved], np.column_stack([theta[a], theta[b]])[moved]
+
+
+def _middle(angles: Floats) -> Floats:
+    """Return the angles half way between two, rad."""
+    middle: Floats = angles[:, 0] + 0.5 * np.angle(np.exp(1j * (angles[:, 1] - angles[:, 0])))
+    return middle
+
+
+def _score(off: Floats) -> float:
+    """Return the log-likelihood of directions by how far they are off the heading, rad."""
+    off = np.abs(np.angle(np.exp(1j * off)))
+    fits = np.exp(-0.5 * (off / SPREAD_RAD) ** 2) + 0.3 * np.exp(-0.5 * ((math.pi - off) / SPREAD_RAD) ** 2)
+    density = 0.8 * fits / (1.3 * SPREAD_RAD * math.sqrt(2.0 * math.pi)) + 0.2 / math.pi
+    return float(np.log(density * math.pi).sum())
 
 
 def echo_scores(

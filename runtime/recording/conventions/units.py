@@ -32,7 +32,10 @@ METRES_NAT: Final = 6.0
 RIVAL_NAT: Final = 20.0
 """Units less likely by this are left out."""
 WORSE: Final = 3.0
-"""Standard errors from which echoes refute units that are too small."""
+"""Standard errors from which echoes speak against units that are too small."""
+DOUBT_NAT: Final = 8.0
+"""The most that echoes say against units: wide beams blur them, and in 40 drives those of the right units were worse
+than those of units 2.54 times as large by up to 7.6 standard errors."""
 IMPOSSIBLE_NAT: Final = -60.0
 PERIOD_LN, SPEED_LN, REACH_LN = 1.5, 1.0, 0.8
 """Spreads of the logarithms of the row's period, the speed and the farthest echo, over the robot's."""
@@ -40,12 +43,23 @@ FAST, TURNS_FAST = 3.0, 5.0
 """A median speed or turning rate over the robot's greatest by this is impossible: odometry leaps, but not always."""
 FAR, FAR_SHARE = 1.2, 0.1
 """Ranges beyond the ring's by this factor are impossible; so many may be glitches."""
+EDGE: Final = 0.02
+EDGE_NAT: Final = 4.3
+"""Width in which ranges end at the ring's greatest one, as a share of it, and the log of how rarely they do by
+chance: where a room's ranges end is a matter of the room, over a factor of 4 or so."""
+EDGE_GLITCHES: Final = 0.05
+"""Share of the ranges about the greatest one that may lie beyond it."""
 PAIR_ALONG: Final = 0.85
 PAIR_LN: Final = 0.12
 """Least cosine between the way and the beam where a range's change is compared with the way, and the spread of the
 logarithm of their ratio."""
 PAIRS_WEIGHT, PAIRS_MAX = 0.2, 150
 """Neighbouring pairs share an echo: each counts a fifth, and all together no more than so many."""
+PAIRS_BIAS_LN: Final = 0.14
+"""Spread of the logarithm of the ratio that most pairs of a log share. A wide beam sees a surface aslant: in 30
+drives it was between -0.30 and 0.26."""
+PAIRS_BIASES: Final = np.linspace(-3.0, 3.0, 61)
+"""Where this bias is looked at, in its standard deviations."""
 
 
 class Units(NamedTuple):
@@ -102,7 +116,8 @@ def find_units(
     if len(choices) == 1:
         return choices[0], {choices[0]: 0.0}
     facts = _Facts.of(table, silence, angle)
-    scores = {units: _score(units, facts, robot, ratios) for units in choices}
+    ways = {pair: _way_score(ratios, LENGTHS[pair[0]] / LENGTHS[pair[1]]) for pair in {one[1:] for one in choices}}
+    scores = {units: _score(units, facts, robot) + ways[units[1:]] for units in choices}
     best = max(scores, key=scores.__getitem__)
     default = Units(
         *(
@@ -113,7 +128,9 @@ def find_units(
         )
     )
     if options.angle_unit == "auto" and facts.rate > TURNS_FAST * robot.body.turn_max_rad_s * TIMES[best.time]:
-        raise RingLogError(f"{_impossible(facts, robot)}: say --angle-unit deg if it is in degrees")
+        raise RingLogError(
+            f"{_too_fast(facts, robot)}: say --angle-unit deg if it is in degrees, or give it in radians"
+        )
     if scores[default] > scores[best] - SURE_NAT:
         return default, scores
     if _contradictions(best, facts, robot):
@@ -154,7 +171,7 @@ def check_scale(units: Units, scores: dict[Units, float], echoes: Callable[[Unit
         larger = [blocks for (_, range_), blocks in found.items() if LENGTHS[range_] > reach]
         worse = max((sureness(blocks, found[one.length, one.range_]) for blocks in larger), default=0.0)
         if worse > WORSE:
-            plain[one] -= min(0.5 * worse**2, RIVAL_NAT)
+            plain[one] -= min(0.5 * worse**2, DOUBT_NAT)
     rivals = [one for one in near if one[1:] != units[1:] and plain[one] > plain[units] - APART_NAT]
     if rivals:
         rivals.sort(key=plain.__getitem__, reverse=True)
@@ -198,8 +215,20 @@ STEPS_MIN: Final = 30
 ECHOES_MIN: Final = 50
 
 
-def _score(units: Units, facts: _Facts, robot: RobotConfig, ratios: Floats) -> float:
-    """Return the log-likelihood of units."""
+def _way_score(ratios: Floats, expected: float) -> float:
+    """Return the log-likelihood of ratios of range to way, all of them with one unknown bias."""
+    if not len(ratios):
+        return 0.0
+    ratios = ratios[:: 1 + int(PAIRS_WEIGHT * len(ratios) / PAIRS_MAX)]
+    off = np.log(ratios) - math.log(expected) - PAIRS_BIAS_LN * PAIRS_BIASES[:, None]
+    fits = np.exp(-0.5 * (off / PAIR_LN) ** 2) / (PAIR_LN * math.sqrt(2.0 * math.pi))
+    weight = min(PAIRS_WEIGHT, PAIRS_MAX / len(ratios))
+    scores = weight * np.log(0.3 * fits + 0.7 * 0.1).sum(axis=1) - 0.5 * PAIRS_BIASES**2
+    return float(np.logaddexp.reduce(scores) - np.logaddexp.reduce(-0.5 * PAIRS_BIASES**2))
+
+
+def _score(units: Units, facts: _Facts, robot: RobotConfig) -> float:
+    """Return the log-likelihood of units but for the ratios of range to way."""
     body, ring = robot.body, robot.ring
     t, length, range_ = TIMES[units.time], LENGTHS[units.length], LENGTHS[units.range_]
     score = METRES_NAT * (units.length == units.range_ == "m") + IMPOSSIBLE_NAT * _contradictions(units, facts, robot)
@@ -210,11 +239,6 @@ def _score(units: Units, facts: _Facts, robot: RobotConfig, ratios: Floats) -> f
         score += _ln_normal(speed / 0.4, SPEED_LN)
     if len(facts.echoes) >= ECHOES_MIN:
         score += _range_score(facts, range_, robot)
-    if len(ratios):
-        off = np.log(ratios) - math.log(length / range_)
-        fits = np.exp(-0.5 * (off / PAIR_LN) ** 2) / (PAIR_LN * math.sqrt(2.0 * math.pi))
-        weight = min(PAIRS_WEIGHT, PAIRS_MAX / len(ratios))
-        score += weight * float(np.log(0.3 * fits + 0.7 * 0.1).sum())
     return score
 
 
@@ -237,11 +261,21 @@ def _range_score(facts: _Facts, unit: float, robot: RobotConfig) -> float:
     score = -20.0 * far + _ln_normal(float(np.quantile(echoes, 0.95)) / (0.6 * ring.range_max_m), REACH_LN)
     if facts.ceiling is not None and abs(unit * facts.ceiling / ring.range_max_m - 1.0) < 0.01:
         score += SURE_NAT + APART_NAT
+    else:
+        score += _edge_score(echoes / ring.range_max_m)
     if ring.resolution_m >= 0.01:  # finer ones are lost among the file's decimals
         steps = echoes / ring.resolution_m
         off = float(np.sqrt(np.mean((steps - np.round(steps)) ** 2)))
         score += (SURE_NAT + APART_NAT) * (off < 0.1)
     return score
+
+
+def _edge_score(shares: Floats) -> float:
+    """Return the evidence that ranges, as shares of the ring's greatest one, end there."""
+    below = np.count_nonzero(np.abs(shares - 1.0 + 0.5 * EDGE) <= 0.5 * EDGE)
+    above = np.count_nonzero(np.abs(shares - 1.0 - 0.5 * EDGE) < 0.5 * EDGE)
+    score = below * math.log((1.0 - EDGE_GLITCHES) / 0.5) + above * math.log(EDGE_GLITCHES / 0.5)
+    return min(max(PAIRS_WEIGHT * score, 0.0), EDGE_NAT)  # as of pairs, neighbouring readings are of one echo
 
 
 def _ln_normal(ratio: float, spread: float) -> float:
@@ -273,6 +307,11 @@ def _impossible(facts: _Facts, robot: RobotConfig) -> str:
             f"theta turns at {facts.rate:.3g} rad/s, and this robot's body.turn_max_rad_s is {body.turn_max_rad_s:g}"
         )
     return f"the firings are {facts.period:.3g} s apart, and this robot's are {ring.firing.step_period_s:g}"
+
+
+def _too_fast(facts: _Facts, robot: RobotConfig) -> str:
+    limit = robot.body.turn_max_rad_s
+    return f"theta turns at {facts.rate:.3g} rad/s, and this robot's body.turn_max_rad_s is {limit:g}"
 
 
 def way_ratios(table: Table, robot: RobotConfig, yaw: Floats, hand: int) -> Floats:

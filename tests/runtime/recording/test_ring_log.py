@@ -104,6 +104,26 @@ def test_bad_stamp_names_row_column_value_and_what_is_allowed(tmp_path: Path, co
     assert text.startswith(f"row 3 column '{['t', 'x', 'y', 'theta'][column]}' {found}; allowed is a finite number")
 
 
+@pytest.mark.parametrize(
+    ("column", "cell", "action"),
+    [
+        (0, "2025-11-28T18:20:00.03+00:00", "write the time in seconds"),
+        (0, "18:20:00.03", "write the time in seconds"),
+        (1, "1,5", "write decimals with a point"),
+        (4, "1,5", "write decimals with a point"),
+        (4, "None", "write one of these in its place"),
+        (4, "#N/A", "write one of these in its place"),
+        (4, "--", "write one of these in its place"),
+        (4, " ", "write one of these in its place"),
+        (4, "far", "correct or delete the row"),
+    ],
+)
+def test_a_bad_cell_is_refused_with_what_to_write(tmp_path: Path, column: int, cell: str, action: str) -> None:
+    cells = ["0", "0", "0", "0", "1", "1"]
+    cells[column] = f'"{cell}"'
+    assert f"; {action}" in error_message(log(tmp_path, HEADER + ",".join(cells) + "\n"))
+
+
 def test_an_empty_ring_yaw_is_refused(tmp_path: Path) -> None:
     text = error_message(log(tmp_path, "t,x,y,theta,ring_yaw,r00\n0,0,0,1,,3\n"))
     assert text.startswith("row 2 column 'ring_yaw' is empty")
@@ -113,8 +133,13 @@ def test_an_empty_ring_yaw_is_refused(tmp_path: Path) -> None:
     ("header", "expected"),
     [
         ("t,x,theta,r00", "row 1 lacks the column 'y'"),
-        ("t;x;y;theta;r00", "row 1 lacks the column 't'"),
-        ("0.0,1.0,2.0,3.0,4.0", "row 1 lacks the column 't'"),
+        ("t;x;y;theta;r00", "row 1 separates its columns by semicolons; separate them by commas, and write decimals"),
+        ("t\tx\ty\ttheta\tr00", "row 1 separates its columns by tabs"),
+        ("# t x y theta r00", "row 1 separates its columns by spaces"),
+        ("# recorded today", "row 1 lacks the column 't'"),
+        ("0.0,1.0,2.0,3.0,4.0", "row 1 holds numbers where the header belongs; write it above them"),
+        ("0.0,0.0,0.0,0.0,,4.0", "row 1 holds numbers where the header belongs"),
+        ("r00,r01,t,x,y,theta", "row 1 has 'r00' as column 1 where 't' belongs"),
         ("t,x,y,theta", "row 1 has no sensor column"),
         ("t,x,y,theta,ring_yaw", "row 1 has no sensor column"),
         ("t,x,y,theta,r00,r00", "row 1 names the column 'r00' 2 times"),

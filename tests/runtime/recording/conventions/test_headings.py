@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -29,12 +31,35 @@ def counted(drive: Drive, how: Angles) -> Table:
 @pytest.mark.parametrize("heading", list(HEADINGS))
 def test_motion_leaves_the_convention_and_its_mirror_image(drive: Drive, heading: str, unit: str) -> None:
     how = Angles(heading, unit)
-    scores, is_related = motion_scores(counted(drive, how), AUTO)
-    assert is_related
+    motion = motion_scores(counted(drive, how), AUTO)
+    assert (motion.is_known, motion.is_related, motion.turned) == (True, True, None)
+    scores = motion.scores
     same = [one for one, score in scores.items() if score > scores[how] - 1e-6 * abs(scores[how])]
     rule = HEADINGS[heading]
     assert how in same
     assert all(HEADINGS[one.heading][:2] == rule[:2] and one.unit == unit for one in same)
+
+
+@pytest.mark.parametrize("how", [Angles("ccw"), Angles("cw", "deg"), Angles("north-cw")])
+@pytest.mark.parametrize("degrees", [30.0, -43.0])
+def test_headings_that_count_from_elsewhere_are_at_an_angle(drive: Drive, how: Angles, degrees: float) -> None:
+    table = counted(drive, how)
+    pose = table.pose.copy()
+    pose[:, 2:] += math.radians(degrees) / ANGLES[how.unit]
+    found = motion_scores(table._replace(pose=pose), AUTO).turned
+    assert found is not None
+    one, offset_rad = found
+    rule = HEADINGS[how.heading]
+    expected = rule.offset_rad - rule.turn * math.radians(degrees)
+    assert (HEADINGS[one.heading].turn, one.unit) == (rule.turn, how.unit)
+    assert abs(math.remainder(offset_rad - expected, 2.0 * math.pi)) < math.radians(5.0)
+
+
+def test_a_straight_way_says_nothing_of_where_headings_count_from(drive: Drive) -> None:
+    pose = np.zeros((300, 4))
+    pose[:, 0], pose[:, 1] = 0.8 * np.arange(300), 0.6 * np.arange(300)
+    motion = motion_scores(Table(0.05 * np.arange(300), pose, drive.ranges[:300]), AUTO)
+    assert (motion.is_known, motion.turned) == (True, None)
 
 
 def test_echoes_agree_in_the_true_convention_only(drive: Drive) -> None:

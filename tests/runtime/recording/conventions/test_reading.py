@@ -6,6 +6,7 @@ import math
 import os
 import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
@@ -15,9 +16,10 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
+from config.robot import SensorConfig
 from drivers.firing_pattern import firing_pattern
-from drivers.messages import Firing, Pose
-from runtime.recording.conventions.options import RingLogOptions
+from drivers.messages import Firing, Floats, Pose
+from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.reading import FIRST_OF_PIPE, converted_firings, open_ring_log
 from runtime.recording.ring_log import RingLogError, read_ring_log
 from runtime.recording.ring_log_replay import replay_firings
@@ -179,6 +181,52 @@ def test_a_turned_or_mirrored_ring_is_refused_with_what_it_may_be(
     assert all(text in str(refused.value) for text in named), str(refused.value)
     if how.shift == 0:
         check_right(list(open_ring_log(path, drive.settings, right_options(how))), drive, how)
+
+
+def refusal(drive: Drive, path: Path, options: RingLogOptions = AUTO) -> str:
+    """Return why the table of a drive is refused."""
+    with pytest.raises(RingLogError) as refused:
+        list(open_ring_log(written(drive, Convention(), np.random.default_rng(12), path), drive.settings, options))
+    return str(refused.value)
+
+
+def with_angles(drive: Drive, change: Callable[[Floats], Floats]) -> Drive:
+    return replace(drive, pose=np.column_stack([drive.pose[:, :2], change(drive.pose[:, 2:])]))
+
+
+def test_headings_that_count_from_elsewhere_are_refused_with_the_angle(tmp_path: Path) -> None:
+    drive = make_drive(12, "p3dx", "room", "specular")
+    turned = with_angles(drive, lambda angles: angles + math.radians(30.0))
+    text = refusal(turned, tmp_path / "table.csv")
+    assert "the robot moves at -30° from its heading" in text
+    assert "or say --heading ccw --angle-unit rad if the robot drives so" in text
+
+
+def test_a_robot_that_drives_aslant_is_believed(tmp_path: Path) -> None:
+    """Its echoes agree with its headings, and would not with those along its way."""
+    drive, by = make_drive(12, "p3dx", "room", "specular"), 0.5
+    c, s = math.cos(by), math.sin(by)
+    sensors = tuple(
+        SensorConfig(
+            x_m=c * mount.x_m - s * mount.y_m,
+            y_m=s * mount.x_m + c * mount.y_m,
+            angle_deg=math.degrees(math.remainder(mount.angle_rad + by, 2.0 * math.pi)),
+        )
+        for mount in drive.settings.ring.mounts
+    )
+    ring = drive.settings.ring.model_copy(update={"sensors": sensors})
+    aslant = with_angles(drive, lambda angles: angles - by)
+    aslant = replace(aslant, settings=drive.settings.model_copy(update={"ring": ring}))
+    path = written(aslant, Convention(), np.random.default_rng(12), tmp_path / "table.csv")
+    assert len(list(open_ring_log(path, aslant.settings, warn=pytest.fail))) == len(aslant.t)
+
+
+@pytest.mark.parametrize("factor", [1800.0 / math.pi, 1000.0], ids=["tenths of a degree", "milliradians"])
+@pytest.mark.parametrize("robot", ["p3dx", "denning"])
+def test_angles_in_no_unit_of_ours_are_refused(robot: str, factor: float, tmp_path: Path) -> None:
+    drive = make_drive(12, robot, "room", "specular")
+    text = refusal(with_angles(drive, lambda angles: factor * angles), tmp_path / "table.csv")
+    assert re.search("theta is neither in radians nor in degrees|theta turns at|do not follow theta", text), text
 
 
 def test_a_robot_that_always_drives_backward_is_believed(tmp_path: Path) -> None:

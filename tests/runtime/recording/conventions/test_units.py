@@ -15,7 +15,7 @@ from drivers.messages import Firing, Pose
 from runtime.recording.conventions.options import AUTO
 from runtime.recording.conventions.reading import converted_firings
 from runtime.recording.conventions.table import LENGTHS, TIMES, Table
-from runtime.recording.conventions.units import Units, way_ratios
+from runtime.recording.conventions.units import APART_NAT, EDGE_NAT, Units, _edge_score, _way_score, way_ratios
 from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import Drive, make_drive
 
@@ -36,6 +36,26 @@ def test_ranges_change_with_the_way_by_the_ratio_of_the_units(drive: Drive, leng
     table = in_units(drive, Units("s", length, "m"))
     ratios = way_ratios(table, drive.settings, table.pose[:, 3], 1)
     assert float(np.median(ratios)) == pytest.approx(LENGTHS[length], rel=0.05)
+
+
+@pytest.mark.parametrize("bias", [0.78, 1.0, 1.25])
+def test_ratios_of_a_wide_beam_leave_units_that_are_near(bias: float) -> None:
+    """A log whose echoes all come aslant is no log in other units; one by another factor is."""
+    ratios = bias * np.exp(0.05 * np.random.default_rng(3).standard_normal(800))
+    scores = {name: _way_score(ratios / LENGTHS["in"], 1.0 / LENGTHS[name]) for name in ("in", "cm", "ft")}
+    near = _way_score(ratios / LENGTHS["in"], LENGTHS["ft"] / LENGTHS["cm"])
+    assert near - scores["in"] < APART_NAT
+    assert min(scores["in"] - scores["cm"], scores["in"] - scores["ft"]) > 12.0
+
+
+def test_ranges_that_end_at_the_rings_greatest_one_are_evidence() -> None:
+    rng = np.random.default_rng(4)
+    cut = np.minimum(rng.uniform(0.0, 2.0, 4000), 1.0)
+    cut = cut[cut < 1.0]
+    assert _edge_score(cut) == EDGE_NAT
+    assert _edge_score(0.394 * cut) == 0.0, "units that are too small"
+    assert _edge_score(2.54 * cut) == 0.0, "units that are too large"
+    assert _edge_score(np.append(cut, 1.01)) > 0.9 * EDGE_NAT, "a glitch beyond"
 
 
 def test_options_say_what_units_are() -> None:
