@@ -27,7 +27,7 @@ from runtime.recording.conventions.headings import (
 from runtime.recording.conventions.not_fired import find_not_fired, option_of, without_not_fired
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.repeats import find_repeats
-from runtime.recording.conventions.sensor_order import check_shift, mirrored_columns
+from runtime.recording.conventions.sensor_order import Shift, find_shift, mirrored_columns
 from runtime.recording.conventions.silence import Silence, check_near, find_silence
 from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
 from runtime.recording.conventions.units import Units, check_scale, find_units, way_ratios
@@ -147,9 +147,6 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
     if _are_unusual(units, given):
         said.append((units.words, units.options))
     angles = _find_angles(table, robot, options, units, motion)
-    if motion.is_related and options.sensor_order == "auto":
-        reach = LENGTHS[units.range_]
-        check_shift(table, robot, angles, reach, LENGTHS[units.length] / reach)
     if angles != _asked_angles(options):
         said.append((angles.words, angles.options))
     if options.silence == "auto":
@@ -227,10 +224,7 @@ def _shown(ranges: Floats, silence: Silence) -> Floats:
 
 def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, units: Units, motion: Motion) -> Angles:
     """Return how headings are counted: the form's own way unless motion or ranges contradict it."""
-    ways = motion.scores
-    if len(ways) == 1:
-        return next(iter(ways))
-    default = next(one for one in ways)  # ccw and rad come first, or what is given
+    default = next(one for one in motion.scores)  # ccw and rad come first, or what is given
     if motion.turned is not None:
         _check_turned(table, robot, units, default, motion.turned)
     near, backward = _near_angles(motion, default)
@@ -241,6 +235,13 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
             "the robot's steps do not follow theta, and the ranges do not show how headings are counted; "
             f"correct theta, or say {default.options} if {default.words}"
         )
+    forward = [one for one in near if one not in backward]
+    shift = Shift(default, 0, 0.0)
+    if motion.is_related and options.sensor_order != "file":
+        reach = LENGTHS[units.range_]
+        shift = find_shift(table, robot, forward, reach, LENGTHS[units.length] / reach, echoes.values())
+    if shift.surely > SURE:
+        raise RingLogError(f"later echoes fall on earlier ones only if {shift.words(robot.ring)}")
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
         doubts = [one for one in left if sureness(echoes[one], echoes[default]) > 0.5 * SURE]
@@ -255,6 +256,8 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
     if len(fits) == 1 and not (is_mirrored or is_backward):
         return fits[0]
     names = _names(fits or left, is_mirrored=is_mirrored, is_backward=is_backward)
+    if shift.surely > 0.5 * SURE:
+        names.insert(0, f"{shift.angles.words}, and {shift.words(robot.ring)}")
     raise RingLogError(
         f"the robot's motion and the ranges leave open how headings are counted: {', or '.join(names)}"
     )

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig, RobotConfig
 from drivers.messages import Floats
-from runtime.recording.conventions.headings import SURE, Angles, echo_scores, sureness
-from runtime.recording.conventions.table import Table
+from runtime.recording.conventions.headings import Angles, echo_scores, sureness
+from runtime.recording.conventions.table import HEADINGS, Table
 from runtime.recording.ring_log import RingLogError
 
 MIRROR_M: Final = 0.02
 """How far a sensor's mirror image may lie from the sensor that takes its column, m and rad."""
-FEW_ECHOES: Final = 400
-"""Echoes by which the likeliest of all orders is found; it is then compared by all of them."""
+FEW_ECHOES, LIKELY = 400, 3
+"""Echoes by which the likeliest of all orders are found, and how many of these are then compared by all echoes."""
 
 
 def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
@@ -39,8 +40,35 @@ def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
     return columns
 
 
-def check_shift(table: Table, robot: RobotConfig, angles: Angles, range_m: float, length_per_range: float) -> None:
-    """Raise an error if the echoes agree only where the columns begin with another sensor.
+class Shift(NamedTuple):
+    """A column order that begins with another sensor."""
+
+    angles: Angles
+    sensor: int
+    surely: float
+    """By how many standard errors the echoes agree better than by every order that begins with sensor 0."""
+
+    def words(self, ring: RingConfig) -> str:
+        """Return what it means, and what to do."""
+        found = f"r00 is sensor {self.sensor} of the robot file"
+        if HEADINGS[self.angles.heading].hand < 0:
+            image = mirrored_columns(ring)[self.sensor]
+            found += f" and {self.angles.words}, or r00 is sensor {image} and the columns run the other way round"
+        return (
+            f"{found}: the sensors are counted from another one, or the ring is turned (write them into the robot "
+            "file in the log's order)"
+        )
+
+
+def find_shift(
+    table: Table,
+    robot: RobotConfig,
+    ways: Sequence[Angles],
+    range_m: float,
+    length_per_range: float,
+    others: Iterable[Floats],
+) -> Shift:
+    """Return the sensor of the first column by which the echoes agree best; sensor 0 at no standard errors.
 
     Parameters
     ----------
@@ -48,26 +76,23 @@ def check_shift(table: Table, robot: RobotConfig, angles: Angles, range_m: float
         Of a robot that moved, in the file's units, without silence and repeats.
     robot : RobotConfig
         Its ring.
-    angles : Angles
-        How headings are counted.
+    ways : sequence of Angles
+        How headings may be counted.
     range_m, length_per_range : float
         The unit of the ranges, m, and that of positions over it.
-
-    Raises
-    ------
-    RingLogError
-        They do.
+    others : iterable of (blocks,) float
+        Of `echo_scores`, by orders that begin with sensor 0.
     """
 
-    def scores(shift: int, **more: int) -> Floats:
+    def scores(way: Angles, shift: int, **more: int) -> Floats:
         shifted = table._replace(ranges=np.roll(table.ranges, shift, axis=1))
-        return echo_scores(shifted, robot, [angles], range_m, length_per_range, **more)[angles]
+        return echo_scores(shifted, robot, [way], range_m, length_per_range, **more)[way]
 
-    sensors = table.ranges.shape[1]
-    best = max(range(sensors), key=lambda shift: float(scores(shift, echoes=FEW_ECHOES).mean()))
-    if best and sureness(scores(best), scores(0)) > SURE:
-        raise RingLogError(
-            f"later echoes fall on earlier ones if r00 is sensor {best} of the robot file, not if it is sensor 0: "
-            "the sensors are counted from another one, or the ring is turned; write them into the robot file in the "
-            "log's order"
-        )
+    orders = [(way, shift) for way in ways for shift in range(table.ranges.shape[1])]
+    orders.sort(key=lambda order: float(scores(*order, echoes=FEW_ECHOES).mean()))
+    likely = {order: scores(*order) for order in orders[-LIKELY:]}
+    way, shift = max(likely, key=lambda order: float(likely[order].mean()))
+    if shift == 0:
+        return Shift(way, 0, 0.0)
+    found = likely[way, shift]
+    return Shift(way, shift, min(sureness(found, other) for other in (scores(way, 0), *others)))

@@ -168,7 +168,9 @@ def test_times_in_nanoseconds_are_not_taken_for_microseconds(tmp_path: Path) -> 
         (Convention(heading="cw", mirrored=True), ("--heading y-down ", "--sensor-order mirrored --heading cw ")),
         (Convention(heading="y-down-north-cw"), ("--heading y-down-north-cw ", "--heading south-ccw ")),
         (Convention(shift=3), ("r00 is sensor 13 of the robot file",)),
-        (Convention(shift=8), ("the robot drives backward", "the ring is turned by 180°")),
+        (Convention(shift=5), ("r00 is sensor 11 of the robot file",)),
+        (Convention(shift=8), ("r00 is sensor 8 of the robot file", "the ring is turned")),
+        (Convention(mirrored=True, shift=8), ("or r00 is sensor 15 and the columns run the other way",)),
     ],
 )
 def test_a_turned_or_mirrored_ring_is_refused_with_what_it_may_be(

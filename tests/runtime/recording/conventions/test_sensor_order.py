@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from config.load import load_settings
-from runtime.recording.conventions.headings import Angles
-from runtime.recording.conventions.sensor_order import check_shift, mirrored_columns
+from runtime.recording.conventions.headings import SURE, Angles, echo_scores, mirror_image
+from runtime.recording.conventions.sensor_order import find_shift, mirrored_columns
 from runtime.recording.conventions.table import Table
-from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import make_drive
 
 RING = load_settings("hallway", robot="p3dx").ring
@@ -27,12 +24,19 @@ def test_a_mirrored_ring_takes_each_column_for_the_sensor_on_the_other_side() ->
 
 @pytest.mark.parametrize("robot", ["denning", "p3dx"])
 @pytest.mark.parametrize("shift", [0, 1, 5])
-def test_columns_that_begin_with_another_sensor_are_refused(robot: str, shift: int) -> None:
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_columns_that_begin_with_another_sensor_are_found(robot: str, shift: int, *, is_mirrored: bool) -> None:
     drive = make_drive(11, robot, "room", "cone", 60.0)
-    shifted = replace(drive, ranges=np.roll(drive.ranges, shift, axis=1))
-    table = Table(shifted.t, shifted.pose, np.where(np.isinf(shifted.ranges), np.nan, shifted.ranges))
-    if shift == 0:
-        check_shift(table, drive.settings, Angles(), 1.0, 1.0)
-        return
-    with pytest.raises(RingLogError, match=f"r00 is sensor {drive.ranges.shape[1] - shift} of the robot file"):
-        check_shift(table, drive.settings, Angles(), 1.0, 1.0)
+    ring, sensors = drive.settings.ring, drive.ranges.shape[1]
+    ranges = drive.ranges[:, mirrored_columns(ring)] if is_mirrored else drive.ranges
+    ranges = np.roll(np.where(np.isinf(ranges), np.nan, ranges), shift, axis=1)
+    table = Table(drive.t, drive.pose, ranges)
+    ways = [Angles(), mirror_image(Angles())]
+    others = echo_scores(table, drive.settings, ways, 1.0, 1.0)
+    found = find_shift(table, drive.settings, ways, 1.0, 1.0, others.values())
+    assert found.angles == ways[is_mirrored]
+    assert found.sensor == (sensors - shift) % sensors
+    assert (found.surely > SURE) == (shift > 0)
+    if shift and is_mirrored:
+        image = mirrored_columns(ring)[found.sensor]
+        assert f"or r00 is sensor {image} and the columns run the other way round" in found.words(ring)
