@@ -58,7 +58,7 @@ def test_headings_that_count_from_elsewhere_are_at_an_angle(drive: Drive, how: A
 def test_a_straight_way_says_nothing_of_where_headings_count_from(drive: Drive) -> None:
     pose = np.zeros((300, 4))
     pose[:, 0], pose[:, 1] = 0.8 * np.arange(300), 0.6 * np.arange(300)
-    motion = motion_scores(Table(0.05 * np.arange(300), pose, drive.ranges[:300]), AUTO)
+    motion = motion_scores(Table(np.linspace(0.0, 15.0, 300), pose, drive.ranges[:300]), AUTO)
     assert (motion.is_known, motion.turned) == (True, None)
 
 
