@@ -43,15 +43,27 @@ ROBOTS: Final = (
     "peoplebot", "powerbot",
 )  # fmt: skip
 ROOMS: Final = ("room", "office", "hallway", "furnished", "goal", "corridor")
+AHEAD, ALL_BUT_ONE = "ahead", "all but one"
+"""In place of the numbers of sensors: those within 60° of the robot's front; all but one that looks ahead."""
 KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
     "frozen": {"kind": "frozen_ring"},
+    "frozen ahead": {"kind": "frozen_ring", "sensors": AHEAD},
+    "frozen but one": {"kind": "frozen_ring", "sensors": ALL_BUT_ONE},
+    "frozen with jitter": {"kind": "frozen_ring", "jitter_m": 0.001},
+    "silent ahead": {"kind": "silent_ring", "sensors": AHEAD},
+    "alternately silent": {"kind": "silent_ring", "every": 2},
+    "delayed": {"kind": "delayed_echoes"},
+    "coarse": {"kind": "coarse_ranges"},
+    "odometry frozen": {"kind": "odometry_error"},
+    "odometry backwards": {"kind": "odometry_error", "factor": -1.0},
+    "turned 45": {"kind": "turned_ring", "angle_deg": 45.0},
     "latched clock": {"kind": "clock_error"},
     "silent": {"kind": "silent_ring"},
     "at the maximum": {"kind": "constant_ring", "range_m": math.inf},
     "blind near": {"kind": "blind_near"},
     "constant": {"kind": "constant_ring"},
     "dropped": {"kind": "dropped_readings"},
-    "dropped, silent": {"kind": "dropped_readings", "silent": True},
+    "dropped silent": {"kind": "dropped_readings", "silent": True},
     "random": {"kind": "outliers", "share": 1.0},
     "turned 90": {"kind": "turned_ring"},
     "turned 180": {"kind": "turned_ring", "angle_deg": 180.0},
@@ -61,6 +73,7 @@ KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
     "replayed": {"kind": "replayed_echoes"},
     "clock at half": {"kind": "clock_error", "rate": 0.5},
     "clock at double": {"kind": "clock_error", "rate": 2.0},
+    "clock in steps": {"kind": "clock_error", "rate": 1.0, "step_s": 0.2},
     "clock leaps": {"kind": "clock_error", "rate": 1.0, "leap_s": 0.6},
     "clock leaps back": {"kind": "clock_error", "rate": 1.0, "leap_s": -0.6},
     "object at .1 m": {"kind": "sudden_object", "distance_m": 0.1},
@@ -69,6 +82,7 @@ KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
 """The kinds of lies; `constant_ring` of +inf stands for the ring's greatest range."""
 CLOCK: Final = "clock"
 """Kinds with this word change nothing on a robot whose packets carry no stamps."""
+AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5
 """A robot that has driven less since a lie began has hardly changed what it hears."""
 AT_SPEED_M_S: Final = 0.05
@@ -224,6 +238,11 @@ def make_lie(kind: str, settings: Settings, begin_s: float) -> Fault:
     values: dict[str, Any] = dict(KINDS[kind])
     if values.get("range_m") == math.inf:
         values["range_m"] = settings.ring.range_max_m
+    axes = [abs(math.degrees(math.remainder(mount.angle_rad, math.tau))) for mount in settings.ring.mounts]
+    if values.get("sensors") == AHEAD:
+        values["sensors"] = [i for i, angle_deg in enumerate(axes) if angle_deg <= AHEAD_DEG]
+    elif values.get("sensors") == ALL_BUT_ONE:
+        values["sensors"] = [i for i in range(len(axes)) if i != int(np.argmin(axes))]
     adapter: TypeAdapter[Fault] = TypeAdapter(Fault)
     return adapter.validate_python(values | {"at_s": begin_s, "duration_s": 1e4})
 
@@ -259,7 +278,7 @@ def run_trial(
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
     run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0
     place = device.truth.pose
-    contact_s = named_s = said = None
+    contact_s = named_s = said = held = None
     known: set[object] = set()
     while run_s < until_s:
         cycle += 1
@@ -274,6 +293,7 @@ def run_trial(
         reports = {(report.sensor, report.fault): report.reason for report in state.perception.sensor_reports()}
         if run_s < begin_s:
             known |= set(reports) | set(inputs.received.notes)
+            held = state.hold_reason
             before_m_s, speed_m_s = truth.contact_m_s, abs(truth.twist.v)
             continue
         way_m += math.hypot(place.x - before.x, place.y - before.y)
@@ -286,7 +306,8 @@ def run_trial(
                 texts += [note for note in inputs.received.notes if note not in known]
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
-            if kind is not None and state.hold_reason in {LOST, UNHEARD}:
+            held = held if state.hold_reason == held else None
+            if kind is not None and held is None and state.hold_reason in {LOST, UNHEARD}:
                 texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]

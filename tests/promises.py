@@ -39,8 +39,8 @@ LIMITS: Sequence[str] = (
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
     "become so where the ring hears four echoes or fewer from then on: they change as the robot's motion says. A "
     "map of the room contradicts them; without one, only a bumper stops the robot.",
-    "A ring that freezes while one sensor alone still hears: its echo may be a stuck sensor's, and the rest are "
-    "silent anyway.",
+    "A part of the ring that freezes or falls silent while the rest still hears: a sensor that does not change is "
+    "named after a metre or two on which its neighbours change, and what stood ahead may be touched before.",
     "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "
     "which the robot drives goes on, and one that turns into it has never heard that part.",
     "Echoes of an earlier drive that fit the present one, until they come again: replays in a corridor along its "

@@ -250,7 +250,7 @@ class DenningDevice(EventDevice):
         self._line.add_garbage(now, TICK_US)
 
     def _report_odometry(self) -> None:
-        body = self._body
+        body, twist = self._body, self._body.odometry_twist
         self._send(
             frames.Odom(
                 0,
@@ -259,8 +259,8 @@ class DenningDevice(EventDevice):
                 round(body.odometry_pose.y * 1e4),
                 round(body.odometry_pose.theta * 1e4),
                 round(body.odometry_ring_yaw * 1e4),
-                round(body.twist.v * 1e3),
-                round(body.twist.w * 1e3),
+                round(twist.v * 1e3),
+                round(twist.w * 1e3),
                 int(self.flags),
                 self._drive_seq,
             )

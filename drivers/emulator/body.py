@@ -83,6 +83,8 @@ class Body:
         The odometry.
     odometry_m
         The way of the wheels by odometry, m; backwards counts below zero.
+    odometry_factor
+        What the wheels count is the odometry's way and turn times this, for a fault of the encoders.
     twist
         The wheels' velocity.
     contacts
@@ -103,6 +105,7 @@ class Body:
         self.odometry_pose = Pose(0.0, 0.0, 0.0)
         self.odometry_ring_yaw = 0.0
         self.odometry_m = 0.0
+        self.odometry_factor = 1.0
         self.twist = Twist(0.0, 0.0)
         self.contacts = 0
         self.contact_m_s = 0.0
@@ -120,6 +123,12 @@ class Body:
     def radius_m(self) -> float:
         """Radius of the rim, m."""
         return self._config.radius_m
+
+    @property
+    def odometry_twist(self) -> Twist:
+        """The wheels' velocity as the encoders count it."""
+        factor = self.odometry_factor
+        return self.twist if factor == 1.0 else Twist(factor * self.twist.v, factor * self.twist.w)
 
     def reset_odometry(self) -> None:
         """Set the odometry to zero; the ring's angle to the wheels is measured at its gear and stays."""
@@ -241,9 +250,10 @@ class Body:
         errors = self._odometry_errors
         drift = errors.heading_rad_per_sqrt_m
         wander = drift * math.sqrt(abs(distance)) * self._rng.standard_normal() if drift > 0.0 else 0.0
-        counted = errors.turn_scale * turn + errors.veer_rad_per_m * distance + wander
-        self.odometry_pose = arc(self.odometry_pose, errors.scale * distance, counted)
-        self.odometry_m += errors.scale * distance
+        counted = self.odometry_factor * (errors.turn_scale * turn + errors.veer_rad_per_m * distance + wander)
+        counted_m = self.odometry_factor * errors.scale * distance
+        self.odometry_pose = arc(self.odometry_pose, counted_m, counted)
+        self.odometry_m += counted_m
         if not self._config.synchro:
             self.ring_yaw += turn
             self.odometry_ring_yaw += counted

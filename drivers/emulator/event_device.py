@@ -13,7 +13,7 @@ from config.world import WorldConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import Body
 from drivers.emulator.fault_schedule import FaultSchedule
-from drivers.emulator.faults import Fault, Reboot, SuddenObject
+from drivers.emulator.faults import Fault, OdometryError, Reboot, SuddenObject
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import NOWHERE, compile_scene
@@ -105,6 +105,7 @@ class EventDevice(ABC):
         """Start or end a fault as far as all robots do so alike."""
         self._line.collect(self._now_us)
         self._faults.set_active(fault, on=on)
+        self._body.odometry_factor = math.prod(error.factor for error in self._faults.all(OdometryError))
         if isinstance(fault, SuddenObject):
             pose, way = self._body.pose, self._body.pose.theta + math.radians(fault.bearing_deg)
             away_m = self._body.radius_m + fault.distance_m + fault.radius_m

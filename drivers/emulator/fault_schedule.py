@@ -61,6 +61,8 @@ class FaultSchedule:
             if at_us >= begin_us:
                 lasted_us = min(at_us - begin_us, round(error.duration_s * 1e6))
                 shown_us += round(error.leap_s * 1e6 + (error.rate - 1.0) * lasted_us)
+                if error.step_s > 0.0 and lasted_us == at_us - begin_us:
+                    shown_us -= shown_us % round(error.step_s * 1e6)
         return shown_us
 
     def all(self, kind: type[F]) -> list[F]:

@@ -138,12 +138,16 @@ class FrozenRing(_Lie):
     """Each sensor repeats the range that it reported last, bit for bit."""
 
     kind: Literal["frozen_ring"]
+    jitter_m: float = Field(default=0.0, ge=0.0)
+    """Random noise of at most this, either way, on what it repeats."""
 
 
 class SilentRing(_Lie):
     """Sensors fire and hear nothing."""
 
     kind: Literal["silent_ring"]
+    every: int = Field(default=1, ge=1)
+    """Of so many firings of a sensor one is silent."""
 
 
 class ConstantRing(_Lie):
@@ -184,6 +188,20 @@ class ReplayedEchoes(_Lie):
     period_s: float = Field(default=2.0, gt=0.0, le=600.0)
 
 
+class DelayedEchoes(_Lie):
+    """Sensors report what they heard this long ago."""
+
+    kind: Literal["delayed_echoes"]
+    delay_s: float = Field(default=0.5, gt=0.0, le=600.0)
+
+
+class CoarseRanges(_Lie):
+    """Ranges are rounded to multiples of this step."""
+
+    kind: Literal["coarse_ranges"]
+    step_m: float = Field(default=0.25, gt=0.0)
+
+
 class TurnedRing(_Timed):
     """The ring is mounted turned by this angle, counter-clockwise."""
 
@@ -205,6 +223,8 @@ class ClockError(_Timed):
     kind: Literal["clock_error"]
     rate: float = Field(default=0.0, ge=0.0, le=100.0)
     leap_s: float = Field(default=0.0, ge=-600.0, le=600.0)
+    step_s: float = Field(default=0.0, ge=0.0, le=600.0)
+    """Meanwhile the clock moves on in steps of this length, so that stamps repeat."""
 
 
 class SuddenObject(_Timed):
@@ -216,6 +236,13 @@ class SuddenObject(_Timed):
     bearing_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
     """Direction from the robot, counter-clockwise from straight ahead."""
     radius_m: float = Field(default=0.15, gt=0.0)
+
+
+class OdometryError(_Timed):
+    """The odometry counts the wheels' motion times this factor: 0 freezes it, −1 has it run backwards."""
+
+    kind: Literal["odometry_error"]
+    factor: float = Field(default=0.0, ge=-10.0, le=10.0)
 
 
 class OdometryJump(_Timed):
@@ -256,10 +283,13 @@ Fault: TypeAlias = (
     | DroppedReadings
     | RangeOffset
     | ReplayedEchoes
+    | DelayedEchoes
+    | CoarseRanges
     | TurnedRing
     | SwappedSensors
     | ClockError
     | SuddenObject
+    | OdometryError
     | OdometryJump
     | Unplug
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlindNear,
+    CoarseRanges,
     ConstantRing,
+    DelayedEchoes,
     DroppedReadings,
     Fault,
     FrozenRing,
@@ -29,7 +32,9 @@ from drivers.messages import Floats, Pose
 
 KINDS: tuple[type[Fault], ...] = (
     BlindNear,
+    CoarseRanges,
     ConstantRing,
+    DelayedEchoes,
     DroppedReadings,
     FrozenRing,
     Outliers,
@@ -41,6 +46,8 @@ KINDS: tuple[type[Fault], ...] = (
     TurnedRing,
 )
 """The faults of sensors."""
+Memory: TypeAlias = FrozenRing | ReplayedEchoes | DelayedEchoes
+"""The faults by which sensors report what they heard before."""
 
 
 class FaultySonar:
@@ -61,7 +68,9 @@ class FaultySonar:
     def __init__(self, sonar: Sonar, sensors: int, faults: FaultSchedule, rng: np.random.Generator) -> None:
         self._sonar, self._sensors, self._faults, self._rng = sonar, sensors, faults, rng
         self._heard = [deque[tuple[int, float]]() for _ in range(sensors)]
-        self._kept_us = max((_period_us(fault) for fault in faults.planned(ReplayedEchoes)), default=0)
+        remembering: list[Memory] = [*faults.planned(ReplayedEchoes), *faults.planned(DelayedEchoes)]
+        self._kept_us = max((_kept_us(fault) for fault in remembering), default=0)
+        self._fired = np.zeros(sensors, np.int64)
 
     def fire(
         self,
@@ -107,8 +116,12 @@ class FaultySonar:
             ranges[wild] = self._rng.uniform(0.0, window_m, len(ranges))[wild]
         for constant in faults.all(ConstantRing):
             ranges[self._those(constant.sensors)] = constant.range_m
+        self._fired[list(active)] += 1
         for silent in faults.all(SilentRing):
-            ranges[self._those(silent.sensors)] = math.inf
+            ranges[self._those(silent.sensors) & (self._fired % silent.every == 0)] = math.inf
+        for coarse in faults.all(CoarseRanges):
+            which = self._those(coarse.sensors)
+            ranges[which] = coarse.step_m * np.round(ranges[which] / coarse.step_m)
         missing: set[int] = set()
         for dropped in faults.all(DroppedReadings):
             which = self._those(dropped.sensors) & (self._rng.random(len(ranges)) < dropped.share)
@@ -136,25 +149,38 @@ class FaultySonar:
 
     def _repeat(self, ranges: Floats, active: Sequence[int], at_us: int) -> None:
         """Put earlier ranges in the place of the present ones where a fault says so; otherwise keep the present."""
-        faults: list[FrozenRing | ReplayedEchoes] = [*self._faults.all(FrozenRing)]
-        faults += self._faults.all(ReplayedEchoes)
-        begin_us = {i: fault for fault in faults for i in self._those(fault.sensors).nonzero()[0].tolist()}
+        faults: list[Memory] = [*self._faults.all(FrozenRing), *self._faults.all(ReplayedEchoes)]
+        faults += self._faults.all(DelayedEchoes)
+        repeated = {i: fault for fault in faults for i in self._those(fault.sensors).nonzero()[0].tolist()}
         for i in active:
-            heard = self._heard[i]
-            if i in begin_us and heard:
-                ranges[i] = _range_then(heard, begin_us[i], at_us)
-                continue
-            heard.append((at_us, float(ranges[i])))
-            while len(heard) > 1 and heard[1][0] <= at_us - self._kept_us:
-                heard.popleft()
+            heard, fault = self._heard[i], repeated.get(i)
+            if not isinstance(fault, FrozenRing | ReplayedEchoes) or not heard:
+                heard.append((at_us, float(ranges[i])))
+                while len(heard) > 1 and heard[1][0] <= at_us - self._kept_us:
+                    heard.popleft()
+            if fault is not None:
+                ranges[i] = _range_then(heard, fault, at_us)
+                if isinstance(fault, FrozenRing) and fault.jitter_m > 0.0:
+                    ranges[i] = max(0.0, ranges[i] + self._rng.uniform(-fault.jitter_m, fault.jitter_m))
 
 
-def _period_us(fault: FrozenRing | ReplayedEchoes) -> int:
-    return round(1e6 * fault.period_s) if isinstance(fault, ReplayedEchoes) else 0
+def _kept_us(fault: Memory) -> int:
+    """Return for how long a fault remembers what was heard, µs."""
+    match fault:
+        case ReplayedEchoes():
+            return round(1e6 * fault.period_s)
+        case DelayedEchoes():
+            return round(1e6 * fault.delay_s)
+        case _:
+            return 0
 
 
-def _range_then(heard: Iterable[tuple[int, float]], fault: FrozenRing | ReplayedEchoes, at_us: int) -> float:
-    """Return the range that a sensor repeats at a time: its last one, or the last of that time of the period."""
-    begin_us, period_us = round(1e6 * fault.at_s), _period_us(fault)
-    then_us = begin_us - period_us + (at_us - begin_us) % period_us if period_us else begin_us
+def _range_then(heard: Iterable[tuple[int, float]], fault: Memory, at_us: int) -> float:
+    """Return the range that a sensor repeats at a time: the last one, that of the period, or a late one."""
+    begin_us, kept_us = round(1e6 * fault.at_s), _kept_us(fault)
+    then_us = begin_us
+    if isinstance(fault, ReplayedEchoes):
+        then_us += (at_us - begin_us) % kept_us - kept_us
+    elif isinstance(fault, DelayedEchoes):
+        then_us = at_us - kept_us
     return [range_m for i, (t_us, range_m) in enumerate(heard) if i == 0 or t_us <= then_us][-1]

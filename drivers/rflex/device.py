@@ -278,7 +278,7 @@ class RflexDevice(EventDevice):
         return round(way_m * rflex.distance_factor), round(body.odometry_pose.theta * rflex.angle_factor)
 
     def _report_axes(self) -> None:
-        twist, rflex, clock = self._body.twist, self._rflex, self._clock()
+        twist, rflex, clock = self._body.odometry_twist, self._rflex, self._clock()
         speeds = (round(twist.v * rflex.distance_factor), round(twist.w * rflex.angle_factor))
         factors = (rflex.distance_factor, rflex.angle_factor)
         for axis, count in enumerate(self._counts()):

@@ -14,6 +14,8 @@ can only be compared with how it moves. An honest ring among objects that stand 
   sensors have in common (`perception.ring_faults.changes`).
 
 The first four are sequential tests, with one threshold for all, `perception.ring_faults.motion_tests.EVIDENCE_NAT`.
+The same threshold names a single sensor that repeats its reading while all others are silent: a frozen ring may have
+heard a single echo.
 A lie that agrees with the motion, as ranges that are all too long by the same amount do, can be found only as it
 begins.
 """
@@ -37,6 +39,7 @@ from perception.ring_faults.motion_tests import (
     NOTHING,
     REPEATED,
     SCATTERED,
+    STUCK,
     TURNED,
     VANISHED,
     check_motion,
@@ -118,8 +121,8 @@ class RingMonitor:
         self._past_looks = PastLooks(self._past, self._looks, self._replayed_nat)
         self._found = NOTHING
 
-    def observe(self, firing: Firing) -> None:
-        """Test a firing, in which sensors that are masked have no readings."""
+    def observe(self, firing: Firing) -> int | None:
+        """Test a firing, in which sensors that are masked have no readings; return a sensor that is found stuck."""
         mounts = self._mounts
         if self._turns:
             mounts = self._turned
@@ -134,8 +137,11 @@ class RingMonitor:
             self._expected,
             self._past_looks,
         )
+        if found >= STUCK:
+            return int(found) - STUCK
         if found != NOTHING:
             self._found = int(found)
+        return None
 
     def take_problem(self) -> str | None:
         """Return why the readings since the last call cannot be true, once; None if they can."""

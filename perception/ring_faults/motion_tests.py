@@ -13,7 +13,7 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_faults.changes import NO_CHANGE, NOISE_M, Expected, weigh_changes
+from perception.ring_faults.changes import EXCHANGED, NO_CHANGE, NOISE_M, Expected, weigh_changes
 from perception.ring_faults.memory import (
     HALVES,
     LOOK_KINDS,
@@ -82,7 +82,9 @@ NOTHING, REPEATED, VANISHED, SCATTERED, TURNED = range(5)
 """What `check_motion` returns: nothing is wrong; the ring repeats old readings; most known echoes have gone
 silent, or are elsewhere; `TURNED` plus 0 to 2: it is turned by a quarter, two or three, …"""
 CHANGED: Final = TURNED + QUARTERS - 1
-"""… and this plus one of the changes of `perception.ring_faults.changes`."""
+"""… and this plus one of the changes of `perception.ring_faults.changes`; …"""
+STUCK: Final = CHANGED + EXCHANGED + 1
+"""… and this plus the number of a sensor that repeats its reading while no other one hears anything new."""
 
 
 @kernel
@@ -343,4 +345,9 @@ def check_motion(
         past.replayed_nat[:] = 0.0
         for i in range(len(echoes)):
             echoes[i].is_compared = 0
-    return found
+        return found
+    for i in range(len(echoes)):
+        if echoes[i].stuck_nat >= EVIDENCE_NAT:
+            echoes[i].stuck_nat = 0.0
+            return STUCK + i
+    return NOTHING

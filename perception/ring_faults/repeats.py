@@ -9,14 +9,17 @@ from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace
+from perception.sensor_faults.monitor import TOLERANCE_MIN_M
 from perception.sensor_faults.wall import NOISE_SHARE
 
+REPEAT_M: Final = TOLERANCE_MIN_M
+"""Readings that differ by no more repeat each other, m: what is old may come with noise of a few millimetres."""
 REPEAT_NAT: Final = math.log(100.0)
-"""Evidence of a reading that repeats, to the bit, what it should have changed by `STEP_MIN_M` or three tolerances."""
+"""Evidence of a reading that repeats what it should have changed by `STEP_MIN_M` or three tolerances."""
 STEP_MIN_M: Final = 0.06
 """See `REPEAT_NAT`, m: ten times the error of a short way's odometry and of a range in steps of a millimetre."""
 REPEATS_MAX: Final = 3.0
-"""Such changes of one sensor that count: a single sensor may be stuck, which says nothing about the ring."""
+"""Such changes of one sensor that count for the ring: a single sensor may be stuck, and needs more to be named."""
 CHATTER_SHARE: Final = 0.002
 """A range varies by at least this share of it from look to look, also where a wall along the path answers."""
 EQUAL_PRIOR: Final = 2e-8
@@ -95,9 +98,16 @@ def is_parallel_wall(
 
 @kernel
 def changes_due(
-    i: int, look: Look, yaw: float, mounts: Floats, reception: Reception, echoes: Records[EchoTrace], path_m: float
+    i: int,
+    look: Look,
+    then: SensorPlace,
+    yaw: float,
+    mounts: Floats,
+    reception: Reception,
+    echoes: Records[EchoTrace],
+    path_m: float,
 ) -> float:
-    """Return how many times sensor `i` should have changed the reading that it repeats.
+    """Return how many times sensor `i` should have changed the reading that it repeats since it was at a place.
 
     A surface whose normal lies in the beam comes nearer by at least d·cos(ψ + β) when the sensor moves by d at an
     angle ψ to its axis, β being half the beam; after a turn by two beams it hears what another sensor heard before.
@@ -108,6 +118,8 @@ def changes_due(
         The sensor.
     look : Look
         Its reading, place and direction.
+    then : record
+        Where it made that reading before.
     yaw, mounts, echoes
         As for `check_motion`.
     reception : Reception
@@ -117,9 +129,8 @@ def changes_due(
     """
     half_angle, tolerance, _ = reception
     _, x, y, axis = look
-    c = echoes[i]
-    r = c.latest.range_m
-    dx, dy, turned = x - c.repeated.x, y - c.repeated.y, axis - c.repeated.axis
+    r = echoes[i].latest.range_m
+    dx, dy, turned = x - then.x, y - then.y, axis - then.axis
     if abs(turned) <= 2.0 * half_angle:  # it may still hear the same surface
         beam = half_angle + abs(turned)
         along = abs(dx * math.cos(axis) + dy * math.sin(axis))
@@ -130,7 +141,7 @@ def changes_due(
         lean = min(1.0, tolerance / math.hypot(dx, dy))  # the range stays within the tolerance for so long
         if is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, lean, echoes, path_m):
             return 0.0
-        return min(REPEATS_MAX, float(due))
+        return float(due)
     nearest, off = -1, half_angle
     for k in range(len(echoes)):
         away = abs(wrapped(mounts[k, 2] - mounts[i, 2] - turned))
@@ -138,7 +149,13 @@ def changes_due(
             nearest, off = k, away
     if nearest < 0 or abs(echoes[nearest].latest.range_m - r) <= tolerance + 0.1 * r:
         return 0.0
-    return min(REPEATS_MAX, math.floor(abs(turned) / (2.0 * half_angle)))
+    return math.floor(abs(turned) / (2.0 * half_angle))
+
+
+@kernel
+def repeats(r: float, before: float) -> bool:
+    """Return whether a reading repeats one before, m; both are below zero for a silence."""
+    return r == before or (r >= 0.0 and before >= 0.0 and abs(r - before) <= REPEAT_M)
 
 
 @kernel
@@ -203,20 +220,23 @@ def weigh_repeat(
     c, all_of = echoes[i], ring[0]
     r, x, y, axis = look
     tolerance = reception[1]
-    if not c.is_known or r != c.before.range_m:
+    is_repeating = c.standstill == all_of.standstill
+    if not c.is_known or not repeats(r, c.repeated.range_m if is_repeating else c.before.range_m):
         if c.is_known and is_ahead:
             all_of.standstill += 1
             all_of.repeated_nat = all_of.equal_nat = 0.0
-        elif c.is_known and c.standstill == all_of.standstill:
+        elif c.is_known and is_repeating:
             all_of.repeated_nat = max(0.0, all_of.repeated_nat - c.repeated_nat)
             all_of.equal_nat = max(0.0, all_of.equal_nat - c.equal_nat)
-        c.standstill, c.repeated_nat, c.equal_nat = 0, 0.0, 0.0
+        c.standstill, c.repeated_nat, c.equal_nat, c.stuck_nat = 0, 0.0, 0.0, 0.0
         c.is_known = 1
-    elif c.standstill != all_of.standstill:
-        c.standstill, c.repeated_nat, c.equal_nat = all_of.standstill, 0.0, 0.0
+    elif not is_repeating:
+        c.standstill, c.repeated_nat, c.equal_nat, c.stuck_nat = all_of.standstill, 0.0, 0.0, 0.0
         mark(c.repeated, r, x, y, axis, all_of.path_m)
-    elif r >= 0.0 and c.repeated_nat < SENSOR_NAT:
-        due = REPEAT_NAT * changes_due(i, look, yaw, mounts, reception, echoes, all_of.path_m)
+    elif r >= 0.0:
+        due = REPEAT_NAT * changes_due(i, look, c.repeated, yaw, mounts, reception, echoes, all_of.path_m)
+        c.stuck_nat = max(c.stuck_nat, due)
+        due = min(due, SENSOR_NAT)
         if due > c.repeated_nat:
             all_of.repeated_nat += due - c.repeated_nat
             c.repeated_nat = due

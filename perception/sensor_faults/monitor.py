@@ -6,7 +6,8 @@ A single reading proves nothing; how readings change while the robot moves and w
   that could give that reading, or although its neighbours saw objects pass. The same reading is legitimate at rest,
   along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
   or those of the whole ring do not. Or it repeats one through a full turn in place, while others read otherwise
-  (`perception.sensor_faults.turning`).
+  (`perception.sensor_faults.turning`). One that hears alone is found by its motion
+  (`perception.ring_faults.motion_tests.STUCK`).
 - *Silent.* The sensor hears nothing of what others heard where it looks, from both sides of its axis
   (`perception.sensor_faults.silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
   still counts as a look (`perception.obstacle_echoes.fresh_echoes`), which has no echo.
@@ -37,7 +38,7 @@ from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
 from perception.sensor_faults.memory import SETS_MAX, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.reading_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
-from perception.sensor_faults.report import SILENT, SensorReport, describe_fault
+from perception.sensor_faults.report import SILENT, STUCK, SensorReport, describe_fault
 from perception.sensor_faults.silence import miss_share
 from perception.sensor_mounts import mounts_array, ring_pose
 
@@ -200,6 +201,13 @@ class SensorMonitor:
         faulty = (self._sensors["faults"] & ~SILENT) != 0
         sound = ~(faulty[heard.transmitters] | faulty[heard.listeners])
         return CrossPaths(heard.transmitters[sound], heard.listeners[sound], heard.half_paths_m[sound])
+
+    def mask_stuck(self, sensor: int) -> None:
+        """Mask a sensor that repeats its last reading against the robot's motion, until it reads something else."""
+        one = self._sensor_records[sensor]
+        one.faults |= STUCK
+        one.stuck_m, one.off_stuck = one.last_m, 0
+        self.changes += 1
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""

@@ -69,7 +69,7 @@ def describe_fault(
             sensor,
             "stuck",
             f"sensor {sensor} always answers {stuck_m:.2f} m although the base has moved on: masked; look for "
-            f"something that hangs in front of it, then replace it",
+            f"something that hangs in front of it, and whether the wheels slip, then replace it",
         )
     if faults & TOO_NEAR:
         return SensorReport(

@@ -77,6 +77,24 @@ def test_echoes_are_replayed_from_the_beginning_of_the_period() -> None:
     assert [ranges[0] for ranges in lies("replayed_echoes", period_s=0.2)] == [2.0, 1.99, 2.0, 1.99, 2.0]
 
 
+def test_frozen_ranges_may_tremble() -> None:
+    frozen = lies("frozen_ring", 4, jitter_m=0.001)
+    ahead = [ranges[0] for ranges in frozen if ranges[0] is not None]
+    assert len(set(ahead)) == 4
+    assert all(abs(range_m - 1.99) <= 0.001 for range_m in ahead)
+
+
+def test_late_and_coarse_echoes() -> None:
+    assert [ranges[0] for ranges in lies("delayed_echoes", 3, delay_s=0.2)] == [2.0, 1.99, 1.98]
+    assert lies("coarse_ranges", 1, step_m=0.25) == [[2.0, 1.0, 3.0, math.inf]]
+    assert lies("coarse_ranges", 1, step_m=0.5, sensors=[2]) == [[1.98, 1.0, 3.0, math.inf]]
+
+
+def test_every_second_firing_may_be_silent() -> None:
+    ahead = [ranges[0] for ranges in lies("silent_ring", 4, every=2)]
+    assert ahead in ([math.inf, 1.97, math.inf, 1.95], [1.98, math.inf, 1.96, math.inf])
+
+
 def test_silent_constant_and_blind_sensors() -> None:
     silence = math.inf
     assert lies("silent_ring", 1) == [4 * [silence]]
@@ -147,12 +165,26 @@ def test_a_latched_clock_stamps_everything_alike() -> None:
     assert [clock.clock_us(us) for us in (0, 1_000_000, 2_000_000, 3_500_000)] == [0, 1_000_000, 1_000_000, 1_500_000]
     slow = FaultSchedule(script(kind="clock_error", at_s=1.0, duration_s=9.0, rate=0.5, leap_s=3.0))
     assert [slow.clock_us(us) for us in (999_999, 1_000_000, 2_000_000)] == [999_999, 4_000_000, 4_500_000]
+    steps = FaultSchedule(script(kind="clock_error", at_s=1.0, duration_s=2.0, rate=1.0, step_s=0.5))
+    stamps = [steps.clock_us(us) for us in (900_000, 1_300_000, 1_600_000, 3_100_000)]
+    assert stamps == [900_000, 1_000_000, 1_500_000, 3_100_000]
     for family in (DENNING, RFLEX, ROS2):
         cable = family.driving(AHEAD, lie("clock_error", at_s=BEGIN_S, duration_s=99.0))
         cable.run(BEGIN_S - cable.now_s + 0.1)
         cable.odometry.clear()
         cable.run(0.3)
         assert len({sample.robot_s for sample in cable.odometry}) <= 1
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0])
+def test_the_odometry_counts_by_a_factor(family: Family, factor: float) -> None:
+    cable = family.driving(AHEAD, lie("odometry_error", at_s=BEGIN_S, duration_s=9.0, factor=factor))
+    cable.run(BEGIN_S - cable.now_s + 0.2)
+    reported, true = cable.odometry[-1].pose.x, cable.robot.truth.pose.x
+    cable.run(1.0)
+    way = cable.robot.truth.pose.x - true
+    assert way > 0.1
+    assert cable.odometry[-1].pose.x - reported == pytest.approx(factor * way, abs=0.05)
 
 
 def test_a_drum_appears_ahead_and_stops_the_body(family: Family) -> None:
@@ -170,4 +202,6 @@ def test_a_drum_appears_ahead_and_stops_the_body(family: Family) -> None:
 def test_every_lie_is_documented() -> None:
     page = ROOT.joinpath("docs", "extending.md").read_text(encoding="utf-8")
     named = [get_args(kind.model_fields["kind"].annotation)[0] for kind in KINDS]
-    assert [name for name in (*named, "clock_error", "sudden_object") if f"| `{name}` |" not in page] == []
+    assert [
+        name for name in (*named, "clock_error", "odometry_error", "sudden_object") if f"| `{name}` |" not in page
+    ] == []

@@ -56,6 +56,10 @@ def frozen(ranges: Floats, context: LieContext) -> Floats:
     return np.where(np.isnan(context.last) | np.isnan(ranges), ranges, context.last)
 
 
+def trembling(ranges: Floats, context: LieContext) -> Floats:
+    return frozen(ranges, context) + context.rng.uniform(-0.001, 0.001, len(ranges))
+
+
 def silent(ranges: Floats, _: LieContext) -> Floats:
     return np.where(np.isnan(ranges), ranges, math.inf)
 
@@ -200,6 +204,30 @@ def test_a_ring_that_freezes_between_walls_along_the_path_is_found(
     measured(f"{robot}, walls at {angle:g} rad: {len(ways)} of 8 found, after {max(ways, default=0.0):.2f} m or less")
     assert len(ways) >= (8 if angle else 6), "a ring whose only echoes are two or three needs more than this way"
     assert max(ways) < 1.0
+
+
+@pytest.mark.parametrize("robot", ["p3dx", "b21r"])
+def test_a_ring_that_repeats_old_readings_with_a_little_noise_is_found(robot: str) -> None:
+    ring = load_settings("room", robot=robot).ring
+    for seed in range(2):
+        world, path = room(seed, ROUGH)
+        got = found(ring, firings(ring, world, path, trembling, 1.2, seed))
+        assert got is not None
+        assert got[1] == REASONS[REPEATED]
+        assert got[0] < 1.0
+
+
+def test_the_only_sensor_that_hears_is_returned() -> None:
+    """An echo that does not change on the way to it, with silence around: all that a frozen ring may have heard."""
+    ring = load_settings("room", robot="p3dx").ring
+    monitor, stuck = RingMonitor(ring), []
+    for k in range(60):
+        ranges = np.full(len(ring.mounts), math.inf)
+        ranges[3] = 2.0
+        sensor = monitor.observe(Firing(0.05 * k, Pose(SPEED_M * k, 0.0, 0.0), 0.0, ranges))
+        stuck += [] if sensor is None else [sensor]
+        assert monitor.take_problem() is None
+    assert set(stuck) == {3}
 
 
 def test_slipping_wheels_are_named_as_the_other_cause() -> None:

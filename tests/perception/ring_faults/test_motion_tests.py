@@ -17,6 +17,7 @@ from perception.ring_faults.motion_tests import (
     NOTHING,
     REPEATED,
     SCATTERED,
+    STUCK,
     TURNED,
     VANISHED,
     check_motion,
@@ -123,6 +124,17 @@ def test_a_few_misses_are_honest_and_a_finding_begins_anew() -> None:
     assert ring.missed_nat == 0.0
     assert ring.fire(np.full(COUNT, math.inf)) == VANISHED
     assert ring.missed_nat == 0.0
+
+
+def test_the_only_sensor_that_hears_is_named_where_it_does_not_change() -> None:
+    """A frozen ring that has heard one echo: what is silent on is not contradicted, and one sensor may be stuck."""
+    ring, ranges = Ring(), np.full(COUNT, math.inf)
+    ranges[1] = 2.0
+    assert {ring.fire(ranges) for _ in range(30)} == {NOTHING, STUCK + 1}
+    honest_ring = Ring()
+    for k in range(30):
+        ranges[1] = 2.0 - STEP_M * k
+        assert honest_ring.fire(ranges) == NOTHING
 
 
 @pytest.mark.parametrize("quarter", [1, 2, 3])

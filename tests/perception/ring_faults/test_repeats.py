@@ -22,6 +22,7 @@ from perception.ring_faults.repeats import (
     learn_noise,
     mark,
     repeat_evidence,
+    repeats,
     weigh_repeat,
 )
 
@@ -42,7 +43,7 @@ def heard(*ranges: tuple[int, float]) -> Records[EchoTrace]:
 
 def due(echoes: Records[EchoTrace], i: int, x: float, turned: float = 0.0) -> float:
     axis = MOUNTS[i, 2] + turned
-    return changes_due(i, (0.0, x, 0.0, axis), turned, MOUNTS, RECEPTION, echoes, x)
+    return changes_due(i, (0.0, x, 0.0, axis), echoes[i].repeated, turned, MOUNTS, RECEPTION, echoes, x)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -59,7 +60,7 @@ def test_a_rough_wall_beside_the_path_explains_what_sensors_hear_of_it(side: int
 
 def test_a_sensor_that_looks_ahead_should_change_with_the_way() -> None:
     echoes = heard((0, 2.0))
-    assert [due(echoes, 0, x) for x in (0.05, 0.07, 0.13, 1.0)] == [0.0, 1.0, 2.0, REPEATS_MAX]
+    assert [due(echoes, 0, x) for x in (0.05, 0.07, 0.13, 1.0)] == [0.0, 1.0, 2.0, 16.0]
     assert due(heard((6, 2.0)), 6, 1.0) == 0.0, "what is beside the path does not come nearer"
 
 
@@ -69,6 +70,13 @@ def test_after_a_turn_a_sensor_should_hear_what_another_heard() -> None:
     assert due(heard((0, 2.0), (2, 2.1)), 0, 0.0, turned) == 0.0, "alike all around"
     assert due(heard((0, 2.0)), 0, 0.0, turned) == 0.0, "nothing is known of where it looks"
     assert due(heard((0, 2.0), (2, 3.0)), 0, 0.0, math.radians(20.0)) == 0.0, "it may still hear the same"
+
+
+def test_readings_with_a_little_noise_repeat_each_other() -> None:
+    assert repeats(2.0, 2.004)
+    assert not repeats(2.0, 2.02)
+    assert repeats(NO_ECHO_M, NO_ECHO_M)
+    assert not repeats(0.001, NO_ECHO_M)
 
 
 def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:

@@ -214,6 +214,23 @@ def test_the_silence_of_a_silent_sensor_is_masked_until_its_first_echo(
     measured(f"{halls} sensors that never hear: the silence of {caught} not believed")
 
 
+def test_a_sensor_that_another_test_found_stuck_is_masked_until_it_reads_otherwise() -> None:
+    monitor, ranges = SensorMonitor(RING), np.full(24, math.inf)
+
+    def trusted(range_m: float) -> float:
+        ranges[3] = range_m
+        return float(monitor.filter(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges))[0].ranges_m[3])
+
+    assert trusted(2.0) == 2.0
+    monitor.mask_stuck(3)
+    assert math.isnan(trusted(2.0))
+    (report,) = monitor.reports()
+    assert (report.sensor, report.fault) == (3, "stuck")
+    assert "always answers 2.00 m" in report.reason
+    assert [trusted(3.0) for _ in range(RECOVERY_READINGS)][-1] == 3.0
+    assert monitor.reports() == ()
+
+
 def test_a_stuck_sensor_returns_to_use_when_it_behaves() -> None:
     world, path = random_hall(3, NOISY)
     watch, config = SensorMonitor(RING), RING
