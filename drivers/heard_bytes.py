@@ -32,6 +32,10 @@ _QUOTED_MAX: Final = 60
 """Longest quotation, characters."""
 _ECHO_MIN: Final = 6
 """Shortest write that counts when it comes back, bytes."""
+_ECHOES: Final = (
+    "what this program sends comes back; the other end echoes it, as a loopback, a terminal or a modem does: give "
+    "the robot's own port"
+)
 
 
 class HeardBytes:
@@ -57,9 +61,9 @@ class HeardBytes:
         self._stranger, self._received = self.stranger, b""
 
     def sent(self, data: bytes) -> None:
-        """Take a write that no robot of the protocol sends back."""
+        """Take a write that no robot of the protocol sends back; what was found out before it stays."""
         if len(data) >= _ECHO_MIN:
-            self._sent = data
+            self._stranger, self._sent = self.stranger, data
 
     def received(self, data: bytes) -> None:
         """Take bytes from the line."""
@@ -71,11 +75,8 @@ class HeardBytes:
         """What device sends these bytes, likely cause, next action; None if they may be a robot's."""
         data = self._received
         if self._sent and self._sent in data:
-            return (
-                "what this program sends comes back; the other end echoes it, as a loopback, a terminal or a modem "
-                "does: give the robot's own port"
-            )
-        line = _last_line(data)
+            return _ECHOES
+        line = _last_line(data) if self._stranger is None else None
         if line is None:
             return self._stranger
         return (

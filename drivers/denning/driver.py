@@ -123,12 +123,16 @@ class DenningDriver(Session[PoseStamper]):
         commands = self._commands
         given_up = [n for n in _SEND_ORDER if n in commands and commands[n].tick(run_s)] if commands else ()
         if given_up:
-            name, tries = given_up[0], commands[given_up[0]].tries
-            self._go_down(lambda: diagnostics.no_answer(name, tries, self._decoder.frames, self._heard))
+            name, command = given_up[0], commands[given_up[0]]
+            self._go_down(lambda: self._no_answer(name, command))
         if self._state is LineState.READY:
             self._check_timeouts()
             if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
                 self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
+
+    def _no_answer(self, name: str, command: PendingCommand) -> str:
+        frames = self._decoder.frames if self._last_frame_s > command.begun_s else 0
+        return diagnostics.no_answer(name, command.tries, frames, self._heard)
 
     def halt(self) -> None:
         """Stop the robot at once and latch it: sent before everything else, and repeated until acknowledged."""
@@ -136,6 +140,8 @@ class DenningDriver(Session[PoseStamper]):
         self._commands.pop("RELEASE", None)
         if "HALT" not in self._commands:
             self._queue("HALT")
+            if self._state is LineState.READY:
+                self._heard.clear()
 
     def release(self) -> None:
         """Clear the latch; without effect unless READY, so that the robot is never released later and unnoticed."""
@@ -317,6 +323,7 @@ class DenningDriver(Session[PoseStamper]):
             if "HALT" in self._commands:
                 # A robot that answers other commands must answer this one within the usual number of tries.
                 self._queue("HALT")
+                self._heard.clear()
         if self._state is LineState.READY:
             self._problem = None
 

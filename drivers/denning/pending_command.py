@@ -33,6 +33,8 @@ class PendingCommand:
         Tries before giving up; None = never.
     due
         True if it should be sent as soon as possible.
+    tries, sent_s, begun_s
+        Number of tries, and the times of the newest and of the first.
     """
 
     build: Callable[[int], HostFrame]
@@ -41,6 +43,7 @@ class PendingCommand:
     due: bool = True
     tries: int = 0
     sent_s: float = 0.0
+    begun_s: float = 0.0
     seqs: deque[int] = field(default_factory=lambda: deque(maxlen=_SEQS_KEPT))
 
     def frame(self, seq: int, run_s: float) -> HostFrame:
@@ -48,6 +51,8 @@ class PendingCommand:
         self.due = False
         self.tries += 1
         self.sent_s = run_s
+        if self.tries == 1:
+            self.begun_s = run_s
         self.seqs.append(seq)
         return self.build(seq)
 

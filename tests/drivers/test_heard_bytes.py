@@ -64,6 +64,31 @@ def test_what_was_found_out_outlasts_a_change_of_speed_but_not_another_line() ->
     assert bytes_.total == 0
 
 
+def test_a_device_with_a_prompt_is_one_stranger_between_its_writes() -> None:
+    """It prints, sends back what it gets, and prints again: what was found out does not change with each write."""
+    bytes_, said = heard(b"\r\nboot of a board\r\nlogin: "), []
+    for k in range(20):
+        write = bytes([0xAA, 0x55, 1, k, 0, 0, 9, k])
+        bytes_.sent(write)
+        said.append(bytes_.stranger)
+        bytes_.received(write)
+        said.append(bytes_.stranger)
+        bytes_.received(b"\r\nunknown command %d\r\nlogin: " % k * 8)
+        said.append(bytes_.stranger)
+    assert said[0] is not None
+    assert "a device sends text" in said[0]
+    assert set(said[1:]) == {said[1]}
+    assert "what this program sends comes back" in (said[1] or "")
+
+
+def test_the_first_text_is_quoted_from_the_second_write_on() -> None:
+    bytes_ = HeardBytes()
+    for k in range(5):
+        bytes_.sent(bytes(8))
+        bytes_.received(b"temperature %d degrees\r\n" % k)
+    assert "temperature 0 degrees" in (bytes_.stranger or "")
+
+
 def test_only_a_whole_write_that_comes_back_is_an_echo() -> None:
     bytes_ = HeardBytes()
     bytes_.sent(b"\xfa\xfb\x03\x1d\x00\x1d\xfa\xfb\x03\x37\x00\x37")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from drivers.denning.frames import (
     Ack,
     Drive,
@@ -87,7 +89,12 @@ def test_halt_is_repeated_until_acknowledged(harness: DriverHarness) -> None:
     assert harness.state() is LineState.READY
 
 
-def test_a_robot_that_answers_all_but_halt_is_down() -> None:
+@pytest.mark.parametrize(
+    ("sends", "what"),
+    [(True, "although the robot sends other frames"), (False, "and nothing is received; the robot is off")],
+)
+def test_a_robot_that_answers_all_but_halt_is_down(sends: bool, what: str) -> None:
+    """A robot that froze sent frames before the HALT, and none since."""
     harness = DriverHarness()
     harness.robot.halt()
     harness.open()
@@ -96,11 +103,13 @@ def test_a_robot_that_answers_all_but_halt_is_down() -> None:
     (pattern,) = only(harness.received(), Pattern)
     harness.send(Ack(0, pattern.seq))
     assert harness.state() is LineState.READY
-    for _ in range(20):
+    for k in range(20):
         harness.received()
         harness.pass_time(0.02)
+        if sends:
+            harness.odom(20_000 * k)
     assert harness.state() is LineState.DOWN
-    assert "no answer to 3 HALT commands although the robot sends" in (harness.robot.problem or "")
+    assert f"no answer to 3 HALT commands {what}" in (harness.robot.problem or "")
 
 
 def test_release_clears_a_pending_halt_without_waiting(harness: DriverHarness) -> None:
