@@ -131,7 +131,7 @@ class DenningDriver(Session[PoseStamper]):
                 self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
 
     def _no_answer(self, name: str, command: PendingCommand) -> str:
-        frames = self._decoder.frames if self._last_frame_s > command.begun_s else 0
+        frames = self._decoder.frames if self._last_frame_s > command.first_s else 0
         return diagnostics.no_answer(name, command.tries, frames, self._heard)
 
     def halt(self) -> None:

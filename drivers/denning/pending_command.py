@@ -33,7 +33,7 @@ class PendingCommand:
         Tries before giving up; None = never.
     due
         True if it should be sent as soon as possible.
-    tries, sent_s, begun_s
+    tries, sent_s, first_s
         Number of tries, and the times of the newest and of the first.
     """
 
@@ -43,7 +43,7 @@ class PendingCommand:
     due: bool = True
     tries: int = 0
     sent_s: float = 0.0
-    begun_s: float = 0.0
+    first_s: float = 0.0
     seqs: deque[int] = field(default_factory=lambda: deque(maxlen=_SEQS_KEPT))
 
     def frame(self, seq: int, run_s: float) -> HostFrame:
@@ -52,7 +52,7 @@ class PendingCommand:
         self.tries += 1
         self.sent_s = run_s
         if self.tries == 1:
-            self.begun_s = run_s
+            self.first_s = run_s
         self.seqs.append(seq)
         return self.build(seq)
 
