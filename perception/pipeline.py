@@ -150,8 +150,7 @@ class Perception:
         if len(firing.ranges_m) != self._sensors:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges, but the ring has {self._sensors} sensors")
         trusted, possible = self.sensor_monitor.filter(firing)
-        if (stuck := self.ring_monitor.observe(possible)) is not None:
-            self.sensor_monitor.mask_stuck(stuck)
+        self.sensor_monitor.mask_stuck(self.ring_monitor.observe(possible))
         self._echoes.update(possible)
         if self.known_room is not None:
             self.known_room.observe(trusted)

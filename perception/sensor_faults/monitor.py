@@ -202,8 +202,10 @@ class SensorMonitor:
         sound = ~(faulty[heard.transmitters] | faulty[heard.listeners])
         return CrossPaths(heard.transmitters[sound], heard.listeners[sound], heard.half_paths_m[sound])
 
-    def mask_stuck(self, sensor: int) -> None:
-        """Mask a sensor that repeats its last reading against the robot's motion, until it reads something else."""
+    def mask_stuck(self, sensor: int | None) -> None:
+        """Mask a sensor, if any, that repeats a reading against the robot's motion, until it reads something else."""
+        if sensor is None:
+            return
         one = self._sensor_records[sensor]
         one.faults |= STUCK
         one.stuck_m, one.off_stuck = one.last_m, 0
