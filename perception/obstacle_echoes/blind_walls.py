@@ -179,13 +179,18 @@ class BlindWalls:
         directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         off = np.abs(np.remainder(directions[:, None] - axes_rad + math.pi, math.tau) - math.pi)
         nearest = off.min(axis=1)
-        nearest[np.cos(directions - pose.theta) <= 0.0] = 0.0
+        is_ahead = np.cos(directions - pose.theta) > 0.0
         c, s = np.cos(directions), np.sin(directions)
         away = self._walls["offset"] - pose.x * c - pose.y * s
         is_known = self._walls["is_known"] == 1
-        stands = (nearest > self._half_angle) & is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
+        is_wall = is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
+        stands = is_ahead & is_wall & (nearest > self._half_angle)
         # What lies partly in a beam is seen as the robot turns a little; beams that touch miss nothing between them.
-        is_unknown = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
+        is_unseen = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
+        # At the edge of what is unseen it is looked at whole: else the robot would turn to and fro between two edges.
+        is_edge = (nearest > self._half_angle - 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
+        is_edge &= np.roll(is_unseen, 1) | np.roll(is_unseen, -1)
+        is_unknown = is_ahead & (is_unseen | is_edge)
         return np.stack([pose.x + away * c, pose.y + away * s], axis=1)[stands], directions[is_unknown]
 
     def clear(self) -> None:

@@ -82,7 +82,7 @@ def test_a_direction_is_unknown_until_the_ring_looks_there_and_again_some_metres
     there = Pose(KEPT_M + 0.1, 0.0, 0.0)
     walls.update(Firing(0.0, there, 0.0, np.full(4, math.inf)))
     unknown = np.degrees(np.abs(np.remainder(sides(walls, there)[1] + math.pi, math.tau) - math.pi))
-    assert set(np.rint(unknown)) == {60.0, 70.0, 80.0}
+    assert set(np.rint(unknown)) == {50.0, 60.0, 70.0, 80.0}, "the beams reach 45°, where that of 50° begins"
     walls.clear()
     assert len(sides(walls, there)[1]) >= 6
 
@@ -103,3 +103,22 @@ def test_beams_that_touch_leave_nothing_unknown() -> None:
     walls = BlindWalls(mounts, math.radians(ring.beam_half_angle_deg))
     _, unknown = walls.sides(Pose(0.0, 0.0, 0.0), mounts[:, 2])
     assert len(unknown) == 0
+
+
+@pytest.mark.parametrize("first_deg", range(0, 10, 2))
+def test_a_robot_that_hears_nothing_and_turns_to_what_is_unknown_soon_knows_all(first_deg: float) -> None:
+    """It turns on after the edge of its outermost beam has reached a direction, until all of that was looked at."""
+    mounts = np.array([[0.3, 0.0, a] for a in np.radians([-34.0, 0.0, 34.0])])
+    walls, course = BlindWalls(mounts, math.radians(18.0)), math.radians(first_deg)
+    theta, turns = course - 0.5, 0
+    while turns < 200:  # four radians
+        turns += 1
+        pose = Pose(0.0, 0.0, theta)
+        walls.update(Firing(0.0, pose, theta, np.full(3, math.inf)))
+        _, unknown = walls.sides(pose, theta + mounts[:, 2])
+        towards = np.remainder(unknown - theta + math.pi, math.tau) - math.pi
+        towards = towards[np.cos(unknown - course) > 0.0]
+        if not len(towards):
+            break
+        theta += math.copysign(0.02, towards[np.abs(towards).argmin()])
+    assert turns < 200
