@@ -154,7 +154,7 @@ def pose_line(pose: PoseRow, units: Units) -> str:
     heading, error = math.degrees(pose["theta"]) % 360.0, math.degrees(sigma_theta)
     return (
         f"{pose['status']}: the robot is at {format_point(pose['x'], pose['y'], units)} {units}, "
-        f"± {format_length(max(sigma_x, sigma_y), units, 3)} {units}, heading {heading:.1f}° ± {error:.1f}°"
+        f"{page_text.spread(max(sigma_x, sigma_y), units)}, heading {heading:.1f}° ± {error:.1f}°"
     )
 
 

@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from runtime.cli.tables import objects_table, outcome_line, table_2, timing_line, timing_table
-from runtime.cycle.summary import ObjectRow, RunSummary
+from runtime.cli.tables import objects_table, outcome_line, pose_line, table_2, timing_line, timing_table
+from runtime.cycle.summary import ObjectRow, PoseRow, RunSummary
 from runtime.simulation.evaluation import Outcome
 from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import Spread
@@ -56,6 +56,15 @@ def test_result_line() -> None:
     )
     nothing: Outcome = {**OUTCOME, "drums": OUTCOME["drums"][1:], "mean_error": None, "max_error": None}
     assert outcome_line(nothing, "m").startswith("0 of 1 drums found, 1 false; 79 times real time; ")
+
+
+@pytest.mark.parametrize(("sigma_m", "said"), [(0.02, "± 0.020 m"), (0.0004, "± 0.4 mm"), (0.0, "less than 0.1 mm")])
+def test_no_place_is_known_to_nothing(sigma_m: float, said: str) -> None:
+    covariance = [[sigma_m**2, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1e-6]]
+    here: PoseRow = {
+        "x": 1.0, "y": 2.0, "theta": 0.0, "covariance": covariance, "status": "tracking", "probability": 1.0,
+    }  # fmt: skip
+    assert said in pose_line(here, "m")
 
 
 def test_objects() -> None:
