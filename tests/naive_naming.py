@@ -79,16 +79,18 @@ def is_doubtful(careful: bool, misfit: float, room_lead: float, sides: int, conf
 def is_called(
     called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
     rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
-    compared: bool,
+    compared: bool, standing: bool,
 ) -> bool:  # fmt: skip
     """Return whether a circle has a model's name, unless it is doubtful: given when sure, kept while likely.
 
-    It is not given before each rival was `compared`.
+    It is not given before each rival was `compared`. A robot that is `standing` keeps it as long as that is probable.
     """
     share = 1.1 if max(rivals) < -20 else 1.25
     seen_round = dispersion >= 0.008
     possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2
     needed = near if wall != 0 and wall <= -4 else sure
+    if standing and called:
+        return established and known and probability >= min(needed, 0.5)
     return possible and ((compared and probability >= needed) or (called and probability >= min(needed, 0.5)))
 
 

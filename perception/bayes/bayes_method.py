@@ -49,6 +49,7 @@ from perception.bayes.tracks.observe import associate, hear_crosses, observe
 from perception.bayes.tracks.polygon_tracks import polygon_quantum
 from perception.bayes.tracks.refine import quantum
 from perception.bayes.tracks.track_archive import TrackArchive
+from perception.bayes.walls.standing import keep_while_standing
 from perception.bayes.walls.wall_map import update_walls
 from perception.bounds import CONSTANT, Bound, bounds, index_of, up_to
 from perception.detected_object import DetectedObject, MapCounts
@@ -154,6 +155,7 @@ class BayesPerception:
         s, tracks, settings = self.memory.s, self.memory.tracks, self.settings
         pose, time_s = firing.pose, float(firing.robot_s)
         mounts = mounts_at(firing, self._mounts, self._turning)
+        keep_while_standing(self.memory, float(pose.x), float(pose.y), float(firing.ring_yaw))
         readings = associate(
             s,
             tracks,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import get_args
 
@@ -35,6 +36,22 @@ def test_nothing_sure_is_lost_while_the_robot_stands(model: Reflection, seed: in
     assert trial.known, "a drive through a room makes something sure"
     assert losses(trial) == []
     assert trial.named == set()
+
+
+@pytest.mark.parametrize(
+    ("seed", "model"),
+    [
+        (301, "specular"),  # a span of a wall comes near a circle's, …
+        (306, "cone"),  # … or walls end a little farther from their corner, …
+        (310, "cone"),  # … or a stray passes where a wall goes on to its corner, …
+        (401, "specular"),  # … or two echoes of a drum drop out
+        *itertools.product([2003, 2004], MODELS),
+    ],
+)
+def test_the_last_readings_of_a_drive_take_no_wall_and_no_drum_away(seed: int, model: Reflection) -> None:
+    trial = try_standing(SETTINGS, seed, model, 20.0)
+    assert trial.known
+    assert [one for one, _ in trial.lost if one.model in {"wall", "drum"}] == []
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -58,6 +58,8 @@ class WallBin(Record):
     """1 where the last review found that the wall covers it by echoes, or one was entered since."""
     is_open: Flag
     """1 where the last review found it open."""
+    is_kept: Flag
+    """1 where a wall was sure when the robot stopped, until it moves on."""
     newest: Reading
 
 
@@ -155,6 +157,8 @@ class RoomCorner(Record):
     """The walls; where a wall ends alone, that wall …"""
     second: Annotated[int, index_of(MAX_WALLS)]
     """… and 1 if it is its high end, 0 for its low end."""
+    is_kept: Flag
+    """1 if it was sure when the robot stopped, until it moves on."""
 
 
 class RecentReading(Record):
@@ -163,6 +167,16 @@ class RecentReading(Record):
     reading: Reading
     is_free: Annotated[int, Bound(IS_KNOWN, IS_TAKEN)]
     """1 for an echo that nothing explains yet, 2 while a new wall is fitted to it."""
+
+
+class Stop(Record):
+    """Where the robot is, and whether it stands there."""
+
+    x: Place
+    y: Place
+    yaw: Finite
+    """Of the ring, rad."""
+    is_standing: Flag
 
 
 class WallMap(Record):
@@ -192,6 +206,7 @@ class WallMap(Record):
     remembered_of: Annotated[Floats, SENSORS_MAX, FINITE]
     """1 for each sensor that has one."""
     firings: Count
+    stop: Stop
     edge_echoes: Finite
     """Slanting walls that answered from the beam's edge …"""
     edge_silences: Finite

@@ -90,7 +90,9 @@ def is_compared(track: CircleTrack, p: SettingsRecord) -> bool:
 
 
 @kernel
-def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float, careful: bool) -> None:
+def update_name(
+    track: CircleTrack, p: SettingsRecord, sure: float, least: float, careful: bool, is_standing: bool
+) -> None:
     """Name a track after a model once that is sure; withdraw the name once it is no longer likely.
 
     Without this hysteresis a name would come and go with each comparison, and could not be used for steering.
@@ -105,6 +107,8 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
         Least probability to give a name, and the same where a wall is excluded.
     careful : bool
         Whether it must have been heard from all over its front.
+    is_standing : bool
+        Whether the robot stands: then no echo that drops out takes away a name that is likely.
     """
     line = p[0].circle_count
     if track.leads[line] == 0.0 or track.leads[line] > NO_WALL_LEAD_NAT:
@@ -116,6 +120,8 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
         or is_name_doubtful(track, careful)
     ):
         track.is_named = 0
+        return
+    if is_standing and track.is_named == 1:
         return
     best = -1e300
     for k in range(line + 2):

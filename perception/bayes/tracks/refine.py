@@ -345,7 +345,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         check_model(s, p, track, n)
     report = p[0].report_probability
     near = p[0].report_probability_near if prior >= p[0].model_prior_nat else report
-    update_name(track, p, report, near, careful)
+    update_name(track, p, report, near, careful, s[0].room.stop.is_standing == 1)
     withdraw_overlapping(tracks, t)
     if track.is_named == 1:
         track.marks &= CONFIRMED

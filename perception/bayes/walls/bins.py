@@ -76,6 +76,7 @@ def clear_bins(wall: Wall) -> None:
         of.number = 0
         of.is_held = 0
         of.is_open = 0
+        of.is_kept = 0
 
 
 def free(wall: Wall) -> None:

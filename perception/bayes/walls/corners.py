@@ -124,6 +124,7 @@ def clear_corner(corner: RoomCorner) -> None:
     corner.ended = 0.0
     corner.far_echoes = 0.0
     corner.far_passes = 0.0
+    corner.is_kept = 0
     clear_information(corner.heard)
 
 

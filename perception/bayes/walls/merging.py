@@ -127,6 +127,7 @@ def move_bins(main: Wall, part: Wall) -> None:
     np.maximum.at(target["passes"], at, source["passes"])
     np.maximum.at(target["is_held"], at, source["is_held"])
     np.maximum.at(target["is_open"], at, source["is_open"])
+    np.maximum.at(target["is_kept"], at, source["is_kept"])
     target["newest"][at] = source["newest"]
     target["number"][at] = source["number"]
     main.is_changed = 1
@@ -223,10 +224,20 @@ def release(room: WallMap, wall: Wall, p: SettingsRecord) -> None:
 
 
 @kernel
+def is_kept(wall: Wall) -> bool:
+    """Return whether a wall was sure when the robot stopped."""
+    is_any = False
+    for b in range(WALL_BINS):
+        is_any = is_any or wall.bins[b].is_kept == 1
+    return is_any
+
+
+@kernel
 def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn: int) -> None:
     """End a wall that does not fit its readings, or whose readings heavier walls or other objects explain.
 
-    Those are lines across a corner, or along some ends.
+    Those are lines across a corner, or along some ends. While the robot stands, no other explanation ends what was
+    sure when it stopped: that explained the same readings before.
 
     Parameters
     ----------
@@ -245,6 +256,8 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
     if room.walls[own].misfit > MERGED_MISFIT_MAX:
         release(room, room.walls[own], p)
         clear_wall(room.walls[own])
+        return
+    if is_kept(room.walls[own]):
         return
     count = 0
     taken = 0

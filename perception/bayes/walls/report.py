@@ -16,7 +16,7 @@ from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_E
 from perception.bayes.walls.crossing import CORNER_BEYOND_M, CORNER_INSIDE_M
 from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.walls.numbers import SPAN_MIN_M
-from perception.bayes.walls.straight import TINY_M, Straight, straight, straighten
+from perception.bayes.walls.straight import TINY_M, Straight, kept_bins, straight, straighten
 from perception.kernel import Floats
 from perception.records import Record
 
@@ -120,6 +120,15 @@ def wall_segments(memory: Memory) -> NDArray[Any]:
 def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
     with np.errstate(all="ignore"):  # numbers of a damaged recording
+        walls, found = sure_room(memory)
+        bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
+        segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
+        return np.array(segments, WallSegment.DTYPE), np.array(found, CornerPoint.DTYPE)
+
+
+def sure_room(memory: Memory) -> tuple[dict[int, Straight], list[tuple[float, ...]]]:
+    """Return the walls that are sure, by their number, with their ends, and the corners, as of `CornerPoint`."""
+    with np.errstate(all="ignore"):
         room, are_mirrors, are_rough = memory.state["room"][0], has_mirrors(memory), edges_answer(memory)
         corners, edges = room["corners"].copy(), room["edges"].copy()
         if are_rough:
@@ -131,11 +140,11 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
             for of in walls.values():
                 of.hold_to_review()
             walls = {number: of for number, of in walls.items() if len(of.ends)}
+        if room["stop"]["is_standing"] == 1:
+            for of in walls.values():
+                of.hold_to_stop()
         corners, edges = straighten(walls, corners, edges)
-        found = [*reach_corners(walls, corners, are_mirrors), *end_at_edges(walls, edges, are_mirrors)]
-        bodies = memory.circles[(memory.circles["status"] == ESTABLISHED) & (memory.circles["is_named"] == 1)]
-        segments = [row for wall in walls.values() for row in _segments(wall) if not is_of_body(row, bodies)]
-        return np.array(segments, WallSegment.DTYPE), np.array(found, CornerPoint.DTYPE)
+        return walls, [*reach_corners(walls, corners, are_mirrors), *end_at_edges(walls, edges, are_mirrors)]
 
 
 def has_mirrors(memory: Memory) -> bool:
@@ -204,14 +213,18 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
     spans = walls["spans"][fitting]
     is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
     is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= HEAVIEST_SPAN_MIN)
-    if not (spans["chi2"][is_long] >= FIRST_CHI2_MIN).any():
+    kept = kept_bins(walls["bins"])
+    if not ((spans["chi2"][is_long] >= FIRST_CHI2_MIN).any() or kept.any()):
         return found
     for is_neighbour in (False, True):
         proven = {int(b if a in found else a) for a, b in pairs if (a in found) != (b in found)}
         for number in fitting if not is_neighbour else sorted(proven.intersection(fitting)):
             wall = walls[number]
-            spans = wall["spans"][: wall["span_count"]]
-            spans = spans[sure_spans(spans, wall["chi2"], is_neighbour)]
+            spans = wall["spans"][: wall["span_count"]].copy()
+            is_sure = sure_spans(spans, wall["chi2"], is_neighbour)
+            if kept[number].any():
+                is_sure |= kept_spans(spans, kept[number], wall["bins"]["number"])
+            spans = spans[is_sure]
             if len(spans):
                 found[number] = straight(wall, spans)
     return found
@@ -238,6 +251,26 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
         is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= HEAVIEST_SPAN_MIN
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
     return np.asarray(sure)
+
+
+def kept_spans(spans: NDArray[Any], kept: NDArray[np.bool_], numbers: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which spans of a wall were sure when the robot stopped.
+
+    Parameters
+    ----------
+    spans : (n,) record of `Span`
+        All spans of the wall. One that has become too short for a number gets back that of its bins.
+    kept : (WALL_BINS,) bool
+        Of the wall, as of `kept_bins`.
+    numbers : (WALL_BINS,) int
+        Of the spans that held the bins last.
+    """
+    are_kept = np.zeros(len(spans), np.bool_)
+    for k, (first, end) in enumerate(spans[["first_bin", "end_bin"]].tolist()):
+        if kept[first:end].any() and spans["number"][k] == 0:
+            spans["number"][k] = np.setdiff1d(numbers[first:end], spans["number"]).max(initial=0)
+        are_kept[k] = kept[first:end].any() and spans["number"][k] > 0
+    return are_kept
 
 
 def _is_proven(corner: np.void, passes: float, *, are_mirrors: bool) -> bool:
@@ -287,9 +320,12 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
         is_met = _extend(owners, places, is_reached=is_heard or is_near) and len(owners) == 2
-        if _is_proven(corner, passes, are_mirrors=are_mirrors) or (is_met and (is_heard or is_near)):
-            # Ranges that end at both walls speak for their corner, whether it answers or not.
-            found.append(_point(corner, max(echoes, CORNER_PASSED_SHARE * ended) if is_met and is_near else echoes))
+        # Ranges that end at both walls speak for their corner, whether it answers or not.
+        signs = max(echoes, CORNER_PASSED_SHARE * ended)
+        is_kept = corner["is_kept"] == 1 and signs > passes
+        is_proven = _is_proven(corner, passes, are_mirrors=are_mirrors)
+        if is_kept or is_proven or (is_met and (is_heard or is_near)):
+            found.append(_point(corner, signs if is_kept or (is_met and is_near) else echoes))
     return found
 
 
@@ -316,10 +352,11 @@ def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: b
         if are_mirrors and edge["is_edge"] == 1:
             echoes -= float(edge["far_echoes"])
         variance = float(edge["covariance_xx"] + edge["covariance_yy"])
-        if echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2:
+        is_kept = bool(edge["is_kept"] == 1 and edge["echoes"] > passes)
+        if not is_kept and (echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2):
             continue
         least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ALONE_ECHOES
-        is_sure = echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes
+        is_sure = is_kept or (echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes)
         if owner is not None:
             along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
             reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_MIN_M

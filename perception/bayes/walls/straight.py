@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.memory.wall_records import WALL_BIN_M, WALL_BINS
 from perception.bayes.walls.bins import HALF, bin_of
-from perception.bayes.walls.fit import OPENING_PASSES_MIN, ROUGH_GAP_MAX_M
+from perception.bayes.walls.fit import CRACK_PASSES_MIN, OPENING_PASSES_MIN, ROUGH_GAP_MAX_M
 from perception.bayes.walls.joint_fit import Lines, fit_together
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.kernel import Floats
@@ -71,9 +71,10 @@ class Straight:
         if not self.wall["reviewed"]["information"] > 0.0:
             return
         bins = self.wall["bins"]
-        on = np.flatnonzero(bins["is_held"] == 1)
+        is_held = (bins["is_held"] == 1) | kept_bins(bins)
+        on = np.flatnonzero(is_held)
         is_far = (np.diff(on) - 1) * WALL_BIN_M > ROUGH_GAP_MAX_M + TINY_M
-        opened = np.cumsum((bins["is_open"] == 1) & (bins["is_held"] == 0))[on]
+        opened = np.cumsum((bins["is_open"] == 1) & ~is_held)[on]
         parts = np.split(on, np.flatnonzero(is_far | (np.diff(opened) > 0)) + 1)
         ends, kept = [], []
         for low, high in ((int(part[0]), int(part[-1]) + 1) for part in parts if len(part)):
@@ -82,6 +83,28 @@ class Straight:
                 kept.append(own[int(own["weight"].argmax())])
                 ends.append(((low - HALF) * WALL_BIN_M, (high - HALF) * WALL_BIN_M))
         self.spans, self.ends = np.array(kept, self.spans.dtype), np.array(ends).reshape(-1, 2)
+
+    def hold_to_stop(self) -> None:
+        """Let the spans go as far as they did when the robot stopped, but not into one another."""
+        kept = kept_bins(self.wall["bins"])
+        low, high = np.rint(self.ends.T / WALL_BIN_M).astype(np.int64) + HALF
+        for k in range(len(self.ends)):
+            first, end = int(low[k]), int(high[k])
+            while first > (int(high[k - 1]) if k else 0) and kept[first - 1]:
+                first -= 1
+            while end < (int(low[k + 1]) if k + 1 < len(low) else WALL_BINS) and kept[end]:
+                end += 1
+            low[k], high[k] = first, end
+            self.ends[k, 0] = min(self.ends[k, 0], (first - HALF) * WALL_BIN_M)
+            self.ends[k, 1] = max(self.ends[k, 1], (end - HALF) * WALL_BIN_M)
+
+
+def kept_bins(bins: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return where a wall was sure when the robot stopped, and ranges do not pass now, of records of `WallBin`.
+
+    One range may be a stray; where the surroundings have changed, a sensor that stands counts more than one.
+    """
+    return np.asarray((bins["is_kept"] == 1) & (bins["passes"] < np.maximum(bins["weight"], CRACK_PASSES_MIN)))
 
 
 def straight(wall: NDArray[Any], spans: NDArray[Any]) -> Straight:

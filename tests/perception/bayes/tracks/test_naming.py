@@ -49,7 +49,7 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         circles["sides"], circles["is_confirmed"] = rng.integers(5, 15, TRACKS), rng.integers(0, 2, TRACKS)
         circles["reservoir"] = rng.choice([20, 79, 80, 200], TRACKS)
         circles["refinements"] = rng.integers(0, 12, TRACKS)
-        careful = bool(rng.random() < 0.3)
+        careful, is_standing = (bool(rng.random() < 0.3) for _ in range(2))
         doubtful = [
             naive_naming.is_doubtful(careful, it["misfit"], it["room_lead"], it["sides"], it["is_confirmed"] == 1)
             for it in circles
@@ -60,11 +60,11 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
                 it["is_named"] == 1, it["status"] == ESTABLISHED, it["kind"] < S.model_count, it["probability"], 0.92,
                 0.7, np.delete(leads[t], it["kind"]).tolist(), leads[t, -2], it["dispersion"],
                 it["log_likelihood_ratio"], it["unknown_nat"], [it["covariance_xx"], it["covariance_yy"]],
-                it["reservoir"] < 80 or it["refinements"] >= 1 + len(RADII),
+                it["reservoir"] < 80 or it["refinements"] >= 1 + len(RADII), is_standing,
             )
         ]  # fmt: skip
         for t in range(TRACKS):
-            naming.update_name(memory.tracks[t], P, 0.92, 0.7, careful)
+            naming.update_name(memory.tracks[t], P, 0.92, 0.7, careful, is_standing)
         circles["marks"] = 0
         assert report() == want
         sure += len(want)
