@@ -22,6 +22,8 @@ READY_WORD: Final = "ready"
 START_MAX_S: Final = 60.0
 """Longest wait for the emulator, which may have to compile its kernels first."""
 
+OVERLOADED: Final = "likely the machine is overloaded: end other programs, then try again"
+
 END_MAX_S: Final = 2.0
 """Longest wait for the emulator to end without being killed, s."""
 
@@ -110,7 +112,7 @@ async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
     try:
         line = await asyncio.wait_for(out.readline(), START_MAX_S)
     except TimeoutError:
-        line, silent = b"", f"no answer within {START_MAX_S:.0f} s"
+        line, silent = b"", f"no answer within {START_MAX_S:.0f} s; {OVERLOADED}"
     if not line.startswith(READY_WORD.encode()):
         _signal(process, signal.SIGKILL)
         words = (await err.read()).decode(errors="replace").strip()
