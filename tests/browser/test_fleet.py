@@ -112,6 +112,7 @@ async def operate(page: Page, runs: list[Run]) -> None:
         await first.get_by_role("button", name="HALT").click()
         await expect(first.locator(".halt-state")).to_have_text("HALT confirmed")
         assert await first.get_attribute("data-mode") == "SAFE_STOP"
+        await expect(first.locator(".mode-word")).to_have_text("SAFE STOP")  # as on its own page
         await until(lambda before=before: stopped_again(runs[0], before), "a stop in the log")  # type: ignore[misc]
         if was_halted(runs[0]):
             break

@@ -93,7 +93,8 @@ function show() {
     if (!cards.has(row.address)) list.append(parts.root);
     cards.set(row.address, parts);
     setText(parts.name, row.name || row.address);
-    for (const key of FACTS) setText(parts[key], row[key] || (key === "mode" ? "not known" : ""));
+    for (const key of FACTS) if (key !== "mode") setText(parts[key], row[key]);
+    setText(parts.mode, (row.mode || "not known").replace("_", " ")); // as on the run's own page
     setText(parts.problem, row.problem);
     setText(parts.halt, HALT_WORDS[row.halt]);
     setAttribute(parts.halt, "data-halt", row.halt);
