@@ -121,7 +121,7 @@ async def test_an_emulator_that_is_killed_while_it_starts_is_reported(children: 
 async def test_an_emulator_that_says_nothing_is_given_up(children: Children, monkeypatch: pytest.MonkeyPatch) -> None:
     children.program = SILENT
     monkeypatch.setattr(emulator_process, "START_MAX_S", 0.05)
-    with pytest.raises(UserError, match="no answer within 0 s; .*: end other programs"):
+    with pytest.raises(UserError, match=r"no answer within 0 s; .*: end other programs"):
         async with start_emulator([]):
             pass
     assert children.started[0].returncode == -9
