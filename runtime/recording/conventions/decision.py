@@ -140,9 +140,10 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
                 )
             )
     motion = motion_scores(table, options)
-    likely = max(motion.scores, key=motion.scores.__getitem__)
-    unit = likely.unit if motion.is_related else next(one.unit for one in motion.scores)
-    units, scores = find_units(table, silence, robot, options, unit, _ratios(table, robot, likely))
+    likely = next(one for one in motion.scores)
+    if motion.is_related:
+        likely = max(motion.scores, key=motion.scores.__getitem__)
+    units, scores = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
     given = (options.time_unit, options.length_unit, options.range_unit)
     if _are_unusual(units, given):
         said.append((units.words, units.options))

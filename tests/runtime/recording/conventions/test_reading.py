@@ -272,6 +272,16 @@ def test_a_recording_in_the_forms_own_conventions_passes_to_the_bit(name: str) -
     assert recording(name)
 
 
+SIDEWAYS: Final = 202
+"""A synchro drive whose theta is its ring's: under the headings that fit its way by chance, ranges are in feet."""
+
+
+def test_a_way_that_does_not_follow_theta_does_not_show_the_units(tmp_path: Path) -> None:
+    drive = good_tables(SIDEWAYS)[3]
+    path = written(drive, Convention(), np.random.default_rng(SIDEWAYS), tmp_path / "table.csv")
+    check_unchanged(path, drive.robot)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_good_table_passes_to_the_bit(seed: int, tmp_path: Path) -> None:
     for drive in good_tables(seed):
