@@ -13,18 +13,14 @@ import numpy as np
 from tests.naive_tracks import FT, SILENT, Array
 
 
-def model_check(
-    own: Array, room: Array, expected: Array, variance: Array, bearings: Array
-) -> tuple[float, float, int]:  # fmt: skip
-    """Return misfit (σ), lead of the room (nat) and sides of a model.
+def model_check(own: Array, room: Array, bearings: Array) -> tuple[float, int]:
+    """Return the lead of the room (nat) over a model, and from how many sides that was heard.
 
-    Each argument has a value for each reading in its beam and gate: log ratios of model and room (nat), mean and
-    variance of the first if the noise is right, and direction to the centre (rad).
+    Each argument has a value for each reading in its beam and gate: log ratios of model and room (nat), and direction
+    to the centre (rad).
     """
-    short = expected - own
-    misfit = (short.sum() - max(0.0, short.max(initial=0.0))) / math.sqrt(max(0.25, np.maximum(0.25, variance).sum()))
     sides = {int(v) % 36 for v in np.floor((bearings[own > 0] / (2.0 * math.pi) + 0.5) * 36)}
-    return float(misfit), float((room - own).sum()), len(sides)
+    return float((room - own).sum()), len(sides)
 
 
 def outline_lead(bearings: Array, errors: Array, variances: Array) -> float:
@@ -71,9 +67,10 @@ def round_lead(w: Array, centre: Array, rho: float, variances: Array) -> float:
     return 0.5 * (change**2 / own - change**2 / (own + 0.04) + math.log(own / (own + 0.04)))
 
 
-def is_doubtful(careful: bool, misfit: float, room_lead: float, sides: int, confirmed: bool) -> bool:
-    """Return whether a model's checks speak against its name."""
-    return room_lead > -5.0 or (careful and (misfit > 3.0 or sides < (8 if confirmed else 11)))
+def is_doubtful(careful: bool, room_lead: float, outline_lead: float, rivals: Sequence[float], sure: float) -> bool:
+    """Return whether a model's checks speak against its name: with a prior of −3 nat it must be `sure`."""
+    best = max(outline_lead, *(rival for rival in rivals if rival != 0.0))
+    return room_lead > -5.0 or (careful and 1.0 / (1.0 + math.exp(best + 3.0)) < sure)
 
 
 def is_called(

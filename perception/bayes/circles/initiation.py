@@ -118,7 +118,6 @@ def reset_circle(track: CircleTrack) -> None:
     track.misses = 0.0
     track.dispersion = 0.0
     track.unknown_nat = 0.0
-    track.misfit = 0.0
     track.outline_lead = 0.0
     track.round_lead = 0.0
     track.room_lead = 0.0

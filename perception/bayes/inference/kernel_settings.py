@@ -16,7 +16,7 @@ import numpy as np
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig
-from perception.bayes.inference.likelihood import build_levels, build_table, expected_evidence
+from perception.bayes.inference.likelihood import build_levels, build_table
 from perception.bayes.memory.parameters import (
     ASSOCIATING_LINE_M,
     BACKGROUND_RANGE_M,
@@ -231,9 +231,6 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
         column(p, "table")[0],
         column(p, "table_bins_per_m")[0],
         sigmas,
-    )
-    column(p, "expected_nat")[0], column(p, "variance_nat2")[0] = expected_evidence(
-        column(p, "table")[0], OUTLIER_SHARE
     )
     it.silent_share_min = DIFFUSE_SILENCE * max(0.0, 1.0 - MIRRORS_HEARD * half_angle / math.pi)
     for noise, (absolute, relative) in zip(

@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from perception.bayes.memory.parameters import TABLE_REACH_SIGMAS
 from perception.bayes.memory.settings_record import (
     NOISES,
@@ -91,24 +89,6 @@ def build_table(
             table[k, b] = math.log((1.0 - outliers) * max(p, 0.0) / density + outliers)
         table[k, TABLE_BINS - 2] = math.log(outliers)
         table[k, TABLE_BINS - 1] = math.log(outliers)
-
-
-def expected_evidence(table: Floats, outliers: float) -> tuple[Floats, Floats]:
-    """Return mean (nat) and variance (nat²) of each level's log likelihood ratio if its noise is right.
-
-    Outliers are left out. A level's bins are equally wide, so that their weights are the likelihoods themselves.
-
-    Parameters
-    ----------
-    table, outliers
-        As `build_table` writes and takes them.
-    """
-    level = table[:, :-1].T
-    share = np.maximum(np.exp(level) - outliers, 0.0)
-    share[0] *= 0.5  # the other bins stand for errors of both signs
-    share /= share.sum(axis=0)
-    mean = (share * level).sum(axis=0)
-    return mean, (share * (level - mean) ** 2).sum(axis=0)
 
 
 @kernel

@@ -329,10 +329,6 @@ UNKNOWN_HITS_MIN: Final = 5.0
 
 # --- Whether a model is right where it is the best explanation ----------------------------------------------------
 
-HITS_MISFIT_MAX: Final = 3.0
-"""Greatest shortfall of the hits' log likelihood, in σ, of a model where an echo says little."""
-VARIANCE_MIN_NAT2: Final = 0.25
-"""Least variance assumed of a hit's log likelihood: exact ranges have none, and one outlier would decide."""
 OUTLINE_SIGMA_M: Final = 0.05
 OUTLINE_SCALE_RAD: Final = 0.45
 """Deviation of an unknown outline from a model's, and over which bearing it changes: those of boxes of its size."""
@@ -362,12 +358,10 @@ MIRRORS_HEARD: Final = 8
 DIFFUSE_SILENCE: Final = 0.35
 """Where the beams are silent less often than this share of what such a room leaves silent, surfaces answer at any
 angle: 16 % for beams of ±12°. The halls have 26 % or more, closed rooms of diffuse walls none."""
-CAREFUL_SIDES: Final = 11
-"""Bearing bins (10° each) from which an object must have been heard where an echo says little …"""
 CONFIRMED_SIDES: Final = 8
-"""… and from which a named object counts as confirmed."""
+"""Bearing bins (10° each) from which a named object must have been heard to count as confirmed."""
 TRUSTED_M: Final = 15.0
-"""After this way without a confirmed object, a withdrawn name makes all new ones need those sides."""
+"""After this way without a confirmed object, a withdrawn name turns the prior against all new ones."""
 
 # --- A user's edits ------------------------------------------------------------------------------------------------
 

@@ -146,10 +146,6 @@ class Settings(Record):
     table: Annotated[Floats, TABLE_LEVELS, TABLE_BINS]
     """Log likelihood ratios (nat) by noise level and error; see `inference.likelihood.build_table`."""
     table_bins_per_m: Annotated[Floats, TABLE_LEVELS]
-    expected_nat: Annotated[Floats, TABLE_LEVELS]
-    """Mean of a level's log likelihood ratio if its noise is right, …"""
-    variance_nat2: Annotated[Floats, TABLE_LEVELS]
-    """… and its variance."""
     silent_share_min: float
     """Share of silent readings below which surfaces answer at any angle."""
     noises: Annotated[Records[NoiseModel], NOISES]

@@ -194,8 +194,6 @@ class CircleTrack(Track):
     """Dispersion of the axes of the sensors that heard it."""
     unknown_nat: Finite
     """Evidence of an unknown object in its place."""
-    misfit: Finite
-    """Shortfall of its hits' log likelihood from what the noise lets expect, in σ."""
     outline_lead: Finite
     """Lead of a body of unknown outline, nat; 0 where it was not compared."""
     round_lead: Finite

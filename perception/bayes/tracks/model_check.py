@@ -2,9 +2,8 @@
 
 The alternatives of `perception.bayes.circles.alternatives` are not all there is: a wall that answers from the beam's
 edge is none of them, and then the model wins by default. `perception.bayes.circles.outline_check` compares it with
-bodies of any outline. Three more checks need no alternative: the readings must scatter about the model as the ranges'
-noise does; the mapped walls and corners must not explain them; and where an echo says little about the shape, the
-object must have been heard from all over its front.
+bodies of any outline. The mapped walls and corners must not explain the readings either. And where an echo says
+little about the shape, the prior is as much against a model as it is for it elsewhere.
 
 An echo says little where everything echoes, because then it may come from anywhere in the beam; and a short look
 says little where names that it gave were withdrawn and no model was confirmed for a while.
@@ -24,11 +23,11 @@ from perception.bayes.memory.parameters import (
     ROOM_MARGIN_M,
     SILENCE_MEMORY,
     TRUSTED_M,
-    VARIANCE_MIN_NAT2,
 )
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.memory.wall_records import CORNERS_MAX, MAX_WALLS, WallMap
+from perception.bayes.tracks.naming import best_other_lead
 from perception.bayes.walls.contact import BEAM_EDGE, FOOT, NOWHERE, contact, edges_answer, is_on_span, wall_normal
 from perception.kernel import kernel
 
@@ -54,7 +53,7 @@ def everything_echoes(s: StateRecord, p: SettingsRecord) -> bool:
 
 @kernel
 def is_careful(s: StateRecord, p: SettingsRecord) -> bool:
-    """Return whether a model must have been heard from all over its front to be named."""
+    """Return whether the prior is against a model, as an echo says little about the shape."""
     return everything_echoes(s, p) or (s[0].names_withdrawn > 0 and s[0].unconfirmed_m > TRUSTED_M)
 
 
@@ -100,9 +99,7 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
 
 @kernel
 def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
-    """Update a track's misfit, the lead of the mapped room, and from how many sides it was heard.
-
-    The worst reading does not count for the misfit: one in so many may come from something else.
+    """Update the lead of the mapped room over a track, and from how many sides it was heard.
 
     Parameters
     ----------
@@ -117,9 +114,6 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     sides = scratch.sides
     sides[:] = 0
     edges = edges_answer(room)
-    shortfall = 0.0
-    worst = 0.0
-    variance = 0.0
     lead = 0.0
     for j in range(n):
         q = scratch.readings[j]
@@ -128,16 +122,11 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
             continue
         level = level_of(p, s[0].noise_level, q.range_m)
         v = log_likelihood(p, level, e)
-        missing: float = p[0].expected_nat[level] - v
-        shortfall += missing
-        worst = max(worst, missing)
-        variance += max(VARIANCE_MIN_NAT2, p[0].variance_nat2[level])
         lead += room_evidence(room, q, p, level, edges) - v
         if v > 0.0:
             dx = track.x - q.x
             dy = track.y - q.y
             sides[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * BEARING_BINS) % BEARING_BINS] = 1
-    track.misfit = (shortfall - worst) / math.sqrt(max(variance, VARIANCE_MIN_NAT2))
     track.room_lead = lead
     track.sides = 0
     for b in range(BEARING_BINS):
@@ -155,16 +144,6 @@ def is_named_near(tracks: CircleTracks, x: float, y: float, apart: float) -> boo
 
 
 @kernel
-def leads_alone(track: CircleTrack, p: SettingsRecord) -> bool:
-    """Return whether a model leads without its prior: this cannot confirm a name that rests on it alone."""
-    best = track.outline_lead  # 0, so not confirmed, where the outline was not compared
-    for k in range(p[0].circle_count + 2):
-        if k != track.kind and track.leads[k] != 0.0:
-            best = max(best, track.leads[k])
-    return best < -p[0].model_prior_nat
-
-
-@kernel
 def count_names(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
     """Count the name of a track that was named before its refinement: as confirmed, as withdrawn, or not yet.
 
@@ -179,7 +158,7 @@ def count_names(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int,
     """
     track = tracks[t]
     if track.status == ESTABLISHED and track.is_named == 1:
-        if track.sides >= CONFIRMED_SIDES and leads_alone(track, p):
+        if track.sides >= CONFIRMED_SIDES and best_other_lead(track, p) < -p[0].model_prior_nat:
             track.is_confirmed = 1
             s[0].names_withdrawn = 0
             s[0].unconfirmed_m = 0.0

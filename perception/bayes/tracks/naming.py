@@ -14,9 +14,6 @@ from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.memory.parameters import (
     ALONE_LEAD_NAT,
-    CAREFUL_SIDES,
-    CONFIRMED_SIDES,
-    HITS_MISFIT_MAX,
     NAME_KEPT_PROBABILITY,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
@@ -58,20 +55,29 @@ class Reported(Record):
 
 
 @kernel
-def is_name_doubtful(track: CircleTrack, careful: bool) -> bool:
+def best_other_lead(track: CircleTrack, p: SettingsRecord) -> float:
+    """Return the greatest lead of any other body, priors left out; 0 where other outlines were not compared, nat."""
+    best = track.outline_lead
+    for k in range(p[0].circle_count + 2):
+        if k != track.kind and track.leads[k] != 0.0:
+            best = max(best, track.leads[k])
+    return float(best)
+
+
+@kernel
+def is_name_doubtful(track: CircleTrack, p: SettingsRecord, sure: float, careful: bool) -> bool:
     """Return whether a model's checks speak against its name; see `perception.bayes.tracks.model_check`.
 
     Parameters
     ----------
-    track : CircleTrack
-        The track.
+    track, p, sure
+        As of `update_name`.
     careful : bool
-        Whether its readings must fit, and have been heard from all over its front.
+        Whether the prior is as much against a model as it is for it elsewhere.
     """
     if track.room_lead > ROOM_LEAD_NAT:
         return True
-    sides_min = CONFIRMED_SIDES if track.is_confirmed == 1 else CAREFUL_SIDES
-    return bool(careful and (track.misfit > HITS_MISFIT_MAX or track.sides < sides_min))
+    return bool(careful and best_other_lead(track, p) > -p[0].model_prior_nat - math.log(sure / (1.0 - sure)))
 
 
 @kernel
@@ -106,7 +112,7 @@ def update_name(
     sure, least : float
         Least probability to give a name, and the same where a wall is excluded.
     careful : bool
-        Whether it must have been heard from all over its front.
+        As of `is_name_doubtful`.
     is_standing : bool
         Whether the robot stands: then no echo that drops out takes away a name that is likely.
     """
@@ -117,7 +123,7 @@ def update_name(
         track.status != ESTABLISHED
         or track.kind >= p[0].model_count
         or track.probability < min(least, NAME_KEPT_PROBABILITY)
-        or is_name_doubtful(track, careful)
+        or is_name_doubtful(track, p, sure, careful)
     ):
         track.is_named = 0
         return

@@ -10,7 +10,6 @@ import pytest
 from perception.bayes.inference.likelihood import (
     build_levels,
     build_table,
-    expected_evidence,
     level_of,
     log_likelihood,
 )
@@ -89,15 +88,3 @@ def test_levels_are_the_nearest_on_a_logarithmic_scale() -> None:
             assert level_of(p, h, r) == level
         assert level_of(p, h, 1e6) == level
     assert len(wanted) == NOISES
-
-
-def test_mean_and_variance_of_the_evidence_are_those_of_simulated_errors() -> None:
-    half_box = 0.01524
-    table, bins_per_m, sigmas = table_of(half_box)
-    mean, variance = expected_evidence(table, EPS)
-    rng = np.random.default_rng(3)
-    for k in (0, 8, 14, 20):
-        errors = np.abs(rng.uniform(-half_box, half_box, 40_000) + sigmas[k] * rng.standard_normal(40_000))
-        values = np.interp(errors * bins_per_m[k], np.arange(TABLE_BINS), table[k])
-        assert mean[k] == pytest.approx(values.mean(), abs=0.03)
-        assert variance[k] == pytest.approx(values.var(), abs=0.05)

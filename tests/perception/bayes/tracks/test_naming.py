@@ -45,14 +45,16 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         leads[:, -2] = rng.choice([0.0, -3.9, -4.1, -30.0], TRACKS)
         circles["dispersion"] = rng.uniform(0.004, 0.03, TRACKS)
         circles["is_named"] = rng.integers(0, 2, TRACKS)
-        circles["misfit"], circles["room_lead"] = rng.uniform(-1, 9, TRACKS), rng.choice([-90.0, -5.1, -4.9], TRACKS)
-        circles["sides"], circles["is_confirmed"] = rng.integers(5, 15, TRACKS), rng.integers(0, 2, TRACKS)
+        circles["room_lead"] = rng.choice([-90.0, -5.1, -4.9], TRACKS)
+        circles["outline_lead"] = rng.choice([0.0, -2.0, -5.3, -5.6, -20.0], TRACKS)
         circles["reservoir"] = rng.choice([20, 79, 80, 200], TRACKS)
         circles["refinements"] = rng.integers(0, 12, TRACKS)
         careful, is_standing = (bool(rng.random() < 0.3) for _ in range(2))
         doubtful = [
-            naive_naming.is_doubtful(careful, it["misfit"], it["room_lead"], it["sides"], it["is_confirmed"] == 1)
-            for it in circles
+            naive_naming.is_doubtful(
+                careful, it["room_lead"], it["outline_lead"], np.delete(leads[t], it["kind"]).tolist(), 0.92
+            )
+            for t, it in enumerate(circles)
         ]
         want = [
             t for t, it in enumerate(circles)
