@@ -69,7 +69,7 @@ from perception.edits import (
 )
 from perception.kernel import Floats
 from perception.records import records, zeros
-from perception.sensor_mounts import mounts_array, mounts_at
+from perception.sensor_mounts import mounts_array, mounts_at, ring_pose
 from perception.snapshot import bounds_of
 
 
@@ -176,9 +176,7 @@ class BayesPerception:
                 tracks,
                 settings,
                 mounts,
-                float(pose.x),
-                float(pose.y),
-                float(firing.ring_yaw),
+                ring_pose(firing),
                 readings,
                 heard.transmitters,
                 heard.listeners,

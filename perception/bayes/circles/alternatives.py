@@ -11,7 +11,7 @@ import math
 from typing import Final
 
 from perception.bayes.inference.noise_estimation import noise_variance
-from perception.bayes.inference.range_fit import fit_circle, fit_reading_line, score_circle, score_line
+from perception.bayes.inference.range_fit import Circle, fit_circle, fit_reading_line, score_circle, score_line
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import FIT_SOFTNESS
 from perception.bayes.memory.scratch import Predictions
@@ -90,19 +90,24 @@ def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius:
 
 @kernel
 def fit_other_circle(
-    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, ux: float, uy: float,
-    other: float, steps: int,
-) -> float:  # fmt: skip
+    s: StateRecord,
+    p: SettingsRecord,
+    n: int,
+    circle: Circle,
+    bearing: tuple[float, float],
+    other: float,
+    steps: int,
+) -> float:
     """Return the log ratio (nat) of a circle of another radius on the same surface; write the scratch's `circle_fit`.
 
     Parameters
     ----------
     s, p, n
         As for `score`.
-    cx, cy, radius : float
-        The known circle, m.
-    ux, uy : float
-        Mean bearing of its readings, a unit vector, or zeros without any.
+    circle : Circle
+        The known circle.
+    bearing : (float, float)
+        Mean bearing of its readings, as of `mean_bearing`.
     other : float
         The other radius, m.
     steps : int
@@ -110,46 +115,42 @@ def fit_other_circle(
     """
     scratch = s[0].scratch
     readings = scratch.readings[:n]
+    cx, cy, radius = circle
+    ux, uy = bearing
     if ux == 0.0 and uy == 0.0:
         return HOPELESS_NAT
-    var0, rel2 = noise_variance(s, p)
+    noise = noise_variance(s, p)
     k = other - radius
-    if not fit_circle(
-        readings, cx + k * ux, cy + k * uy, other, p, FIT_SOFTNESS, var0, rel2, steps, scratch.predicted,
-        scratch.circle_fit,
-    ):  # fmt: skip
+    start = (cx + k * ux, cy + k * uy, other)
+    if not fit_circle(readings, start, p, FIT_SOFTNESS, noise, steps, scratch.predicted, scratch.circle_fit):
         return HOPELESS_NAT
     return score(s, p, n, scratch.circle_fit.x, scratch.circle_fit.y, other)
 
 
 @kernel
 def fit_other_line(
-    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, ux: float, uy: float, steps: int
-) -> float:  # fmt: skip
+    s: StateRecord, p: SettingsRecord, n: int, circle: Circle, bearing: tuple[float, float], steps: int
+) -> float:
     """Return the log ratio (nat) of a line along the same surface; write the scratch's `line_fit` about the centre.
 
     Parameters
     ----------
-    s, p, n, cx, cy, radius, ux, uy, steps
+    s, p, n, circle, bearing, steps
         As for `fit_other_circle`.
     """
     scratch = s[0].scratch
     readings = scratch.readings[:n]
+    cx, cy, radius = circle
+    ux, uy = bearing
     if ux == 0.0 and uy == 0.0:
         return HOPELESS_NAT
-    var0, rel2 = noise_variance(s, p)
     fit_reading_line(
         readings,
-        ux,
-        uy,
-        cx,
-        cy,
-        -radius,
-        p[0].cos_may_answer,
-        p[0].gate_m,
+        (ux, uy, -radius),
+        (cx, cy),
+        (p[0].cos_may_answer, p[0].gate_m),
         FIT_SOFTNESS,
-        var0,
-        rel2,
+        noise_variance(s, p),
         steps,
         scratch.line_fit,
     )

@@ -13,7 +13,7 @@ from perception.bayes.circles.alternatives import bearing_if_near
 from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line
 from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
-from perception.bayes.inference.range_fit import fit_reading_line
+from perception.bayes.inference.range_fit import Circle, Near, NoiseVariance, fit_reading_line
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
@@ -147,17 +147,26 @@ def find_facing(
 
 @kernel
 def fit_faces(
-    readings: Records[Reading], facing: Ints, sx: float, sy: float, face_readings: Records[Reading], cx: float,
-    cy: float, radius: float, cos_may: float, gate: float, var0: float, rel2: float, fit: LineFit, corner: CornerFit,
-) -> tuple[bool, bool]:  # fmt: skip
+    readings: Records[Reading],
+    facing: Ints,
+    bearing: tuple[float, float],
+    face_readings: Records[Reading],
+    circle: Circle,
+    near: Near,
+    noise: NoiseVariance,
+    fit: LineFit,
+    corner: CornerFit,
+) -> tuple[bool, bool]:
     """Fit two faces and their edge, at first to the readings left and right of the mean bearing.
 
     Parameters
     ----------
-    readings, cx, cy, radius, cos_may, gate, var0, rel2
-        As for `score_corner`.
-    facing, sx, sy
+    readings, circle, noise
+        As for `range_fit.fit_circle`.
+    facing, bearing
         From `find_facing`.
+    near : Near
+        Which readings take part.
     face_readings, fit
         Scratch.
     corner : CornerFit
@@ -168,6 +177,9 @@ def fit_faces(
     (bool, bool)
         Whether there are two faces, and whether they have an edge.
     """
+    sx, sy = bearing
+    cx, cy, radius = circle
+    cos_may, gate = near
     has_edge = False
     for turn in range(CORNER_ROUNDS):
         for side in range(2):
@@ -198,9 +210,15 @@ def fit_faces(
                 face.distance = -radius
             if k >= CORNER_FACE_READINGS_MIN:
                 fit_reading_line(
-                    face_readings[:k], face.normal_x, face.normal_y, cx, cy, face.distance,
-                    cos_may - CORNER_LEEWAY_COS, gate, FIT_SOFTNESS, var0, rel2, CORNER_FIT_STEPS, fit,
-                )  # fmt: skip
+                    face_readings[:k],
+                    (face.normal_x, face.normal_y, face.distance),
+                    (cx, cy),
+                    (cos_may - CORNER_LEEWAY_COS, gate),
+                    FIT_SOFTNESS,
+                    noise,
+                    CORNER_FIT_STEPS,
+                    fit,
+                )
                 face.normal_x = fit.normal_x
                 face.normal_y = fit.normal_y
                 face.distance = fit.distance
@@ -245,9 +263,16 @@ def score_corner(
         return IMPOSSIBLE_NAT
     facing = scratch.facing[:count]
     found, has_edge = fit_faces(
-        readings, facing, sx, sy, scratch.face_readings, cx, cy, radius, cos_may, gate, var0, rel2,
-        scratch.line_fit, corner,
-    )  # fmt: skip
+        readings,
+        facing,
+        (sx, sy),
+        scratch.face_readings,
+        (cx, cy, radius),
+        (cos_may, gate),
+        (var0, rel2),
+        scratch.line_fit,
+        corner,
+    )
     if not found:
         return IMPOSSIBLE_NAT
     total = 0.0

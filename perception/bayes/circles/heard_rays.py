@@ -83,7 +83,7 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
     scratch = s[0].scratch
     fit = scratch.circle_fit
     radius = p[0].circles[kind].radius_m
-    var0, rel2 = noise_variance(s, p)
+    noise = noise_variance(s, p)
     fit.x, fit.y = scratch.hypothesis.x, scratch.hypothesis.y
     assume_rays(s, p, rays)
     n = 0
@@ -92,7 +92,7 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
         n = keep_relevant(s, tracks, p, gather_history(s, p, x, y, radius), x, y, radius, -1)
         softness = FIT_SOFTNESS if turn == 1 else FIRST_FIT_SOFTNESS
         if n < CIRCLE_READINGS_MIN or not fit_circle(
-            scratch.readings[:n], x, y, radius, p, softness, var0, rel2, INITIATION_STEPS, scratch.predicted, fit
+            scratch.readings[:n], (x, y, radius), p, softness, noise, INITIATION_STEPS, scratch.predicted, fit
         ):  # fmt: skip
             return 0.0
     x, y = fit.x, fit.y
@@ -100,12 +100,12 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
     best = p[0].unknown_nat * scratch.score.near
     if scratch.score.hits < CIRCLE_READINGS_MIN or by_rays < max(best, CIRCLE_EVIDENCE_MIN_NAT):
         return 0.0
-    ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
+    bearing = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     assume_rays(s, p, s[0].rays)
-    best = max(best, fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS))
+    best = max(best, fit_other_line(s, p, n, (x, y, radius), bearing, INITIATION_STEPS))
     for k in range(p[0].circle_count):
         other = p[0].circles[k].radius_m
-        best = max(best, fit_other_circle(s, p, n, x, y, radius, ux, uy, other, INITIATION_STEPS))
+        best = max(best, fit_other_circle(s, p, n, (x, y, radius), bearing, other, INITIATION_STEPS))
     return by_rays - best
 
 
@@ -123,12 +123,12 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, r
         As in `State`.
     """
     scratch = s[0].scratch
-    ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, track.x, track.y, p[0].gate_m)
+    bearing = mean_bearing(scratch.readings[:n], scratch.predicted, track.x, track.y, p[0].gate_m)
     assume_rays(s, p, rays)
     best = -LEAD_MAX_NAT
     for k in range(p[0].circle_count):
         radius = p[0].circles[k].radius_m
-        v = fit_other_circle(s, p, n, track.x, track.y, track.radius, ux, uy, radius, TRACK_FIT_STEPS)
+        v = fit_other_circle(s, p, n, (track.x, track.y, track.radius), bearing, radius, TRACK_FIT_STEPS)
         best = max(best, v)
     return best
 

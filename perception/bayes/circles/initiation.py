@@ -245,16 +245,13 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     n = gather_relevant(s, tracks, p, hypothesis.x, hypothesis.y, radius)
     if n < CIRCLE_READINGS_MIN:
         return UNTRIED
-    var0, rel2 = noise_variance(s, p)
+    noise = noise_variance(s, p)
     if not fit_circle(
         scratch.readings[:n],
-        hypothesis.x,
-        hypothesis.y,
-        radius,
+        (hypothesis.x, hypothesis.y, radius),
         p,
         FIRST_FIT_SOFTNESS,
-        var0,
-        rel2,
+        noise,
         INITIATION_STEPS,
         scratch.predicted,
         fit,
@@ -262,9 +259,15 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
         return UNTRIED
     n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
     if not fit_circle(
-        scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, scratch.predicted,
+        scratch.readings[:n],
+        (fit.x, fit.y, radius),
+        p,
+        FIT_SOFTNESS,
+        noise,
+        INITIATION_STEPS,
+        scratch.predicted,
         fit,
-    ):  # fmt: skip
+    ):
         return UNTRIED
     x, y = fit.x, fit.y
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
@@ -273,9 +276,9 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     if scratch.score.hits < CIRCLE_READINGS_MIN or llr < CIRCLE_EVIDENCE_MIN_NAT:
         return UNSUPPORTED
     prior = p[0].model_prior_nat
-    ux, uy = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
+    bearing = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     own = llr + (prior if kind < p[0].model_count else 0.0)
-    if fit_other_line(s, p, n, x, y, radius, ux, uy, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
+    if fit_other_line(s, p, n, (x, y, radius), bearing, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             enter_line(s, scratch.line_fit, x, y, line)
@@ -286,7 +289,7 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     best_y = y
     for k in range(p[0].circle_count):
         if k != kind:
-            v = fit_other_circle(s, p, n, x, y, radius, ux, uy, p[0].circles[k].radius_m, INITIATION_STEPS) + (
+            v = fit_other_circle(s, p, n, (x, y, radius), bearing, p[0].circles[k].radius_m, INITIATION_STEPS) + (
                 prior if k < p[0].model_count else 0.0
             )
             if v > best + SWITCH_LEAD_NAT:

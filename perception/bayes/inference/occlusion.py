@@ -192,9 +192,7 @@ def is_relevant(
     others: Records[OtherCircle],
     p: Records[Settings],
     q: Reading,
-    cx: float,
-    cy: float,
-    radius: float,
+    circle: tuple[float, float, float],
     d: float,
     e: float,
     var0: float,
@@ -206,11 +204,12 @@ def is_relevant(
     ----------
     others, p, q, var0, rel2
         As for `is_explained_elsewhere`.
-    cx, cy, radius : float
-        The circle, m.
+    circle : (float, float, float)
+        Centre x, y and radius of the circle, m.
     d, e : float
         Distance of the centre from the sensor, and the reading's error, m.
     """
+    cx, cy, radius = circle
     if is_crossed(q) and (abs(e) > p[0].gate_m or answers_before(others, p, q)):
         return False
     if e > p[0].gate_m:
@@ -250,7 +249,7 @@ def keep_relevant(
     kept = 0
     for j in range(n):
         d, e = predicted.distance[j], predicted.error[j]
-        if is_relevant(others, p, readings[j], cx, cy, radius, d, e, var0, rel2):
+        if is_relevant(others, p, readings[j], (cx, cy, radius), d, e, var0, rel2):
             if kept != j:
                 copy_reading(readings[j], readings[kept])
             kept += 1

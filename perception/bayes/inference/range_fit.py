@@ -9,7 +9,7 @@ against, as a hit is evidence for.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, TypeAlias
 
 from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line
 from perception.bayes.inference.cross_path import is_crossed, over_line
@@ -140,16 +140,21 @@ def score_circle(
     score.dispersion = 1.0 - math.sqrt(axis_x * axis_x + axis_y * axis_y) / max(hits, 1.0)
 
 
+Circle: TypeAlias = tuple[float, float, float]
+"""Centre x, y and radius, m."""
+NoiseVariance: TypeAlias = tuple[float, float]
+"""var0 and rel2, as of `noise_estimation.noise_variance`: the variance of a range r is var0 (m²) + rel2 · r²."""
+Near: TypeAlias = tuple[float, float]
+"""Cosine of the angle off the axis within which a reading may be answered, and how far off it may be, m."""
+
+
 @kernel
 def fit_circle(
     readings: Records[Reading],
-    cx: float,
-    cy: float,
-    radius: float,
+    circle: Circle,
     p: Records[Settings],
     soft: float,
-    var0: float,
-    rel2: float,
+    noise: NoiseVariance,
     steps: int,
     predicted: Predictions,
     fit: CircleFit,
@@ -161,12 +166,14 @@ def fit_circle(
 
     Parameters
     ----------
-    readings, cx, cy, radius, p
-        As for `score_circle`; the centre is where the fit starts.
+    readings, p
+        As for `score_circle`.
+    circle : Circle
+        Its centre is where the fit starts.
     soft : float
         How many σ² a residual may have before it counts for a quarter.
-    var0, rel2 : float
-        Variance of a range r: var0 (m²) + rel2 · r².
+    noise : NoiseVariance
+        Of the ranges.
     steps : int
         At most.
     predicted : Predictions
@@ -180,8 +187,8 @@ def fit_circle(
         False where a step was singular; `fit` is untouched then.
     """
     cos_may, gate = p[0].cos_may_answer, p[0].gate_m
-    x = cx
-    y = cy
+    x, y, radius = circle
+    var0, rel2 = noise
     a = 0.0
     b = 0.0
     c = 0.0
@@ -229,16 +236,11 @@ def fit_circle(
 @kernel
 def fit_reading_line(
     readings: Records[Reading],
-    nx: float,
-    ny: float,
-    ox: float,
-    oy: float,
-    distance: float,
-    cos_may: float,
-    gate: float,
+    start: tuple[float, float, float],
+    origin: tuple[float, float],
+    near: Near,
     soft: float,
-    var0: float,
-    rel2: float,
+    noise: NoiseVariance,
     steps: int,
     fit: LineFit,
 ) -> None:
@@ -246,19 +248,22 @@ def fit_reading_line(
 
     Parameters
     ----------
-    readings, soft, var0, rel2, steps
+    readings, soft, noise, steps
         As for `fit_circle`.
-    nx, ny, distance : float
-        Unit normal, away from the sensors, and distance from o (m) to start from.
-    ox, oy : float
+    start : (float, float, float)
+        Unit normal x, y, away from the sensors, and distance from o (m) to start from.
+    origin : (float, float)
         The origin o, m: near the readings, so that direction and distance hardly correlate.
-    cos_may, gate : float
-        Cosine of the angle off the axis within which a reading may be answered, and how far off it may be, m.
+    near : Near
+        Which readings take part.
     fit : LineFit
         Out: unit normal and c (m), for the rays it gives.
     """
+    nx, ny, c = start
+    ox, oy = origin
+    cos_may, gate = near
+    var0, rel2 = noise
     alpha = math.atan2(ny, nx)
-    c = distance
     for _ in range(steps):
         nx = math.cos(alpha)
         ny = math.sin(alpha)

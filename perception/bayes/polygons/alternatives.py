@@ -126,13 +126,10 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float
         behind = (radius - outline.inner_radius_m) / length
         if fit_circle(
             readings,
-            x + behind * ux,
-            y + behind * uy,
-            radius,
+            (x + behind * ux, y + behind * uy, radius),
             p,
             FIT_SOFTNESS,
-            var0,
-            rel2,
+            (var0, rel2),
             CIRCLE_FIT_STEPS,
             scratch.predicted,
             scratch.circle_fit,

@@ -129,10 +129,7 @@ def predict_cross(
 def score_crosses(
     readings: Records[Reading],
     every: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
+    frame: tuple[float, float, float, float],
     sides: Records[PolygonSide],
     is_closed: bool,
     p: SettingsRecord,
@@ -146,9 +143,10 @@ def score_crosses(
     ----------
     readings, every, sides, is_closed, p, noise
         As for `likelihood.score_polygon`.
-    x, y, c, s
-        As for `predict_cross`.
+    frame : (float, float, float, float)
+        x, y, c, s, as for `predict_cross`.
     """
+    x, y, c, s = frame
     gate = p[0].gate_m
     mirror = mirror_near = mirror_hits = 0.0
     cone = cone_near = cone_hits = 0.0

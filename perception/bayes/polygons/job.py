@@ -111,9 +111,7 @@ def score_pose(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float
     return score_polygon(
         s[0].job_readings[: s[0].job.reading_count],
         1,
-        x,
-        y,
-        heading,
+        (x, y, heading),
         outline.sides[: outline.side_count],
         outline.is_closed > 0,
         p,

@@ -36,6 +36,22 @@ ALONG, ACROSS, TURN = range(3)
 
 
 @kernel
+def is_met(towards: float, sideways: float, along: float, height: float, length: float) -> bool:
+    """Return whether a direction of a beam meets a side.
+
+    Parameters
+    ----------
+    towards, sideways : float
+        The direction, a unit vector: towards the side's line, and along it.
+    along, height : float
+        Where the sensor is along the side, and how far from its line, m.
+    length : float
+        Of the side, m.
+    """
+    return towards > GRAZING_COS and 0.0 <= along * towards + height * sideways <= length * towards
+
+
+@kernel
 def predict(
     sx: float, sy: float, ux: float, uy: float, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
 ) -> tuple[float, bool, float, float, bool]:
@@ -108,15 +124,12 @@ def predict(
                 must = must or dot * dot >= cos_must * cos_must * d2
         for hand in (-1.0, 1.0):
             towards = ahead * cos_half - hand * lateral * sin_half
-            if towards > GRAZING_COS:
-                sideways = lateral * cos_half + hand * ahead * sin_half
-                if 0.0 <= along * towards + height * sideways <= length * towards:
-                    edge = min(edge, height / towards)
+            sideways = lateral * cos_half + hand * ahead * sin_half
+            if is_met(towards, sideways, along, height, length):
+                edge = min(edge, height / towards)
             if not must:
                 towards = ahead * cos_must - hand * lateral * sin_must
-                if towards > GRAZING_COS:
-                    sideways = lateral * cos_must + hand * ahead * sin_must
-                    must = 0.0 <= along * towards + height * sideways <= length * towards
+                must = is_met(towards, lateral * cos_must + hand * ahead * sin_must, along, height, length)
     corner = math.sqrt(corner2)
     nearest = min(foot, corner, edge)
     must = foot_must or (must and nearest < NO_ANSWER_M)
@@ -132,12 +145,54 @@ def surplus_nat(throughs: float, hits: float) -> float:
 
 
 @kernel
+def range_nat(r: float, at: float, must: bool, price: float, p: SettingsRecord, level: int) -> float:
+    """Return what a range says for a polygon by one of both rules, nat; see `score_polygon`.
+
+    Parameters
+    ----------
+    r, at : float
+        The range, and the predicted one, m.
+    must : bool
+        Whether it must be heard.
+    price : float
+        What the answer costs, nat.
+    p : (1,) Settings
+        Gate and likelihood.
+    level : int
+        Of the range, as of `level_of`.
+    """
+    if abs(r - at) < p[0].gate_m:
+        v = log_likelihood(p, level, r - at) - price
+        return v if must else max(v, 0.0)
+    if must:
+        return p[0].missed_echo_nat if r > at else p[0].short_echo_nat
+    return 0.0
+
+
+@kernel
+def counts_of(v: float, r: float, at: float, must: bool, gate: float) -> tuple[float, float, float, float]:
+    """Return whether a range is near the predicted one, a hit, a sure hit, and a drop-out, 1 or 0 each.
+
+    Parameters
+    ----------
+    v : float
+        What the range says, as of `range_nat`, nat.
+    r, at, must
+        As for `range_nat`.
+    gate : float
+        How far off a near range may be, m.
+    """
+    if abs(r - at) < gate:
+        hit = 1.0 if v > 0.0 else 0.0
+        return 1.0, hit, hit if must else 0.0, 0.0
+    return 0.0, 0.0, 0.0, 1.0 if must and r > at else 0.0
+
+
+@kernel
 def score_polygon(
     readings: Records[Reading],
     every: int,
-    x: float,
-    y: float,
-    heading: float,
+    pose: tuple[float, float, float],
     sides: Records[PolygonSide],
     is_closed: bool,
     p: SettingsRecord,
@@ -162,8 +217,8 @@ def score_polygon(
         Raw ranges.
     every : int
         Step from one scored reading to the next.
-    x, y, heading : float
-        The polygon's pose: m, rad.
+    pose : (float, float, float)
+        The polygon's place x, y (m) and heading (rad).
     sides, is_closed, p
         As for `predict`.
     noise : int
@@ -176,19 +231,12 @@ def score_polygon(
     float
         The log ratio, nat.
     """
-    gate, missed, short = p[0].gate_m, p[0].missed_echo_nat, p[0].short_echo_nat
+    x, y, heading = pose
+    gate = p[0].gate_m
     c = math.cos(heading)
     s = math.sin(heading)
-    mirror = 0.0
-    cone = 0.0
-    mirror_hits = 0.0
-    mirror_throughs = 0.0
-    mirror_near = 0.0
-    mirror_sure = 0.0
-    cone_hits = 0.0
-    cone_throughs = 0.0
-    cone_near = 0.0
-    cone_sure = 0.0
+    mirror = mirror_near = mirror_hits = mirror_sure = mirror_throughs = 0.0
+    cone = cone_near = cone_hits = cone_sure = cone_throughs = 0.0
     has_crosses = False
     for j in range(0, len(readings), every):
         q = readings[j]
@@ -208,40 +256,24 @@ def score_polygon(
             p,
         )
         k = level_of(p, noise, r)
-        v = 0.0
-        if abs(r - at) < gate:
-            v = log_likelihood(p, k, r - at) - price
-            v = v if must else max(v, 0.0)
-            mirror_near += 1.0
-            if v > 0.0:
-                mirror_hits += 1.0
-                if must:
-                    mirror_sure += 1.0
-        elif must:
-            v = short
-            if r > at:
-                v = missed
-                mirror_throughs += 1.0
+        v = range_nat(r, at, must, price, p, k)
+        near, hit, sure, through = counts_of(v, r, at, must, gate)
         mirror += v
+        mirror_near += near
+        mirror_hits += hit
+        mirror_sure += sure
+        mirror_throughs += through
         if at_cone != at or must_cone != must or price > 0.0:
-            v = 0.0
-            if abs(r - at_cone) < gate:
-                v = log_likelihood(p, k, r - at_cone)
-                v = v if must_cone else max(v, 0.0)
-            elif must_cone:
-                v = missed if r > at_cone else short
+            v = range_nat(r, at_cone, must_cone, 0.0, p, k)
+            near, hit, sure, through = counts_of(v, r, at_cone, must_cone, gate)
         cone += v
-        if abs(r - at_cone) < gate:
-            cone_near += 1.0
-            if v > 0.0:
-                cone_hits += 1.0
-                if must_cone:
-                    cone_sure += 1.0
-        elif must_cone and r > at_cone:
-            cone_throughs += 1.0
+        cone_near += near
+        cone_hits += hit
+        cone_sure += sure
+        cone_throughs += through
     if has_crosses:  # in a loop of their own: the one above is the innermost of all
         over_mirror, near, hits, over_cone, near_cone, hits_cone = score_crosses(
-            readings, every, x, y, c, s, sides, is_closed, p, noise
+            readings, every, (x, y, c, s), sides, is_closed, p, noise
         )
         mirror += over_mirror
         mirror_near += near
@@ -335,7 +367,7 @@ def continue_search(
         scored += 1
         if search.trial < 0:
             search.log_likelihood_ratio = score_polygon(
-                readings, every, search.x, search.y, search.heading, sides, is_closed, p, noise, score
+                readings, every, (search.x, search.y, search.heading), sides, is_closed, p, noise, score
             )
             search.trial = 0
             continue
@@ -346,7 +378,7 @@ def continue_search(
             * (1.0 if search.trial % 2 == 1 else -1.0)
         )
         x, y, heading = moved(search.x, search.y, search.heading, axis, step)
-        v = score_polygon(readings, every, x, y, heading, sides, is_closed, p, noise, score)
+        v = score_polygon(readings, every, (x, y, heading), sides, is_closed, p, noise, score)
         search.trial += 1
         if v > search.log_likelihood_ratio + SEARCH_GAIN_MIN_NAT:
             search.x = x

@@ -132,7 +132,7 @@ def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end
         y = middle.y + root.yx * i + root.yy * j
         heading = middle.heading + root.hx * i + root.hy * j + root.hh * k
         v = score_polygon(
-            readings, 1, x, y, heading, sides, outline.is_closed > 0, p, job.noise_level, s[0].scratch.score
+            readings, 1, (x, y, heading), sides, outline.is_closed > 0, p, job.noise_level, s[0].scratch.score
         )
         share = math.exp(min(v - job.middle_nat, LATTICE_LEAD_MAX_NAT))
         moments.mass += share

@@ -68,7 +68,7 @@ def circle_evidence(
         q = readings[j]
         d = math.hypot(track.x - q.x, track.y - q.y)
         e, _ = answer(q, track.x - q.x, track.y - q.y, d, track.radius, p[0].half_angle_rad, s[0].rays)
-        if is_relevant(known, p, q, track.x, track.y, track.radius, d, e, var0, rel2):
+        if is_relevant(known, p, q, (track.x, track.y, track.radius), d, e, var0, rel2):
             score_circle(
                 readings[j : j + 1], track.x, track.y, track.radius, p, s[0].noise_level, predicted[0], score[0]
             )
@@ -95,9 +95,7 @@ def polygon_evidence(
         nats[j] = score_polygon(
             readings[j : j + 1],
             1,
-            track.x,
-            track.y,
-            track.heading,
+            (track.x, track.y, track.heading),
             sides,
             outline.is_closed > 0,
             p,

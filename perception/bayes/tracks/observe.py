@@ -34,6 +34,7 @@ from perception.bayes.tracks.model_check import count_surroundings
 from perception.bayes.tracks.track_selection import is_waiting
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
+from perception.sensor_mounts import RingPose
 
 
 @kernel
@@ -271,9 +272,16 @@ def associate(
 
 @kernel
 def hear_crosses(
-    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, m: int,
-    transmitters: Ints, listeners: Ints, half_paths: Floats,
-) -> None:  # fmt: skip
+    s: StateRecord,
+    tracks: CircleTracks,
+    p: SettingsRecord,
+    mounts: Floats,
+    pose: RingPose,
+    m: int,
+    transmitters: Ints,
+    listeners: Ints,
+    half_paths: Floats,
+) -> None:
     """Write the cross paths of a firing to the scratch, behind its echoes, remember them, and associate them.
 
     Those that were not heard are left out, and all of a transmitter that has hardly moved since others last listened
@@ -281,13 +289,16 @@ def hear_crosses(
 
     Parameters
     ----------
-    s, tracks, p, mounts, px, py, yaw
+    s, tracks, p, mounts
         As for `associate`, which has placed the firing's echoes.
+    pose : RingPose
+        Place (m) and direction (rad) of the ring.
     m : int
         Echoes of this firing.
     transmitters, listeners, half_paths
         As in `drivers.messages.CrossPaths`.
     """
+    px, py, yaw = pose
     if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
         return
     scratch = s[0].scratch

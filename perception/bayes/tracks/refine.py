@@ -82,12 +82,18 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
         As for `locate_circle`.
     """
     fit = s[0].scratch.circle_fit
-    var0, rel2 = noise_variance(s, p)
+    noise = noise_variance(s, p)
     steps = TENTATIVE_FIT_STEPS if track.status == TENTATIVE else TRACK_FIT_STEPS
     if not fit_circle(
-        s[0].scratch.readings[:n], track.x, track.y, track.radius, p, FIT_SOFTNESS, var0, rel2, steps,
-        s[0].scratch.predicted, fit,
-    ):  # fmt: skip
+        s[0].scratch.readings[:n],
+        (track.x, track.y, track.radius),
+        p,
+        FIT_SOFTNESS,
+        noise,
+        steps,
+        s[0].scratch.predicted,
+        fit,
+    ):
         return
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
     det = h00 * h11 - h01 * h01
@@ -222,18 +228,17 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
     line, corner = p[0].circle_count, p[0].circle_count + 1
     var0, rel2 = noise_variance(s, p)
     scratch = s[0].scratch
-    ux, uy = mean_bearing(scratch.readings[:n], scratch.own, track.x, track.y, p[0].gate_m)
+    bearing = mean_bearing(scratch.readings[:n], scratch.own, track.x, track.y, p[0].gate_m)
     turns = corner + 1 if n < p[0].compare_all_below and track.probability < CERTAIN_PROBABILITY else 1
     for _ in range(turns):
         track.alternative = (track.alternative + 1) % (corner + 1)
         if track.alternative == track.kind:
             track.alternative = (track.alternative + 1) % (corner + 1)
         k = track.alternative
+        circle = (track.x, track.y, track.radius)
         own_prior = prior if track.kind < p[0].model_count else 0.0
         if k < line:
-            v = fit_other_circle(
-                s, p, n, track.x, track.y, track.radius, ux, uy, p[0].circles[k].radius_m, ALTERNATIVE_STEPS
-            )  # fmt: skip
+            v = fit_other_circle(s, p, n, circle, bearing, p[0].circles[k].radius_m, ALTERNATIVE_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
             leads = (
                 v + (prior if k < p[0].model_count else 0.0)
@@ -244,7 +249,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
                 predict_circle(scratch.readings[:n], track.x, track.y, track.radius, scratch.own)
                 break
         elif k == line:
-            v = fit_other_line(s, p, n, track.x, track.y, track.radius, ux, uy, ALTERNATIVE_STEPS)
+            v = fit_other_line(s, p, n, circle, bearing, ALTERNATIVE_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score

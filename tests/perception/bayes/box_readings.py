@@ -80,7 +80,7 @@ def score(w: Floats, pose: Floats, every: int = 1) -> tuple[float, Score]:
     """Return the evidence of readings at a pose, and the whole score."""
     result = records(Score, zeros(Score, 1))[0]
     x, y, heading = pose.tolist()
-    return score_polygon(readings_of(w), every, x, y, heading, SIDES, CLOSED, P, LEVEL, result), result
+    return score_polygon(readings_of(w), every, (x, y, heading), SIDES, CLOSED, P, LEVEL, result), result
 
 
 def evidence(w: Floats, pose: Floats) -> float:

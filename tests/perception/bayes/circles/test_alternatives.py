@@ -60,9 +60,9 @@ def test_alternatives_are_fitted_and_scored_on_the_same_readings(examples: int) 
         predict_own(memory, n, centre, rho)
         bearing = alternatives.mean_bearing(readings_of(w), s[0].scratch.own, *pair(centre), float(S.gate_m))
         assert bearing == pytest.approx(aim, abs=1e-12)
-        v = alternatives.fit_other_circle(s, P, n, *pair(centre), rho, *bearing, rho2, 4)
+        v = alternatives.fit_other_circle(s, P, n, (*pair(centre), rho), bearing, rho2, 4)
         if not aim.any():
-            assert v == hopeless == alternatives.fit_other_line(s, P, n, *pair(centre), rho, *bearing, 4)
+            assert v == hopeless == alternatives.fit_other_line(s, P, n, (*pair(centre), rho), bearing, 4)
             continue
         compared += 1
         if v != hopeless:
@@ -75,7 +75,7 @@ def test_alternatives_are_fitted_and_scored_on_the_same_readings(examples: int) 
                 w, fit, rho2, COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noises()[h]
             )
             assert v == pytest.approx(score["llr"], rel=1e-12, abs=1e-11)
-        v = alternatives.fit_other_line(s, P, n, *pair(centre), rho, *bearing, 4)
+        v = alternatives.fit_other_line(s, P, n, (*pair(centre), rho), bearing, 4)
         normal, c = naive_bayes.fit_line(
             w, aim, centre, -rho, S.cos_may_answer, S.gate_m, 9.0, var0, rel2, 4
         )  # fmt: skip

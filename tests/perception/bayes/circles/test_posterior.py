@@ -56,7 +56,7 @@ def test_the_posterior_beats_least_squares_where_ranges_are_only_rounded() -> No
             w[j] = (*(-d * u), *u, round((d - 0.3) / (2 * HALF_BOX)) * 2 * HALF_BOX)
         fit, out = one(CircleFit)
         pose = posterior_of(case, readings_of(w), (0.01, -0.01, 0.003, 0.0, 0.003))
-        args = (0.01, -0.01, 0.3, p, 9.0, HALF_BOX**2 / 3, 0.0, 8)
+        args = ((0.01, -0.01, 0.3), p, 9.0, (HALF_BOX**2 / 3, 0.0), 8)
         range_fit.fit_circle(readings_of(w), *args, predictions(), fit[0])
         exact.append(math.hypot(*pose[:2]))
         fitted.append(math.hypot(*out[:2]))

@@ -146,7 +146,7 @@ def test_one_stand_gives_the_place_of_a_circle_and_a_line() -> None:
     rows = one_stand(centre, radius, 0.0, rng)
     fit, out = one(CircleFit)
     start = centre * cmath.exp(0.1j)
-    args = (start.real, start.imag, radius, P, 9.0, 1e-6, 0.0, 600)
+    args = ((start.real, start.imag, radius), P, 9.0, (1e-6, 0.0), 600)
     assert range_fit.fit_circle(crosses(rows), *args, predictions(), fit[0])
     assert complex(*out[:2]) == pytest.approx(centre, abs=3e-3)  # steps are damped, and end when they are short
     normal = cmath.exp(0.15j)
@@ -155,7 +155,14 @@ def test_one_stand_gives_the_place_of_a_circle_and_a_line() -> None:
         row[4] = half_over_line(t, t + complex(row[5], row[6]), normal, 1.2)
     line, fields = one(LineFit)
     range_fit.fit_reading_line(
-        crosses(rows), 1.0, 0.0, 0.0, 0.0, 1.21, P[0].cos_may_answer, GATE, 9.0, 1e-6, 0.0, 40, line[0]
+        crosses(rows),
+        (1.0, 0.0, 1.21),
+        (0.0, 0.0),
+        (P[0].cos_may_answer, GATE),
+        9.0,
+        (1e-6, 0.0),
+        40,
+        line[0],
     )
     assert fields[:3] == pytest.approx([normal.real, normal.imag, 1.2], abs=1e-4)
 
@@ -197,7 +204,7 @@ def test_cross_paths_of_a_firing_are_placed_remembered_and_associated() -> None:
     def hear(half_paths: Floats, pose: tuple[float, float, float] = pose) -> int:
         assert placement.place_readings(memory.s, P, MOUNTS, *pose, nothing) == 0
         observe.hear_crosses(
-            memory.s, memory.tracks, P, MOUNTS, *pose, 0, np.array([0, 0, 0]), np.array([1, 2, 0]), half_paths
+            memory.s, memory.tracks, P, MOUNTS, pose, 0, np.array([0, 0, 0]), np.array([1, 2, 0]), half_paths
         )
         return int(memory.s[0].scratch.crosses)
 
@@ -266,7 +273,7 @@ def test_a_cross_path_that_a_named_drum_must_have_answered_sooner_is_no_other_bo
         others = memory.s[0].scratch.others
         others = others[: occlusion.find_others(memory.tracks, own, P, to.real, to.imag, 0.3, 0, others)]
         e = cross_path.circle_error(q, to.real, to.imag, abs(to), 0.3)
-        return bool(occlusion.is_relevant(others, P, q, to.real, to.imag, 0.3, abs(to), e, 1e-6, 0.0))
+        return bool(occlusion.is_relevant(others, P, q, (to.real, to.imag, 0.3), abs(to), e, 1e-6, 0.0))
 
     assert not counts(1)
     near.is_named = 0

@@ -46,7 +46,7 @@ def test_a_circles_fit_equals_its_oracle(examples: int) -> None:
     for case in cases(examples, 2):
         fit, out = one(CircleFit)
         assert range_fit.fit_circle(
-            case.readings, *case.place, case.rho, case.p, 9.0, case.var0, case.rel2, 4, predictions(), fit[0]
+            case.readings, (*case.place, case.rho), case.p, 9.0, (case.var0, case.rel2), 4, predictions(), fit[0]
         )  # fmt: skip
         p, info = naive_bayes.fit_circle(
             case.used, case.centre, case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4
@@ -60,7 +60,7 @@ def test_a_lines_fit_and_score_equal_their_oracles(examples: int) -> None:
     for case in cases(examples, 3):
         n0, (fit, out), (score, fields) = first_normal(case), one(LineFit), one(LineScore)
         range_fit.fit_reading_line(
-            case.readings, *pair(n0), *case.place, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4, fit[0]
+            case.readings, (*pair(n0), -case.rho), case.place, (OPT, GATE), 9.0, (case.var0, case.rel2), 4, fit[0]
         )
         n, c = naive_bayes.fit_line(case.used, n0, case.centre, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4)
         # With a single reading only the damping determines the turn: hence not 1e-12.
@@ -77,7 +77,7 @@ def test_without_an_echo_a_fit_does_not_move_and_the_score_has_no_hits() -> None
     silent = case.used.copy()
     silent[:, 4] = range_fit.FAR
     fit, out = one(CircleFit)
-    args = (0.2, 0.3, 0.3, case.p, 9.0, case.var0, case.rel2, 4)
+    args = ((0.2, 0.3, 0.3), case.p, 9.0, (case.var0, case.rel2), 4)
     assert range_fit.fit_circle(readings_of(silent), *args, predictions(), fit[0])
     assert out[:2] == pytest.approx([0.2, 0.3], abs=1e-12)
     fields = score_circle(case._replace(rho=0.3), readings_of(silent), 0.2, 0.3)

@@ -40,7 +40,7 @@ def test_half_the_way_over_a_box_is_the_shortest_by_both_rules(examples: int) ->
         if at < 1e17:
             q.range_m = at + 0.004
             got = polygon_cross_path.score_crosses(
-                one, 1, place.real, place.imag, math.cos(heading), math.sin(heading), sides, CLOSED, P, 0
+                one, 1, (place.real, place.imag, math.cos(heading), math.sin(heading)), sides, CLOSED, P, 0
             )
             v = max(0.0, log_likelihood(P, level_of(P, 0, q.range_m), 0.004) - price)
             assert got[:3] == pytest.approx((v, 1.0, float(v > 0.0)), abs=1e-6)
