@@ -18,7 +18,7 @@ from one direction also answers from another shows which kind of place this is; 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,13 +49,15 @@ from perception.mapping.grid.window import (
     OCTANTS,
     SPREAD_CELLS,
     SPREAD_RELATIVE,
+    Beams,
+    Raster,
     Ring,
     Window,
+    beams_of,
     octant,
     row_of_beam,
     set_edges,
 )
-from perception.sensor_mounts import mounts_at
 
 DIRECTED_ARC_SIGMAS: Final = 1.5
 UNDIRECTED_ARC_SIGMAS: Final = 2.0
@@ -91,28 +93,121 @@ MIRROR_SHARE: Final = 0.5
 """Share of passages from which on, and up to which, the undirected evidence counts less and less."""
 
 
+class Scratch(NamedTuple):
+    """What is overwritten at each firing, and how much a cell draws."""
+
+    arc: Ints
+    """(k, 4): the cells of all arcs, y and x, their looking directions, and the sensors."""
+    shares: Floats
+    """(k, 2): the share of its echo that each draws, in a looking direction and in the undirected evidence."""
+    draws: Floats
+    """(2 CERTAIN + 1,): how much a cell draws by its evidence, from −`CERTAIN`; see `make_draws`. Constant."""
+    edges: Floats
+    """(4,): the edges of a beam, as of `set_edges`."""
+
+
+@kernel
+def sweep_beam(
+    planes: Cells,
+    maybe_sure: Flags,
+    raster: Raster,
+    place: int,
+    beam: tuple[float, float, float, float],
+    heard: tuple[float, float, float, float, bool],
+    weights: tuple[float, float],
+    entry: tuple[int, int],
+    scratch: Scratch,
+) -> tuple[int, float]:
+    """Enter what a beam has passed, and gather the cells of its arc.
+
+    Parameters
+    ----------
+    planes, maybe_sure, raster, place
+        As of `enter_readings`. Updated.
+    beam : (float, float, float, float)
+        Place (m) and direction (rad) of the sensor, and half the beam's width, rad.
+    heard : (float, float, float, float, bool)
+        Its range and that range's standard deviation, how far the beam has passed, how far it goes (m), and whether
+        the cells around the range are gathered as an arc.
+    weights : (float, float)
+        Evidence of a passage, in a looking direction and in the undirected evidence.
+    entry : (int, int)
+        The number of the sensor, and of the cells gathered before.
+    scratch : Scratch
+        Updated; its edges are those of this beam.
+
+    Returns
+    -------
+    (int, float)
+        The number of cells gathered by now, and the distance to the nearest cell in the middle of the beam that
+        something was heard in from elsewhere, m; infinite without one.
+    """
+    arc, shares, _, edges = scratch
+    corner, cell_m = raster
+    sx, sy, axis, half_angle = beam
+    r, sigma, passed, end, has_arc = heard
+    weight, weight_both = weights
+    i, m = entry
+    mask = planes.shape[1] - 1
+    ux = math.cos(axis)
+    uy = math.sin(axis)
+    nearest = math.inf
+    # Cells so near are passed, and in no arc: what is done there needs no root of the square of the distance.
+    square_sine = math.sin(half_angle) ** 2
+    deep = 0.999 * max(0.0, min(passed, end - 2.0 * UNDIRECTED_ARC_SIGMAS * sigma)) ** 2
+    one = octant(edges[0], edges[1])
+    other = octant(edges[2], edges[3])
+    low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
+    high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
+    for iy in range(low_y, high_y + 1):
+        dy = (iy + 0.5) * cell_m - sy
+        jy = iy & mask
+        low, high = row_of_beam(dy, end, edges)
+        if low > high:
+            continue
+        low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
+        high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+        for ix in range(low_x, high_x + 1):
+            dx = (ix + 0.5) * cell_m - sx
+            square = dx * dx + dy * dy
+            across = ux * dy - uy * dx
+            inside = 1.0 - across * across / (square * square_sine) if square > 0.0 else 0.0
+            if inside <= 0.0:
+                continue
+            k = one if one == other else octant(dx, dy)
+            jx = ix & mask
+            if square >= deep or maybe_sure[jy, jx]:
+                d = math.sqrt(square)
+                if has_arc and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
+                    arc[m, 0] = jy
+                    arc[m, 1] = jx
+                    arc[m, 2] = k if abs(d - r) <= DIRECTED_ARC_SIGMAS * sigma else UNDIRECTED
+                    arc[m, 3] = i
+                    shares[m, 0] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
+                    m += 1
+                if d < nearest and inside >= MIDDLE and is_sure_elsewhere(planes, maybe_sure, jy, jx, k, place):
+                    nearest = d
+                if d >= passed:
+                    continue
+            own = planes[k, jy, jx]
+            renew(own, place)
+            own[PASSAGE] = min(int(own[PASSAGE]), -int(weight * inside))
+            both = planes[UNDIRECTED, jy, jx]
+            renew(both, place)
+            both[PASSAGE] = min(int(both[PASSAGE]), -int(weight_both * inside))
+    return m, nearest
+
+
 @kernel
 def enter_readings(
     planes: Cells,
     maybe_sure: Flags,
-    corner: Ints,
-    cell_m: float,
+    raster: Raster,
     place: int,
-    x: float,
-    y: float,
-    yaw: float,
-    ranges: Floats,
-    mounts: Floats,
-    bearings: Floats,
-    half_angle: float,
-    rounding_m: float,
-    silence_m: float,
-    mirrors: float,
+    beams: Beams,
+    known: tuple[float, float, float],
     answers: Floats,
-    arc: Ints,
-    shares: Floats,
-    draws: Floats,
-    edges: Floats,
+    scratch: Scratch,
 ) -> None:
     """Enter the readings of a firing: first what they passed, then their hits, so that their order does not matter.
 
@@ -122,41 +217,26 @@ def enter_readings(
         The torus, direction by direction. Updated.
     maybe_sure : (n, n) bool
         As of `is_sure_elsewhere`. Updated.
-    corner : (2,) int
-        Number of the window's first cell in x and y.
-    cell_m : float
-        Side of a cell, m.
+    raster : Raster
+        Where the cells are.
     place : int
         Where on its way the robot is.
-    x, y, yaw : float
-        Place (m) and direction (rad) of the ring.
-    ranges : (n,) float
-        As in a `Firing`, m.
-    mounts : (n, 3) float
-        x, y (m), direction (rad) of each sensor in the ring's frame.
-    bearings : (n,) float
-        Where in its beam each echo came from, rad from the axis; NaN where that is not known.
-    half_angle : float
-        Half the beam's width, rad.
-    rounding_m : float
-        Standard deviation of a range by its rounding, m.
-    silence_m : float
-        Distance to which a beam without an echo shows free space, m.
-    mirrors : float
-        How far this is a place of mirrors, 0 to 1.
+    beams : Beams
+        The beams of the firing.
+    known : (float, float, float)
+        Standard deviation of a range by its rounding (m), distance to which a beam without an echo shows free space
+        (m), and how far this is a place of mirrors, 0 to 1.
     answers : (2,) float
         How often a cell that was heard from other directions answered, and how often not. Updated.
-    arc : (k, 4) int
-        Scratch: the cells of all arcs, their looking directions, and the sensors.
-    shares : (k, 2) float
-        Scratch: the share of its echo that each draws, in a looking direction and in the undirected evidence.
-    draws : (2 CERTAIN + 1,) float
-        How much a cell draws by its evidence, from −`CERTAIN`; see `make_draws`.
-    edges : (4,) float
-        Scratch.
+    scratch : Scratch
+        Updated.
     """
+    corner, cell_m = raster
+    x, y, yaw = beams.pose
+    ranges, mounts, bearings, half_angle = beams.ranges, beams.mounts, beams.bearings, beams.half_angle
+    rounding_m, silence_m, mirrors = known
+    arc, shares, draws, edges = scratch
     mask = planes.shape[1] - 1
-    square_sine = math.sin(half_angle) ** 2
     c = math.cos(yaw)
     s = math.sin(yaw)
     m = 0
@@ -168,8 +248,6 @@ def enter_readings(
         sx = x + c * mounts[i, 0] - s * mounts[i, 1]
         sy = y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
-        ux = math.cos(axis)
-        uy = math.sin(axis)
         set_edges(axis, half_angle, edges)
         sigma = max(SPREAD_CELLS * cell_m, rounding_m, SPREAD_RELATIVE * r) if is_echo else 0.0
         passed = r - PASSED_SIGMAS * sigma if is_echo else silence_m
@@ -181,49 +259,18 @@ def enter_readings(
         if not is_echo:
             weight = SILENT_NAT * (1.0 - MIRRORS_SILENT * mirrors)
             weight_both = UNDIRECTED_SILENT
-        nearest = math.inf
-        # Cells so near are passed, and in no arc: what is done there needs no root of the square of the distance.
-        deep = 0.999 * max(0.0, min(passed, end - 2.0 * UNDIRECTED_ARC_SIGMAS * sigma)) ** 2
-        one = octant(edges[0], edges[1])
-        other = octant(edges[2], edges[3])
-        low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
-        high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
-        for iy in range(low_y, high_y + 1):
-            dy = (iy + 0.5) * cell_m - sy
-            jy = iy & mask
-            low, high = row_of_beam(dy, end, edges)
-            if low > high:
-                continue
-            low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
-            high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
-            for ix in range(low_x, high_x + 1):
-                dx = (ix + 0.5) * cell_m - sx
-                square = dx * dx + dy * dy
-                across = ux * dy - uy * dx
-                inside = 1.0 - across * across / (square * square_sine) if square > 0.0 else 0.0
-                if inside <= 0.0:
-                    continue
-                k = one if one == other else octant(dx, dy)
-                jx = ix & mask
-                if square >= deep or maybe_sure[jy, jx]:
-                    d = math.sqrt(square)
-                    if has_arc and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
-                        arc[m, 0] = jy
-                        arc[m, 1] = jx
-                        arc[m, 2] = k if abs(d - r) <= DIRECTED_ARC_SIGMAS * sigma else UNDIRECTED
-                        arc[m, 3] = i
-                        shares[m, 0] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
-                        m += 1
-                    if d < nearest and inside >= MIDDLE and is_sure_elsewhere(planes, maybe_sure, jy, jx, k, place):
-                        nearest = d
-                    if d >= passed:
-                        continue
-                own = planes[k, jy, jx]
-                renew(own, place)
-                own[PASSAGE] = min(int(own[PASSAGE]), -int(weight * inside))
-                both = planes[UNDIRECTED, jy, jx]
-                renew(both, place)
-                both[PASSAGE] = min(int(both[PASSAGE]), -int(weight_both * inside))
+        heard = (r, sigma, passed, end, has_arc)
+        m, nearest = sweep_beam(
+            planes,
+            maybe_sure,
+            raster,
+            place,
+            (sx, sy, axis, half_angle),
+            heard,
+            (weight, weight_both),
+            (i, m),
+            scratch,
+        )
         if is_located and m < arc.shape[0]:
             px = r * math.cos(axis + bearings[i])
             py = r * math.sin(axis + bearings[i])
@@ -305,7 +352,7 @@ class DirectedGrid:
         "_arc",
         "_shares",
         "_draws",
-        "_edges",
+        "_scratch",
         "_odds",
         "_planes",
         "_maybe_sure",
@@ -330,7 +377,7 @@ class DirectedGrid:
         self._arc = np.zeros((room, 4), np.int64)
         self._shares = np.zeros((room, 2))
         self._draws = make_draws()
-        self._edges = np.zeros(4)
+        self._scratch = Scratch(self._arc, self._shares, self._draws, np.zeros(4))
         self._odds = (1.0 / (1.0 + np.exp(np.arange(CERTAIN, -CERTAIN - 1, -1) / NAT))).astype(np.float32)
 
     @property
@@ -345,13 +392,16 @@ class DirectedGrid:
         if not self.window.follow(firing.pose, (self.cells, self._maybe_sure)):
             return
         self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NOWHERE
-        mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_readings(
-            self._planes, self._maybe_sure, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
-            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, mounts, bearings, self._ring.half_angle,
-            self._rounding_m, silence_m, self.mirrors, self._answers, self._arc, self._shares, self._draws,
-            self._edges,
-        )  # fmt: skip
+            self._planes,
+            self._maybe_sure,
+            self.window.raster,
+            self._place,
+            beams_of(firing, self._ring, bearings),
+            (self._rounding_m, silence_m, self.mirrors),
+            self._answers,
+            self._scratch,
+        )
         if self._answers.sum() > ANSWERS_MAX:
             self._answers *= 0.5
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
-from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.window import SPREAD_CELLS, Ring, Window, placed, row_of_beam, set_edges
+from perception.kernel import Floats, kernel
+from perception.mapping.grid.window import SPREAD_CELLS, Raster, Ring, Window, placed, row_of_beam, set_edges
+from perception.sensor_mounts import SensorPose
 
 SPREAD: Final = 0.01
 """σ_r: standard deviation of a range as a share of it, at least `SPREAD_CELLS`."""
@@ -35,11 +36,8 @@ LOG_ODDS_MAX: Final = 8.0
 @kernel
 def enter_reading(
     log_odds: Floats,
-    corner: Ints,
-    cell_m: float,
-    sx: float,
-    sy: float,
-    axis: float,
+    raster: Raster,
+    sensor: SensorPose,
     half_angle: float,
     r: float,
     sigma: float,
@@ -57,12 +55,14 @@ def enter_reading(
     ----------
     log_odds : (n, n) float
         The torus. Updated.
-    corner, cell_m, sx, sy, axis, half_angle, r, edges
+    raster, sensor, half_angle, r, edges
         As of `moravec_elfes.enter_reading`.
     sigma : float
         σ_r, m; 0 for a beam without an echo that is empty up to `r`.
     """
     mask = log_odds.shape[0] - 1
+    corner, cell_m = raster
+    sx, sy, axis = sensor
     set_edges(axis, half_angle, edges)
     ux = math.cos(axis)
     uy = math.sin(axis)
@@ -134,11 +134,8 @@ class ElfesGrid:
             sigma = max(SPREAD_CELLS * cell_m, self._rounding_m, SPREAD * r) if r < math.inf else 0.0
             enter_reading(
                 self.log_odds,
-                self.window.corner,
-                cell_m,
-                sx,
-                sy,
-                axis,
+                self.window.raster,
+                (sx, sy, axis),
                 self._half_angle,
                 r if r < math.inf else silence_m,
                 sigma,

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.bounds import SHARE, bounds
-from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.window import Ring, Window, placed, row_of_beam, set_edges
+from perception.kernel import Floats, kernel
+from perception.mapping.grid.window import Raster, Ring, Window, placed, row_of_beam, set_edges
+from perception.sensor_mounts import SensorPose
 
 EMPTY: Final = 0
 OCCUPIED: Final = 1
@@ -32,11 +33,8 @@ NEAREST_M: Final = 0.15
 @kernel
 def enter_reading(
     cells: Floats,
-    corner: Ints,
-    cell_m: float,
-    sx: float,
-    sy: float,
-    axis: float,
+    raster: Raster,
+    sensor: SensorPose,
     half_angle: float,
     r: float,
     accuracy_m: float,
@@ -55,11 +53,9 @@ def enter_reading(
     ----------
     cells : (n, n, 2) float
         The torus. Updated.
-    corner : (2,) int
-        Number of the window's first cell in x and y.
-    cell_m : float
-        Side of a cell, m.
-    sx, sy, axis : float
+    raster : Raster
+        Where the cells are.
+    sensor : SensorPose
         Place (m) and direction (rad) of the sensor.
     half_angle : float
         h: half the beam's width, rad.
@@ -71,6 +67,8 @@ def enter_reading(
         Scratch.
     """
     mask = cells.shape[0] - 1
+    corner, cell_m = raster
+    sx, sy, axis = sensor
     set_edges(axis, half_angle, edges)
     ux = math.cos(axis)
     uy = math.sin(axis)
@@ -140,11 +138,8 @@ class MoravecElfesGrid:
             accuracy_m = max(ACCURACY_CELLS * cell_m, ACCURACY * r) if r < math.inf else 0.0
             enter_reading(
                 self.cells,
-                self.window.corner,
-                cell_m,
-                sx,
-                sy,
-                axis,
+                self.window.raster,
+                (sx, sy, axis),
                 self._half_angle,
                 r if r < math.inf else silence_m,
                 accuracy_m,

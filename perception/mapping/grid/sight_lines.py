@@ -25,18 +25,21 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
 from perception.mapping.grid.cell_evidence import PLACE_NUMBERS
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
     SPREAD_RELATIVE,
+    Beams,
+    Raster,
     Ring,
     Window,
+    beams_of,
     is_possible,
     row_of_beam,
     set_edges,
 )
-from perception.sensor_mounts import mounts_at
+from perception.sensor_mounts import SensorPose
 
 LOCATED_RAD: Final = 0.07
 """Greatest angle off the line on which an echo from something recognised came, rad. In three random rooms with
@@ -85,11 +88,8 @@ Flags = NDArray[np.bool_]
 @kernel
 def follow_rays(
     holds: Flags,
-    corner: Ints,
-    cell_m: float,
-    sx: float,
-    sy: float,
-    axis: float,
+    raster: Raster,
+    sensor: SensorPose,
     sine: float,
     r: float,
     sigma: float,
@@ -100,9 +100,9 @@ def follow_rays(
 
     Parameters
     ----------
-    holds, corner, cell_m
+    holds, raster
         As of `enter_sights`.
-    sx, sy, axis : float
+    sensor : SensorPose
         Place (m) and direction (rad) of the sensor.
     sine : float
         Of half the beam's width.
@@ -113,6 +113,8 @@ def follow_rays(
     shares : (`RAYS`,) float
         Out: the share of the echo that each line has, with those beside it.
     """
+    corner, cell_m = raster
+    sx, sy, axis = sensor
     mask = holds.shape[0] - 1
     ux = math.cos(axis)
     uy = math.sin(axis)
@@ -159,16 +161,9 @@ def follow_rays(
 def enter_sights(
     sights: NDArray[np.int16],
     holds: Flags,
-    corner: Ints,
-    cell_m: float,
+    raster: Raster,
     place: int,
-    x: float,
-    y: float,
-    yaw: float,
-    ranges: Floats,
-    mounts: Floats,
-    bearings: Floats,
-    half_angle: float,
+    beams: Beams,
     blocked_m: Floats,
     shares: Floats,
     edges: Floats,
@@ -182,7 +177,7 @@ def enter_sights(
         The torus: what is kept of each cell. Updated.
     holds : (n, n) bool
         The torus: cells that hold something.
-    corner, cell_m, place, x, y, yaw, ranges, mounts, bearings, half_angle
+    raster, place, beams
         As of `directed.enter_readings`.
     blocked_m, shares : (`RAYS`,) float
         Scratch, as of `follow_rays`.
@@ -192,6 +187,9 @@ def enter_sights(
         How many echoes that nothing recognised explains came from what holds something, how many over it, how many of
         these there are at all, and how many echoes something explains. Updated.
     """
+    corner, cell_m = raster
+    x, y, yaw = beams.pose
+    ranges, mounts, bearings, half_angle = beams.ranges, beams.mounts, beams.bearings, beams.half_angle
     mask = holds.shape[0] - 1
     sine = math.sin(half_angle)
     c = math.cos(yaw)
@@ -208,7 +206,7 @@ def enter_sights(
         sigma = max(SPREAD_CELLS * cell_m, SPREAD_RELATIVE * r)
         end = r - sigma
         is_located = not math.isnan(bearings[i])
-        came = follow_rays(holds, corner, cell_m, sx, sy, axis, sine, r, sigma, blocked_m, shares)
+        came = follow_rays(holds, raster, (sx, sy, axis), sine, r, sigma, blocked_m, shares)
         echoes[3 if is_located else 2] += 1.0
         if not is_located and came != 0:
             echoes[0 if came > 0 else 1] += 1.0
@@ -305,20 +303,12 @@ class SightLines:
         if not is_possible(firing.pose):
             return
         stamp = 1 + place % (PLACE_NUMBERS - 1)
-        mounts = mounts_at(firing, self._ring.mounts, self._ring.turning)
         enter_sights(
             self.sights,
             holds,
-            self._window.corner,
-            self._window.cell_m,
+            self._window.raster,
             stamp,
-            float(firing.pose.x),
-            float(firing.pose.y),
-            float(firing.ring_yaw),
-            firing.ranges_m,
-            mounts,
-            bearings,
-            self._ring.half_angle,
+            beams_of(firing, self._ring, bearings),
             self._blocked_m,
             self._shares,
             self._edges,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing, Pose
 from perception.bounds import CONSTANT, Bound, bounds
 from perception.kernel import Floats, Ints, kernel
-from perception.sensor_mounts import mounts_at
+from perception.sensor_mounts import RingPose, mounts_at, ring_pose
 
 Cell = TypeVar("Cell", bound=np.generic)
 
@@ -56,6 +56,25 @@ class Ring:
     rounding_m: float
     reach_m: float
     turning: tuple[int, ...] = ()
+
+
+class Beams(NamedTuple):
+    """The beams of a firing, as kernels take them."""
+
+    pose: RingPose
+    """Place (m) and direction (rad) of the ring."""
+    ranges: Floats
+    """(n,): as in a `Firing`, m."""
+    mounts: Floats
+    """(n, 3): x, y (m), direction (rad) of each sensor in the ring's frame."""
+    bearings: Floats
+    """(n,): where in its beam each echo came from, rad from the axis; NaN where that is not known."""
+    half_angle: float
+    """Half the beam's width, rad."""
+
+
+Raster: TypeAlias = tuple[Ints, float]
+"""The number of the window's first cell in x and y, and the side of a cell, m."""
 
 
 @kernel
@@ -117,6 +136,12 @@ def is_possible(pose: Pose) -> bool:
     return abs(pose.x) < DRIVEN_MAX_M and abs(pose.y) < DRIVEN_MAX_M and math.isfinite(pose.theta)
 
 
+def beams_of(firing: Firing, ring: Ring, bearings: Floats) -> Beams:
+    """Return the beams of a firing, given where in them the echoes came from."""
+    mounts = mounts_at(firing, ring.mounts, ring.turning)
+    return Beams(ring_pose(firing), firing.ranges_m, mounts, bearings, ring.half_angle)
+
+
 def placed(firing: Firing, ring: Ring) -> list[list[float]]:
     """Return place x, y (m) and direction (rad) of each sensor at a firing."""
     mounts = mounts_at(firing, ring.mounts, ring.turning)
@@ -154,6 +179,11 @@ class Window:
         self.placed = False
         self.fixed = False
         self._shared: list[NDArray[np.generic]] = []
+
+    @property
+    def raster(self) -> Raster:
+        """Where the cells are, as kernels take it."""
+        return self.corner, self.cell_m
 
     def share(self, plane: NDArray[np.generic]) -> None:
         """Clear a plane of the cells' memory, too, wherever cells come in; see `follow`."""
