@@ -27,7 +27,7 @@ from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Floats
 from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import Inputs, State, apply_command, step
 from runtime.support.kernel_warmup import prepare_kernels
@@ -130,7 +130,9 @@ def costs_of_drive(settings: Settings, cycles: int, budget_s: float) -> DriveCos
         for cycle in range(1, SETTLED_CYCLES + cycles + 1):
             run_s = cycle / settings.cycle.rate_hz
             line.exchange(run_s)
-            inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
+            inputs = gather_inputs(
+                driver, run_s, OperatorInput(Request.ARM if state.mode.mode is Mode.READY else None)
+            )
             if cycle == SETTLED_CYCLES + 1:
                 costs = perception.costs = DriveCosts(1e6 * budget_s)
             _one_cycle(state, inputs, settings, driver, costs, budget_s)

@@ -21,7 +21,7 @@ from config.load import load_settings
 from drivers.emulator.robot_device import GroundTruth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
-from runtime.simulation.closed_loop import simulate
+from runtime.simulation.closed_loop import SimulationOptions, simulate
 from runtime.support.kernel_cache import compiled_signatures
 from runtime.support.kernel_warmup import prepare_kernels
 from runtime.timing.footprint import own_mb
@@ -98,8 +98,13 @@ def grow(
     with memory.driving():
         clock_us = 0 if math.isinf(wrap_s) else WRAP_US - round(1e6 * wrap_s)
         simulate(
-            settings, settings.world, 0, last / settings.cycle.rate_hz, monitor.on_cycle, clock_start_us=clock_us
-        )  # fmt: skip
+            settings,
+            settings.world,
+            0,
+            last / settings.cycle.rate_hz,
+            monitor.on_cycle,
+            options=SimulationOptions(clock_start_us=clock_us),
+        )
     signatures = compiled_signatures()
     growth_mb, compilations = round(monitor.after_mb - monitor.before_mb, 3), signatures - monitor.signatures
     figures: dict[str, Any] = {

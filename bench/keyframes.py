@@ -26,14 +26,14 @@ from config.settings import GridConfig, PerceptionConfig, Settings
 from drivers.messages import Pose
 from perception.bounds import COUNT, FINITE, PLACE, Bound
 from perception.snapshot import bounds_of, numbers_of
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import decode, encode
 from runtime.recording.replayer import adopt
 from runtime.recording.schema import Keyframe, carried_state, keyframe
-from runtime.simulation.closed_loop import OperatorInput, simulate
+from runtime.simulation.closed_loop import SimulationOptions, simulate
 
 ROBOTS: Final = list_shipped("robots")
 WORLDS: Final = list_shipped("worlds")
@@ -176,7 +176,15 @@ def adopt_all(settings: Settings, seed: int, seconds: float, period_s: float) ->
         is_waiting = state.mode.mode in {Mode.READY, Mode.SAFE_STOP} and cycle % 20 == 0
         return OperatorInput(Request.ARM if is_waiting else None)
 
-    simulate(settings, settings.world, seed, seconds, on_state=on_state, operator=operator, line_step_s=LINE_STEP_S)
+    simulate(
+        settings,
+        settings.world,
+        seed,
+        seconds,
+        on_state=on_state,
+        operator=operator,
+        options=SimulationOptions(line_step_s=LINE_STEP_S),
+    )
     return found
 
 

@@ -31,7 +31,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
 from drivers.registry import make_device, make_driver
 from runtime.cycle.drive_requests import first_request, needs_recognition
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
@@ -284,8 +284,8 @@ def run_trial(
         cycle += 1
         run_s = cycle / settings.cycle.rate_hz
         line.exchange(run_s)
-        inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None,
-                               preparing=None if recognises else "left out")  # fmt: skip
+        operator = OperatorInput(Request.ARM if state.mode.mode is Mode.READY else None)
+        inputs = gather_inputs(driver, run_s, operator, preparing=None if recognises else "left out")
         budget.begin()
         step(state, inputs, settings, lambda command: apply_command(driver, command), budget)
         truth, before = device.truth, place

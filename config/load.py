@@ -17,7 +17,7 @@ from config.files import ConfigError, Kind, dotted, list_shipped, one_line, pars
 from config.layers import Layers, Location, PathError, Source
 from config.mission import MissionConfig
 from config.model import ModelConfig
-from config.overrides import apply_overrides, parse_override
+from config.overrides import apply_overrides, parse_override, parse_overrides
 from config.places import check_places
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
@@ -154,14 +154,7 @@ def load_settings(
         With a line for each problem, naming the file or ``--set`` the value came from.
     """
     run = read_document("runs", DEFAULT_RUN if config is None else config)
-    problems: list[str] = []
-    changes = []
-    for text in overrides:
-        try:
-            changes.append(parse_override(text))
-        except ConfigError as error:
-            problems += error.problems
-
+    of_names, of_values, problems = parse_overrides(overrides)
     names = Layers(run.source)
     names.lay({"world": DEFAULT_WORLD, "models": [DEFAULT_MODEL]}, run.source)
     section = ("robot",) if isinstance(run.table.get("robot"), dict) else ()
@@ -170,7 +163,7 @@ def load_settings(
     names.lay({key: value for key, value in asked.items() if value is not None}, COMMAND_LINE)
     if isinstance(names.tree["models"], str):
         names.lay({"models": [names.tree["models"]]}, names.source_of(("models",)))
-    problems += apply_overrides([c for c in changes if c.names_files], names)
+    problems += apply_overrides(of_names, names)
 
     settings = Layers(run.source)
     if "robot" in names.tree:
@@ -184,7 +177,7 @@ def load_settings(
     problems += _lay_models(names, settings)
     if "mission" in names.tree:
         problems += _lay_named("missions", "mission", names, settings)
-    problems += apply_overrides([c for c in changes if not c.names_files], settings)
+    problems += apply_overrides(of_values, settings)
     if problems:
         raise ConfigError(*problems)
     return _validated(Settings, settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from config.files import DEPTH_MAX, ConfigError, TomlSyntaxError, is_utf8, one_line, parse_toml
@@ -43,6 +44,21 @@ def parse_override(text: str) -> Override:
     if len(keys) > DEPTH_MAX:
         raise ConfigError(f"--set {shown}: no setting lies that deep")
     return Override(keys, _parse_value(value.strip(), f"--set {shown}"))
+
+
+def parse_overrides(texts: Sequence[str]) -> tuple[list[Override], list[Override], list[str]]:
+    """Return the overrides that name files, those of single values, and a line for each text that is wrong."""
+    names: list[Override] = []
+    values: list[Override] = []
+    problems: list[str] = []
+    for text in texts:
+        try:
+            change = parse_override(text)
+        except ConfigError as error:
+            problems += error.problems
+        else:
+            (names if change.names_files else values).append(change)
+    return names, values, problems
 
 
 def apply_overrides(overrides: list[Override], layers: Layers) -> list[str]:

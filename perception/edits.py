@@ -177,18 +177,10 @@ class PlaceRobot:
     kind: Literal["place_robot"] = "place_robot"
 
 
-MemoryEdit: TypeAlias = (
-    DeleteSegments
-    | PinSegments
-    | RestoreSegments
-    | PlaceModel
-    | WithdrawPlacement
-    | MoveObject
-    | RemoveObject
-    | ConfirmObject
-    | WithdrawConfirmation
-    | ClearMap
-)
+ObjectEdit: TypeAlias = WithdrawPlacement | MoveObject | RemoveObject | ConfirmObject | WithdrawConfirmation
+"""An edit of one object that is known."""
+
+MemoryEdit: TypeAlias = DeleteSegments | PinSegments | RestoreSegments | PlaceModel | ObjectEdit | ClearMap
 """An edit of what a method has recognised, by its plain numbers."""
 
 MapEdit: TypeAlias = MemoryEdit | RestoreObjects

@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Pose
+from runtime.cycle.inputs import OperatorInput
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CHANNELS, CYCLE, KEYFRAME, RawMessage, decode, encode, schema_of
@@ -29,7 +30,7 @@ from runtime.recording.schema import FORMAT, Keyframe, keyframe, perception_snap
 from runtime.recording.storage import RecordingTarget, SingleFile
 from runtime.recording.verification import ReplayResult, verify_recording
 from runtime.recording.writer import RecorderStatus
-from runtime.simulation.closed_loop import OperatorInput, simulate
+from runtime.simulation.closed_loop import SimulationOptions, simulate
 from tests.hil.machine import TIMEOUT_S
 
 SECONDS = 12.0
@@ -130,9 +131,14 @@ def record(
             return reloads.get(cycle)
 
         simulate(
-            settings, world, seed, seconds, on_state=on_state, refinement_budget=FiveInSix(seed, refused),
-            reload=reload, operator=operator,
-        )  # fmt: skip
+            settings,
+            world,
+            seed,
+            seconds,
+            on_state=on_state,
+            operator=operator,
+            options=SimulationOptions(refinement_budget=FiveInSix(seed, refused), reload=reload),
+        )
         recorder.on_summary({"mode": "DRIVE", "cycles": 20 * seconds})
     return recorder.status
 

@@ -6,7 +6,6 @@ Less than 0.5 m in 10 s is stuck; then it spins, waits and backs up in turns, at
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final
 
 from behaviors.move_to_goal import Goal
@@ -16,7 +15,7 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from perception.pipeline import Perception
 from runtime.cycle.drive_requests import DriveRequest
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State, apply_command, step
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
@@ -62,7 +61,7 @@ class Nav2Recovery:
         state = self._state
         request = Request.ARM if state.mode.mode is Mode.READY else None
         drive_request = self._request(run_s) if state.mode.mode is Mode.DRIVE else None
-        inputs = replace(gather_inputs(driver, run_s, request), drive_request=drive_request)
+        inputs = gather_inputs(driver, run_s, OperatorInput(request, drive_request))
         self._budget.begin()
         step(state, inputs, self._settings, lambda command: apply_command(driver, command), self._budget)
         if isinstance(state.drive_request, Goal) and state.drive_request.reached:

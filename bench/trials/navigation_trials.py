@@ -26,7 +26,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
 from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State, apply_command, step
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
@@ -103,7 +103,7 @@ class OurCycle:
     def cycle(self, driver: RobotDriver, run_s: float) -> Outcome | None:
         """See `Controller.cycle`."""
         state = self.state
-        inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
+        inputs = gather_inputs(driver, run_s, OperatorInput(Request.ARM if state.mode.mode is Mode.READY else None))
         self._budget.begin()
         step(state, inputs, self._settings, lambda command: apply_command(driver, command), self._budget)
         if self._on_state is not None:

@@ -11,6 +11,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TextIO
 
@@ -107,6 +108,23 @@ class SlippingClock:
         return self._start_s + emulated_s
 
 
+@dataclass(frozen=True, slots=True)
+class Service:
+    """What an emulated robot does beside being a robot."""
+
+    trace_path: str | None = None
+    """File for the true states, see `TruthTrace`."""
+    latency_path: str | None = None
+    """File for the times of echoes and drive commands, see `LatencyTrace`."""
+    exit_with_parent: bool = False
+    """Whether it ends `LINGER_S` after the parent process has ended."""
+    clock_start_us: int = 0
+    """As for `drivers.registry.make_device`."""
+    control: tuple[int, int] | None = None
+    """Two file descriptors: time scales are read from the first, and acknowledged on the second, see `TimeChannel`.
+    The true states then have the run's clock, which equals the host's until it is paused for the first time."""
+
+
 async def serve(
     robot: RobotConfig,
     world: WorldConfig,
@@ -114,12 +132,8 @@ async def serve(
     make_port: Callable[[], EmulatorPort],
     faults: Sequence[Fault],
     seed: int,
-    trace_path: str | None,
     ready: Callable[[str], None],
-    latency_path: str | None = None,
-    exit_with_parent: bool = False,
-    clock_start_us: int = 0,
-    control: tuple[int, int] | None = None,
+    service: Service,
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
     """Run an emulated robot in real time until SIGTERM or SIGINT.
@@ -130,19 +144,10 @@ async def serve(
         As for `drivers.registry.make_device`.
     make_port
         Returns the port on which it is served; it is closed at the end.
-    trace_path
-        File for the true states, see `TruthTrace`.
-    latency_path
-        File for the times of echoes and drive commands, see `LatencyTrace`.
     ready
         Called once, with the path to open, as soon as a host can open it.
-    exit_with_parent
-        End `LINGER_S` after the parent process has ended.
-    clock_start_us
-        As for `drivers.registry.make_device`.
-    control
-        Two file descriptors: time scales are read from the first, and acknowledged on the second, see `TimeChannel`.
-        The true states then have the run's clock, which equals the host's until it is paused for the first time.
+    service
+        What it does beside being a robot.
     clock
         The host's monotonic clock, seconds.
 
@@ -153,6 +158,7 @@ async def serve(
     drivers.driver.DriverError
         See `drivers.registry.make_device`.
     """
+    trace_path, latency_path, control = service.trace_path, service.latency_path, service.control
     parent = os.getppid()
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -161,7 +167,7 @@ async def serve(
     with contextlib.ExitStack() as stack:
         for number in (signal.SIGTERM, signal.SIGINT):
             stack.callback(loop.remove_signal_handler, number)
-        device = make_device(robot, world, seed, faults=faults, clock_start_us=clock_start_us)
+        device = make_device(robot, world, seed, faults=faults, clock_start_us=service.clock_start_us)
         trace = None if trace_path is None else TruthTrace(_open_trace(trace_path, stack))
         latency = (
             None if latency_path is None else LatencyTrace(_open_trace(latency_path, stack), device.frame_counter())
@@ -191,7 +197,7 @@ async def serve(
                     # Time is paused, but a HALT must be received.
                     _exchange(device, port, before_s, latency, clock)
                 channel.acknowledge(run_s)
-            if exit_with_parent and orphaned_s is None and os.getppid() != parent:
+            if service.exit_with_parent and orphaned_s is None and os.getppid() != parent:
                 orphaned_s = host_s
             if orphaned_s is not None and host_s - orphaned_s > LINGER_S:
                 return

@@ -147,7 +147,7 @@ def contradict_echoes(
             has_moved = math.hypot(one.ring_x - x, one.ring_y - y) > COME_NEARER_M
             silences[SILENT] += 1
             silences[UNCHANGED] += 1
-            hears = hears or r >= 0.0
+            hears |= r >= 0.0
             is_new = is_new or (r >= 0.0 and (r != one.range_m or not has_moved))
             one.ring_x, one.ring_y, one.range_m = x, y, r
         kept += one.state != NOT_KEPT

@@ -217,11 +217,8 @@ class PaperPerception:
                 if refused is not None:
                     return refused
                 missing = set()
-            case PlaceModel(model, x, y, theta):
-                m = next((m for m, known in enumerate(self._models) if known.name == model), None)
-                if m is None:
-                    return f"no model is called {model}: load it first"
-                return self._put(self._numbers.last + 1, m, (x, y, theta), confirmed=False)
+            case PlaceModel():
+                return self._place(edit)
             case MoveObject(number, x, y, theta):
                 return self._make_placement(number, (x, y, theta), confirmed=None)
             case ConfirmObject(number):
@@ -237,13 +234,19 @@ class PaperPerception:
                 self.placements.remove(k)
                 return None
             case RestoreObjects(rows):
-                refusals = [self._restore(row) for row in rows]
-                return next((refused for refused in refusals if refused is not None), None)
+                return next(filter(None, [self._restore(row) for row in rows]), None)
             case ClearMap():
                 self.reset()
                 return None
         self._follow_map()
         return no_such_segments(missing) if missing else None
+
+    def _place(self, edit: PlaceModel) -> str | None:
+        """Place an object of a model; return why it cannot be done, or None."""
+        m = next((m for m, known in enumerate(self._models) if known.name == edit.model), None)
+        if m is None:
+            return f"no model is called {edit.model}: load it first"
+        return self._put(self._numbers.last + 1, m, (edit.x, edit.y, edit.theta), confirmed=False)
 
     def kept(self, number: int) -> str | None:
         """Return whether an object is a placement or a candidate, and its model; None for an unknown number."""

@@ -31,7 +31,7 @@ from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import listen
 from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
-from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run, SettingsFileControl
+from runtime.console.protocols import NO_CONTROLS, Controls, Run
 from runtime.console.timed_coroutine import timed_coroutine
 from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
 from runtime.cycle.inputs import Request
@@ -43,7 +43,6 @@ from runtime.support.length_format import Units
 from runtime.support.restart import console_before
 from runtime.support.user_folders import state_folder
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.time_control import TimeControl
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -64,16 +63,8 @@ class Console:
         Whether the robot is emulated in the settings' world.
     units : {"m", "ft"}
         In which the page shows lengths at first.
-    time : TimeControl, optional
-        Pauses and steps the run.
-    recording : RecordingControl, optional
-        Starts and stops recording the run.
-    replay : ReplayControl, optional
-        Shows recordings.
-    files : FileControl, optional
-        Names, keeps and deletes recordings, and makes files of them.
-    settings_files : SettingsFileControl, optional
-        Reads and writes the settings files of the run, and starts it again.
+    controls : Controls
+        What it can do beside driving.
     limits : Limits, optional
         What clients may cost.
     clock : callable
@@ -99,11 +90,7 @@ class Console:
         *,
         emulated: bool,
         units: Units = "m",
-        time: TimeControl | None = None,
-        recording: RecordingControl | None = None,
-        replay: ReplayControl | None = None,
-        files: FileControl | None = None,
-        settings_files: SettingsFileControl | None = None,
+        controls: Controls = NO_CONTROLS,
         limits: Limits | None = None,
         clock: Callable[[], float] = host_time.monotonic,
     ) -> None:
@@ -122,11 +109,9 @@ class Console:
         self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
-        self._commands = CommandContext(
-            run, self.hub, self.tuning, clock, time, recording, replay, files, settings_files
-        )
-        if files is not None:
-            files.jobs.tell = self.hub.broadcast
+        self._commands = CommandContext(run, self.hub, self.tuning, clock, *controls)
+        if controls.files is not None:
+            controls.files.jobs.tell = self.hub.broadcast
         self.dispatcher = CommandDispatcher(self._commands, self._console_log, self._start_task)
         self._publisher = FramePublisher(run, self.hub, self._commands, settings, log, clock, self._on_stalled)
         self._issue_challenge = run.timing_monitor.timed(CONSOLE_SEND, self._challenge)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Final, Literal, NamedTuple, Protocol
 
 from config.settings import Settings
 from perception.edits import Edit, Evidence
@@ -26,6 +26,7 @@ from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.step import State
 from runtime.support.health import Health
+from runtime.timing.time_control import TimeControl
 from runtime.timing.timing_monitor import TimingMonitor
 
 NOT_AVAILABLE: Final = "not available in this run"
@@ -196,3 +197,21 @@ class FileControl(Protocol):
 
     async def make(self, kind: Literal["report", "map"], file: str) -> int:
         """Begin to make something of a recording, and return the job's number."""
+
+
+class Controls(NamedTuple):
+    """What the console can do beside driving; None what it cannot."""
+
+    time: TimeControl | None = None
+    """Pauses and steps the run."""
+    recording: RecordingControl | None = None
+    """Starts and stops recording the run."""
+    replay: ReplayControl | None = None
+    """Shows recordings."""
+    files: FileControl | None = None
+    """Names, keeps and deletes recordings, and makes files of them."""
+    settings_files: SettingsFileControl | None = None
+    """Reads and writes the settings files of the run, and starts it again."""
+
+
+NO_CONTROLS: Final = Controls()

@@ -66,16 +66,23 @@ class Inputs:
     """How far the preparation of recognition is; None from the cycle on in which recognition begins."""
 
 
+@dataclass(frozen=True, slots=True)
+class OperatorInput:
+    """What an operator requests in a cycle."""
+
+    request: Request | None = None
+    drive_request: DriveInput | None = None
+    edits: tuple[Edit, ...] = ()
+
+
 def gather_inputs(
     driver: RobotDriver,
     run_s: float,
-    request: Request | None,
+    operator: OperatorInput,
     *,
     echo_age_s: float | None = None,
     overrun: str | None = None,
     fault: str | None = None,
-    edits: tuple[Edit, ...] = (),
-    drive_request: DriveInput | None = None,
     host_s: float | None = None,
     preparing: str | None = None,
     line_messages: LineMessages = ROBOT_LINE,
@@ -88,8 +95,8 @@ def gather_inputs(
         Gives up what it has received since the last cycle.
     run_s, host_s : float
         The cycle's beginning by the run's clock and by the host's; virtual time has only the former.
-    request, drive_request, edits
-        What the operator asks for.
+    operator : OperatorInput
+        What the operator requests.
     echo_age_s : float, optional
         How long the oldest of the firings has waited.
     overrun, fault : str, optional
@@ -110,13 +117,13 @@ def gather_inputs(
         line,
         line_problem,
         received,
-        request,
+        operator.request,
         gap_max_s,
         echo_age_s,
         overrun,
         fault,
-        drive_request,
-        edits,
+        operator.drive_request,
+        operator.edits,
         host_s,
         preparing,
     )

@@ -25,7 +25,7 @@ from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENE
 from runtime.cycle.connection import Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
-from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
+from runtime.cycle.inputs import Inputs, OperatorInput, Request, always_valid, command_gap_max_s, gather_inputs
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.logs.alerts import Alerts
@@ -296,10 +296,10 @@ class RobotProcess:
         self._request = None
         edits, self._edits = tuple(self._edits[:EDITS_PER_CYCLE]), self._edits[EDITS_PER_CYCLE:]
         overrun = self._budget.flood(run_s) or self._scheduler.overrun
+        operator = OperatorInput(request, self._drive_inputs.take(), edits)
         return gather_inputs(
-            self._driver, run_s, request, echo_age_s=echo_age_s, overrun=overrun, fault=self.health.fault(),
-            edits=edits, drive_request=self._drive_inputs.take(), host_s=host_s,
-            preparing=self._preparation.progress(run_s), line_messages=self._line_messages,
+            self._driver, run_s, operator, echo_age_s=echo_age_s, overrun=overrun, fault=self.health.fault(),
+            host_s=host_s, preparing=self._preparation.progress(run_s), line_messages=self._line_messages,
         )  # fmt: skip
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:

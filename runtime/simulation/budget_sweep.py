@@ -19,7 +19,7 @@ from config.world import WorldConfig
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
 from runtime.cycle.step import CycleRecord, State
-from runtime.simulation.closed_loop import simulate
+from runtime.simulation.closed_loop import SimulationOptions, simulate
 from runtime.simulation.evaluation import GATE_M, SECONDS_MAX, estimates, match_drums, require_finished
 from runtime.simulation.long_hall import WAY_M, long_hall
 from runtime.timing.refinement_budget import RefinementBudget
@@ -138,8 +138,8 @@ def drive(
             seed,
             SECONDS_MAX,
             detections.on_cycle,
-            refinement_budget=refinement_budget(),
             on_state=detections.on_state,
+            options=SimulationOptions(refinement_budget=refinement_budget()),
         )
         require_finished(run, seed, SECONDS_MAX)
         rows, wrong = match_drums(world, estimates(run))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from config.settings import Settings
@@ -18,24 +18,15 @@ from drivers.emulator.memory_transport import STEP_S, MemoryLine, OnBytes
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import LinkCounts, Pose
 from drivers.registry import make_device, make_driver
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
-from runtime.cycle.step import CycleRecord, DriveInput, Edit, State, apply_command, apply_settings, step
+from runtime.cycle.step import CycleRecord, State, apply_command, apply_settings, step
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget, RefinementBudget
 
 SETTLING_S: Final = 1.0
 """Time that a run continues after the robot has arrived, so that the last echoes count."""
-
-
-@dataclass(frozen=True, slots=True)
-class OperatorInput:
-    """What an operator requests in a cycle."""
-
-    request: Request | None = None
-    drive_request: DriveInput | None = None
-    edits: tuple[Edit, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +44,25 @@ class SimulationResult:
     counts: LinkCounts
 
 
+@dataclass(frozen=True, slots=True)
+class SimulationOptions:
+    """What is seldom otherwise in a run in virtual time."""
+
+    refinement_budget: RefinementBudget | None = None
+    """Of each cycle; None for `QUANTA_PER_CYCLE` quanta."""
+    clock_start_us: int = 0
+    """The robot's own clock at the start, µs; it wraps at 2³²."""
+    reload: Callable[[int], Settings | None] | None = None
+    """Called with the number of each cycle; returns settings in force from there on, as after a reload, or None."""
+    on_bytes: OnBytes | None = None
+    """Called with direction, time and data of everything that goes over the line."""
+    line_step_s: float = STEP_S
+    """Time between exchanges on the line, s."""
+
+
+DEFAULT_OPTIONS: Final = SimulationOptions()
+
+
 def simulate(
     settings: Settings,
     world: WorldConfig,
@@ -60,14 +70,10 @@ def simulate(
     seconds_max: float,
     on_cycle: Callable[[CycleRecord, GroundTruth], None] | None = None,
     *,
-    refinement_budget: RefinementBudget | None = None,
     on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
-    clock_start_us: int = 0,
-    reload: Callable[[int], Settings | None] | None = None,
-    on_bytes: OnBytes | None = None,
     operator: Callable[[int, State], OperatorInput] | None = None,
     is_over: Callable[[State], bool] | None = None,
-    line_step_s: float = STEP_S,
+    options: SimulationOptions = DEFAULT_OPTIONS,
 ) -> SimulationResult:
     """Drive through `world` until the leg is done, the robot stops or the time is up, and return the result.
 
@@ -83,28 +89,21 @@ def simulate(
         Virtual time after which the run ends.
     on_cycle : callable, optional
         Called with every record and the ground truth at that moment.
-    refinement_budget : RefinementBudget, optional
-        Of each cycle; `QUANTA_PER_CYCLE` quanta if not given.
     on_state : callable, optional
         Called with every record, the state after it, and where the odometry began.
-    clock_start_us : int
-        The robot's own clock at the start, µs; it wraps at 2³².
-    reload : callable, optional
-        Called with the number of each cycle; returns new settings in force from there on, as after a reload, or None.
-    on_bytes : callable, optional
-        Called with direction, time and data of everything that goes over the line.
     operator : callable, optional
         Called with the number of each cycle and the state before it; returns the operator's input. The robot is then
         armed only by that input, and the run lasts for `seconds_max`.
     is_over : callable, optional
         Called with the state after each cycle; the run ends when it returns True.
-    line_step_s : float
-        Time between exchanges on the line, s.
+    options : SimulationOptions
+        What is seldom otherwise.
     """
-    refinement_budget = QuantumBudget(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
-    robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
+    refinement_budget = options.refinement_budget or QuantumBudget(QUANTA_PER_CYCLE)
+    reload = options.reload
+    robot = make_device(settings, world, seed, clock_start_us=options.clock_start_us)
     driver = make_driver(settings)
-    line = MemoryLine(driver, robot, on_bytes=on_bytes, step_s=line_step_s)
+    line = MemoryLine(driver, robot, on_bytes=options.on_bytes, step_s=options.line_step_s)
     state = fresh_state(settings)
     start = robot.truth.pose
     began = time.perf_counter()
@@ -119,11 +118,7 @@ def simulate(
         line.exchange(run_s)
         request = Request.ARM if state.mode.mode is Mode.READY else None
         operator_input = OperatorInput(request) if operator is None else operator(cycle_stats.cycles + 1, state)
-        inputs = replace(
-            gather_inputs(driver, run_s, operator_input.request),
-            drive_request=operator_input.drive_request,
-            edits=operator_input.edits,
-        )
+        inputs = gather_inputs(driver, run_s, operator_input)
         step_s = time.perf_counter()
         refinement_budget.begin()
         record = step(state, inputs, settings, lambda c: apply_command(driver, c), refinement_budget)

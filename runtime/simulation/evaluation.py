@@ -17,7 +17,7 @@ from drivers.messages import Pose
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import object_row
-from runtime.simulation.closed_loop import SimulationResult, simulate
+from runtime.simulation.closed_loop import SimulationOptions, SimulationResult, simulate
 from runtime.timing.cycle_stats import Quantiles, worst_of
 
 CHI2_95: Final = 5.991
@@ -106,7 +106,9 @@ def run_seed(
     UserError
         The robot stopped, touched an obstacle, or did not arrive within `SECONDS_MAX`.
     """
-    run = simulate(settings, world, seed, SECONDS_MAX, on_state=on_state, on_bytes=on_bytes)
+    run = simulate(
+        settings, world, seed, SECONDS_MAX, on_state=on_state, options=SimulationOptions(on_bytes=on_bytes)
+    )
     require_finished(run, seed, SECONDS_MAX)
     rows, false = match_drums(world, estimates(run))
     return SeedOutcome(

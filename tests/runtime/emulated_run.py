@@ -14,7 +14,7 @@ from drivers.emulator.memory_transport import MemoryLine
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Firing, Pose
 from drivers.registry import make_device, make_driver
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import CycleRecord, apply_command, step
@@ -63,7 +63,7 @@ class Run:
         self.line.exchange(run_s)
         if self.arms and self.mode is Mode.READY:
             request = Request.ARM
-        inputs = gather_inputs(self.driver, run_s, request, preparing=self.preparing)
+        inputs = gather_inputs(self.driver, run_s, OperatorInput(request), preparing=self.preparing)
         record = step(
             self.state, inputs, self.settings, lambda c: apply_command(self.driver, c), within_quanta_per_cycle
         )

@@ -24,6 +24,7 @@ from perception.edits import (
     DeleteSegments,
     MemoryEdit,
     MoveObject,
+    ObjectEdit,
     PinSegments,
     PlaceModel,
     RemoveObject,
@@ -71,8 +72,11 @@ def edit_memory(
             pins.clear()
             return None
     row = row_of(memory, edit.object)
-    if row is None:
-        return no_such_object(edit.object)
+    return no_such_object(edit.object) if row is None else _edit_object(memory, p, row, edit)
+
+
+def _edit_object(memory: Memory, p: SettingsRecord, row: int, edit: ObjectEdit) -> str | None:
+    """Apply an edit of the object in a row, circles first, then polygons; return why it cannot be done, or None."""
     t = row - len(memory.circles)
     match edit:
         case MoveObject(_, x, y, theta):

@@ -88,7 +88,7 @@ def emulate(
 
         settings = load_settings(config, sets, world=world, robot=robot)
         from drivers.emulator.faults import load_faults
-        from drivers.emulator.server import serve
+        from drivers.emulator.server import Service, serve
 
     if settings.world is None:
         raise UserError("no world: name one with --world", WRONG_CALL)
@@ -108,12 +108,14 @@ def emulate(
             make_port=_port_maker(link, tcp),
             faults=script,
             seed=seed,
-            trace_path=trace,
-            latency_path=latency,
             ready=ready,
-            exit_with_parent=end_with_parent,
-            clock_start_us=round(1e6 * clock),
-            control=PIPES if control else None,
+            service=Service(
+                trace_path=trace,
+                latency_path=latency,
+                exit_with_parent=end_with_parent,
+                clock_start_us=round(1e6 * clock),
+                control=PIPES if control else None,
+            ),
         )
     )
     return DONE

@@ -206,10 +206,10 @@ class FrameEncoder:
             "canyons": [_canyon(canyon) for canyon in state.perception.canyons()],
             "vectors": [(r.schema, round(r.x, 4), round(r.y, 4)) for r in state.vectors],
             "drive_request": self._drive_request(state.drive_request, state.goal_place),
-            "valley": None if state.goal_drive is None else _valley(state.goal_drive),
-            "phases": {name: round(1e6 * s, 1) for name, s in (phases_s or {}).items()},
-            "cycle_us": None if phases_s is None else round(1e6 * sum(phases_s.values()), 1),
-            "late_us": None if late_s is None else round(1e6 * late_s, 1),
+            "valley": _valley(state.goal_drive),
+            "phases": _phases_us(phases_s),
+            "cycle_us": None if phases_s is None else _us(sum(phases_s.values())),
+            "late_us": None if late_s is None else _us(late_s),
             "missed": context.missed,
             "late": context.late,
             "quanta": 0 if record is None else record.quanta,
@@ -362,6 +362,14 @@ def _canyon(canyon: Canyon) -> CanyonRow:
     }
 
 
+def _us(s: float) -> float:
+    return round(1e6 * s, 1)
+
+
+def _phases_us(phases_s: Mapping[str, float] | None) -> dict[str, float]:
+    return {name: _us(s) for name, s in (phases_s or {}).items()}
+
+
 def _link(counts: LinkCounts | None) -> LinkRow | None:
     return None if counts is None else {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost}
 
@@ -375,8 +383,10 @@ def _set_odometry(head: StateHead, odometry: Odometry) -> None:
     head["flags"] = [str(flag.name) for flag in odometry.flags]
 
 
-def _valley(drive: GoalDrive) -> ValleyRow:
-    """Return the blocked sectors, the direction chosen (rad) and the way of the look-ahead (m)."""
+def _valley(drive: GoalDrive | None) -> ValleyRow | None:
+    """Return the blocked sectors, the direction chosen (rad) and the look-ahead's way (m); None without a goal."""
+    if drive is None:
+        return None
     direction = drive.valley.direction_rad
     return {
         "blocked": drive.valley.blocked,

@@ -17,7 +17,7 @@ from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Frame
 from drivers.emulator.faults import Fault
 from drivers.emulator.pty_transport import PtyPort
-from drivers.emulator.server import EmulatorPort, serve
+from drivers.emulator.server import EmulatorPort, Service, serve
 from drivers.emulator.truth_trace import HEADER
 from tests.drivers.ring import RING
 from tests.hil.machine import TIMEOUT_S
@@ -83,11 +83,20 @@ async def emulator(
     clock = TickingClock()
     task = asyncio.create_task(
         serve(
-            robot, WORLD, make_port=make_port, faults=faults, seed=1, ready=ready.set_result,
-            trace_path=None if trace is None else str(trace), latency_path=None if latency is None else str(latency),
-            exit_with_parent=exit_with_parent, clock=clock,
+            robot,
+            WORLD,
+            make_port=make_port,
+            faults=faults,
+            seed=1,
+            ready=ready.set_result,
+            service=Service(
+                trace_path=None if trace is None else str(trace),
+                latency_path=None if latency is None else str(latency),
+                exit_with_parent=exit_with_parent,
+            ),
+            clock=clock,
         )
-    )  # fmt: skip
+    )
     try:
         while not ready.done():
             if task.done():

@@ -24,7 +24,7 @@ from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
-from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, SettingsFileControl
+from runtime.console.protocols import Controls, FileControl, RecordingControl, ReplayControl, SettingsFileControl
 from runtime.cycle.callbacks import CALLBACKS
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Request
@@ -246,10 +246,14 @@ async def open_console(
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
     run = StubRun(settings, log)
     console = Console(
-        run, log, KernelLoader(log), emulated=emulated, time=time,
-        recording=recording, replay=replay, files=files, settings_files=settings_files, limits=limits,
+        run,
+        log,
+        KernelLoader(log),
+        emulated=emulated,
+        controls=Controls(time, recording, replay, files, settings_files),
+        limits=limits,
         clock=lambda: clock[0],
-    )  # fmt: skip
+    )
     before = asyncio.all_tasks()
     with (
         run.health.catching_unhandled_errors(),

@@ -10,7 +10,7 @@ from config.robot import LinkConfig
 from drivers.denning.frames import Ack, Drive, Halt, Hello, Pattern, Release
 from drivers.driver import LineState
 from drivers.messages import Flags, Twist
-from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import HELD_UP, Mode, ModeState, advance
 from tests.drivers.driver_harness import CONFIG, IDENT, DriverHarness, only
 
@@ -51,7 +51,7 @@ class FalseRobot:
             self.momentary = Flags.NONE
             self.harness.robot.tick(self.harness.now)
             self._answer()
-        inputs = gather_inputs(self.harness.robot, self.harness.now, request)
+        inputs = gather_inputs(self.harness.robot, self.harness.now, OperatorInput(request))
         before, self.mode = self.mode, advance(self.mode, inputs, inputs.received.flags, gap_s)
         if self.mode.mode is Mode.DRIVE:
             self.harness.robot.drive(Twist(0.1, 0.0))

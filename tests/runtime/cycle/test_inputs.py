@@ -10,7 +10,16 @@ import pytest
 from drivers.driver import LineState, Received
 from drivers.messages import Identity
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.inputs import GAP_LIMIT_S, GAP_MAX_S, GAP_SHARE, Inputs, Request, command_gap_max_s, gather_inputs
+from runtime.cycle.inputs import (
+    GAP_LIMIT_S,
+    GAP_MAX_S,
+    GAP_SHARE,
+    Inputs,
+    OperatorInput,
+    Request,
+    command_gap_max_s,
+    gather_inputs,
+)
 
 RECEIVED = Received((), None, rebooted=True)
 
@@ -37,7 +46,7 @@ def test_the_driver_is_asked_at_the_time_of_the_cycle_and_what_it_received_is_ta
     driver: Any = StubDriver()
     drive_request = Legs()
     inputs = gather_inputs(
-        driver, 7.5, Request.ARM, echo_age_s=0.01, overrun="o", fault="f", drive_request=drive_request, host_s=9.0
+        driver, 7.5, OperatorInput(Request.ARM, drive_request), echo_age_s=0.01, overrun="o", fault="f", host_s=9.0
     )
     assert driver.calls == [7.5, "taken"]
     assert inputs == Inputs(
@@ -50,7 +59,7 @@ def test_commands_may_be_nine_tenths_of_the_deadman_apart() -> None:
     assert command_gap_max_s(driver) == GAP_MAX_S == pytest.approx(0.45), "until the robot reports its own"
     driver.identity = Identity("denning", 24, 0.381, 0.4, 0.02, 7)
     assert command_gap_max_s(driver) == GAP_SHARE * 0.4
-    assert gather_inputs(driver, 0.0, None).gap_max_s == GAP_SHARE * 0.4
+    assert gather_inputs(driver, 0.0, OperatorInput()).gap_max_s == GAP_SHARE * 0.4
 
 
 @pytest.mark.promise("P25")

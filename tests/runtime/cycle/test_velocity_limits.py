@@ -16,11 +16,11 @@ from config.places import NoGoAreaConfig, NoGoLineConfig, PlaceConfig, PlacesCon
 from config.settings import Settings
 from drivers.messages import Pose
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, CycleRecord, State
 from runtime.cycle.velocity_limits import VOID
-from runtime.simulation.closed_loop import OperatorInput, simulate
+from runtime.simulation.closed_loop import simulate
 from tests.runtime.cycle.requested_robot import RequestedRobot, driving, hold_reason
 
 ROOM = load_settings("room", ["perception.method=paper"])

@@ -24,9 +24,8 @@ from perception.edits import (
     WithdrawConfirmation,
 )
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.step import Edit, State
-from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import hall, record
 
 SECONDS = 26.0

@@ -9,9 +9,8 @@ import pytest
 from behaviors.missions.mission import Mission, MissionEdit, route
 from config.load import load_settings
 from runtime.cycle.drive_requests import DriveInput
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.step import State
-from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import record, verify_file
 
 SETS = ["perception.method=paper", "recording.keyframe_period_s=1.0"]

@@ -8,14 +8,13 @@ import pytest
 
 from config.load import load_world, with_room
 from perception.edits import PlaceRobot
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
 from runtime.recording.channels import CYCLE
 from runtime.recording.reader import open_recording
 from runtime.recording.replayer import Replayer
 from runtime.recording.verification import verify_recording
-from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import hall, record
 
 LOADED, PLACED = 20, 60

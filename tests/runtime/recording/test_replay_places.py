@@ -13,12 +13,11 @@ from config.load import with_mission
 from config.mission import MissionConfig, StepConfig
 from config.mission_step import MoveToGoalUse
 from config.places import NoGoAreaConfig, PlaceConfig, PlacesConfig, SpeedAreaConfig
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
 from runtime.recording.reader import open_recording
 from runtime.recording.verification import verify_recording
-from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import hall, record
 
 SET, REMOVED = 50, 160

@@ -7,10 +7,10 @@ import pytest
 from config.load import load_settings, load_world
 from config.settings import Settings
 from drivers.emulator.robot_device import GroundTruth
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
-from runtime.simulation.closed_loop import SETTLING_S, OperatorInput, simulate
+from runtime.simulation.closed_loop import SETTLING_S, SimulationOptions, simulate
 
 SETTINGS = load_settings(
     "hallway", ["perception.method=paper", "behaviors.move_ahead.distance_m=0.3", "behaviors.move_ahead.at_end=stop"]
@@ -41,7 +41,10 @@ def test_a_run_ends_when_the_last_echoes_after_its_leg_have_counted() -> None:
 
 
 def test_the_same_seed_is_the_same_run() -> None:
-    runs = [simulate(SETTINGS, WORLD, seed, 3.0, clock_start_us=2**32 - 1_000_000) for seed in (1, 1)]
+    runs = [
+        simulate(SETTINGS, WORLD, seed, 3.0, options=SimulationOptions(clock_start_us=2**32 - 1_000_000))
+        for seed in (1, 1)
+    ]
     assert runs[0].truth == runs[1].truth
     assert runs[0].state.odometry == runs[1].state.odometry
     assert runs[0].state.mode.mode is Mode.DRIVE, "the wrap of the robot's clock is no restart"
@@ -72,7 +75,11 @@ def test_reloaded_settings_are_in_force_from_their_cycle_on() -> None:
         way.append((direction, run_s))
 
     run = simulate(
-        load_settings("hallway", ["perception.method=paper"]), WORLD, 0, 5.0, reload=reload, on_bytes=on_bytes
+        load_settings("hallway", ["perception.method=paper"]),
+        WORLD,
+        0,
+        5.0,
+        options=SimulationOptions(reload=reload, on_bytes=on_bytes),
     )
     assert run.truth.twist.v == pytest.approx(0.1, abs=0.02)
     assert {direction for direction, _ in way} == {"in", "out"}

@@ -197,7 +197,8 @@ from numba.core.dispatcher import Dispatcher
 from behaviors.move_to_goal import Goal
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.simulation.closed_loop import OperatorInput, simulate
+from runtime.simulation.closed_loop import simulate
+from runtime.cycle.inputs import OperatorInput
 
 def signatures():
     # the emulator's kernels may still load: it is another process when it matters

@@ -6,7 +6,7 @@ import pytest
 
 from config.load import load_settings
 from runtime.cycle.step import CycleRecord
-from runtime.simulation.closed_loop import simulate
+from runtime.simulation.closed_loop import SimulationOptions, simulate
 from runtime.timing.refinement_budget import CpuTimeBudget, QuantumBudget, RefinementBudget
 
 
@@ -60,7 +60,7 @@ def test_record_holds_quanta_and_the_reason_why_refinement_stopped() -> None:
             0,
             15.0,
             lambda record, _truth: records.append(record),
-            refinement_budget=budget,
+            options=SimulationOptions(refinement_budget=budget),
         )
     quanta: dict[str, set[int]] = {}
     for record in records:

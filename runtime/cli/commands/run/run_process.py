@@ -137,7 +137,6 @@ async def run_process(
             page = await stack.enter_async_context(
                 serve_console(
                     process,
-                    settings,
                     log,
                     kernel_loader,
                     recording,

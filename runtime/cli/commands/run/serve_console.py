@@ -13,6 +13,7 @@ from runtime.console.files.jobs import Jobs
 from runtime.console.files.recording_files import RecordingFiles
 from runtime.console.files.settings_files import SettingsFiles
 from runtime.console.playback.replay_client import ReplayClient
+from runtime.console.protocols import Controls
 from runtime.cycle.live_settings import PrepareSettings
 from runtime.recording.storage import recordings_folder
 from runtime.support.length_format import Units
@@ -32,7 +33,6 @@ REPLAY_PROGRAM: Final = "runtime.console.playback.replay_frames"
 @asynccontextmanager
 async def serve_console(
     process: Run,
-    settings: Settings,
     log: FilteringBoundLogger,
     prepare: PrepareSettings,
     recording: RunRecording,
@@ -49,8 +49,6 @@ async def serve_console(
     ----------
     process, log, prepare, emulated, units
         As of `Console`.
-    settings : Settings
-        Of the run, at its start.
     recording : RunRecording
         Of the run.
     control : TimeControl
@@ -75,7 +73,7 @@ async def serve_console(
             process.stop()
         return restart.refusal
 
-    folder, jobs = recordings_folder(settings.recording), Jobs(units)
+    folder, jobs = recordings_folder(process.live_settings.current.recording), Jobs(units)
     replays = ReplayClient(folder, REPLAY_PROGRAM, current_file)
     console = Console(
         process,
@@ -83,11 +81,13 @@ async def serve_console(
         prepare,
         emulated=emulated,
         units=units,
-        time=control,
-        recording=recording,
-        replay=replays,
-        files=RecordingFiles(folder, current_file, jobs),
-        settings_files=SettingsFiles(documents_read(), reload, end_and_restart),
+        controls=Controls(
+            time=control,
+            recording=recording,
+            replay=replays,
+            files=RecordingFiles(folder, current_file, jobs),
+            settings_files=SettingsFiles(documents_read(), reload, end_and_restart),
+        ),
     )
     try:
         async with console.open():

@@ -16,11 +16,10 @@ from runtime.console.playback.replay_client import ReplayClient
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_frames import make_replay_frames
 from runtime.console.playback.replay_worker import PlaybackPosition
-from runtime.cycle.inputs import Request
+from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
 from runtime.recording.reader import open_recording, parse_settings
-from runtime.simulation.closed_loop import OperatorInput
 from tests.hil.machine import TIMEOUT_S
 from tests.recorded import hall, record
 from tests.runtime.console.playback.test_replay_client import Page, until

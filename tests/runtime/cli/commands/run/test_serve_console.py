@@ -38,9 +38,16 @@ async def test_the_page_is_served_while_the_run_lasts(tmp_path: Path, monkeypatc
     async with aiohttp.ClientSession() as session:
         with open_run_recording(settings, None, no_record=True, emulated=False) as recording:
             async with serve_console(
-                StubRun(settings, log), settings, log, KernelLoader(log), recording, NoTimeControl(),
-                emulated=False, units="m", reload=lambda: settings, restart=Restart(None),
-            ) as console:  # fmt: skip
+                StubRun(settings, log),
+                log,
+                KernelLoader(log),
+                recording,
+                NoTimeControl(),
+                emulated=False,
+                units="m",
+                reload=lambda: settings,
+                restart=Restart(None),
+            ) as console:
                 async with session.get(console.url) as answer:
                     assert answer.status == 200
                     assert "text/html" in answer.headers["Content-Type"]
