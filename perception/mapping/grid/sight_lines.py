@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import PLACE_NUMBERS
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
@@ -246,8 +246,10 @@ def fill_crossed(sights: NDArray[np.int16], corner: Ints, places: int, units: fl
 
     Parameters
     ----------
-    sights, corner
+    sights
         As of `enter_sights`; nothing is updated.
+    corner : (2,) int
+        The number of the window's first cell in x and y.
     places : int
         From so many places echoes passed such a cell, or …
     units : float
