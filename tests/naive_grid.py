@@ -10,6 +10,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 
 from drivers.messages import Floats
+from perception.mapping.grid import cell_evidence
 from perception.mapping.grid import directed as d
 from perception.mapping.grid.cell_evidence import CERTAIN, FADING_PLACES, NAT, UNDIRECTED
 from perception.mapping.grid.window import SPREAD_CELLS, SPREAD_RELATIVE
@@ -84,7 +85,7 @@ class NaiveGrid:
         beam = self.beam(sensor, r + d.UNDIRECTED_ARC_SIGMAS * sigma)
         units = (
             (d.DIRECTED_UNIT + d.MIRRORS_UNIT * mirrors, d.DIRECTED_ARC_SIGMAS),
-            (d.UNDIRECTED_UNIT, d.UNDIRECTED_ARC_SIGMAS),
+            (cell_evidence.UNDIRECTED_UNIT, d.UNDIRECTED_ARC_SIGMAS),
         )
         for unit, sigmas in units:
             is_directed = sigmas == d.DIRECTED_ARC_SIGMAS

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.window import OCTANTS, octant
 
+UNDIRECTED_UNIT: Final = 2.0
+"""An echo's unit of evidence in the undirected evidence."""
 UNDIRECTED: Final = OCTANTS
 """Index of the undirected evidence of a cell, behind those of the looking directions."""
 BASE: Final = 0
@@ -194,3 +196,47 @@ def fill_probability(
                 value = evidence_now(planes[k, jy, jx], place)
                 value = max(0, value - FAINT) if value > 0 else value
             out[row, column] = odds[CERTAIN + value]
+
+
+@kernel
+def enter_hits(
+    planes: Cells, maybe_sure: Flags, place: int, unit: float, arc: Ints, shares: Floats, draws: Floats
+) -> None:
+    """Share each echo over its arc.
+
+    Parameters
+    ----------
+    planes, maybe_sure, place, shares, draws
+        As of `directed.enter_readings`.
+    unit : float
+        The unit of evidence in a looking direction.
+    arc : (m, 4) int
+        As of `directed.enter_readings`; cells for the undirected evidence only have that in place of a looking
+        direction.
+    """
+    first = 0
+    while first < len(arc):
+        last = first
+        total = 0.0
+        total_both = 0.0
+        while last < len(arc) and arc[last, 3] == arc[first, 3]:
+            share = shares[last, 0]
+            own = planes[arc[last, 2], arc[last, 0], arc[last, 1]]
+            renew(own, place)
+            both = planes[UNDIRECTED, arc[last, 0], arc[last, 1]]
+            renew(both, place)
+            shares[last, 0] = share * draws[CERTAIN + without_hits(own)]
+            shares[last, 1] = share * draws[CERTAIN + without_hits(both)]
+            if arc[last, 2] != UNDIRECTED:
+                total += shares[last, 0]
+            total_both += shares[last, 1]
+            last += 1
+        for n in range(first, last):
+            if arc[n, 2] != UNDIRECTED:
+                own = planes[arc[n, 2], arc[n, 0], arc[n, 1]]
+                own[HIT] = max(int(own[HIT]), hit_nat(unit * shares[n, 0] / total))
+                if int(own[BASE]) + int(own[HIT]) >= SURE:
+                    maybe_sure[arc[n, 0], arc[n, 1]] = True
+            both = planes[UNDIRECTED, arc[n, 0], arc[n, 1]]
+            both[HIT] = max(int(both[HIT]), hit_nat(UNDIRECTED_UNIT * shares[n, 1] / total_both))
+        first = last

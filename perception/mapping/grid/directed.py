@@ -27,23 +27,19 @@ from drivers.messages import Firing
 from perception.bounds import Bound, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
-    BASE,
     CERTAIN,
-    HIT,
     NAT,
     PASSAGE,
     PLACE_NUMBERS,
-    SURE,
     UNDIRECTED,
     Cells,
     Flags,
+    enter_hits,
     fill_probability,
     fill_sure,
-    hit_nat,
     is_sure_elsewhere,
     make_draws,
     renew,
-    without_hits,
 )
 from perception.mapping.grid.window import (
     OCTANTS,
@@ -77,7 +73,6 @@ MIRRORS_UNIT: Final = 2.0
 looking direction of 45° are wide beside the few degrees in which a mirror answers."""
 UNDIRECTED_PASSED: Final = 1.8 * NAT
 UNDIRECTED_SILENT: Final = 1.8 * NAT
-UNDIRECTED_UNIT: Final = 2.0
 """The same for the undirected evidence, in which the passages of all directions count."""
 MIDDLE: Final = 0.75
 """A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
@@ -289,49 +284,6 @@ def enter_readings(
             elif nearest < passed - BEYOND_M:
                 answers[1] += 1.0
     enter_hits(planes, maybe_sure, place, DIRECTED_UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
-
-
-@kernel
-def enter_hits(
-    planes: Cells, maybe_sure: Flags, place: int, unit: float, arc: Ints, shares: Floats, draws: Floats
-) -> None:
-    """Share each echo over its arc.
-
-    Parameters
-    ----------
-    planes, maybe_sure, place, shares, draws
-        As of `enter_readings`.
-    unit : float
-        The unit of evidence in a looking direction.
-    arc : (m, 4) int
-        As of `enter_readings`; cells for the undirected evidence only have that in place of a looking direction.
-    """
-    first = 0
-    while first < len(arc):
-        last = first
-        total = 0.0
-        total_both = 0.0
-        while last < len(arc) and arc[last, 3] == arc[first, 3]:
-            share = shares[last, 0]
-            own = planes[arc[last, 2], arc[last, 0], arc[last, 1]]
-            renew(own, place)
-            both = planes[UNDIRECTED, arc[last, 0], arc[last, 1]]
-            renew(both, place)
-            shares[last, 0] = share * draws[CERTAIN + without_hits(own)]
-            shares[last, 1] = share * draws[CERTAIN + without_hits(both)]
-            if arc[last, 2] != UNDIRECTED:
-                total += shares[last, 0]
-            total_both += shares[last, 1]
-            last += 1
-        for n in range(first, last):
-            if arc[n, 2] != UNDIRECTED:
-                own = planes[arc[n, 2], arc[n, 0], arc[n, 1]]
-                own[HIT] = max(int(own[HIT]), hit_nat(unit * shares[n, 0] / total))
-                if int(own[BASE]) + int(own[HIT]) >= SURE:
-                    maybe_sure[arc[n, 0], arc[n, 1]] = True
-            both = planes[UNDIRECTED, arc[n, 0], arc[n, 1]]
-            both[HIT] = max(int(both[HIT]), hit_nat(UNDIRECTED_UNIT * shares[n, 1] / total_both))
-        first = last
 
 
 class DirectedGrid:
