@@ -77,7 +77,7 @@ class ScriptedRobot:
         self.run_s += PERIOD_S
         self.robot_s += PERIOD_S
         sensors = len(self.settings.ring.mounts)
-        self.trembles = 1e-6 - self.trembles  # a ring that repeats its readings to the bit while it moves is frozen
+        self.trembles = 0.01 - self.trembles  # a ring that repeats its readings while it moves is frozen
         ranges = np.full(sensors, 3.0 + self.trembles)
         firings = (Firing(self.robot_s, self.pose, 0.0, ranges),) if firing else ()
         reported = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None

@@ -197,7 +197,7 @@ from numba.core.dispatcher import Dispatcher
 from behaviors.move_to_goal import Goal
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.simulation.closed_loop import simulate
+from runtime.simulation.closed_loop import SimulationOptions, simulate
 from runtime.cycle.inputs import OperatorInput
 
 def signatures():
@@ -250,7 +250,8 @@ def by_hand(cycle, state):
     return OperatorInput(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
 
 run = simulate(
-    settings, settings.world, 0, 15.0, operator=by_hand, reload=lambda n: further if n == 100 else None,
+    settings, settings.world, 0, 15.0, operator=by_hand,
+    options=SimulationOptions(reload=lambda n: further if n == 100 else None),
 )
 assert run.state.cycle > 280 and run.state.odometry.pose.x > 1.0, run.state
 print(*sorted(signatures() - before))

@@ -9,6 +9,7 @@ import pytest
 
 from config.errors import DONE, WRONG_CALL
 from drivers.emulator.faults import Reboot
+from drivers.emulator.server import Service
 from runtime.cli.app import run_command
 from runtime.cli.commands.emulate import PIPES
 
@@ -42,8 +43,10 @@ def test_every_option_reaches_the_emulator(
     assert call["settings"].cycle.rate_hz == 10.0
     assert call["world"] == call["settings"].world
     assert [type(fault) for fault in call["faults"]] == [Reboot]
-    options = ("seed", "trace_path", "latency_path", "clock_start_us", "exit_with_parent", "control")
-    assert [call[name] for name in options] == [7, "t.csv", "l.csv", 4_500_000, True, PIPES]
+    assert call["seed"] == 7
+    assert call["service"] == Service(
+        "t.csv", "l.csv", exit_with_parent=True, clock_start_us=4_500_000, control=PIPES
+    )
     assert call["make_port"].args == ("robot",)
 
 
@@ -51,8 +54,7 @@ def test_by_default_nothing_is_written_and_no_fault_is_planned(served: list[dict
     assert run_command(["emulate", "--world", "irregular"]) == DONE
     (call,) = served
     assert len(call["world"].drum) == 8
-    options = ("faults", "seed", "trace_path", "latency_path", "clock_start_us", "control")
-    assert [call[name] for name in options] == [(), 0, None, None, 0, None]
+    assert (call["faults"], call["seed"], call["service"]) == ((), 0, Service())
     assert call["make_port"].args == (None,)
 
 
