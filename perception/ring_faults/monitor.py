@@ -39,7 +39,7 @@ from perception.ring_faults.motion_tests import (
     NOTHING,
     REPEATED,
     SCATTERED,
-    STUCK,
+    STUCK_SENSOR,
     TURNED,
     VANISHED,
     check_motion,
@@ -137,8 +137,8 @@ class RingMonitor:
             self._expected,
             self._past_looks,
         )
-        if found >= STUCK:
-            return int(found) - STUCK
+        if found >= STUCK_SENSOR:
+            return int(found) - STUCK_SENSOR
         if found != NOTHING:
             self._found = int(found)
         return None

@@ -83,7 +83,7 @@ NOTHING, REPEATED, VANISHED, SCATTERED, TURNED = range(5)
 silent, or are elsewhere; `TURNED` plus 0 to 2: it is turned by a quarter, two or three, …"""
 CHANGED: Final = TURNED + QUARTERS - 1
 """… and this plus one of the changes of `perception.ring_faults.changes`; …"""
-STUCK: Final = CHANGED + EXCHANGED + 1
+STUCK_SENSOR: Final = CHANGED + EXCHANGED + 1
 """… and this plus the number of a sensor that repeats its reading while no other one hears anything new."""
 
 
@@ -349,5 +349,5 @@ def check_motion(
     for i in range(len(echoes)):
         if echoes[i].stuck_nat >= EVIDENCE_NAT:
             echoes[i].stuck_nat = 0.0
-            return STUCK + i
+            return STUCK_SENSOR + i
     return NOTHING

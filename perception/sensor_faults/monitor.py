@@ -7,7 +7,7 @@ A single reading proves nothing; how readings change while the robot moves and w
   along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
   or those of the whole ring do not. Or it repeats one through a full turn in place, while others read otherwise
   (`perception.sensor_faults.turning`). One that hears alone is found by its motion
-  (`perception.ring_faults.motion_tests.STUCK`).
+  (`perception.ring_faults.motion_tests.STUCK_SENSOR`).
 - *Silent.* The sensor hears nothing of what others heard where it looks, from both sides of its axis
   (`perception.sensor_faults.silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
   still counts as a look (`perception.obstacle_echoes.fresh_echoes`), which has no echo.

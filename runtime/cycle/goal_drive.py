@@ -129,6 +129,7 @@ def drive_to_goal(
         room_m = behaviors.follow_valley.safety_m
     responses = (response, _pushes(percept, room_m, settings), *beside)
     decision = _arbitrate(responses, percept, last_rad_s, settings, commitment)
+    turn_rad_s = decision.twist.w if isinstance(decision, Drive) else 0.0
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
             progress,
@@ -140,10 +141,9 @@ def drive_to_goal(
             is_blocked=not now.search.reaches,
             is_occupied=_is_occupied(percept, goal, distance_m, settings),
         )
-    turn_rad_s = decision.twist.w if isinstance(decision, Drive) else 0.0
+        if progress.given_up is not None:
+            decision, hold_reason = Drive(STANDSTILL), progress.given_up
     now = GoalDrive(progress, valley, now.search, now.searched_run_s, turn_rad_s, detour)
-    if isinstance(decision, Drive) and not goal.reached and progress.given_up is not None:
-        return goal, now, responses, Drive(STANDSTILL), progress.given_up
     return goal, now, responses, decision, hold_reason
 
 

@@ -22,7 +22,7 @@ from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.corners import SAME_CORNER_M
 from perception.bayes.walls.report import sure_room
 
-STILL_RAD: Final = math.acos(STILL_COS)
+STANDING_RAD: Final = math.acos(STILL_COS)
 STOPPED_M: Final = 0.001
 STOPPED_RAD: Final = 0.001
 """A robot that moved and turned by less between two firings has stopped: bases count their way in millimetres. Later
@@ -45,7 +45,7 @@ def keep_while_standing(memory: Memory, x: float, y: float, yaw: float) -> None:
     stop = room["stop"]
     moved, turned = math.hypot(x - float(stop["x"]), y - float(stop["y"])), abs(wrapped(yaw - float(stop["yaw"])))
     is_standing = bool(stop["is_standing"] == 1)
-    if moved > (STANDING_M if is_standing else STOPPED_M) or turned > (STILL_RAD if is_standing else STOPPED_RAD):
+    if moved > (STANDING_M if is_standing else STOPPED_M) or turned > (STANDING_RAD if is_standing else STOPPED_RAD):
         if is_standing:
             room["walls"]["bins"]["is_kept"] = 0
             room["corners"]["is_kept"] = room["edges"]["is_kept"] = 0

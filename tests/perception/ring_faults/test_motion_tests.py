@@ -17,7 +17,7 @@ from perception.ring_faults.motion_tests import (
     NOTHING,
     REPEATED,
     SCATTERED,
-    STUCK,
+    STUCK_SENSOR,
     TURNED,
     VANISHED,
     check_motion,
@@ -130,7 +130,7 @@ def test_the_only_sensor_that_hears_is_named_where_it_does_not_change() -> None:
     """A frozen ring that has heard one echo: what is silent on is not contradicted, and one sensor may be stuck."""
     ring, ranges = Ring(), np.full(COUNT, math.inf)
     ranges[1] = 2.0
-    assert {ring.fire(ranges) for _ in range(30)} == {NOTHING, STUCK + 1}
+    assert {ring.fire(ranges) for _ in range(30)} == {NOTHING, STUCK_SENSOR + 1}
     honest_ring = Ring()
     for k in range(30):
         ranges[1] = 2.0 - STEP_M * k
