@@ -16,11 +16,12 @@ import numpy as np
 from perception.angles import wrapped
 from perception.bayes.inference.placement import COORDINATE_MAX_M, STANDING_M
 from perception.bayes.memory.parameters import STILL_COS
-from perception.bayes.memory.state import Memory
-from perception.bayes.memory.wall_records import WALL_BIN_M, WALL_BINS
+from perception.bayes.memory.state import Memory, StateRecord
+from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, WALL_BIN_M, WALL_BINS
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.corners import SAME_CORNER_M
 from perception.bayes.walls.report import sure_room
+from perception.kernel import kernel
 
 STANDING_RAD: Final = math.acos(STILL_COS)
 STOPPED_M: Final = 0.001
@@ -39,20 +40,41 @@ def keep_while_standing(memory: Memory, x: float, y: float, yaw: float) -> None:
     x, y, yaw : float
         The robot's place (m) and its ring's yaw (rad) at a firing whose readings are not in the memory yet.
     """
-    if not (abs(x) < COORDINATE_MAX_M and abs(y) < COORDINATE_MAX_M and math.isfinite(yaw)):
-        return
-    room = memory.state["room"][0]
-    stop = room["stop"]
-    moved, turned = math.hypot(x - float(stop["x"]), y - float(stop["y"])), abs(wrapped(yaw - float(stop["yaw"])))
-    is_standing = bool(stop["is_standing"] == 1)
-    if moved > (STANDING_M if is_standing else STOPPED_M) or turned > (STANDING_RAD if is_standing else STOPPED_RAD):
-        if is_standing:
-            room["walls"]["bins"]["is_kept"] = 0
-            room["corners"]["is_kept"] = room["edges"]["is_kept"] = 0
-        stop["x"], stop["y"], stop["yaw"], stop["is_standing"] = x, y, yaw, 0
-    elif not is_standing:
-        stop["is_standing"] = 1
+    if has_just_stopped(memory.s, x, y, yaw):
         mark_sure(memory)
+
+
+@kernel
+def has_just_stopped(s: StateRecord, x: float, y: float, yaw: float) -> bool:
+    """Return whether the robot has stopped since the last firing; when it moves on, remove the marks.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Updated.
+    x, y, yaw : float
+        As of `keep_while_standing`.
+    """
+    if not (abs(x) < COORDINATE_MAX_M and abs(y) < COORDINATE_MAX_M and math.isfinite(yaw)):
+        return False
+    room = s[0].room
+    stop = room.stop
+    moved, turned = math.hypot(x - stop.x, y - stop.y), abs(wrapped(yaw - stop.yaw))
+    is_standing = stop.is_standing == 1
+    most_m, most_rad = (STANDING_M, STANDING_RAD) if is_standing else (STOPPED_M, STOPPED_RAD)
+    if moved <= most_m and turned <= most_rad:
+        stop.is_standing = 1
+        return not is_standing
+    if is_standing:
+        for k in range(len(room.walls)):
+            for b in range(WALL_BINS):
+                room.walls[k].bins[b].is_kept = 0
+        for k in range(CORNERS_MAX):
+            room.corners[k].is_kept = 0
+        for k in range(EDGES_MAX):
+            room.edges[k].is_kept = 0
+    stop.x, stop.y, stop.yaw, stop.is_standing = x, y, yaw, 0
+    return False
 
 
 def mark_sure(memory: Memory) -> None:
