@@ -153,17 +153,15 @@ class BayesPerception:
     def observe(self, firing: Firing) -> int:
         """Process one firing; return the number of outline segments that it completed."""
         s, tracks, settings = self.memory.s, self.memory.tracks, self.settings
-        pose, time_s = firing.pose, float(firing.robot_s)
+        pose, time_s = ring_pose(firing), float(firing.robot_s)
         mounts = mounts_at(firing, self._mounts, self._turning)
-        keep_while_standing(self.memory, float(pose.x), float(pose.y), float(firing.ring_yaw))
+        keep_while_standing(self.memory, pose)
         readings = associate(
             s,
             tracks,
             settings,
             mounts,
-            float(pose.x),
-            float(pose.y),
-            float(firing.ring_yaw),
+            pose,
             time_s,
             firing.ranges_m,
         )
@@ -176,7 +174,7 @@ class BayesPerception:
                 tracks,
                 settings,
                 mounts,
-                ring_pose(firing),
+                pose,
                 readings,
                 heard.transmitters,
                 heard.listeners,

@@ -152,31 +152,38 @@ class MotionMonitor:
         modelled, lasted_s = self._model(run_s, body)
         asked_s, asked_turn_s, asked = self._ask(modelled, lasted_s)
         if odometry is None:
-            # As `replace` does, in a fifth of its time, as in `command`: each cycle calls them.
-            return MotionMonitor(
-                fine,
-                commands,
-                last,
-                self.directions,
-                self.still,
-                self.still_s,
-                self.has_stood,
-                asked_s,
-                asked,
-                asked_turn_s,
-                modelled,
-                run_s,
+            return replace(
+                self,
+                movement=fine,
+                commands=commands,
+                modelled=modelled,
+                modelled_run_s=run_s,
+                asked_s=asked_s,
+                asked_turn_s=asked_turn_s,
+                asked=asked,
             )
         if last is None:  # it may be moving by commands of before
             limits = (body.speed_max_m_s,) * 2 + (body.turn_max_rad_s,) * 2
             directions = tuple(map(Direction, limits))
-            seen = replace(self, commands=commands, odometry=odometry, directions=directions)
-            return replace(seen, modelled=modelled, modelled_run_s=run_s)
+            return replace(
+                self,
+                commands=commands,
+                odometry=odometry,
+                directions=directions,
+                modelled=modelled,
+                modelled_run_s=run_s,
+            )
         passed_s, (along, turned) = odometry.robot_s - last.robot_s, _between(last.pose, odometry.pose)
         if _has_leapt(along, turned, passed_s, body) or not 0.0 < passed_s <= GAP_MAX_S:
-            seen = replace(self, movement=fine, commands=commands, odometry=odometry)
-            seen = replace(seen, modelled=modelled, modelled_run_s=run_s)
-            return replace(seen, still=None, still_s=0.0, asked_s=0.0, asked_turn_s=0.0, asked=NOTHING)
+            return MotionMonitor(
+                fine,
+                commands,
+                odometry,
+                self.directions,
+                has_stood=self.has_stood,
+                modelled=modelled,
+                modelled_run_s=run_s,
+            )
         directions, is_excessive = self._explain(commands, along, turned, passed_s, body)
         is_still = self.still is not None and not _reaches(_between(self.still, odometry.pose), MOVED)
         still_s = self.still_s + passed_s if is_still else 0.0
@@ -211,6 +218,7 @@ class MotionMonitor:
         """Return the monitor after a command that reached the base; None commands no velocity: it ends any motion."""
         twist = STANDSTILL if twist is None else twist
         has_stood = self.has_stood and twist.v == 0.0 and twist.w == 0.0
+        # As `replace` does, in a fifth of its time: this is called in each cycle.
         return MotionMonitor(
             self.movement,
             (*self.commands, Command(run_s, twist)),

@@ -245,9 +245,14 @@ def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) 
 
 @kernel
 def associate(
-    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float,
-    time_s: float, ranges: Floats,
-) -> int:  # fmt: skip
+    s: StateRecord,
+    tracks: CircleTracks,
+    p: SettingsRecord,
+    mounts: Floats,
+    pose: RingPose,
+    time_s: float,
+    ranges: Floats,
+) -> int:
     """Place the readings of one firing, associate them with circles, and return how many they are.
 
     Parameters
@@ -256,11 +261,14 @@ def associate(
         Memory and circles, updated, and settings.
     mounts : (n, 3) float
         x, y (m), direction (rad) of each sensor in the ring's frame.
-    px, py, yaw, time_s : float
-        Position (m) and direction (rad) of the ring, and the time (s).
+    pose : RingPose
+        Place (m) and direction (rad) of the ring.
+    time_s : float
+        The time (s).
     ranges : (n,) float
         Ranges, m; NaN: the sensor did not fire, inf: no echo.
     """
+    px, py, yaw = pose
     m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(time_s) else 0
     if m > 0:
         count_surroundings(s, m, math.hypot(px - s[0].ring_x, py - s[0].ring_y))

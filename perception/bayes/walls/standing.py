@@ -22,6 +22,7 @@ from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.corners import SAME_CORNER_M
 from perception.bayes.walls.report import sure_room
 from perception.kernel import kernel
+from perception.sensor_mounts import RingPose
 
 STANDING_RAD: Final = math.acos(STILL_COS)
 STOPPED_M: Final = 0.001
@@ -30,31 +31,32 @@ STOPPED_RAD: Final = 0.001
 it stands while its sensors are where they were, as `placement` has it."""
 
 
-def keep_while_standing(memory: Memory, x: float, y: float, yaw: float) -> None:
+def keep_while_standing(memory: Memory, pose: RingPose) -> None:
     """Mark what is sure when the robot stops, and remove the marks when it moves on.
 
     Parameters
     ----------
     memory : Memory
         Updated.
-    x, y, yaw : float
-        The robot's place (m) and its ring's yaw (rad) at a firing whose readings are not in the memory yet.
+    pose : RingPose
+        Of a firing whose readings are not in the memory yet.
     """
-    if has_just_stopped(memory.s, x, y, yaw):
+    if has_just_stopped(memory.s, pose):
         mark_sure(memory)
 
 
 @kernel
-def has_just_stopped(s: StateRecord, x: float, y: float, yaw: float) -> bool:
+def has_just_stopped(s: StateRecord, pose: RingPose) -> bool:
     """Return whether the robot has stopped since the last firing; when it moves on, remove the marks.
 
     Parameters
     ----------
     s : (1,) State
         Updated.
-    x, y, yaw : float
+    pose : RingPose
         As of `keep_while_standing`.
     """
+    x, y, yaw = pose
     if not (abs(x) < COORDINATE_MAX_M and abs(y) < COORDINATE_MAX_M and math.isfinite(yaw)):
         return False
     room = s[0].room

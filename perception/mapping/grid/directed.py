@@ -50,8 +50,9 @@ from perception.mapping.grid.window import (
     Ring,
     Window,
     beams_of,
+    columns_of_beam,
     octant,
-    row_of_beam,
+    rows_within,
     set_edges,
 )
 
@@ -138,7 +139,7 @@ def sweep_beam(
         something was heard in from elsewhere, m; infinite without one.
     """
     arc, shares, _, edges = scratch
-    corner, cell_m = raster
+    _, cell_m = raster
     sx, sy, axis, half_angle = beam
     r, sigma, passed, end, has_arc = heard
     weight, weight_both = weights
@@ -152,16 +153,11 @@ def sweep_beam(
     deep = 0.999 * max(0.0, min(passed, end - 2.0 * UNDIRECTED_ARC_SIGMAS * sigma)) ** 2
     one = octant(edges[0], edges[1])
     other = octant(edges[2], edges[3])
-    low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
-    high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
+    low_y, high_y = rows_within(raster, sy, end, mask)
     for iy in range(low_y, high_y + 1):
         dy = (iy + 0.5) * cell_m - sy
         jy = iy & mask
-        low, high = row_of_beam(dy, end, edges)
-        if low > high:
-            continue
-        low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
-        high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+        low_x, high_x = columns_of_beam(raster, sx, dy, end, edges, mask)
         for ix in range(low_x, high_x + 1):
             dx = (ix + 0.5) * cell_m - sx
             square = dx * dx + dy * dy

@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats, kernel
-from perception.mapping.grid.window import SPREAD_CELLS, Raster, Ring, Window, placed, row_of_beam, set_edges
+from perception.mapping.grid.window import (
+    SPREAD_CELLS,
+    Raster,
+    Ring,
+    Window,
+    columns_of_beam,
+    placed,
+    rows_within,
+    set_edges,
+)
 from perception.sensor_mounts import SensorPose
 
 SPREAD: Final = 0.01
@@ -61,7 +70,7 @@ def enter_reading(
         σ_r, m; 0 for a beam without an echo that is empty up to `r`.
     """
     mask = log_odds.shape[0] - 1
-    corner, cell_m = raster
+    _, cell_m = raster
     sx, sy, axis = sensor
     set_edges(axis, half_angle, edges)
     ux = math.cos(axis)
@@ -69,16 +78,11 @@ def enter_reading(
     inner = r - ARC_SIGMAS * sigma
     outer = r + ARC_SIGMAS * sigma
     total = 0.0
-    low_y = max(int(corner[1]), math.floor((sy - outer) / cell_m))
-    high_y = min(int(corner[1]) + mask, math.floor((sy + outer) / cell_m))
+    low_y, high_y = rows_within(raster, sy, outer, mask)
     for step in range(2):  # the beam's inside and the sum over the arc; the arc
         for iy in range(low_y, high_y + 1):
             dy = (iy + 0.5) * cell_m - sy
-            low, high = row_of_beam(dy, outer, edges)
-            if low > high:
-                continue
-            low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
-            high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+            low_x, high_x = columns_of_beam(raster, sx, dy, outer, edges, mask)
             for ix in range(low_x, high_x + 1):
                 dx = (ix + 0.5) * cell_m - sx
                 theta = math.atan2(ux * dy - uy * dx, ux * dx + uy * dy)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import SHARE, bounds
 from perception.kernel import Floats, kernel
-from perception.mapping.grid.window import Raster, Ring, Window, placed, row_of_beam, set_edges
+from perception.mapping.grid.window import Raster, Ring, Window, columns_of_beam, placed, rows_within, set_edges
 from perception.sensor_mounts import SensorPose
 
 EMPTY: Final = 0
@@ -67,7 +67,7 @@ def enter_reading(
         Scratch.
     """
     mask = cells.shape[0] - 1
-    corner, cell_m = raster
+    _, cell_m = raster
     sx, sy, axis = sensor
     set_edges(axis, half_angle, edges)
     ux = math.cos(axis)
@@ -75,16 +75,11 @@ def enter_reading(
     inner = r - accuracy_m
     outer = r + accuracy_m
     total = 0.0
-    low_y = max(int(corner[1]), math.floor((sy - outer) / cell_m))
-    high_y = min(int(corner[1]) + mask, math.floor((sy + outer) / cell_m))
+    low_y, high_y = rows_within(raster, sy, outer, mask)
     for step in range(3):  # the beam's inside; the sum over the arc; the arc
         for iy in range(low_y, high_y + 1):
             dy = (iy + 0.5) * cell_m - sy
-            low, high = row_of_beam(dy, outer, edges)
-            if low > high:
-                continue
-            low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
-            high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+            low_x, high_x = columns_of_beam(raster, sx, dy, outer, edges, mask)
             for ix in range(low_x, high_x + 1):
                 dx = (ix + 0.5) * cell_m - sx
                 theta = math.atan2(ux * dy - uy * dx, ux * dx + uy * dy)

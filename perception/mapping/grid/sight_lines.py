@@ -35,8 +35,9 @@ from perception.mapping.grid.window import (
     Ring,
     Window,
     beams_of,
+    columns_of_beam,
     is_possible,
-    row_of_beam,
+    rows_within,
     set_edges,
 )
 from perception.sensor_mounts import SensorPose
@@ -187,7 +188,7 @@ def enter_sights(
         How many echoes that nothing recognised explains came from what holds something, how many over it, how many of
         these there are at all, and how many echoes something explains. Updated.
     """
-    corner, cell_m = raster
+    _, cell_m = raster
     x, y, yaw = beams.pose
     ranges, mounts, bearings, half_angle = beams.ranges, beams.mounts, beams.bearings, beams.half_angle
     mask = holds.shape[0] - 1
@@ -211,15 +212,10 @@ def enter_sights(
         if not is_located and came != 0:
             echoes[0 if came > 0 else 1] += 1.0
         set_edges(axis, half_angle, edges)
-        low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
-        high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
+        low_y, high_y = rows_within(raster, sy, end, mask)
         for iy in range(low_y, high_y + 1):
             dy = (iy + 0.5) * cell_m - sy
-            low, high = row_of_beam(dy, end, edges)
-            if low > high:
-                continue
-            low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
-            high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+            low_x, high_x = columns_of_beam(raster, sx, dy, end, edges, mask)
             for ix in range(low_x, high_x + 1):
                 dx = (ix + 0.5) * cell_m - sx
                 d = math.hypot(dx, dy)

@@ -123,6 +123,45 @@ def row_of_beam(dy: float, reach: float, edges: Floats) -> tuple[float, float]:
 
 
 @kernel
+def rows_within(raster: Raster, sy: float, reach: float, mask: int) -> tuple[int, int]:
+    """Return the first and the last row of a window's cells that come as near to a y as `reach`, m.
+
+    Parameters
+    ----------
+    raster : Raster
+        Of the window.
+    sy, reach : float
+        m.
+    mask : int
+        Rows of the window, less one.
+    """
+    corner, cell_m = raster
+    first = max(int(corner[1]), math.floor((sy - reach) / cell_m))
+    return first, min(int(corner[1]) + mask, math.floor((sy + reach) / cell_m))
+
+
+@kernel
+def columns_of_beam(raster: Raster, sx: float, dy: float, reach: float, edges: Floats, mask: int) -> tuple[int, int]:
+    """Return the first and the last column of a row whose middles lie in a beam; the first is greater if none does.
+
+    Parameters
+    ----------
+    raster, mask
+        As for `rows_within`.
+    sx : float
+        The sensor's x, m.
+    dy, reach, edges
+        As for `row_of_beam`.
+    """
+    corner, cell_m = raster
+    low, high = row_of_beam(dy, reach, edges)
+    if low > high:
+        return 1, 0
+    first = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
+    return first, min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+
+
+@kernel
 def set_edges(bearing: float, half_angle: float, edges: Floats) -> None:
     """Write the edges of a beam as `row_of_beam` takes them."""
     edges[0] = math.cos(bearing - half_angle)

@@ -32,7 +32,6 @@ class Alerts:
         self._ring_problems: set[str] = set()
         self.recovered: list[str] = []
         """Of the last update: what is well again, and needs nobody."""
-        self._good: set[str] = set()
 
     def update(self, received: Received, state: State, run_s: float) -> list[str]:
         """Return a line for each new fact that asks for attention: what happened, likely cause, next action.
@@ -46,41 +45,44 @@ class Alerts:
         run_s : float
             The cycle's beginning; a robot that causes too many lines has the excess counted in the next one.
         """
-        lines, self.recovered = list[str](), []
-        self._good.clear()
-        facts = self._new_facts(received, state.perception)
+        facts, recovered = self._new_facts(received, state.perception)
         if (problem := state.ring_problem) is not None and state.mode.reason != problem:
             facts += [] if problem in self._ring_problems else [f"while the robot does not drive: {problem}"]
             self._ring_problems.add(problem)
+        lines, self.recovered = self._limited(facts, run_s), self._limited(recovered, run_s)
+        return lines
+
+    def _limited(self, facts: list[str], run_s: float) -> list[str]:
+        """Return the lines for which there is time."""
+        lines = []
         for line in facts:
             left_out = self._limit.take(run_s)
             if left_out is not None:
-                (self.recovered if line in self._good else lines).append(
-                    f"{line} ({left_out} such lines were left out before)" if left_out else line
-                )
+                lines.append(f"{line} ({left_out} such lines were left out before)" if left_out else line)
         return lines
 
-    def _new_facts(self, received: Received, perception: Perception) -> list[str]:
-        lines = [*received.notes, *self._new_waiting(perception), *self._new_place(perception.known_room)]
+    def _new_facts(self, received: Received, perception: Perception) -> tuple[list[str], list[str]]:
+        """Return what asks for attention, and what is well again."""
+        lost, recovered = self._new_place(perception.known_room)
+        lines = [*received.notes, *self._new_waiting(perception), *lost]
         if perception.sensor_monitor.changes == self._changes:
-            return lines
+            return lines, recovered
         self._changes = perception.sensor_monitor.changes
         now = {report.sensor: report for report in perception.sensor_reports()}
         lines += [report.reason for sensor, report in now.items() if self._is_new(report)]
-        lines += self._well(
-            [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
-        )
+        recovered += [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
         self._reported = now
-        return lines
+        return lines, recovered
 
-    def _new_place(self, room: KnownRoom | None) -> list[str]:
-        """Return what is new of the robot's place in a known room."""
+    def _new_place(self, room: KnownRoom | None) -> tuple[list[str], list[str]]:
+        """Return what is new of the robot's place in a known room, as of `_new_facts`."""
+        lines, recovered = list[str](), list[str]()
         if room is None:
-            return []
-        (status, refuted, rivals), lines = self._place, []
+            return lines, recovered
+        status, refuted, rivals = self._place
         self._place = room.status, room.refuted, room.rivals
         if self._place == (status, refuted, rivals):
-            return []
+            return lines, recovered
         if room.refuted > refuted:
             lines.append(
                 "the readings do not fit the place that was named for the robot: it searches the whole room; "
@@ -94,18 +96,13 @@ class Alerts:
             )
         if room.status == "tracking" != status:
             here = room.localized().pose
-            lines += self._well([f"the robot's place is known: ({here.x:.2f} m, {here.y:.2f} m) in the map"])
+            recovered.append(f"the robot's place is known: ({here.x:.2f} m, {here.y:.2f} m) in the map")
         if room.rivals > rivals == 0:
             lines.append(
                 f"the readings fit {room.rivals + 1} places of this room alike: drive to where they differ, or say "
                 "where the robot is"
             )
-        return lines
-
-    def _well(self, lines: list[str]) -> list[str]:
-        """Return lines, noted as no warnings."""
-        self._good.update(lines)
-        return lines
+        return lines, recovered
 
     def _is_new(self, report: SensorReport) -> bool:
         """Return whether a sensor's fault is another one than before; the figures in its reason may change."""

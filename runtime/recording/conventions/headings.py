@@ -112,22 +112,18 @@ def motion_scores(table: Table, options: RingLogOptions) -> Motion:
     directions, angles = _directions(table)
     if len(directions) < STEPS_MIN:
         return Motion(dict.fromkeys(choices, 0.0), is_known=False, is_related=False)
-    scores = {}
-    for one in choices:
-        rule, unit = HEADINGS[one.heading], ANGLES[one.unit]
-        scores[one] = _score(directions - rule.turn * _middle(unit * angles) - rule.offset_rad)
+
+    def score(one: Angles, offset_rad: float) -> float:
+        return _score(directions - HEADINGS[one.heading].turn * _middle(ANGLES[one.unit] * angles) - offset_rad)
+
+    scores = {one: score(one, HEADINGS[one.heading].offset_rad) for one in choices}
     best = max(scores.values())
     turned = None
     if options.heading == "auto":
         offsets = np.linspace(-math.pi, math.pi, TURNS, endpoint=False)
         alone = max(_score(directions - offset) for offset in offsets)
         found = {
-            (one, offset): _score(
-                directions - HEADINGS[one.heading].turn * _middle(ANGLES[one.unit] * angles) - offset
-            )
-            for one in choices
-            if one.heading in {"ccw", "cw"}
-            for offset in offsets
+            (one, offset): score(one, offset) for one in choices if one.heading in {"ccw", "cw"} for offset in offsets
         }
         likely = max(found, key=found.__getitem__)
         if found[likely] > max(best, alone, RELATED_NAT * len(directions)) + NEAR_NAT:

@@ -303,9 +303,7 @@ def _impossible(facts: _Facts, robot: RobotConfig) -> str:
     if facts.speed > FAST * body.speed_max_m_s:
         return f"x and y move at {facts.speed:.3g} m/s, and this robot's body.speed_max_m_s is {body.speed_max_m_s:g}"
     if facts.rate > TURNS_FAST * body.turn_max_rad_s:
-        return (
-            f"theta turns at {facts.rate:.3g} rad/s, and this robot's body.turn_max_rad_s is {body.turn_max_rad_s:g}"
-        )
+        return _too_fast(facts, robot)
     return f"the firings are {facts.period:.3g} s apart, and this robot's are {ring.firing.step_period_s:g}"
 
 

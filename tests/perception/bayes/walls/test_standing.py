@@ -26,8 +26,8 @@ def stopped() -> tuple[Memory, WallMap]:
         fill(memory, room.walls[k], low, high)
     find_corners(memory.s)
     room.corners[0].echoes, room.corners[0].passes = 6.0, 1.0
-    keep_while_standing(memory, 0.1, 0.0, 0.0)
-    keep_while_standing(memory, 0.1, 0.0, 0.0)
+    keep_while_standing(memory, (0.1, 0.0, 0.0))
+    keep_while_standing(memory, (0.1, 0.0, 0.0))
     return memory, room
 
 
@@ -45,12 +45,12 @@ def test_what_is_sure_at_the_stop_stays_until_the_robot_moves_on() -> None:
     assert before[0]["x1"][1] == pytest.approx(CORNER[0], abs=0.05)
     make_doubtful(room)
     for x, yaw in ((0.1, 0.0), (0.104, 0.01)):  # odometry trembles
-        keep_while_standing(memory, x, 0.0, yaw)
+        keep_while_standing(memory, (x, 0.0, yaw))
         segments, points = room_report(memory)
         for name in ("x1", "y1", "x2", "y2"):
             assert segments[name] == pytest.approx(before[0][name], abs=0.035)
         assert len(points) == len(before[1]) == 1
-    keep_while_standing(memory, 0.12, 0.0, 0.0)
+    keep_while_standing(memory, (0.12, 0.0, 0.0))
     assert [len(part) for part in room_report(memory)] == [0, 0]
 
 
@@ -59,8 +59,8 @@ def test_a_robot_that_creeps_or_turns_does_not_stand(x: float, yaw: float) -> No
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
     fill(memory, room.walls[0], -2.0, 2.0)
-    keep_while_standing(memory, 0.1, 0.0, 0.0)
-    keep_while_standing(memory, x, 0.0, yaw)
+    keep_while_standing(memory, (0.1, 0.0, 0.0))
+    keep_while_standing(memory, (x, 0.0, yaw))
     make_doubtful(room)
     assert len(wall_ends(memory)) == 0
 
@@ -99,7 +99,7 @@ def test_another_explanation_ends_a_wall_before_the_stop_and_a_misfit_after_it_t
 def test_an_invalid_place_is_no_stop() -> None:
     memory, room = new_room()
     for x in (np.nan, np.inf, 1e12):
-        keep_while_standing(memory, x, 0.0, 0.0)
-        keep_while_standing(memory, 0.0, 0.0, x)
+        keep_while_standing(memory, (x, 0.0, 0.0))
+        keep_while_standing(memory, (0.0, 0.0, x))
     assert room.stop.is_standing in (0, 1)
     assert abs(room.stop.x) < 1.0

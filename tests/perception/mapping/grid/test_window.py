@@ -10,7 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.messages import Firing, Pose
-from perception.mapping.grid.window import Ring, Window, octant, placed, row_of_beam, set_edges
+from perception.mapping.grid.window import (
+    Ring,
+    Window,
+    columns_of_beam,
+    octant,
+    placed,
+    row_of_beam,
+    rows_within,
+    set_edges,
+)
 
 
 @given(st.floats(-math.pi, math.pi))
@@ -30,6 +39,25 @@ def test_row_of_a_beam_holds_its_points_and_no_others(bearing: float, half: floa
         margins = (half - abs(off), reach - math.hypot(dx, dy))
         if min(map(abs, margins)) > 1e-9 and math.hypot(dx, dy) > 1e-9:
             assert (min(margins) > 0.0) == (low <= dx <= high)
+
+
+@given(st.floats(-10.0, 10.0), st.floats(0.05, 1.2), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.1, 9.0))
+def test_cells_of_a_beam_are_those_whose_middles_lie_in_it(
+    bearing: float, half: float, sx: float, sy: float, reach: float
+) -> None:
+    edges, cell_m, mask, corner = np.zeros(4), 0.5, 15, np.array([-9, -7])
+    set_edges(bearing, half, edges)
+    first_row, last_row = rows_within((corner, cell_m), sy, reach, mask)
+    for iy in range(-7, -7 + mask + 1):
+        dy = (iy + 0.5) * cell_m - sy
+        first, last = columns_of_beam((corner, cell_m), sx, dy, reach, edges, mask)
+        for ix in range(-9, -9 + mask + 1):
+            dx = (ix + 0.5) * cell_m - sx
+            off = math.remainder(math.atan2(dy, dx) - bearing, 2.0 * math.pi)
+            margins = (half - abs(off), reach - math.hypot(dx, dy))
+            if min(map(abs, margins)) > 1e-9 and math.hypot(dx, dy) > 1e-9:
+                is_found = first_row <= iy <= last_row and first <= ix <= last
+                assert (min(margins) > 0.0) == is_found
 
 
 def test_window_keeps_what_stays_and_clears_what_comes_in() -> None:
