@@ -215,6 +215,11 @@ class LinkConfig(Strict):
     reopen_max_s: float = Field(default=0.5, gt=0.0, le=600.0)
     """Longest wait between such attempts, s."""
 
+    @property
+    def answer_max_s(self) -> float:
+        """Longest time until a command shows in the odometry, s: every try, and then the next sample."""
+        return self.reply_timeout_s * self.tries + self.silence_max_s
+
     @model_validator(mode="after")
     def _ordered(self) -> LinkConfig:
         if self.deadman_min_s > self.deadman_max_s:

@@ -26,6 +26,11 @@ def obeyed(before: Twist, asked: Twist, body: BodyConfig, lasted_s: float) -> Tw
     )
 
 
+def stop_s(twist: Twist, body: BodyConfig) -> float:
+    """Return how long a base that brakes as its file says takes from a velocity to standstill, s."""
+    return max(abs(twist.v) / body.acceleration_max_m_s2, abs(twist.w) / body.turn_acceleration_max_rad_s2)
+
+
 def _approach(before: float, asked: float, limit: float, change: float) -> float:
     target = max(-limit, min(limit, asked))
     return max(before - change, min(before + change, target))

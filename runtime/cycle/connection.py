@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from config.errors import FAILED, UserError
+from config.robot import BodyConfig
+from drivers.base_model import stop_s
 from drivers.driver import LineState, RobotDriver
 from drivers.link import Link
 from drivers.messages import Flags
@@ -18,9 +20,6 @@ CONNECT_MAX_S: Final = 5.0
 
 ANSWER_TIMEOUT_S: Final = 2.0
 """Least wait, s, also where the driver gave up earlier: a robot may be starting, or its emulator kept waiting."""
-
-HALT_MAX_S: Final = 0.5
-"""Longest wait at the end of a run until the base confirms that it has stopped, s."""
 
 POLL_S: Final = 0.005
 """Period of the line's exchanges while no cycle runs, s."""
@@ -34,6 +33,8 @@ class Connection(NamedTuple):
     send: Callable[[], None]
     clock: Callable[[], float]
     """The run's clock, s."""
+    body: BodyConfig
+    """How fast the base brakes."""
     line_messages: LineMessages = ROBOT_LINE
 
     async def connect(self, is_stopping: Callable[[], bool]) -> None:
@@ -72,12 +73,16 @@ class Connection(NamedTuple):
 
     async def _halt(self) -> bool:
         self.driver.halt()
-        deadline_run_s = self.clock() + HALT_MAX_S
+        begin_run_s, answer_max_s = self.clock(), self.link.config.answer_max_s
+        deadline_run_s = begin_run_s + answer_max_s
         while self.link.is_open and self.clock() < deadline_run_s:
             self.driver.tick(self.clock())
             self.send()
             await asyncio.sleep(POLL_S)
             odometry = self.driver.take_received().odometry
-            if odometry is not None and Flags.LATCHED in odometry.flags and odometry.twist == STANDSTILL:
+            if odometry is None:
+                continue
+            if Flags.LATCHED in odometry.flags and odometry.twist == STANDSTILL:
                 return True
+            deadline_run_s = max(deadline_run_s, begin_run_s + answer_max_s + stop_s(odometry.twist, self.body))
         return False

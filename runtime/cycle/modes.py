@@ -23,7 +23,8 @@ ARMING_MIN_S: Final = 0.1
 """Time from a RELEASE until the flags are believed: odometry sent after it must have had time to arrive, s."""
 
 ARMING_MAX_S: Final = 1.0
-"""Time from a RELEASE until an arming is given up: a latch that is still set has another cause, s."""
+"""Least time from a RELEASE until an arming is given up: a latch that is still set has another cause, s. A
+robot whose file lets it answer later has that time."""
 
 DEADMAN_GRACE_S: Final = 0.5
 """Time after DRIVE is entered in which the deadman's flag may still date from before the first DRIVE command, s."""
@@ -132,6 +133,7 @@ def advance(
     gap_s: float,
     movement: Movement = Movement.AS_COMMANDED,
     clock: ClockState = ClockState.RIGHT,
+    arming_max_s: float = ARMING_MAX_S,
 ) -> ModeState:
     """Return the mode in which a cycle decides.
 
@@ -149,6 +151,8 @@ def advance(
         How the base moves by its odometry.
     clock : ClockState
         How the robot's clock runs.
+    arming_max_s : float
+        Time after which an arming is given up.
     """
     run_s, request, fault = inputs.run_s, inputs.request, inputs.fault
     if state.mode is Mode.FAULT:
@@ -171,7 +175,8 @@ def advance(
         state = state.enter(Mode.READY, run_s)
     if movement in {Movement.UNCOMMANDED, Movement.UNSTOPPED}:
         return _stop_moving(state, run_s)
-    return _advance_arming(state, inputs, flags, gap_s, clock)
+    reason = _why_interrupt(inputs, gap_s) or CLOCK_REASONS[clock]
+    return _advance_arming(state, inputs, flags, reason, arming_max_s)
 
 
 def _why_waiting(reason: str | None, inputs: Inputs, flags: Flags) -> str:
@@ -270,7 +275,9 @@ def _wait_for_line(state: ModeState, inputs: Inputs, flags: Flags) -> ModeState:
     return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem or lost, arming_run_s=None)
 
 
-def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float, clock: ClockState) -> ModeState:
+def _advance_arming(
+    state: ModeState, inputs: Inputs, flags: Flags, interrupt: str | None, arming_max_s: float
+) -> ModeState:
     """Return the mode of a robot in READY or SAFE_STOP on a working line, by the progress of arming.
 
     RELEASE clears the latch and the flags of what caused it. What is still set afterwards is present, and the robot
@@ -284,12 +291,12 @@ def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float
     if inputs.request is Request.DISARM:
         # Entering SAFE_STOP again sets the latch, which the arming has already cleared.
         return state.enter(state.mode, run_s, DISARMED)
-    if (reason := _why_interrupt(inputs, gap_s) or CLOCK_REASONS[clock]) is not None:
-        return state.enter(Mode.SAFE_STOP, run_s, reason)
+    if interrupt is not None:
+        return state.enter(Mode.SAFE_STOP, run_s, interrupt)
     waited_s, reason = run_s - state.arming_run_s, _why_latched(flags)
     if waited_s >= ARMING_MIN_S and reason is None:
         return state.enter(Mode.DRIVE, run_s)
-    if waited_s > ARMING_MAX_S:
+    if waited_s > arming_max_s:
         latch = "the base's latch does not clear: look for bumper contact or a motor fault"
         return state.enter(Mode.SAFE_STOP, run_s, reason if flags & STOPPING else latch)
     return state

@@ -48,7 +48,7 @@ from runtime.cycle.driving import commit, drive
 from runtime.cycle.goal_drive import can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.line_messages import blind_reason
-from runtime.cycle.modes import Mode, ModeState, advance
+from runtime.cycle.modes import ARMING_MAX_S, Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.unheard_limit import limit_unheard
@@ -295,7 +295,8 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     map_frame = state.perception.known_map_frame() if wants_map(request, settings) else None
     state.goal_place = goal_place(request, state.goal_place, map_frame, gap_s) if isinstance(request, Goal) else None
     movement = state.motion_monitor.movement
-    state.mode = advance(before, inputs, flags, gap_s, movement, state.clock_monitor.clock)
+    arming_max_s = max(ARMING_MAX_S, settings.link.answer_max_s)
+    state.mode = advance(before, inputs, flags, gap_s, movement, state.clock_monitor.clock, arming_max_s)
     if state.mode.mode is Mode.DRIVE:
         decision = _drive(state, inputs, settings, map_frame, gap_s)
         if isinstance(decision, Drive):

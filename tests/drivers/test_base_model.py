@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.load import load_robot
-from drivers.base_model import obeyed
+from drivers.base_model import obeyed, stop_s
 from drivers.messages import Twist
 
 
@@ -27,6 +27,14 @@ def test_one_step_is_as_many_and_keeps_the_limits() -> None:
         assert abs(once.v - before.v) <= body.acceleration_max_m_s2 * lasted_s + 1e-12
         end = obeyed(before, asked, body, 100.0)
         assert end.v == max(-body.speed_max_m_s, min(body.speed_max_m_s, asked.v))
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.4, 0.1), (-0.2, 1.0), (0.0, 0.0)])
+def test_a_base_stands_after_the_time_that_it_takes_to_stop_and_not_before(v: float, w: float) -> None:
+    body, still = load_robot("p3dx").body, Twist(0.0, 0.0)
+    needed_s = stop_s(Twist(v, w), body)
+    assert obeyed(Twist(v, w), still, body, needed_s + 1e-9) == still
+    assert needed_s == 0.0 or obeyed(Twist(v, w), still, body, 0.99 * needed_s) != still
 
 
 @pytest.mark.parametrize("v", [-0.4, -0.1, 0.0, 0.1, 0.4])

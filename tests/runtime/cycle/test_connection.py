@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, MutableMapping
+from typing import Any, NoReturn
 
 import pytest
 import structlog
 
 from config.errors import FAILED, UserError
+from drivers.base_model import stop_s
 from drivers.emulator.faults import Deaf, Fault, Garbage, Mute
-from drivers.messages import Flags
-from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, HALT_MAX_S, POLL_S
+from drivers.messages import Flags, Twist
+from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, POLL_S
 from runtime.cycle.process import Observers, RobotProcess
 from tests.runtime.virtual_time import STEP_S, MemoryLink, in_virtual_time
 
 LONG_S = 600.0
+FASTEST = Twist(0.32, 0.0)
+"""What a drive of the hallway does not exceed."""
 
 
 def _drop(*_: object) -> dict[str, object]:
@@ -107,9 +111,34 @@ def test_the_base_has_stopped_and_its_session_has_ended_before_the_line_is_close
         assert driven_m_s > 0.2, "it drove"
         assert v == 0.0
         assert robot.truth.flags & Flags.LATCHED
-        assert closed_s - asked_s < HALT_MAX_S, "it was confirmed"
+        assert closed_s - asked_s < settings.link.answer_max_s, "it was confirmed"
         assert sent.endswith(bytes.fromhex(farewell))
         assert not links[0].is_open
+
+
+@pytest.mark.parametrize("deceleration_m_s2", [0.2, 0.35, 0.5, 1.0, 3.0])
+def test_a_base_that_brakes_as_its_file_says_has_confirmed_its_halt(
+    monkeypatch: pytest.MonkeyPatch, deceleration_m_s2: float
+) -> None:
+    monkeypatch.setattr("drivers.denning.device.BRAKE_S", None)  # a halt brakes no harder than any command
+    body = f"body.acceleration_max_m_s2={deceleration_m_s2}"
+    with in_virtual_time(monkeypatch, body) as (loop, settings, robot, _links):
+        warnings, driven_m_s = list[str](), list[float]()
+
+        def keep(_logger: object, method: str, event: MutableMapping[str, Any]) -> NoReturn:
+            warnings.extend([str(event["event"])] if method == "warning" else [])
+            raise structlog.DropEvent
+
+        def end() -> None:
+            driven_m_s.append(robot.truth.twist.v)
+            process.stop()
+
+        process = RobotProcess(settings, structlog.wrap_logger(None, processors=[keep]), clock=loop.time)
+        loop.call_later(5.0, end)
+        loop.run_until_complete(process.run(arm=True, seconds=None))
+    assert driven_m_s[0] > 0.2
+    assert robot.truth.twist.v == 0.0
+    assert not [text for text in warnings if "halt" in text]
 
 
 def test_a_base_that_does_not_confirm_its_halt_is_left_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,7 +149,8 @@ def test_a_base_that_does_not_confirm_its_halt_is_left_after_a_while(monkeypatch
         loop.call_later(4.0, process.stop)
         begin_s = loop.time()
         loop.run_until_complete(process.run(arm=True, seconds=None))
-        assert loop.time() - begin_s == pytest.approx(4.0 + HALT_MAX_S, abs=2.0 * POLL_S)
+        waited_s = loop.time() - begin_s - 4.0
+        assert settings.link.answer_max_s <= waited_s <= settings.link.answer_max_s + stop_s(FASTEST, settings.body)
 
 
 def test_a_robot_that_answers_late_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

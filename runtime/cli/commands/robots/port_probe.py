@@ -138,7 +138,7 @@ async def _try(port: str, config: RobotConfig) -> _Answer:
         await link.open_once()
     except LinkError as error:
         return _Answer(has_answered=False, problem=str(error))
-    connection, begin_s = Connection(link, driver, send, clock), clock()
+    connection, begin_s = Connection(link, driver, send, clock, config.body), clock()
     try:
         while driver.state is not LineState.READY and link.is_open:
             driver.tick(clock())

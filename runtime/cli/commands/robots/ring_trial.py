@@ -14,6 +14,7 @@ from serial.tools.list_ports import comports
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.robot import FiringConfig, RingConfig, RobotConfig
+from drivers.base_model import stop_s
 from drivers.driver import LineState
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.link import Link
@@ -26,7 +27,7 @@ SLACK_S: Final = 2.0
 WARNING_S: Final = 3.0
 MOVE_S: Final = 1.0
 SETTLE_S: Final = 0.5
-"""Time from the warning to the first motion, of each motion, and after it, s."""
+"""Time from the warning to the first motion, of each motion, and after a base stands again by its file, s."""
 DRIVE_S: Final = 0.05
 """Time from one velocity to the next, s, as of a run: a line that is full of them carries no request."""
 UNSTEADY_M: Final = 0.1
@@ -207,7 +208,7 @@ class RingTest:
         self._write = write
         self._driver = make_driver(config)
         self._link = Link(config.link, self._opened, self._received, lambda _reason: self._driver.line_closed())
-        self._connection = Connection(self._link, self._driver, self._send, clock)
+        self._connection = Connection(self._link, self._driver, self._send, clock, config.body)
         self._flags = Flags.NONE
         self._odometry: Odometry | None = None
 
@@ -255,11 +256,13 @@ class RingTest:
         await self._pass(SETTLE_S, None)
         for name, twist in MOTIONS:
             self._flags, before = Flags.NONE, self._odometry
-            await self._pass(MOVE_S, twist)
-            await self._pass(SETTLE_S, Twist(0.0, 0.0))
+            # A base that is slow to speed up drives as much longer, and then brakes on as far as it lacked.
+            move_s = max(MOVE_S, stop_s(twist, self._config.body))
+            await self._pass(move_s, twist)
+            await self._pass(SETTLE_S + stop_s(twist, self._config.body), Twist(0.0, 0.0))
             if before is None or self._odometry is None:
                 raise UserError("the robot sends no odometry: see `echolocate check`, and its firmware", FAILED)
-            finding = judge_motion(twist, before, self._odometry, self._flags, MOVE_S)
+            finding = judge_motion(twist, before, self._odometry, self._flags, move_s)
             self._write(f"motors {name}: {finding.text}\n")
             if not finding.is_good:
                 return False
