@@ -42,7 +42,7 @@ class DetectedObject:
     placed: bool = False
     """A user placed it, and the readings alone do not support it yet."""
     sigma_theta: float | None = None
-    """Standard error of `theta`, rad; None for all but walls."""
+    """Standard error of `theta`, rad; None for what has no heading, and where only a user gave it."""
 
     @property
     def ends(self) -> tuple[float, float, float, float] | None:

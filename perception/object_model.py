@@ -29,12 +29,15 @@ class ObjectModel:
         Mean of the outline, weighted by length, m.
     facing : float or None
         The direction in which an open outline bulges, rad. None for a closed outline: it gives no first guess.
+    lever_m : float or None
+        Root mean square distance of the outline from its mean, m: what a heading is measured by. None if it is round.
     """
 
     name: str
     sides: Floats
     centroid: tuple[float, float]
     facing: float | None
+    lever_m: float | None = None
 
     @classmethod
     def from_config(cls, config: ModelConfig) -> ObjectModel:
@@ -53,4 +56,12 @@ class ObjectModel:
             straight = math.hypot(*bulge) < BULGE_MIN_M
             across = math.atan2(along[0, 1], along[0, 0]) + 0.5 * math.pi
             facing = across if straight else math.atan2(bulge[1], bulge[0])
-        return cls(config.name, np.ascontiguousarray(sides), (float(centroid[0]), float(centroid[1])), facing)
+        lever_m = None
+        if config.arc_radius_m is None:
+            lever_m = math.sqrt(float((length * ((middle - centroid) ** 2).sum(axis=1)).sum() / length.sum()))
+        place = (float(centroid[0]), float(centroid[1]))
+        return cls(config.name, np.ascontiguousarray(sides), place, facing, lever_m)
+
+    def sigma_theta(self, sigma: float) -> float | None:
+        """Return the standard error of the heading, rad, for one of the place, m; None if the outline is round."""
+        return sigma / self.lever_m if self.lever_m else None

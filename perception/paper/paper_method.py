@@ -377,24 +377,20 @@ class PaperPerception:
         share = support / len(slots)
         if share < limits.support_min or coverage < limits.coverage_min:
             return None
+        sigma = residual / math.sqrt(support)
         return DetectedObject(
-            self._models[m].name,
-            x,
-            y,
-            theta,
-            residual / math.sqrt(support),
-            support,
-            share * coverage,
-            number=int(row["number"]),
-        )
+            self._models[m].name, x, y, theta, sigma, support, share * coverage,
+            number=int(row["number"]), sigma_theta=self._models[m].sigma_theta(sigma),
+        )  # fmt: skip
 
     def _placement(self, k: int) -> DetectedObject:
         """Return a placement as an object, however well it fits."""
         row, slots = self.placements.rows[k], self.placements.members(k, self.outline)
-        x, y, theta = wrapped_pose(row["pose"])
+        (x, y, theta), model = wrapped_pose(row["pose"]), self._models[row["model"]]
         support, residual, coverage = self._fit(int(row["model"]), slots, row["pose"])
         sigma = residual / math.sqrt(support) if support else self._config.clusters.threshold_m
         return DetectedObject(
-            self._models[row["model"]].name, x, y, theta, sigma, support, support / max(1, len(slots)) * coverage,
+            model.name, x, y, theta, sigma, support, support / max(1, len(slots)) * coverage,
             number=int(row["number"]), confirmed=bool(row["is_confirmed"]), placed=not row["is_confirmed"],
+            sigma_theta=model.sigma_theta(sigma) if support else None,
         )  # fmt: skip

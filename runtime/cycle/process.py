@@ -233,8 +233,7 @@ class RobotProcess:
             self.timing_monitor,
             self._driver,
             process_row,
-            self._mode_log.stop_reasons,
-            self._mode_log.hold_reasons,
+            self._mode_log,
         )
 
     def _on_prepared(self) -> None:

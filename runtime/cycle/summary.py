@@ -16,6 +16,8 @@ from drivers.messages import Pose
 from perception.detected_object import DetectedObject, turned_object
 from perception.localization.localized_pose import LocalizedPose, Status
 from perception.pipeline import Perception
+from runtime.cycle.logs.mission_log import MissionRow
+from runtime.cycle.logs.mode_log import ModeLog
 from runtime.cycle.step import State
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
@@ -46,6 +48,8 @@ class ObjectRow(TypedDict):
     """xx, xy, yy of the position, m²."""
     number: NotRequired[int]
     """As on the page; of the same sequence as those of walls."""
+    sigma_theta: NotRequired[float]
+    """Standard error of `theta`, rad; of models with corners."""
 
 
 class WallRow(TypedDict):
@@ -166,6 +170,8 @@ class RunSummary(PerceivedRows):
     stop_reasons: list[str]
     hold_reasons: list[str]
     """Why the robot held or made no progress in DRIVE, in order."""
+    mission: MissionRow | None
+    """None if there was none."""
     preparing: str | None
     """How far the preparation of recognition was at the end; None if it had started."""
     timing: TimingSummary
@@ -192,6 +198,8 @@ def object_row(seen: DetectedObject) -> ObjectRow:
         row["covariance"] = seen.covariance
     if seen.number is not None:
         row["number"] = seen.number
+    if seen.sigma_theta is not None:
+        row["sigma_theta"] = seen.sigma_theta
     return row
 
 
@@ -295,8 +303,7 @@ def run_summary(
     timing_monitor: TimingMonitor,
     driver: RobotDriver,
     footprint: FootprintRow,
-    stop_reasons: list[str],
-    hold_reasons: list[str],
+    mode_log: ModeLog,
 ) -> RunSummary:
     """Return the summary of a run.
 
@@ -312,10 +319,8 @@ def run_summary(
         Counts of the line, and the origin of the odometry.
     footprint : FootprintRow
         What the process used of its machine.
-    stop_reasons : list of str
-        Of every stop, in order.
-    hold_reasons : list of str
-        Why the robot held in DRIVE, in order.
+    mode_log : ModeLog
+        Why the robot stopped and held, and how its mission went on.
     """
     counts = driver.counts
     perceived = perceived_rows(state.perception, driver.odometry_origin)
@@ -336,8 +341,9 @@ def run_summary(
         "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
         "process": footprint,
         "mode": state.mode.mode.value,
-        "stop_reasons": stop_reasons,
-        "hold_reasons": hold_reasons,
+        "stop_reasons": mode_log.stop_reasons,
+        "hold_reasons": mode_log.hold_reasons,
+        "mission": mode_log.missions.row,
         "preparing": state.preparing,
         "timing": timing_monitor.summary(),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections import Counter
@@ -199,9 +200,9 @@ class Verifier:
         replayed = encode(Cycle.model_construct(record=found.replayed))
         if replayed != found.message.data:
             before, now = orjson.loads(found.message.data)["record"], orjson.loads(replayed)["record"]
-            # A version that knew fewer inputs recorded fewer; the replay has those of the record.
-            now["inputs"] = {name: value for name, value in now["inputs"].items() if name in before["inputs"]}
-            self._count(recorded.cycle, find_difference(before, now))
+            # Read back, the record has its fields' defaults as well: a version that knew fewer fields recorded fewer.
+            known = orjson.loads(encode(Cycle.model_construct(record=recorded)))["record"]
+            self._count(recorded.cycle, find_difference(before, without_later(now, before, known)))
 
     def _count(self, cycle: int, difference: tuple[str, object, object] | None) -> None:
         if difference is None:
@@ -227,6 +228,25 @@ def _keyframe_difference(frame: Keyframe, state: State) -> tuple[str, object, ob
     known = {name: value for name, value in carried_state(state).items() if name in frame.state.model_fields_set}
     replayed = encode(CarriedState.model_construct(**known))
     return find_difference(orjson.loads(encode(frame.state)), orjson.loads(replayed), "state.")
+
+
+def without_later(replayed: object, recorded: object, known: object) -> object:
+    """Return a replayed JSON tree without the fields that the version which recorded it did not know.
+
+    Parameters
+    ----------
+    replayed, recorded : JSON value
+        The trees.
+    known : JSON value
+        The recorded tree as this version reads it: every field that is not recorded has its default.
+    """
+    if isinstance(replayed, dict) and isinstance(recorded, dict) and isinstance(known, dict):
+        kept = ((name, value) for name, value in replayed.items() if name in recorded or name not in known)
+        return {name: without_later(value, recorded.get(name), known.get(name)) for name, value in kept}
+    if isinstance(replayed, list) and isinstance(recorded, list) and isinstance(known, list):
+        pairs = itertools.zip_longest(replayed, recorded, known)
+        return [without_later(*pair) for pair in itertools.islice(pairs, len(replayed))]
+    return replayed
 
 
 def find_difference(recorded: object, replayed: object, path: str = "") -> tuple[str, object, object] | None:

@@ -120,6 +120,7 @@ def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probabili
         probability,
         (xx, xy, yy) if is_located else None,
         *label_fields(int(track.number), int(track.marks)),
+        sigma_theta=math.sqrt(float(covariance[2, 2])) if is_located else None,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from drivers.token_bucket import LineLimit
+from runtime.cycle.logs.mission_log import MissionLog
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import State
 from runtime.support.sd_notify import SdNotifier
@@ -37,10 +38,13 @@ class ModeLog:
         Of the newest stops, and of lines that were lost before a drive, in order.
     hold_reasons
         Why the robot held in DRIVE for `HELD_S` or more, in order.
+    missions
+        How missions go on.
     """
 
     def __init__(self, log: FilteringBoundLogger, notifier: SdNotifier) -> None:
         self.stop_reasons: list[str] = []
+        self.missions = MissionLog(log)
         self._log = log
         self._notifier = notifier
         self.hold_reasons: list[str] = []
@@ -53,6 +57,7 @@ class ModeLog:
         """Log the mode if it was entered since `before`, and why a robot in DRIVE holds, once that has lasted."""
         if state.mode.entered_since(before):
             self.entered(state, run_s)
+        self.missions.observe(state.drive_request, run_s)
         if state.hold_reason != self._held or self._held_run_s is None:
             self._held, self._held_run_s, self._is_logged = state.hold_reason, run_s, False
         elif not self._is_logged and self._held is not None and run_s - self._held_run_s >= HELD_S:

@@ -100,7 +100,7 @@ def test_the_timing_table_and_the_causes_of_delays() -> None:
         "objects": [], "walls": [], "corners": [], "canyons": [], "polylines": [], "cycles": 240,
         "process": cost, "cycle_us": spread, "late": 7, "missed": 1, "lag_us": spread,
         "link": {"frames": 0, "bad": 0, "lost": 0}, "sensors": [], "mode": "DRIVE", "stop_reasons": [],
-        "hold_reasons": [], "preparing": None, "timing": timing,
+        "hold_reasons": [], "mission": None, "preparing": None, "timing": timing,
     }  # fmt: skip
     console = Console(record=True, width=110, file=io.StringIO(), color_system=None)
     console.print(timing_table(summary))

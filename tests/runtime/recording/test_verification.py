@@ -15,7 +15,14 @@ from config.errors import DONE
 from runtime.cycle.preparation import fresh_state
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
 from runtime.recording.schema import Cycle, Keyframe, keyframe, perception_snapshot, state_fields
-from runtime.recording.verification import ABSENT, GAPS_MAX, ReplayResult, find_difference, refused_lines
+from runtime.recording.verification import (
+    ABSENT,
+    GAPS_MAX,
+    ReplayResult,
+    find_difference,
+    refused_lines,
+    without_later,
+)
 from tests.recorded import SECONDS, entries_of, hall, record, rewrite, spoil, verify_file
 
 ROOT = Path(__file__).parents[3]
@@ -154,6 +161,30 @@ def test_the_first_difference_of_two_trees(recorded: object, replayed: object, e
     found = find_difference(recorded, replayed)
     assert repr(found) == repr(expected)
     assert (found is None) == (find_difference(replayed, recorded) is None)
+
+
+def test_a_field_that_the_recording_version_did_not_know_is_not_compared_and_any_other_is() -> None:
+    recorded: dict[str, object] = {"mode": {"why": None}, "rows": [{"a": 1}], "names": {"x": 1}}
+    known = {"mode": {"why": None, "since": 0}, "rows": [{"a": 1, "b": 0}], "names": {"x": 1}}
+    replayed: dict[str, object] = {"mode": {"why": None, "since": 5}, "rows": [{"a": 1, "b": 7}], "names": {"x": 1}}
+    assert find_difference(recorded, without_later(replayed, recorded, known)) is None
+    replayed |= {"names": {"x": 1, "y": 2}}  # no field: a name in what was decided
+    found = find_difference(recorded, without_later(replayed, recorded, known))
+    assert found == ("names.y", ABSENT, 2)
+
+
+@pytest.mark.compiled
+def test_a_recording_of_before_a_field_was_added_verifies(run: Path, tmp_path: Path) -> None:
+    """As if a field of the record and one of what was received had been added since."""
+    entries = entries_of(run)
+    for i, entry in enumerate(entries):
+        if entry.topic == CYCLE:
+            content = json.loads(entry.data)
+            del content["record"]["refused"], content["record"]["inputs"]["received"]["notes"]
+            entries[i] = entry._replace(data=json.dumps(content).encode())
+    rewrite(entries, tmp_path / "older.mcap")
+    result = verify_file(tmp_path / "older.mcap")
+    assert (result.first_difference, result.cycles) == (None, 20 * SECONDS)
 
 
 @pytest.mark.promise("P21")

@@ -120,6 +120,7 @@ def test_a_polygon_is_reported_with_its_least_heading_and_an_uncertain_one_with_
     assert placed.theta == pytest.approx(math.radians(-10.0))
     assert (placed.sigma, placed.covariance) == (PLACED_SIGMA_M, None)
     assert (placed.number, placed.confirmed, placed.placed) == (5, False, True)
+    assert placed.sigma_theta is None, "the readings do not support its heading yet"
     held = track.covariance
     held.xx, held.yx, held.yy, held.hx, held.hy, held.hh = 4e-4, 1e-4, 1e-4, 2e-5, 1e-5, 1e-4
     full = object_report.polygon_covariance(track)
@@ -134,6 +135,7 @@ def test_a_polygon_is_reported_with_its_least_heading_and_an_uncertain_one_with_
     located = object_report.polygon_object(track, box_settings, "box", 0.4)
     assert located.covariance == (full[0, 0], full[0, 1], full[1, 1])
     assert located.sigma == pytest.approx(math.sqrt(np.linalg.eigvalsh(full[:2, :2])[1]))
+    assert located.sigma_theta == pytest.approx(math.sqrt(full[2, 2]))
 
 
 def test_a_hypothesis_whose_echoes_a_sure_wall_explains_is_not_reported_unless_a_user_marked_it() -> None:
