@@ -26,8 +26,8 @@ counts as closed where dead ends are recognised. A doorway of 1.1 m leaves a rob
 and ends of walls that are known within some centimetres.
 """
 
-_WITHOUT_LISTENERS: Final = ("arcos", "rflex", "ros2")
-"""Shipped drivers of rings whose sensors hear only their own echoes."""
+_PLAIN_RINGS: Final = ("arcos", "rflex", "ros2")
+"""Shipped drivers of rings whose sensors hear only their own echoes and stand on no servos."""
 
 SensorSet: TypeAlias = Annotated[TomlList[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
 """Indices of sensors that fire together."""
@@ -61,6 +61,35 @@ class SensorConfig(Strict):
     turns_with_wheels: bool = False
     """On a synchro drive: the sensor is on a part that turns with the wheels, above a base that does not, as the
     upper ring of a B21r. Its place and direction are those at the start, where the wheels point forward."""
+    servo: bool = False
+    """The sensor stands on a servo, which goes on to its next bearing after each of its firings; x_m and y_m are the
+    servo's axis, angle_deg is the middle of its sweep."""
+    bearings: int = Field(default=31, ge=2, le=SENSORS_MAX)
+    """Servo: number of its bearings, equally spaced."""
+    sweep_deg: float = Field(default=180.0, gt=0.0, le=360.0)
+    """Servo: angle from its first bearing to its last, degrees, there and back; 360 is a turn without end, always
+    counter-clockwise."""
+    arm_m: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Servo: distance of the sensor from the servo's axis, m."""
+
+    @property
+    def views(self) -> tuple[Mount, ...]:
+        """Place and direction of the sensor at each of its bearings, clockwise ones first; one without a servo."""
+        middle = math.radians(self.angle_deg)
+        if not self.servo:
+            return (Mount(self.x_m, self.y_m, middle),)
+        sweep = math.radians(self.sweep_deg)
+        step = sweep / (self.bearings if self.is_endless else self.bearings - 1)
+        first = middle - step * (self.bearings // 2) if self.is_endless else middle - 0.5 * sweep
+        angles = [first + k * step for k in range(self.bearings)]
+        return tuple(
+            Mount(self.x_m + self.arm_m * math.cos(a), self.y_m + self.arm_m * math.sin(a), a) for a in angles
+        )
+
+    @property
+    def is_endless(self) -> bool:
+        """Whether the servo turns on and on; otherwise there and back."""
+        return self.sweep_deg == 360.0
 
 
 class FiringConfig(Strict):
@@ -153,13 +182,24 @@ class RingConfig(Strict):
             raise ValueError("sensors is empty: a ring needs at least one")
         if self.range_min_m >= self.range_max_m:
             raise ValueError(f"range_min_m {self.range_min_m} is not below range_max_m {self.range_max_m}")
+        if self.has_servo:
+            if (count := len(self.mounts)) > SENSORS_MAX:
+                raise ValueError(
+                    f"the bearings of all sensors are {count}, at most {SENSORS_MAX}: use fewer bearings"
+                )
+            if self.firing.has_listeners:
+                raise ValueError("firing.listen_preset or listen: a ring with a servo cannot listen; remove it")
         return self
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
-        """Place (m) and direction (rad) of each sensor, by index."""
+        """Place (m) and direction (rad) of each sensor, by index; a sensor on a servo counts once for each bearing.
+
+        Everything that knows sensors by their index so takes a servo's sensor as one sensor for each bearing. Only
+        the wire and ring logs number the sensors themselves: see `drivers.servo_views`.
+        """
         if self.sensors is not None:
-            return tuple(Mount(s.x_m, s.y_m, math.radians(s.angle_deg)) for s in self.sensors)
+            return tuple(view for sensor in self.sensors for view in sensor.views)
         count, radius = self.count or 0, self.radius_m or 0.0
         angles = [2.0 * math.pi * i / count for i in range(count)]
         return tuple(Mount(radius * math.cos(a), radius * math.sin(a), a) for a in angles)
@@ -167,7 +207,25 @@ class RingConfig(Strict):
     @property
     def turning(self) -> tuple[int, ...]:
         """The sensors that turn with the wheels of a synchro drive, by index."""
-        return tuple(i for i, sensor in enumerate(self.sensors or ()) if sensor.turns_with_wheels)
+        views = (sensor for sensor in self.sensors or () for _ in sensor.views)
+        return tuple(i for i, sensor in enumerate(views) if sensor.turns_with_wheels)
+
+    @property
+    def sensor_count(self) -> int:
+        """Number of sensors; one on a servo counts once."""
+        return (self.count or 0) if self.sensors is None else len(self.sensors)
+
+    @property
+    def sensor_of(self) -> tuple[int, ...]:
+        """The sensor of each mount: the mount's own index, but for a ring with a servo."""
+        if self.sensors is None:
+            return tuple(range(self.sensor_count))
+        return tuple(i for i, sensor in enumerate(self.sensors) for _ in sensor.views)
+
+    @property
+    def has_servo(self) -> bool:
+        """Whether a sensor stands on a servo."""
+        return any(sensor.servo for sensor in self.sensors or ())
 
     @property
     def window_m(self) -> float:
@@ -265,10 +323,20 @@ class RobotConfig(Strict):
     """Of the driver "ros2", for robots that run ROS 2."""
 
     @model_validator(mode="after")
+    def _can_turn(self) -> RobotConfig:
+        if self.ring.has_servo and (self.robot.driver in _PLAIN_RINGS or self.robot.protocol == 1):
+            which = "version 1 of the protocol" if self.robot.protocol == 1 else f'the driver "{self.robot.driver}"'
+            raise ValueError(
+                f"ring.sensors: {which} has no sensors on servos; remove servo = true, or use the driver "
+                f'"denning" with protocol = 2, as the firmware of `echolocate firmware` does'
+            )
+        return self
+
+    @model_validator(mode="after")
     def _can_listen(self) -> RobotConfig:
         if not self.ring.firing.has_listeners:
             return self
-        if self.robot.driver in _WITHOUT_LISTENERS:
+        if self.robot.driver in _PLAIN_RINGS:
             raise ValueError(
                 f'ring.firing.listen_preset or listen: a ring with the driver "{self.robot.driver}" cannot listen '
                 f"without firing; remove it"

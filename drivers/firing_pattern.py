@@ -6,6 +6,7 @@ last one has closed. The user ensures the first by the choice of sets; this modu
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from config.errors import WRONG_CALL, UserError
-from config.robot import SOUND_SPEED_M_S, ListenPreset, Preset, RingConfig
+from config.robot import SOUND_SPEED_M_S, ListenPreset, Preset, RingConfig, SensorConfig
 
 _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
     {
@@ -31,6 +32,8 @@ _SAME_ANGLE_RAD = 1e-6
 """Angles that differ by less are equal but for rounding."""
 _TOLERANCE_S = 1e-9
 """Slack for the rounding of decimal fractions."""
+_STEPS_MAX = 4096
+"""Most firings before a pattern repeats; bounds the memory for servos whose scans rarely come back together."""
 
 
 class FiringError(UserError):
@@ -81,14 +84,49 @@ def firing_pattern(ring: RingConfig) -> FiringPattern:
         The preset does not divide the ring, a set names a missing sensor, a step is shorter than the time sound needs
         to the end of its window and back, or a sensor listens where it fires or midway between two that fire.
     """
-    count = len(ring.mounts)
-    firing = ring.firing
-    if firing.preset is not None:
-        masks = _preset_masks(firing.preset, count)
-    else:
-        masks = _rotated_masks("sets", firing.sets or (), firing.rotations, count)
+    masks, firing = sensor_masks(ring), ring.firing
     _check_step(firing.step_period_s, ring.window_m)
+    if ring.has_servo:
+        return FiringPattern(_scan_masks(ring, masks), firing.step_period_s, ring.window_m)
     return FiringPattern(masks, firing.step_period_s, ring.window_m, _listeners(ring, masks))
+
+
+def sensor_masks(ring: RingConfig) -> tuple[int, ...]:
+    """Return the masks of the sensors that fire in turn, one on a servo as one bit; errors of `firing_pattern`."""
+    firing, count = ring.firing, ring.sensor_count
+    if firing.preset is not None:
+        return _preset_masks(firing.preset, count)
+    return _rotated_masks("sets", firing.sets or (), firing.rotations, count)
+
+
+def scan_order(sensor: SensorConfig) -> tuple[int, ...]:
+    """Return the bearings of a sensor's servo in the order of its scan, by number; (0,) without a servo."""
+    count = len(sensor.views)
+    back = () if count == 1 or sensor.is_endless else range(count - 2, 0, -1)
+    return (*range(count), *back)
+
+
+def _scan_masks(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the masks of a ring with servos, whose bits are bearings, until all servos are where they began."""
+    listed = ring.sensors or ()
+    orders = [scan_order(sensor) for sensor in listed]
+    begins = list(itertools.accumulate((len(sensor.views) for sensor in listed), initial=0))
+    fired = [sum(mask >> i & 1 for mask in masks) for i in range(len(listed))]
+    rounds = math.lcm(*(len(order) // math.gcd(len(order), n) for order, n in zip(orders, fired, strict=True) if n))
+    if rounds * len(masks) > _STEPS_MAX:
+        raise FiringError(
+            f"ring.sensors: servos whose scans have {', '.join(str(len(o)) for o in orders if len(o) > 1)} steps "
+            f"meet again only after {rounds * len(masks)} firings, at most {_STEPS_MAX}: give them equal bearings"
+        )
+    turned = [0] * len(listed)
+    steps = []
+    for mask in masks * rounds:
+        views = 0
+        for i in sensors(mask):
+            views |= 1 << (begins[i] + orders[i][turned[i] % len(orders[i])])
+            turned[i] += 1
+        steps.append(views)
+    return tuple(steps)
 
 
 def _listeners(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:

@@ -99,6 +99,7 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "drivers/firmware/board/ring/pio.py",
             "drivers/firmware/board/ring/pulse_sensors.py",
             "drivers/firmware/board/ring/robot.py",
+            "drivers/firmware/board/ring/scan.py",
             "drivers/firmware/board/ring/uart_line.py",
             "drivers/firmware/board/ring/usb_line.py",
             "drivers/firmware/board/ring/wheel.py",

@@ -25,6 +25,7 @@ from drivers.denning.frames import (
     Drive,
     Echo,
     Echo2,
+    Echo3,
     Frame,
     Halt,
     Hello,
@@ -35,7 +36,9 @@ from drivers.denning.frames import (
     Odom,
     Pattern,
     Release,
+    Scan,
 )
+from drivers.denning.servo_codec import decode_echo3_tail, decode_scan_tail, encode_servo_tail
 
 FRAME_MAX = 128
 """Longest frame before stuffing, checksum included, bytes."""
@@ -80,6 +83,7 @@ _HOST = (
     _layout(0x01, Hello, "B", ("version",)),
     _layout(0x02, Pattern, "", ()),
     _layout(0x03, Listen, "", ()),
+    _layout(0x04, Scan, "", ()),
     _layout(0x10, Drive, "hh", ("v_mm_s", "w_mrad_s")),
     _layout(0x11, Halt, "", ()),
     _layout(0x12, Release, "", ()),
@@ -111,6 +115,7 @@ _ROBOT = (
     ),
     _layout(0x91, Echo, "IB", ("t_us", "step")),
     _layout(0x92, Echo2, "IB", ("t_us", "step")),
+    _layout(0x93, Echo3, "IB", ("t_us", "step")),
 )
 _BY_CLASS = MappingProxyType({layout.make: layout for layout in (*_HOST, *_ROBOT)})
 _BY_TYPE = MappingProxyType(
@@ -215,6 +220,8 @@ def _encode_tail(frame: Frame) -> bytes:
             for k, count in enumerate(frame.counts):
                 _checked(frame, f"counts[{k}]", count, *_RANGES["H"])
             return masks + struct.pack(f"<{sensors}H", *frame.counts)
+        case Scan() | Echo3():
+            return encode_servo_tail(frame)
         case _:
             return b""
 
@@ -240,8 +247,8 @@ def _decode_tail(layout: _Layout, version: int, tail: bytes) -> tuple[object, ..
             return NakCode.WRONG_LENGTH
         tenths = tuple(tail[_MASK_BYTES:])
         return NakCode.VALUE_OUT_OF_RANGE if any(0 < t < TENTHS_MIN for t in tenths) else (mask, tenths)
-    if layout.make is Echo2:
-        return _decode_echo2_tail(tail)
+    if decode := _TAILS.get(layout.make):
+        return decode(tail)
     return NakCode.WRONG_LENGTH if tail else ()
 
 
@@ -253,6 +260,11 @@ def _decode_echo2_tail(tail: bytes) -> tuple[object, ...] | NakCode:
         return NakCode.WRONG_LENGTH
     counts = struct.unpack_from(f"<{fired.bit_count() + heard.bit_count()}H", tail, 2 * _MASK_BYTES)
     return NakCode.VALUE_OUT_OF_RANGE if fired & heard else (fired, heard, counts)
+
+
+_TAILS = MappingProxyType[Callable[..., Frame], Callable[[bytes], tuple[object, ...] | NakCode]](
+    {Echo2: _decode_echo2_tail, Echo3: decode_echo3_tail, Scan: decode_scan_tail}
+)
 
 
 def _decode_ident_tail(version: int, tail: bytes) -> tuple[object, ...] | NakCode:

@@ -17,7 +17,7 @@ from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.frames import Drive, Halt, Hello, Listen, NakCode, Pattern, Release, RobotFrame
+from drivers.denning.frames import Drive, Halt, Hello, Listen, NakCode, Pattern, Release, RobotFrame, Scan
 from drivers.denning.pattern_rotation import Rotation, window_us
 from drivers.denning.reported_echoes import EchoReporter
 from drivers.denning.wire_frame_counter import WireFrameCounter
@@ -76,7 +76,7 @@ class DenningDevice(EventDevice):
     _decoder: Decoder
     _seq: int
     _version: int
-    _echoes: deque[tuple[int, frames.Echo | frames.Echo2]]
+    _echoes: deque[tuple[int, frames.Echo | frames.Echo2 | frames.Echo3]]
     _rotation: Rotation
     _flags: Flags
     _target: Twist
@@ -93,7 +93,7 @@ class DenningDevice(EventDevice):
         clock_start_us: int = 0,
     ) -> None:
         mounts = robot.ring.mounts
-        self._sensors, sensors_max = len(mounts), frames.SENSORS_MAX
+        self._sensors, sensors_max = robot.ring.sensor_count, frames.SENSORS_MAX
         if self._sensors > sensors_max:
             raise DriverError(f"the ring has {self._sensors} sensors: the protocol supports at most {sensors_max}")
         seeds = np.random.SeedSequence(seed).spawn(6)
@@ -140,16 +140,24 @@ class DenningDevice(EventDevice):
             case Hello():
                 self._version = frame.version
                 size, times = (self._sensors, self._ring_radius_mm), (self._deadman_ms, ODOMETRY_PERIOD_MS)
-                more = (self._reporter.unit_um, frames.CAN_LISTEN) if frame.version > 1 else ()
+                can = frames.HAS_SERVOS if self._reporter.has_servo else frames.CAN_LISTEN
+                more = (self._reporter.unit_um, can) if frame.version > 1 else ()
                 self._send(frames.Ident(0, frame.version, *size, *times, self._boot_id, NAME, *more))
             case Listen() if self._version == 1:
                 self._send(frames.Nak(0, frame.seq, NakCode.UNKNOWN_TYPE))
-            case Listen() if self._within_ring(frame) and self._rotation.set_listeners(frame.masks):
+            case Listen() if self._can_listen(frame) and self._rotation.set_listeners(frame.masks):
                 self._send(frames.Ack(0, frame.seq))
             case Listen():
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
+            case Scan() if self._version == 1 or not self._reporter.has_servo:
+                self._send(frames.Nak(0, frame.seq, NakCode.UNKNOWN_TYPE))
+            case Scan() if self._reporter.set_scan(frame.sweeps):
+                self._send(frames.Ack(0, frame.seq))
+            case Scan():
+                self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
             case Pattern() if self._is_possible(frame):
                 self._rotation.set_pattern(frame, self._now_us)
+                self._reporter.set_scan(())
                 self._send(frames.Ack(0, frame.seq))
             case Pattern():
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
@@ -172,6 +180,9 @@ class DenningDevice(EventDevice):
     def _is_possible(self, pattern: Pattern) -> bool:
         long_enough = 1000 * pattern.step_period_ms >= window_us(pattern)
         return not pattern.masks or (self._within_ring(pattern) and long_enough)
+
+    def _can_listen(self, listen: Listen) -> bool:
+        return self._within_ring(listen) and not (listen.masks and self._reporter.has_servo)
 
     def _within_ring(self, frame: Pattern | Listen) -> bool:
         return all(mask >> self._sensors == 0 for mask in frame.masks)
@@ -298,6 +309,7 @@ class DenningDevice(EventDevice):
         self._line.clear()
         self._echoes = deque()
         self._rotation = Rotation()
+        self._reporter.set_scan(())
         self._flags = Flags.NONE
         self._latch_again()
         self._target = _STILL

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from config.robot import RobotConfig
 from drivers import line_diagnostics
-from drivers.denning.frames import CAN_LISTEN, TENTH_FT_M, VERSION, Ident, NakCode
+from drivers.denning.frames import CAN_LISTEN, HAS_SERVOS, TENTH_FT_M, VERSION, Ident, NakCode, Sweep
 from drivers.heard_bytes import HeardBytes
 from drivers.line_diagnostics import deadman_refused
 
@@ -33,7 +33,7 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
             f"the robot '{ident.name}' speaks version {ident.version} of the protocol and this program versions 1 to "
             f"{VERSION}; update the older one"
         )
-    count = len(config.ring.mounts)
+    count = config.ring.sensor_count
     if ident.sensors != count:
         return (
             f"the robot '{ident.name}' has {ident.sensors} sensors and the robot file {count}; "
@@ -56,6 +56,16 @@ def cannot_listen(ident: Ident, listeners: tuple[int, ...]) -> str | None:
     return (
         f"the firing pattern asks sensors to listen while others fire, and the robot '{ident.name}' {why}; remove "
         f"ring.firing.listen_preset or listen, or choose the robot's own file"
+    )
+
+
+def cannot_turn(ident: Ident, sweeps: tuple[Sweep, ...]) -> str | None:
+    """Return the message for a robot without the servos that the robot file has; None if it has servos."""
+    if not sweeps or (ident.version > 1 and ident.capabilities & HAS_SERVOS):
+        return None
+    return (
+        f"the robot file has {len(sweeps)} sensors on servos, and the robot '{ident.name}' knows no servos; flash "
+        f"the firmware of `echolocate firmware` with SERVOS, or remove servo = true from ring.sensors"
     )
 
 
@@ -107,6 +117,10 @@ def refusal(command: str, code: int) -> str:
         )
     elif command == "LISTEN":
         action = "remove ring.firing.listen_preset or listen, or let only sensors listen that the robot's wiring can"
+    elif command == "SCAN":
+        action = (
+            "make the sweeps of ring.sensors such that the robot's servos reach them, or correct SERVOS on the board"
+        )
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "DRIVE":
         action = "lower body.speed_max_m_s and body.turn_max_rad_s to what the robot can do"
     return f"the robot refuses {command} (NAK {code}): {meaning}; {action}"

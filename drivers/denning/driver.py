@@ -10,12 +10,12 @@ from config.robot import RingConfig, RobotConfig
 from drivers import line_diagnostics
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Hello, Ident, Nak, NakCode, Odom
+from drivers.denning.frames import Ack, Drive, Echo, Echo2, Echo3, Frame, Hello, Ident, Nak, NakCode, Odom
 from drivers.denning.line_load import refuse_overload
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
-from drivers.denning.wire_units import finest_range_m, identity_of, newest_version, to_wire, wire_pattern
+from drivers.denning.wire_units import finest_range_m, identity_of, newest_version, to_wire, wire_pattern, wire_scan
 from drivers.driver import DriverError, LineState
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.messages import Flags, LinkCounts
@@ -28,7 +28,7 @@ _MISSED_STEPS_MAX = 2
 """Firings that the ring may miss, beyond the longest silence, before the robot must identify itself again."""
 _SETTLING_STEPS = 3
 """Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
-_SEND_ORDER = ("HALT", "HELLO", "PATTERN", "LISTEN", "RELEASE")
+_SEND_ORDER = ("HALT", "HELLO", "PATTERN", "LISTEN", "SCAN", "RELEASE")
 """Commands in the order in which they are sent."""
 
 
@@ -51,13 +51,14 @@ class DenningDriver(Session[PoseStamper]):
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern, self._listeners = wire_pattern(config.ring), firing_pattern(config.ring).listeners
-        super().__init__(PoseStamper(tuple(mount.angle_rad for mount in config.ring.mounts), config.body))
+        self._sweeps = wire_scan(config.ring)
+        super().__init__(PoseStamper(config.ring, config.body))
         self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
         version = newest_version(config)
         finer = line_diagnostics.finer_than_line(config.ring.resolution_m, finest_range_m(config.ring, version))
         if finer is not None:
             raise DriverError(finer)
-        refuse_overload(config.link, self._pattern, self._listeners, version)
+        refuse_overload(config.link, self._pattern, self._listeners, version, self._sweeps)
         self._newest = self._version = version  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
         self._ident: Ident | None = None
@@ -163,14 +164,15 @@ class DenningDriver(Session[PoseStamper]):
         deaf = None if self._ident is None else diagnostics.cannot_listen(self._ident, listeners)
         if deaf is not None:
             raise FiringError(deaf)
-        refuse_overload(self._config.link, pattern, listeners, self._newest)
+        refuse_overload(self._config.link, pattern, listeners, self._newest, self._sweeps)
         # Until the robot uses the new pattern, echoes may belong to either; an echo names its own sensors.
         step_ms = min(self._pattern.step_period_ms, pattern.step_period_ms)
         self.stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
         self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern, self._listeners = pattern, listeners
         if self._state is LineState.READY or "PATTERN" in self._commands:
-            self._commands.pop("LISTEN", None)  # of the pattern before
+            for of_pattern_before in ("LISTEN", "SCAN"):
+                self._commands.pop(of_pattern_before, None)
             self._queue("PATTERN")
 
     def end_session(self) -> None:
@@ -230,7 +232,13 @@ class DenningDriver(Session[PoseStamper]):
         without_limit = self._state in (LineState.DOWN, LineState.CLOSED)
         link = self._config.link
         self._commands[name] = pending_command(
-            name, self._pattern, link, self._version, without_limit=without_limit, listeners=self._listeners
+            name,
+            self._pattern,
+            link,
+            self._version,
+            without_limit=without_limit,
+            listeners=self._listeners,
+            sweeps=self._sweeps,
         )
 
     def _queue_hello(self) -> None:
@@ -270,7 +278,7 @@ class DenningDriver(Session[PoseStamper]):
                 self._take_nak(frame)
             case Odom():
                 self._take_odometry(frame)
-            case Echo() | Echo2() if self._state is LineState.READY and (
+            case Echo() | Echo2() | Echo3() if self._state is LineState.READY and (
                 self._version > 1 or isinstance(frame, Echo)
             ):
                 self._echo_timeout.restart(self._run_s, self._decoder.bad)
@@ -283,7 +291,7 @@ class DenningDriver(Session[PoseStamper]):
         ident = replace(ident, name=one_line(ident.name))  # it goes to terminals and logs
         wrong = diagnostics.wrong_robot(ident, self._config)
         if wrong is None:
-            wrong = diagnostics.cannot_listen(ident, self._listeners)
+            wrong = diagnostics.cannot_listen(ident, self._listeners) or diagnostics.cannot_turn(ident, self._sweeps)
         if wrong is not None:
             self._go_down(wrong)
             return
@@ -316,6 +324,8 @@ class DenningDriver(Session[PoseStamper]):
         if name == "PATTERN":
             if self._listeners:
                 self._queue("LISTEN")
+            if self._sweeps:
+                self._queue("SCAN")
             self._state = LineState.READY
             self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
             self._echo_timeout.restart(self._run_s, self._decoder.bad)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 VERSION = 2
 """The newest version of the protocol implemented here; the other one is 1."""
@@ -15,6 +15,8 @@ SENSORS_MAX = 24
 """Bits in a mask of sensors."""
 MASKS_MAX = 24
 """Most steps of a pattern."""
+SWEEPS_MAX = 12
+"""Most servos that a SCAN turns; with more sweeps a frame would be too long."""
 WINDOW_MIN, WINDOW_MAX = 5, 255
 """Shortest and longest window, tenths of a foot."""
 TENTHS_MIN, TENTHS_MAX = 5, 254
@@ -27,6 +29,10 @@ NO_ECHO_COUNT = 0xFFFF
 """The count of a sensor that heard no echo inside the window, in version 2."""
 CAN_LISTEN = 1
 """The bit of `Ident.capabilities` of a ring whose sensors can listen while others fire."""
+HAS_SERVOS = 2
+"""The bit of `Ident.capabilities` of a ring with sensors on servos: it knows SCAN, and answers it with ECHO3."""
+BEARING_RAD = 1e-4
+"""A count of a servo's bearing, rad counter-clockwise from the ring's front."""
 TENTH_FT_M = 0.03048
 """A tenth of a foot in metres."""
 
@@ -64,6 +70,25 @@ class Listen:
 
     seq: int
     masks: tuple[int, ...]
+
+
+class Sweep(NamedTuple):
+    """The scan of one servo: its bearings are first + k × step, k < bearings, one after each firing of its sensor."""
+
+    sensor: int
+    first: int
+    step: int
+    bearings: int
+    endless: int
+    """1: after the last bearing the first follows; 0: there and back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """Let servos turn their sensors; from then on echoes come with bearings. A new PATTERN ends it."""
+
+    seq: int
+    sweeps: tuple[Sweep, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +189,22 @@ class Echo2:
     counts: tuple[int, ...]
 
 
-HostFrame: TypeAlias = Hello | Pattern | Listen | Drive | Halt | Release
-RobotFrame: TypeAlias = Ident | Ack | Nak | Odom | Echo | Echo2
+@dataclass(frozen=True, slots=True)
+class Echo3:
+    """The result of one firing of a ring with servos: `Echo2` with the bearings of those fired sensors on servos.
+
+    Counts are those of the fired sensors, bearings those of the `turned` among them, each lowest sensor first.
+    """
+
+    seq: int
+    t_us: int
+    step: int
+    fired: int
+    turned: int
+    counts: tuple[int, ...]
+    bearings: tuple[int, ...]
+
+
+HostFrame: TypeAlias = Hello | Pattern | Listen | Scan | Drive | Halt | Release
+RobotFrame: TypeAlias = Ident | Ack | Nak | Odom | Echo | Echo2 | Echo3
 Frame: TypeAlias = HostFrame | RobotFrame

@@ -6,7 +6,7 @@ from typing import Final
 
 from config.robot import LinkConfig
 from drivers.denning.codec import encode
-from drivers.denning.frames import Echo, Echo2, Odom
+from drivers.denning.frames import Echo, Echo2, Echo3, Odom, Sweep
 from drivers.denning.wire_units import WirePattern
 from drivers.line_budget import refuse_slow_line
 
@@ -19,7 +19,9 @@ def odometry_bytes_s() -> float:
     return len(encode(Odom(1, 0x55AA55AA, 0x11AA, 0x11AA, 0x11AA, 0x11AA, 0x11, 0x11, 1, 1))) / ODOMETRY_PERIOD_S
 
 
-def sent_bytes_s(pattern: WirePattern, listeners: tuple[int, ...], version: int) -> float:
+def sent_bytes_s(
+    pattern: WirePattern, listeners: tuple[int, ...], version: int, sweeps: tuple[Sweep, ...] = ()
+) -> float:
     """Return how much a robot sends regularly, byte/s.
 
     Parameters
@@ -30,30 +32,40 @@ def sent_bytes_s(pattern: WirePattern, listeners: tuple[int, ...], version: int)
         Mask of the sensors that listen in each step; empty where none does.
     version : int
         Of the protocol.
+    sweeps : tuple of Sweep
+        Of the ring's servos.
     """
-    return odometry_bytes_s() + _firing_bytes(pattern, listeners, version) / (1e-3 * pattern.step_period_ms)
+    return odometry_bytes_s() + _firing_bytes(pattern, listeners, version, sweeps) / (1e-3 * pattern.step_period_ms)
 
 
-def _firing_bytes(pattern: WirePattern, listeners: tuple[int, ...], version: int) -> float:
+def _firing_bytes(pattern: WirePattern, listeners: tuple[int, ...], version: int, sweeps: tuple[Sweep, ...]) -> float:
     """Return the mean size of a firing's echoes, bytes."""
     echoes = 0
     for step, mask in enumerate(pattern.masks):
         heard = listeners[step] if listeners else 0
         fired, all_counts = mask.bit_count(), mask.bit_count() + heard.bit_count()
         frame = Echo(1, 0x55AA55AA, step, mask, (9,) * fired)
-        finer = Echo2(1, 0x55AA55AA, step, mask, heard, (0x1101,) * all_counts)
+        turned = mask & sum(1 << sweep.sensor for sweep in sweeps)
+        angles = (0x1101,) * turned.bit_count()
+        finer = (
+            Echo3(1, 0x55AA55AA, step, mask, turned, (0x1101,) * fired, angles)
+            if sweeps
+            else Echo2(1, 0x55AA55AA, step, mask, heard, (0x1101,) * all_counts)
+        )
         echoes += len(encode(finer if version > 1 else frame))
     return echoes / len(pattern.masks)
 
 
-def refuse_overload(link: LinkConfig, pattern: WirePattern, listeners: tuple[int, ...], version: int) -> None:
+def refuse_overload(
+    link: LinkConfig, pattern: WirePattern, listeners: tuple[int, ...], version: int, sweeps: tuple[Sweep, ...] = ()
+) -> None:
     """Raise an error if the line is too slow for the traffic.
 
     Parameters
     ----------
     link : LinkConfig
         Port and speed of the line.
-    pattern, listeners, version
+    pattern, listeners, version, sweeps
         As of `sent_bytes_s`.
 
     Raises
@@ -62,4 +74,4 @@ def refuse_overload(link: LinkConfig, pattern: WirePattern, listeners: tuple[int
         It is too slow.
     """
     step_s = 1e-3 * pattern.step_period_ms
-    refuse_slow_line(link, odometry_bytes_s(), _firing_bytes(pattern, listeners, version), step_s)
+    refuse_slow_line(link, odometry_bytes_s(), _firing_bytes(pattern, listeners, version, sweeps), step_s)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from config.robot import LinkConfig
-from drivers.denning.frames import Halt, Hello, HostFrame, Listen, Pattern, Release
+from drivers.denning.frames import Halt, Hello, HostFrame, Listen, Pattern, Release, Scan, Sweep
 from drivers.denning.wire_units import WirePattern
 
 _HELLO_PERIOD_S = 0.5
@@ -74,13 +74,14 @@ def pending_command(
     *,
     without_limit: bool,
     listeners: tuple[int, ...] = (),
+    sweeps: tuple[Sweep, ...] = (),
 ) -> PendingCommand:
     """Return the command of a name, not yet sent.
 
     Parameters
     ----------
     name : str
-        HALT, RELEASE, HELLO, PATTERN or LISTEN.
+        HALT, RELEASE, HELLO, PATTERN, LISTEN or SCAN.
     pattern : WirePattern
         The firing pattern that PATTERN sets.
     link : LinkConfig
@@ -91,6 +92,8 @@ def pending_command(
         Never give up; for a robot that does not answer anyway.
     listeners : tuple of int
         The masks that LISTEN sets, one for each step of the pattern.
+    sweeps : tuple of Sweep
+        The scans that SCAN sets.
     """
     tries_max = None if without_limit else link.tries
     match name:
@@ -103,5 +106,7 @@ def pending_command(
             return PendingCommand(lambda seq: Hello(seq, version), every_s, tries_max)
         case "LISTEN":
             return PendingCommand(lambda seq: Listen(seq, listeners), link.reply_timeout_s, tries_max)
+        case "SCAN":
+            return PendingCommand(lambda seq: Scan(seq, sweeps), link.reply_timeout_s, tries_max)
         case _:
             return PendingCommand(lambda seq: Pattern(seq, *pattern), link.reply_timeout_s, tries_max)

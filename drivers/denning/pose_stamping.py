@@ -11,14 +11,15 @@ from collections import deque
 
 import numpy as np
 
-from config.robot import BodyConfig
+from config.robot import BodyConfig, RingConfig
 from drivers.denning import diagnostics
-from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
+from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Echo3, Odom
 from drivers.denning.wire_units import cross_paths_of, odometry_of, ranges_of
 from drivers.dropped_count import RANGES_BEYOND, DroppedCount
 from drivers.messages import CrossPaths, Firing, Floats, Odometry
 from drivers.odometry_history import OdometryHistory
 from drivers.robot_clock import Jump, RobotClock
+from drivers.servo_views import ServoViews
 from drivers.stamper import Stamper
 
 _HISTORY_S = 2.5
@@ -41,8 +42,8 @@ class PoseStamper(Stamper):
 
     Parameters
     ----------
-    axes
-        Directions of the ring's sensors, rad.
+    ring
+        The ring, for the directions of its sensors.
     body
         The base's limits, which distinguish a motion from a jump.
 
@@ -52,10 +53,11 @@ class PoseStamper(Stamper):
         Ranges and cross paths dropped because they lie beyond the window of their firing.
     """
 
-    def __init__(self, axes: tuple[float, ...], body: BodyConfig) -> None:
+    def __init__(self, ring: RingConfig, body: BodyConfig) -> None:
         super().__init__(body)
         self.out_of_window = DroppedCount(RANGES_BEYOND, self.note)
-        self._axes = axes
+        self._axes = tuple(mount.angle_rad for mount in ring.mounts)
+        self._views = ServoViews(ring)
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY_MIN)
         self._gap_max_s = _GAP_MIN_S
@@ -129,12 +131,12 @@ class PoseStamper(Stamper):
         self._history.add(sample)
         return sample
 
-    def echo(self, echo: Echo | Echo2, unit_m: float = TENTH_FT_M) -> None:
+    def echo(self, echo: Echo | Echo2 | Echo3, unit_m: float = TENTH_FT_M) -> None:
         """Take an echo frame, whose counts are of `unit_m`; `firings` returns it as soon as its pose is known.
 
         A range beyond the window belongs to an earlier firing or is noise, and is treated like a sensor's fault.
         """
-        ranges, heard = ranges_of(echo, len(self._axes), unit_m), cross_paths_of(echo, self._axes, unit_m)
+        ranges, heard = ranges_of(echo, self._views, unit_m), cross_paths_of(echo, self._axes, unit_m)
         slack_m = 0.0 if isinstance(echo, Echo) else unit_m  # a range at the window's end is rounded to a count
         window_m = self._window * TENTH_FT_M + slack_m
         beyond = [sensor for sensor, range_m in enumerate(ranges.tolist()) if window_m < range_m < math.inf]

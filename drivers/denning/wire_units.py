@@ -9,11 +9,13 @@ import numpy as np
 
 from config.robot import RingConfig, RobotConfig
 from drivers.denning.frames import (
+    BEARING_RAD,
     FAULT,
     MASKS_MAX,
     NO_ECHO,
     NO_ECHO_COUNT,
     SENSORS_MAX,
+    SWEEPS_MAX,
     TENTH_FT_M,
     TENTHS_MIN,
     VERSION,
@@ -21,12 +23,15 @@ from drivers.denning.frames import (
     WINDOW_MIN,
     Echo,
     Echo2,
+    Echo3,
     Ident,
     Odom,
+    Sweep,
 )
 from drivers.driver import DriverError
-from drivers.firing_pattern import FiringError, cross_pairs, firing_pattern, sensors
+from drivers.firing_pattern import FiringError, cross_pairs, firing_pattern, sensor_masks, sensors
 from drivers.messages import CrossPaths, Flags, Floats, Identity, Odometry, Pose, Twist
+from drivers.servo_views import ServoViews
 
 _ROUNDING = 1e-6
 """Slack before rounding up or down, in units of the protocol, for decimal fractions that float64 cannot hold."""
@@ -55,15 +60,15 @@ def wire_pattern(ring: RingConfig) -> WirePattern:
     FiringError
         The ring cannot carry out the pattern, or the protocol cannot express it.
     """
-    pattern = firing_pattern(ring)
-    if len(ring.mounts) > SENSORS_MAX:
+    pattern, masks = firing_pattern(ring), sensor_masks(ring)
+    if ring.sensor_count > SENSORS_MAX:
         raise FiringError(
-            f"ring: {len(ring.mounts)} sensors, and this robot's protocol supports at most {SENSORS_MAX}; "
+            f"ring: {ring.sensor_count} sensors, and this robot's protocol supports at most {SENSORS_MAX}; "
             f"describe the ring that the robot has"
         )
-    if len(pattern.masks) > MASKS_MAX:
+    if len(masks) > MASKS_MAX:
         raise FiringError(
-            f"ring.firing: {len(pattern.masks)} firings before the pattern repeats, and this robot holds "
+            f"ring.firing: {len(masks)} firings before the pattern repeats, and this robot holds "
             f"{MASKS_MAX}; use fewer sets or rotations"
         )
     window = math.floor(pattern.window_m / TENTH_FT_M + _ROUNDING)
@@ -76,7 +81,34 @@ def wire_pattern(ring: RingConfig) -> WirePattern:
     step_ms = math.ceil(pattern.step_period_s * 1e3 - _ROUNDING)
     if step_ms > _STEP_MAX_MS:  # pragma: no cover - the schema's own limit is below
         raise FiringError(f"ring.firing: step_period_s {pattern.step_period_s:g}, and this robot's longest is 65.535")
-    return WirePattern(step_ms, window, pattern.masks)
+    return WirePattern(step_ms, window, masks)
+
+
+def wire_scan(ring: RingConfig) -> tuple[Sweep, ...]:
+    """Return the scans of the ring's servos, in the protocol's units; none without servos.
+
+    Raises
+    ------
+    FiringError
+        They are more than the protocol has room for.
+    """
+    sweeps = []
+    for number, sensor in enumerate(ring.sensors or ()):
+        if sensor.servo:
+            first, second = (mount.angle_rad / BEARING_RAD for mount in sensor.views[:2])
+            start = round(math.remainder(first, math.tau / BEARING_RAD))
+            sweeps.append(Sweep(number, start, round(second - first), sensor.bearings, int(sensor.is_endless)))
+    if len(sweeps) > SWEEPS_MAX:
+        raise FiringError(f"ring.sensors: {len(sweeps)} servos, and this robot turns at most {SWEEPS_MAX}; use fewer")
+    return tuple(sweeps)
+
+
+def sweep_bearing(sweep: Sweep, number: int) -> int:
+    """Return the bearing of a servo after so many firings of its sensor, in the protocol's units."""
+    count = sweep.bearings
+    k = number % count if sweep.endless else number % (2 * count - 2)
+    turned = (sweep.first + sweep.step * min(k, 2 * count - 2 - k if not sweep.endless else k)) * BEARING_RAD
+    return round(math.remainder(turned, math.tau) / BEARING_RAD)
 
 
 def newest_version(config: RobotConfig) -> int:
@@ -107,7 +139,7 @@ def emulated_version(config: RobotConfig) -> int:
     """
     version, ring = newest_version(config), config.ring
     in_tenths = ring.resolution_m >= TENTH_FT_M - _ROUNDING
-    is_plain = in_tenths and len(ring.mounts) == SENSORS_MAX and not ring.firing.has_listeners
+    is_plain = in_tenths and ring.sensor_count == SENSORS_MAX and not (ring.firing.has_listeners or ring.has_servo)
     return 1 if config.robot.protocol is None and is_plain else version
 
 
@@ -156,34 +188,39 @@ def odometry_of(odom: Odom, t_us: int) -> Odometry:
     )
 
 
-def ranges_of(echo: Echo | Echo2, count: int, unit_m: float = TENTH_FT_M) -> Floats:
-    """Return the ranges of a firing, shape (count,), m: NaN not fired or faulty, +inf no echo.
+def ranges_of(echo: Echo | Echo2 | Echo3, views: ServoViews, unit_m: float = TENTH_FT_M) -> Floats:
+    """Return the ranges of a firing, one for each of the ring's mounts, m: NaN not fired or faulty, +inf no echo.
 
     Bits of the mask beyond the ring's sensors are ignored, and so are the readings of sensors that only listened:
-    see `cross_paths_of`.
+    see `cross_paths_of`; and those of a sensor on a servo without its bearing, or at one that is not of its scan.
 
     Parameters
     ----------
     echo
         The frame.
-    count
-        Sensors of the ring.
+    views
+        The ring's mounts.
     unit_m
-        What a count of an ECHO2 stands for, m; an ECHO has tenths of a foot.
+        What a count of an ECHO2 or ECHO3 stands for, m; an ECHO has tenths of a foot.
     """
+    bearings: dict[int, int] = {}
+    if isinstance(echo, Echo3):
+        bearings = dict(zip(sensors(echo.turned), echo.bearings, strict=True))
     if isinstance(echo, Echo):
         mask, values, no_echo, unit_m = echo.mask, echo.tenths_ft, NO_ECHO, TENTH_FT_M
     else:
         mask, no_echo = echo.fired, NO_ECHO_COUNT
         values = echo.counts[: mask.bit_count()]
-    ranges = [math.nan] * count
+    ranges, count = [math.nan] * views.count, len(views.on_servo)
     for sensor, value in zip(sensors(mask), values, strict=True):
         if sensor < count and value != FAULT:
-            ranges[sensor] = math.inf if value == no_echo else value * unit_m
+            mount = views.mount(sensor, bearings.get(sensor, math.nan) * BEARING_RAD)
+            if mount is not None:
+                ranges[mount] = math.inf if value == no_echo else value * unit_m
     return np.array(ranges)
 
 
-def cross_paths_of(echo: Echo | Echo2, axes: tuple[float, ...], unit_m: float) -> CrossPaths | None:
+def cross_paths_of(echo: Echo | Echo2 | Echo3, axes: tuple[float, ...], unit_m: float) -> CrossPaths | None:
     """Return what the listeners of a firing heard; None if no sensor listened.
 
     Parameters
@@ -195,7 +232,7 @@ def cross_paths_of(echo: Echo | Echo2, axes: tuple[float, ...], unit_m: float) -
     unit_m
         What a count of an ECHO2 stands for, m.
     """
-    if isinstance(echo, Echo) or not echo.heard:
+    if not isinstance(echo, Echo2) or not echo.heard:
         return None
     counts = dict(zip(sensors(echo.heard), echo.counts[echo.fired.bit_count() :], strict=True))
     heard = [

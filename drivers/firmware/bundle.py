@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import itertools
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from config.errors import WRONG_CALL, UserError
 from config.robot import RobotConfig
-from drivers.firing_pattern import firing_pattern, sensors
+from drivers.firing_pattern import sensor_masks, sensors
 
 Board: TypeAlias = Literal["pico", "esp32"]
 CONFIG_NAME: Final = "robot_config.py"
@@ -115,7 +115,7 @@ def check_pins(values: Mapping[str, Any], board: Board, place: str) -> None:
             f'{place}: SENSORS have {echoes} echo pins, and ECHO_TIMING = "pio" times {_MACHINES}; let sensors that '
             f'do not fire together share echo pins through diodes, or set ECHO_TIMING = "irq"'
         )
-    for mask in firing_pattern(ring).masks:
+    for mask in sensor_masks(ring):
         triggers = {wires[i][0] for i in sensors(mask) if i in wires}
         firing = [i for i, (trigger, _) in wires.items() if trigger in triggers]
         for i, j in itertools.combinations(firing, 2):
@@ -126,15 +126,24 @@ def check_pins(values: Mapping[str, Any], board: Board, place: str) -> None:
                 )
 
 
+def _scan(servo: Sequence[float] | None) -> str:
+    """Return the keys of a sensor on a servo, given its bearings and sweep; none without."""
+    return "" if servo is None else f", servo = true, bearings = {servo[0]}, sweep_deg = {servo[1]:g}"
+
+
 def _render(values: Mapping[str, Any]) -> str:
     mounts, count = values["MOUNTS"], len(values["SENSORS"])
     if mounts is not None and len(mounts) != count:
         raise ValueError(f"MOUNTS has {len(mounts)} places and SENSORS {count} sensors")
+    if values["SERVOS"] and mounts is None:
+        raise ValueError("SERVOS without MOUNTS: give the place of each sensor, of one on a servo its axis")
     if mounts is None:
         ring = f"count = {count}\nradius_m = {values['RING_RADIUS_MM'] / 1e3:g}"
     else:
+        servos = {servo[0]: servo[4:] for servo in values["SERVOS"]}
         places = ",\n".join(
-            f"  {{x_m = {x / 1e3:g}, y_m = {y / 1e3:g}, angle_deg = {angle:g}}}" for x, y, angle in mounts
+            f"  {{x_m = {x / 1e3:g}, y_m = {y / 1e3:g}, angle_deg = {angle:g}{_scan(servos.get(i))}}}"
+            for i, (x, y, angle) in enumerate(mounts)
         )
         ring = f"sensors = [\n{places},\n]"
     firing = values["FIRING"]

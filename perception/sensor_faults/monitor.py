@@ -90,14 +90,14 @@ def neighbours_of(axes: Floats, turning: tuple[int, ...] = ()) -> Ints:
 
 def fires(ring: RingConfig) -> NDArray[np.bool_]:
     """Return for each sensor whether it fires at all in the ring's pattern, shape (n,)."""
-    count, firing = len(ring.mounts), ring.firing
+    count, firing = ring.sensor_count, ring.firing
     if firing.sets is None:
-        return np.ones(count, np.bool_)
+        return np.ones(len(ring.mounts), np.bool_)
     named = np.zeros(count, np.bool_)
     for turn in range(firing.rotations):
         for numbers in firing.sets:
             named[[(i + turn) % count for i in numbers]] = True
-    return named
+    return named[list(ring.sensor_of)]
 
 
 @kernel

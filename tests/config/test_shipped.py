@@ -32,6 +32,7 @@ def test_the_names_of_shipped_files() -> None:
         "p3dx-sh",
         "peoplebot",
         "powerbot",
+        "servo1",
     )
     assert list_shipped("worlds") == ("hallway", "irregular", "office", "room")
     assert list_shipped("models") == ("box", "drum", "semicircle")

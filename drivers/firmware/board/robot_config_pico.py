@@ -24,6 +24,9 @@ SENSORS = (
     ("hc-sr04", 1, 7),
     ("hc-sr04", 2, 7),
 )
+TRIGGER_US = 20  # pulse that fires an hc-sr04; waterproof modules need 20 or more, the plain ones 10
+# Sensors on servos, with MOUNTS: (sensor, pin, µs ahead, µs a quarter turn to the left, bearings, sweep in degrees).
+SERVOS = ()
 I2C = None  # (number, SDA pin, SCL pin) for srf08 and srf10
 ECHO_TIMING = "pio"  # the RP2040's state machines, for up to 8 echo pins; or "irq"
 RING_RADIUS_MM = 90  # from the middle between the wheels to the sensors

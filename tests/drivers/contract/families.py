@@ -114,6 +114,16 @@ ROS2: Final = Family(
     DENNING.other_ring, connect_s=0.2, silent_s=0.5, deaf_s=0.5, halt_s=0.15, handshake_bytes=0, cut_stride=29,
 )  # fmt: skip
 """Without ROS, which tests/drivers/ros2 adds in plain data."""
+SERVO1_FILE: Final = load_robot("servo1")
+SERVO1_RING: Final = ring_with(
+    SERVO1_FILE.ring.model_copy(update={"range_max_m": 4.0}), preset="single", step_period_s=0.024
+)
+SERVO1: Final = Family(
+    SERVO1_FILE.model_copy(update={"ring": SERVO1_RING, "body": ROBOT.body.model_copy(update={"synchro": False})}),
+    ring_with(SERVO1_RING, preset="single", step_period_s=0.03), connect_s=0.2, silent_s=0.5, deaf_s=0.5, halt_s=0.15,
+    handshake_bytes=80, cut_stride=29,
+)  # fmt: skip
+"""A sensor on a servo, which sees the whole room."""
 CHIRP_RING: Final = RingConfig.model_validate({
     "count": 12, "radius_m": 0.2, "beam_half_angle_deg": 15.0, "resolution_m": 0.001, "range_min_m": 0.05,
     "range_max_m": 4.0, "firing": {"preset": "thirds", "step_period_s": 0.05},
@@ -128,7 +138,9 @@ CHIRP: Final = Family(
 )  # fmt: skip
 """The example of docs/extending.md."""
 CHIRP_ENTRY: Final = EntryPoint("chirp", "tests.drivers.contract.example.family", GROUP)
-FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING, "rflex": RFLEX, "ros2": ROS2})
+FAMILIES: Final = MappingProxyType(
+    {"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING, "rflex": RFLEX, "ros2": ROS2, "servo1": SERVO1}
+)
 
 
 def is_near(twist: Twist, wanted: Twist) -> bool:

@@ -18,6 +18,7 @@ from drivers.denning.frames import (
     Drive,
     Echo,
     Echo2,
+    Echo3,
     Frame,
     Halt,
     Hello,
@@ -26,6 +27,8 @@ from drivers.denning.frames import (
     NakCode,
     Odom,
     Pattern,
+    Scan,
+    Sweep,
 )
 from tests.drivers.vectors import BAD, GOOD, Side
 
@@ -52,6 +55,17 @@ def fine_echoes(draw: st.DrawFn) -> Echo2:
     return Echo2(draw(U8), draw(st.integers(0, 2**32 - 1)), draw(U8), fired, heard, tuple(counts))
 
 
+@st.composite
+def turned_echoes(draw: st.DrawFn) -> Echo3:
+    fired = draw(st.integers(0, 2**24 - 1))
+    turned = draw(st.integers(0, 2**24 - 1)) & fired
+    counts = draw(st.lists(st.integers(0, 2**16 - 1), min_size=fired.bit_count(), max_size=fired.bit_count()))
+    bearings = draw(st.lists(I16, min_size=turned.bit_count(), max_size=turned.bit_count()))
+    return Echo3(draw(U8), draw(st.integers(0, 2**32 - 1)), draw(U8), fired, turned, tuple(counts), tuple(bearings))
+
+
+sweeps = st.builds(Sweep, U8, I16, I16, U8, U8)
+scans = st.builds(Scan, U8, st.lists(sweeps, min_size=1, max_size=12).map(tuple))
 odoms = st.builds(Odom, U8, st.integers(0, 2**32 - 1), I32, I32, I32, I32, I16, I16, U8, U8)
 patterns = st.builds(
     Pattern,
@@ -241,9 +255,9 @@ def test_any_payload_is_a_frame_that_encodes_to_itself_or_refused(kind: int, pay
     assert all(encode(frame) == wire for frame in frames)
 
 
-@given(st.one_of(odoms, echoes(), fine_echoes(), patterns, listens))
+@given(st.one_of(odoms, echoes(), fine_echoes(), turned_echoes(), patterns, listens, scans))
 def test_any_frame_is_decoded_as_it_was_encoded(frame: Frame) -> None:
-    decoder = Decoder("host" if isinstance(frame, Pattern | Listen) else "robot")
+    decoder = Decoder("host" if isinstance(frame, Pattern | Listen | Scan) else "robot")
     assert decoder.feed(encode(frame)) == [frame]
 
 

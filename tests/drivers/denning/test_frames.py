@@ -26,7 +26,7 @@ def test_the_numbers_of_the_protocol() -> None:
 
 def test_every_frame_starts_with_its_sequence_number_and_cannot_be_changed() -> None:
     kinds = [*get_args(HostFrame), *get_args(RobotFrame)]
-    assert len(kinds) == 12
+    assert len(kinds) == 14
     assert all(dataclasses.fields(kind)[0].name == "seq" for kind in kinds)
     with pytest.raises(dataclasses.FrozenInstanceError):
         Halt(1).seq = 2  # type: ignore[misc]

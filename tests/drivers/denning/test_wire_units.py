@@ -12,6 +12,7 @@ from drivers.denning.frames import Drive, Echo, Odom
 from drivers.denning.wire_units import echo_byte, identity_of, odometry_of, ranges_of, to_wire, wire_pattern
 from drivers.firing_pattern import FiringError
 from drivers.messages import Flags, Identity, Pose, Twist
+from drivers.servo_views import ServoViews
 from tests.drivers.driver_harness import CONFIG, IDENT, DriverHarness
 from tests.drivers.ring import RING
 from tests.drivers.vectors import OCTETS
@@ -94,7 +95,9 @@ def test_flags_that_are_not_known_are_dropped() -> None:
 
 
 def test_ranges_of_an_echo() -> None:
-    ranges = ranges_of(Echo(0, 0, 0, 0b10111, (100, 255, 0, 50)), 4)
+    ranges = ranges_of(
+        Echo(0, 0, 0, 0b10111, (100, 255, 0, 50)), ServoViews(ring_of(FiringConfig(preset="single"), 4))
+    )
     assert ranges[0] == pytest.approx(3.048)
     assert math.isinf(ranges[1])
     assert np.isnan(ranges[2:]).all(), "a fault, and a sensor that did not fire; bit 4 is beyond the ring"

@@ -17,6 +17,7 @@ from drivers.firmware.bundle import CONFIG_NAME, Board, board_files, read_config
 
 FAKE = Path(__file__).with_name("fake")
 HEAP = "64k"
+HEAP_WITH_SERVOS = "68k"
 LOCKSTEP = "LINE = (0, 0, 1, 115200)"
 
 
@@ -38,20 +39,20 @@ def install(folder: Path, board: Board, changes: str = "") -> RobotConfig:
     return RobotConfig.model_validate(tomllib.loads(robot_file(values, CONFIG_NAME)))
 
 
-def start(folder: Path, script: str, **pipes: int | IO[bytes] | None) -> subprocess.Popen[bytes]:
+def start(folder: Path, script: str, heap: str = HEAP, **pipes: int | IO[bytes] | None) -> subprocess.Popen[bytes]:
     environment = {"MICROPYPATH": f"{FAKE}:{folder}:.frozen", "PATH": os.environ["PATH"]}
-    command = [micropython(), "-O3", "-X", f"heapsize={HEAP}", str(FAKE / script)]
+    command = [micropython(), "-O3", "-X", f"heapsize={heap}", str(FAKE / script)]
     return subprocess.Popen(command, env=environment, cwd=folder, **pipes)  # type: ignore[call-overload,no-any-return]
 
 
 class BoardRobot:
     """The firmware in virtual time, with the methods `advance` and `receive` of an emulated robot."""
 
-    def __init__(self, folder: Path, board: Board = "pico", changes: str = "") -> None:
+    def __init__(self, folder: Path, board: Board = "pico", changes: str = "", heap: str = HEAP) -> None:
         self.config = install(folder, board, f"{LOCKSTEP}\n{changes}")
         values = read_config((folder / CONFIG_NAME).read_text("utf-8"), CONFIG_NAME)
         self.triggers = [sensor[1] for sensor in values["SENSORS"]]
-        self._process = start(folder, "lockstep.py", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self._process = start(folder, "lockstep.py", heap, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self._waiting = b""
 
     def wait_until_ready(self) -> None:

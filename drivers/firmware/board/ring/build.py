@@ -19,6 +19,12 @@ I2C_KINDS = ("srf08", "srf10")
 
 def build(config) -> Robot:
     """Return the robot, whose base is already under control of a timer."""
+    scan = None
+    if config.SERVOS:
+        from ring.scan import Scan
+
+        scan = Scan(config.SERVOS)
+        gc.collect()
     line = _line(config)
     gc.collect()
     sensors = make_sensors(config)
@@ -31,7 +37,7 @@ def build(config) -> Robot:
     base.timer = Timer(config.TIMER)
     base.timer.init(period=PERIOD_MS, mode=Timer.PERIODIC, callback=base.tick)
     boot_id = int.from_bytes(os.urandom(4), "little") or 1
-    return Robot(config, sensors, base, line, boot_id)
+    return Robot(config, sensors, base, line, boot_id, scan)
 
 
 def _wheel(config, side: int) -> Wheel:
@@ -75,7 +81,7 @@ def make_sensors(config) -> tuple:
             continue
         _, trigger, echo = entry
         if kind not in kinds:
-            kinds[kind] = kind_of(kind)
+            kinds[kind] = kind_of(kind, config.TRIGGER_US)
         if trigger not in triggers:
             triggers[trigger] = Pin(trigger, Pin.OUT, value=0)
         if echo not in timers:

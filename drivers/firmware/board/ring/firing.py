@@ -10,6 +10,7 @@ from ring.wire import Encoder
 
 _ECHO = const(0x91)
 _ECHO2 = const(0x92)
+_ECHO3 = const(0x93)
 RANGE_UNIT_UM = 172
 """A count of ECHO2, µm: about a microsecond of flight at 343 m/s."""
 _NO_ECHO_COUNT = const(0xFFFF)
@@ -49,9 +50,12 @@ class Firing:
         The ring's sensors, counter-clockwise from forward.
     clock, encoder
         The board's time, and where frames go.
+    scan
+        The servos; None without any.
     """
 
-    def __init__(self, sensors: tuple, clock: Clock, encoder: Encoder) -> None:
+    def __init__(self, sensors: tuple, clock: Clock, encoder: Encoder, scan=None) -> None:
+        self.scan = scan
         self.version = 2
         self._sensors = sensors
         self._clock = clock
@@ -83,6 +87,8 @@ class Firing:
             return 3
         self._next_masks, self._next_period_us, self._next_window_us = masks, 1000 * period_ms, flight_us
         self._changed = True
+        if self.scan is not None:
+            self.scan.on = 0
         if not self._masks:
             self._due = self._clock.poll()
         return 0
@@ -162,10 +168,11 @@ class Firing:
         frame = self._encoder.frame
         pack_into("<IB", frame, 2, self._clock.t_us(self._fired_at), self._fired_step)
         fine = self.version > 1
+        on = self.scan.on if fine and self.scan is not None else 0
         _put_mask(frame, 7, self._fired)
         at = 10
         if fine:
-            _put_mask(frame, 10, 0)
+            _put_mask(frame, 10, self._fired & on)
             at = 13
         for i, sensor in enumerate(self._sensors):
             if self._fired >> i & 1:
@@ -176,7 +183,10 @@ class Firing:
                 else:
                     frame[at] = echo_byte(flight_us)
                     at += 1
-        self._encoder.send(_ECHO2 if fine else _ECHO, at - 2)
+        if on:
+            self._encoder.send(_ECHO3, self.scan.report(frame, at, self._fired & on) - 2)
+        else:
+            self._encoder.send(_ECHO2 if fine else _ECHO, at - 2)
 
 
 def _put_mask(frame: bytearray, at: int, mask: int) -> None:

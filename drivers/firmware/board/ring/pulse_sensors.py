@@ -21,13 +21,13 @@ class Kind:
         self.cycle_us = cycle_us
 
 
-def kind_of(name: str) -> Kind:
-    """Return the kind of a sensor by its name in robot_config.py.
+def kind_of(name: str, trigger_us: int) -> Kind:
+    """Return the kind of a sensor by its name in robot_config.py, and the length of an hc-sr04's trigger.
 
     MaxBotix define their pulse as 147 µs an inch (LV) and 58 µs a centimetre (XL); the flight is at 343 m/s.
     """
     if name == "hc-sr04":
-        return Kind(10, 1.0, 3000, 0)
+        return Kind(trigger_us, 1.0, 3000, 0)
     if name == "mb10xx":
         return Kind(25, 2 * 25400 / 147 / 343, 3000, 49_000)
     if name == "mb12xx":

@@ -13,6 +13,7 @@ from ring.wire import Decoder, Encoder
 _HELLO = const(0x01)
 _PATTERN = const(0x02)
 _LISTEN = const(0x03)
+_SCAN = const(0x04)
 _DRIVE = const(0x10)
 _HALT = const(0x11)
 _RELEASE = const(0x12)
@@ -50,9 +51,11 @@ class Robot:
         The robot's parts.
     boot_id
         A random number, another one after each start.
+    scan
+        The ring's servos, or None.
     """
 
-    def __init__(self, config, sensors: tuple, base: Base, line, boot_id: int) -> None:
+    def __init__(self, config, sensors: tuple, base: Base, line, boot_id: int, scan=None) -> None:
         self.base = base
         self.line = line
         self._config = config
@@ -61,7 +64,7 @@ class Robot:
         self._payload = memoryview(self._decoder.frame)
         self._encoder = Encoder(line)
         self._boot_id = boot_id
-        self.firing = Firing(sensors, self._clock, self._encoder)
+        self.firing = Firing(sensors, self._clock, self._encoder, scan)
         now = self._clock.ticks
         self._odometry_due = ticks_add(now, 1000 * _ODOMETRY_MS)
         self._collect_due = ticks_add(now, _COLLECT_US)
@@ -128,6 +131,8 @@ class Robot:
             if length < 1 or length != 1 + 3 * payload[0]:
                 return _LENGTH
             return 0 if payload[0] == 0 else _VALUE  # this ring cannot listen
+        if kind == _SCAN and self.firing.version > 1 and self.firing.scan is not None:
+            return self.firing.scan.set(payload)
         if kind not in (_HALT, _RELEASE):
             return _UNKNOWN
         if length:
@@ -146,7 +151,7 @@ class Robot:
         pack_into("<BBHHHI", frame, 2, version, self._sensors, radius, deadman, _ODOMETRY_MS, self._boot_id)
         for i in range(16):
             frame[14 + i] = name[i] if i < len(name) else 0
-        pack_into("<HB", frame, 30, RANGE_UNIT_UM, 0)
+        pack_into("<HB", frame, 30, RANGE_UNIT_UM, 0 if self.firing.scan is None else 2)
         self._encoder.send(_IDENT, 28 if version == 1 else 31)
 
     def _report(self) -> None:

@@ -147,8 +147,8 @@ def impossible(heard: list[float], count: int, ring: RingConfig) -> str | None:
     if below > few:
         return (
             f"TOO SHORT, {heard[0]:.4f} m, in {below} of {count} firings, and ring.range_min_m is "
-            f"{ring.range_min_m:g}: check that nothing touches it; waterproof modules need a longer trigger pulse "
-            f"than hc-sr04 gets, of 20 µs or more, as mb10xx gets; then check its echo wire"
+            f"{ring.range_min_m:g}: check that nothing touches it; a waterproof module needs a trigger of 20 µs or "
+            f"more: make TRIGGER_US in robot_config.py longer; then check its echo wire"
         )
     if beyond > few:
         return (

@@ -11,6 +11,8 @@ from utime import ticks_us as real_us
 ISR_US = 12
 RISE_DELAY_US = 450
 NOTHING_US = 38_000
+TOO_SHORT_US = 10
+"""The pulse of a module that needs a longer trigger than it got."""
 WHEEL_TICK_US = 1000
 LAG_S = 0.04
 FRICTION_MM_S = 2.0
@@ -47,6 +49,8 @@ class Board:
         self.states = bytearray(SENSORS)
         self.widths = [None] * SENSORS
         self.fired = [0] * SENSORS
+        self.trigger_min_us = 0
+        self.raised_us = 0
         self.wheels = ()
         self.i2c = {}
         self.config = None
@@ -94,6 +98,8 @@ class Board:
         if self.levels[pin] == level:
             return
         self.levels[pin] = level
+        if level and pin in self.triggers:
+            self.raised_us = self.now
         if not level and pin in self.triggers:
             for sensor in self.triggers[pin]:
                 self.fire(sensor)
@@ -132,6 +138,7 @@ class Board:
             else:
                 self.echoes[number] = entry[2]
                 self.triggers[entry[1]] = self.triggers.get(entry[1], ()) + (number,)
+        self.trigger_min_us = getattr(config, "FAKE_TRIGGER_MIN_US", 0)
         for number in getattr(config, "FAKE_DEAD", ()):
             self.states[number] = DEAD
         encoders = getattr(config, "FAKE_ENCODERS", config.ENCODERS)
@@ -152,6 +159,8 @@ class Board:
         if self.states[sensor] == DEAD:
             return
         rise = self.now + RISE_DELAY_US
+        if self.now - self.raised_us < self.trigger_min_us:
+            width = TOO_SHORT_US
         self.at(rise, self.rise, pin)
         if self.states[sensor] == OK:
             self.at(rise + width, self.fall, pin)

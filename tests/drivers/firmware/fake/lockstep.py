@@ -2,19 +2,22 @@
 
 `A MICROSECONDS HEX` gives the robot bytes and runs it up to a time; the answer is what it sent, as HEX.
 `S SENSOR STATE`, `W SENSOR WIDTH`, `U WIDTH…`, `B WHEEL BLOCKED`, `P PIN LEVEL` and `V READING` change the world.
-`H` answers the free bytes after a collection, `F SENSOR` how often it fired, `M` the ways of both wheels, mm.
+`D PIN` answers the duty of a pin, `H` the free bytes after a collection, `F SENSOR` how often it fired, `M` the ways
+of both wheels, mm.
 """
 
 import gc
 import sys
 from binascii import hexlify, unhexlify
 
+from board import BOARD  # first: a real board has none of it in its heap
+
+gc.collect()
 from ring.build import build
 
 gc.collect()
 import machine
 import robot_config
-from board import BOARD
 
 BOARD.now = getattr(robot_config, "START_US", 0)
 BOARD.wire(robot_config)
@@ -46,6 +49,8 @@ def answer(kind: str, words):
         BOARD.widths = [int(word) for word in words]
         return ""
     first = int(words[0])
+    if kind == "D":
+        return BOARD.duties.get(first, -1)
     if kind == "F":
         return BOARD.fired[first]
     if kind == "V":

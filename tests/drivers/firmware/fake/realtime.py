@@ -2,11 +2,13 @@
 
 import gc
 
-import ring.build  # noqa: F401 - first, while there is room to compile
+from board import BOARD  # first: a real board has none of it in its heap
+
+gc.collect()
+import ring.build  # noqa: F401 - while there is room to compile
 
 gc.collect()
 import robot_config
-from board import BOARD
 
 BOARD.wire(robot_config)
 BOARD.run_in_real_time()
