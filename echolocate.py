@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from perception.detected_object import DetectedObject
     from perception.polyline import Polyline
     from perception.recogniser import Recogniser
-    from runtime.recording.ring_log import read_ring_log, write_ring_log
+    from runtime.recording.ring_log import read_ring_log
+    from runtime.recording.ring_log_rows import write_ring_log
     from runtime.simulation.closed_loop import SimulationResult, simulate
     from runtime.simulation.random_halls import random_hall
 
@@ -61,7 +62,7 @@ _MODULES: Final = {
     "random_hall": "runtime.simulation.random_halls",
     "read_ring_log": "runtime.recording.ring_log",
     "simulate": "runtime.simulation.closed_loop",
-    "write_ring_log": "runtime.recording.ring_log",
+    "write_ring_log": "runtime.recording.ring_log_rows",
 }
 _WRONG_CALL: Final = 2
 """Exit code; `config.errors` has it too, and may be what is hidden."""

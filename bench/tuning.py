@@ -21,7 +21,7 @@ from runtime.batch.runs import expand
 from runtime.batch.tuning_study import SENSORS, THRESHOLDS
 from runtime.batch.worker import run_one
 from runtime.cli.commands.tune import CHANGES, tune
-from runtime.recording.ring_log import write_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
 from runtime.simulation.scenes import halls, readings
 
 MODEL: Final = "drum"

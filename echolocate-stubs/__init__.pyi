@@ -11,7 +11,7 @@ from perception.detected_object import DetectedObject as DetectedObject
 from perception.polyline import Polyline as Polyline
 from perception.recogniser import Recogniser as Recogniser
 from runtime.recording.ring_log import read_ring_log as read_ring_log
-from runtime.recording.ring_log import write_ring_log as write_ring_log
+from runtime.recording.ring_log_rows import write_ring_log as write_ring_log
 from runtime.simulation.closed_loop import SimulationResult as SimulationResult
 from runtime.simulation.closed_loop import simulate as simulate
 from runtime.simulation.random_halls import random_hall as random_hall

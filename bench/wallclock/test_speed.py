@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.recording.ring_log import read_ring_log, write_ring_log
+from runtime.recording.ring_log import read_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
 from tests.runtime.cli.commands.experiments.test_experiment import experiment
 from tests.runtime.recording.test_ring_log import firing
 

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Final, TextIO
 
 from drivers.messages import Firing
-from runtime.recording.ring_log import RingLogError, RingLogRows, cannot_write
+from runtime.recording.ring_log import RingLogError
+from runtime.recording.ring_log_rows import RingLogRows, cannot_write
+from runtime.recording.servo_columns import ServoColumns
 from runtime.recording.writer import CLOSE_MAX_S, RecorderStatus
 from runtime.support.background_writer import BackgroundWriter
 
@@ -28,10 +30,13 @@ class RingLogWriter:
         Replaced if it exists.
     pairs : sequence of tuple
         The cross paths of the firing pattern, (transmitter, listener): those of a later one have no column.
+    servos : ServoColumns, optional
+        The bearings of the ring.
     """
 
-    def __init__(self, path: Path, pairs: Sequence[tuple[int, int]] = ()) -> None:
+    def __init__(self, path: Path, pairs: Sequence[tuple[int, int]] = (), servos: ServoColumns | None = None) -> None:
         self._path = path
+        self._servos = servos
         self._pairs = pairs
         self._file: TextIO | None = None
         self._rows: RingLogRows | None = None
@@ -77,7 +82,7 @@ class RingLogWriter:
     def _begin(self) -> None:
         try:
             self._file = self._path.open("w", encoding="utf-8", newline="\n")
-            self._rows = RingLogRows(self._file, self._path, self._pairs)
+            self._rows = RingLogRows(self._file, self._path, self._pairs, self._servos)
         except OSError as error:
             self._fail(str(cannot_write(self._path, error)))
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from drivers.messages import Firing
 from runtime.recording.reader import Recording, RecordingError
-from runtime.recording.ring_log import write_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
+from runtime.recording.servo_columns import ServoColumns
 
 
 def write_log(recording: Recording, path: Path) -> int:
@@ -24,7 +25,7 @@ def write_log(recording: Recording, path: Path) -> int:
     pairs = {
         pair for paths in heard for pair in zip(paths.transmitters.tolist(), paths.listeners.tolist(), strict=True)
     }
-    write_ring_log(path, firings, sorted(pairs))
+    write_ring_log(path, firings, sorted(pairs), ServoColumns(recording.settings.ring))
     return len(firings)
 
 

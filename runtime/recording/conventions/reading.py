@@ -17,6 +17,7 @@ from runtime.recording.conventions.decision import Conventions, decide
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.recording.servo_columns import ServoColumns
 
 FIRST: Final = 20_000
 """Rows on which the decision rests: a quarter of an hour at the rate of most rings, 20 MB."""
@@ -49,7 +50,10 @@ def open_ring_log(
     """
     options.check()
     rows = read_ring_log(
-        path, sensors=len(robot.ring.mounts), is_strict=(options.silence, options.not_fired) == ("inf", "empty")
+        path,
+        sensors=robot.ring.sensor_count,
+        is_strict=(options.silence, options.not_fired) == ("inf", "empty"),
+        servos=ServoColumns(robot.ring),
     )
     first = FIRST if path.is_file() else FIRST_OF_PIPE
     yield from converted_firings(rows, path, robot, options, warn, first=first)

@@ -15,7 +15,8 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from drivers.messages import CrossPaths, Firing, Pose
-from runtime.recording.ring_log import LINE_MAX_BYTES, RingLogError, read_ring_log, write_ring_log
+from runtime.recording.ring_log import LINE_MAX_BYTES, RingLogError, read_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
 from tests.examples import examples
 
 HEADER = "t,x,y,theta,r00,r01\n"

@@ -180,6 +180,7 @@ def open_run_recording(
     from drivers.firing_pattern import pattern_pairs
     from runtime.recording.recorder import Recorder
     from runtime.recording.ring_log_writer import RingLogWriter
+    from runtime.recording.servo_columns import ServoColumns
     from runtime.recording.storage import RecordingTarget, RotatingFolder, SingleFile, recordings_folder
 
     run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
@@ -187,7 +188,8 @@ def open_run_recording(
     with contextlib.ExitStack() as stack:
         ring_log: RingLogWriter | None = None
         if record is not None and Path(record).suffix.lower() == RING_LOG:
-            on, ring_log = False, stack.enter_context(RingLogWriter(Path(record), pattern_pairs(settings.ring)))
+            columns = pattern_pairs(settings.ring), ServoColumns(settings.ring)
+            on, ring_log = False, stack.enter_context(RingLogWriter(Path(record), *columns))
         elif record is not None:
             on, target = True, SingleFile(Path(record))
         else:

@@ -13,7 +13,7 @@ from config.errors import DONE, FAILED
 from drivers.firing_pattern import pattern_pairs
 from drivers.messages import Firing, Pose
 from runtime.cli.app import run_command
-from runtime.recording.ring_log import write_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
 from tests.perception.test_stand import BEARING, RANGE_M, RING, heard, scene
 
 

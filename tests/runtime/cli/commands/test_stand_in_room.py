@@ -16,7 +16,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, pattern_pairs, sensors
 from drivers.messages import Firing, Pose
 from runtime.cli.app import run_command
-from runtime.recording.ring_log import write_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
 
 RING = load_settings("hallway").ring
 RING_AT = Pose(0.5, -1.0, 0.7)

@@ -12,7 +12,7 @@ import tomli_w
 from config.errors import DONE, FAILED, WRONG_CALL
 from config.load import load_robot
 from runtime.cli.app import run_command
-from runtime.recording.ring_log import write_ring_log
+from runtime.recording.ring_log_rows import write_ring_log
 from tests.calibration_drive import DRUM, CalibrationDrive, calibration_drive
 
 
