@@ -1,13 +1,14 @@
 """The bytes that a line brings in place of a robot's frames, and what they say about the device that sends them.
 
-Two kinds of strangers are common on a serial port: a device that sends text, as a board that prints or a GPS
-receiver, and one that sends back what it gets, as a loopback, a terminal or a modem. Their bytes alone distinguish
-them from a robot.
+Three kinds of strangers are common on a serial port: a device that sends text, as a board that prints or a GPS
+receiver, one that sends back what it gets, as a loopback, a terminal or a modem, and a robot of another family. Their
+bytes alone distinguish them from the robot.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Final
 
 from config.files import one_line
@@ -45,10 +46,13 @@ class HeardBytes:
     ----------
     total
         Number of bytes received since `clear`.
+    find_robot
+        Returns which robot of another family sends these bytes, as a phrase; None if none does.
     """
 
     def __init__(self) -> None:
         self.total = 0
+        self.find_robot: Callable[[bytes], str | None] | None = None
         self._received = self._sent = b""
         self._stranger: str | None = None
 
@@ -63,7 +67,7 @@ class HeardBytes:
     def sent(self, data: bytes) -> None:
         """Take a write that no robot of the protocol sends back; what was found out before it stays."""
         if len(data) >= _ECHO_MIN:
-            self._stranger, self._sent = self.stranger, data
+            self._stranger, self._sent = self._device(), data
 
     def received(self, data: bytes) -> None:
         """Take bytes from the line."""
@@ -72,7 +76,17 @@ class HeardBytes:
 
     @property
     def stranger(self) -> str | None:
-        """What device sends these bytes, likely cause, next action; None if they may be a robot's."""
+        """What device sends these bytes, likely cause, next action; None if they may be the robot's."""
+        device = self._device()
+        if device is not None or self.find_robot is None or (robot := self.find_robot(self._received)) is None:
+            return device
+        return (
+            f"another robot answers: these are frames of {robot}; run that robot's file with --robot, or give the "
+            f"port of the robot that was named"
+        )
+
+    def _device(self) -> str | None:
+        """Return what device that is no robot sends these bytes."""
         data = self._received
         if self._sent and self._sent in data:
             return _ECHOES

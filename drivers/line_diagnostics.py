@@ -7,6 +7,8 @@ from drivers.heard_bytes import HeardBytes
 
 _NOISE_MIN = 3
 """Fewest corrupt frames that count as noise; one or two are normal where a line starts or ends."""
+RECENT_S = 1.0
+"""Frames are said to come if the last one is not older than this, s: several of their usual periods."""
 _UNFRAMED_MIN = 64
 """Bytes without odometry that count as more than the last echo and a broken frame."""
 

@@ -13,9 +13,10 @@ The entry point names an object with the functions of `DriverFamily`; a module w
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Protocol, TypedDict, cast
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypedDict, cast
 
 from config.robot import CalibrationConfig
 from drivers.calibrated_driver import CalibratedDriver
@@ -23,6 +24,7 @@ from drivers.driver import DriverError
 from drivers.firing_pattern import firing_pattern
 from drivers.latched_ranges import FreshDriver
 from drivers.serial_port import OpenPort
+from drivers.session import Session
 
 if TYPE_CHECKING:
     from config.robot import RobotConfig
@@ -72,6 +74,8 @@ class DriverFamily(Protocol):
         """
 
 
+FOREIGN_MIN: Final = 2
+"""Fewest frames of another family that name it: a single one may be chance."""
 GIVES_FIRINGS: Final = frozenset({"arcos", "denning", "rflex"})
 """Drivers whose protocols name what fired; any other may be of a source that repeats last values."""
 
@@ -92,6 +96,8 @@ def make_driver(config: RobotConfig) -> RobotDriver:
         The robot or its protocol cannot carry out the firing pattern of `config`.
     """
     driver = _family(config.robot.driver).make_driver(config)
+    if isinstance(driver, Session) and config.robot.driver in GIVES_FIRINGS:
+        driver.heard.find_robot = partial(other_robot, config.robot.driver)
     if config.robot.driver not in GIVES_FIRINGS:
         pattern, count = firing_pattern(config.ring), len(config.ring.mounts)
         if pattern.set_size < count:
@@ -150,6 +156,18 @@ def line_options(config: RobotConfig) -> LineOptions:
     options: Callable[[RobotConfig], LineOptions] | None
     options = getattr(_family(config.robot.driver), "line_options", None)
     return LineOptions() if options is None else options(config)
+
+
+def other_robot(driver: str, data: bytes) -> str | None:
+    """Return the shipped family, other than that of `driver`, whose robot sends these bytes, as a phrase.
+
+    Such a family has a function `frames_in`, which counts the robot's frames in bytes, and a phrase `ROBOT`.
+    """
+    for name in sorted(GIVES_FIRINGS - {driver}):
+        family: Any = _family(name)
+        if family.frames_in(data) >= FOREIGN_MIN:
+            return str(family.ROBOT)
+    return None
 
 
 def _family(name: str) -> DriverFamily:

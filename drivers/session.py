@@ -27,6 +27,11 @@ class Session(ABC, Generic[S]):
     ----------
     stamper
         That of the protocol.
+
+    Attributes
+    ----------
+    heard
+        The bytes of the line in place of the robot's frames.
     """
 
     def __init__(self, stamper: S) -> None:
@@ -42,7 +47,7 @@ class Session(ABC, Generic[S]):
         self._odometry: Odometry | None = None
         self._flags, self._rebooted = Flags.NONE, False
         self._noted = set[str]()
-        self._heard = HeardBytes()
+        self.heard = HeardBytes()
 
     @property
     def state(self) -> LineState:

@@ -124,7 +124,7 @@ class ArcosDriver(Session[PoseStamper]):
         self._problem = None
         self._is_ending = False
         self._refused_until_s = -math.inf
-        self._heard.clear()
+        self.heard.clear()
         if self._has_session:  # the robot has kept the speed
             self._handshake.resume(run_s)
         else:
@@ -144,8 +144,8 @@ class ArcosDriver(Session[PoseStamper]):
             return
         if self._heard_baud != self._handshake.baud:
             self._heard_baud = self._handshake.baud
-            self._heard.begin_speed()
-        self._heard.received(data)
+            self.heard.begin_speed()
+        self.heard.received(data)
         for packet in self._decoder.feed(data):
             self._take(packet)
 
@@ -160,7 +160,7 @@ class ArcosDriver(Session[PoseStamper]):
         if self._state is LineState.READY:
             self._supervise()
         elif run_s >= self._refused_until_s:
-            if self._heard.total and not self._decoder.frames:
+            if self.heard.total and not self._decoder.frames:
                 self._handshake.hear_noise()
             self._handshake.tick(run_s)
             self._go_on()
@@ -214,7 +214,7 @@ class ArcosDriver(Session[PoseStamper]):
         if commands:
             self._sent_s = self._run_s
         if len(commands) > 1:  # a SYNC, which the robot does echo, is sent alone
-            self._heard.sent(data)
+            self.heard.sent(data)
         return data
 
     def _due_commands(self) -> tuple[Command, ...]:
@@ -242,7 +242,7 @@ class ArcosDriver(Session[PoseStamper]):
         if silent_s > silence_max_s:
             others = self._packet_s - self._sip_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_at_sip
-            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self._heard))
+            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self.heard))
         elif unanswered_s > 2.0 * silence_max_s:
             self._go_down(diagnostics.not_receiving(unanswered_s))
         elif self._enabling.tries > self._config.link.tries:
@@ -313,13 +313,17 @@ class ArcosDriver(Session[PoseStamper]):
         if is_late and (has_failed or is_called_in_vain):
             stage, bauds, self._state = handshake.unanswered, handshake.bauds, LineState.DOWN
             if handshake.failures:
-                self._problem = lambda: diagnostics.unanswered(stage, self._heard)
+                self._problem = lambda: diagnostics.unanswered(stage, self.heard)
             else:
-                self._problem = lambda: diagnostics.no_answer(bauds, self._decoder.frames, self._heard)
+                self._problem = lambda: diagnostics.no_answer(bauds, self._newest_frames(), self.heard)
         elif self._state is LineState.DOWN:
             answered = handshake.unanswered if handshake.failures else Stage.SYNC0
             if stages.index(handshake.stage) > stages.index(answered):
                 self._state = LineState.HANDSHAKE
+
+    def _newest_frames(self) -> int:
+        """Return how many packets were received, 0 if that was long ago."""
+        return self._decoder.frames if self._run_s - self._packet_s < line_diagnostics.RECENT_S else 0
 
     def _set_up(self) -> None:
         """Check and adopt what the robot reports of itself, and queue the commands that set it up."""
@@ -359,7 +363,7 @@ class ArcosDriver(Session[PoseStamper]):
         flags = flags_of(sip, (packet and packet.low_battery) or 0)
         self._odometry, firings = self.stamper.sip(sip, self._run_s, flags, self.line_baud, after_loss=after_loss)
         self._sip_s, self._bad_at_sip = self._run_s, self._decoder.bad
-        self._heard.clear()
+        self.heard.clear()
         self._flags |= flags
         self._battery = sip.battery_10 or sip.battery
         self._firings += firings

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
+from drivers.arcos.codec import Decoder, decode_packet
 from drivers.arcos.driver import ArcosDriver
 from drivers.arcos.firmware import Firmware
+from drivers.arcos.frames import Other, SyncEcho
 from drivers.arcos.wire_units import discs_of
 from drivers.driver import RobotDriver
 from drivers.emulator.robot_device import RobotDevice
 
 if TYPE_CHECKING:
     from drivers.emulator.faults import Fault
+
+ROBOT: Final = "a Pioneer or AmigoBot, as of the file p3dx"
 
 
 def make_driver(config: RobotConfig) -> RobotDriver:
@@ -59,3 +63,10 @@ def firmware_of(config: RobotConfig) -> Firmware:
         rad_s_per_mm_s=arcos.turn_factor,
         sensor_numbers=discs_of(config),
     )
+
+
+def frames_in(data: bytes) -> int:
+    """Return how many frames of such a robot the bytes hold."""
+    decoder = Decoder(decode_packet)
+    packets = decoder.feed(data) + decoder.skip()
+    return sum(not isinstance(packet, Other | SyncEcho) for packet in packets)

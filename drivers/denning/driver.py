@@ -94,7 +94,7 @@ class DenningDriver(Session[PoseStamper]):
         self.line_closed()
         self._run_s = self._last_frame_s = run_s
         self._flush_first = True
-        self._heard.clear()
+        self.heard.clear()
         self._drive_acks = CommandAckMonitor()
         self._start_handshake()
 
@@ -111,7 +111,7 @@ class DenningDriver(Session[PoseStamper]):
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
-        self._heard.received(data)
+        self.heard.received(data)
         for frame in self._decoder.feed(data):
             self._last_frame_s = run_s
             self._take_frame(frame)
@@ -132,8 +132,9 @@ class DenningDriver(Session[PoseStamper]):
                 self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
 
     def _no_answer(self, name: str, command: PendingCommand) -> str:
-        frames = self._decoder.frames if self._last_frame_s > command.first_s else 0
-        return diagnostics.no_answer(name, command.tries, frames, self._heard)
+        since_s = max(command.first_s, self._run_s - line_diagnostics.RECENT_S)
+        frames = self._decoder.frames if self._last_frame_s > since_s else 0
+        return diagnostics.no_answer(name, command.tries, frames, self.heard)
 
     def halt(self) -> None:
         """Stop the robot at once and latch it: sent before everything else, and repeated until acknowledged."""
@@ -142,7 +143,7 @@ class DenningDriver(Session[PoseStamper]):
         if "HALT" not in self._commands:
             self._queue("HALT")
             if self._state is LineState.READY:
-                self._heard.clear()
+                self.heard.clear()
 
     def release(self) -> None:
         """Clear the latch; without effect unless READY, so that the robot is never released later and unnoticed."""
@@ -200,7 +201,7 @@ class DenningDriver(Session[PoseStamper]):
             # Not a pending command: it needs no answer, because other timeouts detect a lost robot.
             self._must_identify = False
             out += encode(Hello(self._next_seq(), self._version))
-        self._heard.sent(bytes(out))
+        self.heard.sent(bytes(out))
         if out and self._flush_first:
             # Ends the incomplete frame that an earlier user of the line may have left in the robot's decoder.
             self._flush_first = False
@@ -216,7 +217,7 @@ class DenningDriver(Session[PoseStamper]):
             # A single echo may follow the last odometry before the robot falls silent.
             others = self._last_frame_s - self._odometry_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_at_odometry
-            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self._heard))
+            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self.heard))
         elif unacknowledged_s > _UNACKNOWLEDGED_SHARE * silence_max_s:
             self._go_down(diagnostics.not_receiving(unacknowledged_s))
         elif self._echo_timeout.expired(self._run_s):
@@ -333,7 +334,7 @@ class DenningDriver(Session[PoseStamper]):
             if "HALT" in self._commands:
                 # A robot that answers other commands must answer this one within the usual number of tries.
                 self._queue("HALT")
-                self._heard.clear()
+                self.heard.clear()
         if self._state is LineState.READY:
             self._problem = None
 
@@ -371,7 +372,7 @@ class DenningDriver(Session[PoseStamper]):
             self._start_handshake()
             return
         self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
-        self._heard.clear()
+        self.heard.clear()
         self._odometry = sample
         if (error := self.stamper.clock_error) is not None and error > 0.0:
             self._go_down(diagnostics.wrong_clock_rate(error))

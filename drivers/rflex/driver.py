@@ -119,7 +119,7 @@ class RflexDriver(Session[Measurements]):
         """Stop the base and request reports, on a line that has just been opened."""
         self.line_closed()
         self._run_s = run_s
-        self._heard.clear()
+        self.heard.clear()
         self._begin(LineState.HANDSHAKE, None)
 
     def line_closed(self) -> None:
@@ -133,7 +133,7 @@ class RflexDriver(Session[Measurements]):
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
-        self._heard.received(data)
+        self.heard.received(data)
         for frame in self._decoder.feed(data):
             self._take(frame)
 
@@ -147,7 +147,11 @@ class RflexDriver(Session[Measurements]):
                 self._set_up()
             if run_s - self._called_s > _CALLING_S and self._state is LineState.HANDSHAKE:
                 self._state = LineState.DOWN
-                self._problem = lambda: diagnostics.no_answer(self._decoder.frames, self._heard)
+                self._problem = lambda: diagnostics.no_answer(self._newest_frames(), self.heard)
+
+    def _newest_frames(self) -> int:
+        """Return how many frames were received, 0 if that was long ago."""
+        return self._decoder.frames if self._run_s - self._report_s < line_diagnostics.RECENT_S else 0
 
     def halt(self) -> None:
         """Stop the base at once, repeat that until it stands, then set its brake."""
@@ -205,7 +209,7 @@ class RflexDriver(Session[Measurements]):
         self._sent_s = self._run_s
         data = encode(frame)
         if self._state is not LineState.READY:
-            self._heard.sent(data)
+            self.heard.sent(data)
         return data
 
     def _next_command(self) -> Frame | None:
@@ -260,7 +264,7 @@ class RflexDriver(Session[Measurements]):
         if silent_s > link.silence_max_s:
             others = self._report_s - self._sample_s > 0.5 * link.silence_max_s
             bad = self._decoder.bad - self._bad_at_sample
-            self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self._heard))
+            self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self.heard))
         elif unanswered_s > 2.0 * link.silence_max_s:
             self._begin(LineState.DOWN, diagnostics.not_receiving(unanswered_s))
         elif self._brake.mode is Mode.RELEASING and self._brake.tries > link.tries:
@@ -307,7 +311,7 @@ class RflexDriver(Session[Measurements]):
         if not isinstance(sample, Odometry):
             return
         self._sample_s, self._bad_at_sample = self._run_s, self._decoder.bad
-        self._heard.clear()
+        self.heard.clear()
         self._brake.observe_speed(sample.twist)
         self._stall.observe(sample.twist, self._run_s)
         if self._state is not LineState.READY:

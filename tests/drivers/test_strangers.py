@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Callable
 
@@ -9,8 +10,11 @@ import pytest
 
 from config.load import load_robot
 from config.robot import RobotConfig
+from config.world import WorldConfig
 from drivers.driver import LineState
-from drivers.registry import make_driver
+from drivers.emulator.memory_transport import MemoryLine
+from drivers.registry import make_device, make_driver
+from drivers.rflex.codec import Status, encode, frame_of
 
 NAMED_S = 5.0
 STEP_S = 0.01
@@ -154,3 +158,42 @@ def test_of_a_silent_line_it_is_said_that_nothing_is_received(name: str) -> None
     said = said_of(lambda _at_s, _sent: b"", robot_at(name, "/dev/ttyUSB0"))
     assert "nothing is received" in said[0][2]
     assert said[0][0] <= NAMED_S
+
+
+def in_session(name: str) -> Device:
+    """Return an emulated robot that an earlier client left in its session: it sends without being asked."""
+    config = load_robot(name)
+    robot, driver = make_device(config, WorldConfig(), 1), make_driver(config)
+    MemoryLine(driver, robot).exchange(begin_s := 6.0)
+    assert driver.state is LineState.READY
+
+    def device(at_s: float, sent: bytes) -> bytes:
+        data = robot.advance(begin_s + at_s)
+        robot.receive(sent)
+        return data
+
+    return device
+
+
+SENDERS = {"p3dx": "frames of a Pioneer", "denning": "frames of a Denning", "b21r": "frames of a robot with an rFLEX"}
+
+
+@pytest.mark.parametrize(("name", "other"), list(itertools.permutations(FAMILIES, 2)))
+def test_a_robot_of_another_family_is_named(name: str, other: str) -> None:
+    said = said_of(in_session(other), robot_at(name, "socket://robot:8101"))
+    assert SENDERS[other] in said[-1][2]
+    assert next(at_s for at_s, _, problem in said if SENDERS[other] in problem) <= NAMED_S
+    assert not any(whose in problem for _, _, problem in said for one, whose in SENDERS.items() if one != other)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_frames_that_have_ended_are_not_said_to_come(name: str) -> None:
+    """A robot of the family that is switched off just after the line was opened."""
+    robot = in_session(name) if name != "b21r" else lambda _at_s, _sent: encode(frame_of(Status(1, 2400, 1)))
+
+    def device(at_s: float, _sent: bytes) -> bytes:
+        return robot(at_s, b"") if at_s < 0.3 else b""
+
+    said = said_of(device, robot_at(name, "socket://robot:8101"))
+    assert "although the robot sends other frames" not in said[-1][2]
+    assert "other frames are received" not in said[-1][2]

@@ -7,6 +7,8 @@ import itertools
 import math
 import shlex
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,11 +18,13 @@ from drivers.driver import LineState
 from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
-from drivers.registry import make_driver
+from drivers.registry import make_driver, other_robot
 from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
 """Longest wait for a robot's first frame, s: as long as it takes to call a Pioneer at every speed of its line."""
+AGAIN_MAX_S: Final = 3.0
+"""Longest wait until a port that was just given up can be opened again, s: a server of one client is still busy."""
 READY_MAX_S: Final = 6.0
 """Longest wait from the first frame until the robot is ready, s."""
 LOOK_S: Final = 1.0
@@ -76,10 +80,10 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
         Robots by the names by which they are run.
     """
     said, best = dict[str, list[str]](), (0, Finding(None, ()))  # what was said as which robots
-    strangers = list[str]()
+    strangers, tries = list[str](), itertools.count()
     for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
         for name, config in family:
-            answer = await _try(port, config)
+            answer = await _try(port, config, again=next(tries) > 0)
             if answer.text is not None:
                 if best[1].robot is None or answer.fired > best[0]:
                     best = (answer.fired, Finding(name, (answer.text,)))
@@ -114,10 +118,19 @@ def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
     return item[1].robot.driver, item[1].link.baud
 
 
-async def _try(port: str, config: RobotConfig) -> _Answer:
-    """Return what the driver of one robot finds out; it is never released, so nothing moves."""
+async def _try(port: str, config: RobotConfig, *, again: bool = False) -> _Answer:
+    """Return what the driver of one robot finds out; it is never released, so nothing moves.
+
+    Parameters
+    ----------
+    port, config
+        The port, and the robot.
+    again
+        Whether the port was open just before.
+    """
     config = config.model_copy(update={"link": config.link.model_copy(update={"port": port})})
     driver, clock, heard = make_driver(config), time.monotonic, HeardBytes()
+    heard.find_robot = partial(other_robot, config.robot.driver)
 
     def send() -> None:
         link.set_baud(driver.line_baud)
@@ -135,7 +148,7 @@ async def _try(port: str, config: RobotConfig) -> _Answer:
 
     link = Link(config.link, opened, received, lambda _reason: driver.line_closed())
     try:
-        await link.open_once()
+        await _open(link, AGAIN_MAX_S if again else 0.0, clock)
     except LinkError as error:
         return _Answer(has_answered=False, problem=str(error))
     connection, begin_s = Connection(link, driver, send, clock, config.body), clock()
@@ -157,6 +170,26 @@ async def _try(port: str, config: RobotConfig) -> _Answer:
         if driver.state is LineState.READY:
             await connection.shut_down()
         await link.stop()
+
+
+async def _open(link: Link, tries_s: float, clock: Callable[[], float]) -> None:
+    """Open the line, and try again for this long.
+
+    Raises
+    ------
+    LinkError
+        It cannot be opened.
+    """
+    end_s = clock() + tries_s
+    while True:
+        try:
+            await link.open_once()
+        except LinkError:
+            if clock() >= end_s:
+                raise
+        else:
+            return
+        await asyncio.sleep(POLL_S)
 
 
 async def _look(connection: Connection) -> _Answer:
