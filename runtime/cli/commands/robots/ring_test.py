@@ -15,9 +15,12 @@ def ring_test(
     *,
     robot: RobotFile = None,
     rounds: Count = 20,
+    hand: Annotated[bool, Flag] = False,
     move: Annotated[bool, Flag] = False,
 ) -> int:
     """Fire each sensor of a robot by itself and report what it hears; with `--move`, try its motors.
+
+    Sensors that hear each other are found by firing them as the robot file says, too.
 
     Parameters
     ----------
@@ -25,6 +28,9 @@ def ring_test(
         Serial port of the robot; by default that of the robot file, or the only one of this computer.
     rounds
         How often each sensor fires.
+    hand
+        Ask for a hand before each sensor in turn: finds sensors whose wires are exchanged, a ring that is mounted
+        turned, and sensors that never hear an echo.
     move
         Turn the wheels as well, for a second in each direction: put the robot on a block first.
 
@@ -42,5 +48,6 @@ def ring_test(
         raise UserError("--rounds: must be at least 1", WRONG_CALL)
     config = load_settings(None, (), robot=robot)
     link = config.link.model_copy(update={"port": port or config.link.port or only_port()})
-    test = RingTest(one_at_a_time(config.model_copy(update={"link": link})), sys.stdout.write)
-    return asyncio.run(test.run(rounds, move=move))
+    single = one_at_a_time(config.model_copy(update={"link": link}))
+    test = RingTest(single, sys.stdout.write, own=config.ring)
+    return asyncio.run(test.run(rounds, move=move, hand=hand))

@@ -20,6 +20,8 @@ from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.link import Link
 from drivers.messages import Flags, Floats, Odometry, Twist
 from drivers.registry import make_driver
+from runtime.cli.commands.robots.crosstalk_trial import crosstalk
+from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
 from runtime.cycle.connection import POLL_S, Connection
 
 SLACK_S: Final = 2.0
@@ -28,6 +30,8 @@ WARNING_S: Final = 3.0
 MOVE_S: Final = 1.0
 SETTLE_S: Final = 0.5
 """Time from the warning to the first motion, of each motion, and after a base stands again by its file, s."""
+HAND_S: Final = 15.0
+"""So long a hand before a sensor is waited for, s."""
 DRIVE_S: Final = 0.05
 """Time from one velocity to the next, s, as of a run: a line that is full of them carries no request."""
 UNSTEADY_M: Final = 0.1
@@ -106,7 +110,7 @@ def judge_sensor(ranges: list[float], rounds: int, ring: RingConfig, unsteadines
     if len(ranges) < ANSWERS_MIN * rounds:
         return Finding(is_good=False, text=f"answers {len(ranges)} times of {rounds}: check for a loose wire")
     if not heard:
-        return Finding(is_good=True, text="hears nothing: hold something flat in front of it to see that it does")
+        return Finding(is_good=True, text="hears nothing: --hand shows whether it does")
     if (wrong := impossible(heard, len(ranges), ring)) is not None:
         return Finding(is_good=False, text=wrong)
     median_m, tenth = statistics.median(heard), len(heard) // 10
@@ -198,11 +202,18 @@ class RingTest:
         Prints text.
     clock
         Monotonic, s.
+    own
+        The ring with the robot's own firing pattern, in which crosstalk is looked for; None to leave that out.
     """
 
     def __init__(
-        self, config: RobotConfig, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic
+        self,
+        config: RobotConfig,
+        write: Callable[[str], object],
+        clock: Callable[[], float] = time.monotonic,
+        own: RingConfig | None = None,
     ) -> None:
+        self._own = own
         self._clock = clock
         self._config = config
         self._write = write
@@ -212,14 +223,18 @@ class RingTest:
         self._flags = Flags.NONE
         self._odometry: Odometry | None = None
 
-    async def run(self, rounds: int, *, move: bool) -> int:
+    async def run(self, rounds: int, *, move: bool, hand: bool = False) -> int:
         """Return the exit code: whether all that was tested is good."""
         await self._connection.connect(lambda: False)
         try:
             identity = self._driver.identity
             if identity is not None:
                 self._write(f"robot '{identity.name}' on {self._config.link.port}, {identity.sensors} sensors\n")
-            is_good = await self._test_sensors(rounds)
+            ranges = await self._listen(self._config.ring, rounds)
+            together = await self._together(rounds)
+            is_good = self._judge(ranges, rounds, together)
+            if hand:
+                is_good = await self._test_places(ranges) and is_good
             if move:
                 is_good = await self._test_motors() and is_good
         finally:
@@ -227,10 +242,11 @@ class RingTest:
             await self._link.stop()
         return DONE if is_good else FAILED
 
-    async def _test_sensors(self, rounds: int) -> bool:
-        mounts, pattern = self._config.ring.mounts, firing_pattern(self._config.ring)
+    async def _listen(self, ring: RingConfig, rounds: int) -> list[list[float]]:
+        """Return what each sensor reports in so many firings: m, +inf no echo."""
+        mounts, pattern = ring.mounts, firing_pattern(ring)
         ranges: list[list[float]] = [[] for _ in mounts]
-        if len(pattern.masks) < len(mounts):
+        if ring is self._config.ring and len(pattern.masks) < len(mounts):
             self._write("this robot does not fire its sensors one by one: sensors that fire together may disturb\n")
         deadline_s = self._clock() + rounds * pattern.cycle_s + SLACK_S
         while any(len(each) < rounds for each in ranges) and self._clock() < deadline_s:
@@ -238,13 +254,52 @@ class RingTest:
                 for sensor, value in enumerate(reported.tolist()):
                     if not math.isnan(value) and len(ranges[sensor]) < rounds:
                         ranges[sensor].append(value)
+        return ranges
+
+    async def _together(self, rounds: int) -> list[list[float]] | None:
+        """Return the same in the robot's own pattern, and go back; None where that fires one at a time, too."""
+        if self._own is None or firing_pattern(self._own).set_size == firing_pattern(self._config.ring).set_size:
+            return None
+        self._driver.set_firing(self._own)
+        await self._pass(SETTLE_S, None)
+        ranges = await self._listen(self._own, rounds)
+        self._driver.set_firing(self._config.ring)
+        await self._pass(SETTLE_S, None)
+        return ranges
+
+    def _judge(self, ranges: list[list[float]], rounds: int, together: list[list[float]] | None) -> bool:
+        """Write what is found of each sensor; return whether all are good."""
+        ring = self._config.ring
+        disturbed = {} if together is None or self._own is None else crosstalk(ranges, together, self._own)
         findings = [
-            judge_sensor(each, rounds, self._config.ring, unsteadiness_of(ranges, number))
-            for number, each in enumerate(ranges)
+            judge_sensor(each, rounds, ring, unsteadiness_of(ranges, number)) for number, each in enumerate(ranges)
         ]
-        for number, (mount, finding) in enumerate(zip(mounts, findings, strict=True)):
-            self._write(f"sensor {number:2} at {math.degrees(mount.angle_rad):4.0f} degrees: {finding.text}\n")
-        return all(finding.is_good for finding in findings)
+        for number, (mount, finding) in enumerate(zip(ring.mounts, findings, strict=True)):
+            text = disturbed.get(number, finding.text) if finding.is_good else finding.text
+            self._write(f"sensor {number:2} at {math.degrees(mount.angle_rad):4.0f} degrees: {text}\n")
+        return all(finding.is_good for finding in findings) and not disturbed
+
+    async def _test_places(self, ranges: list[list[float]]) -> bool:
+        """Ask for a hand before each sensor, and write which of them does not answer in its place."""
+        ring = self._config.ring
+        if ring.has_servo:
+            self._write("--hand: a sensor on a servo looks everywhere; move a hand round it and watch the page\n")
+            return True
+        watch = HandWatch([statistics.median(each) if each else math.inf for each in ranges])
+        answered: list[int | None] = []
+        for mount in ring.mounts:
+            self._write(f"hold something flat 10 to 30 cm from the robot, {side_of(mount.angle_rad)} …\n")
+            sys.stdout.flush()
+            watch.ask()
+            found, deadline_s = None, self._clock() + HAND_S
+            while found is None and self._clock() < deadline_s:
+                for reported in await self._exchange():
+                    found = watch.take(reported.tolist()) if found is None else found
+            answered.append(found)
+        wrong = judge_hands(ring, answered)
+        for line in wrong or ["each sensor answers in its place"]:
+            self._write(f"{line}\n")
+        return not wrong
 
     async def _test_motors(self) -> bool:
         self._write(

@@ -1,0 +1,98 @@
+"""A hand before each sensor of a ring in turn: whether that sensor answers which the robot file has there.
+
+It finds sensors whose wires are exchanged, a ring that is mounted turned, and sensors that never hear an echo: what a
+robot that stands cannot know by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from config.robot import RingConfig
+
+HAND_MAX_M: Final = 0.4
+NEARER_M: Final = 0.1
+"""A hand is nearer than this, and nearer than what a sensor heard before by this, m."""
+READINGS: Final = 3
+"""So many readings in a row of a sensor are of the hand."""
+_SAME_RAD: Final = math.radians(5.0)
+_SIDES: Final = ("ahead", "ahead to the left", "to the left", "behind to the left", "behind",
+                 "behind to the right", "to the right", "ahead to the right")  # fmt: skip
+
+
+class HandWatch:
+    """Finds the sensor that a hand is held before.
+
+    Parameters
+    ----------
+    before : sequence of float
+        What each sensor heard before, m; +inf for nothing.
+    """
+
+    def __init__(self, before: Sequence[float]) -> None:
+        self._before = tuple(before)
+        self._near = [0] * len(self._before)
+        self._free = [False] * len(self._before)
+
+    def ask(self) -> None:
+        """Wait for another hand: one that is there already does not count until it has gone."""
+        self._free = [near == 0 for near in self._near]
+
+    def take(self, ranges: Sequence[float]) -> int | None:
+        """Take the ranges of a firing; return the sensor that now hears a hand, None if none does."""
+        for i, (range_m, before_m) in enumerate(zip(ranges, self._before, strict=True)):
+            if math.isnan(range_m):
+                continue
+            is_near = range_m < min(HAND_MAX_M, before_m - NEARER_M)
+            self._near[i] = self._near[i] + 1 if is_near else 0
+            self._free[i] |= not is_near
+        found = [i for i, near in enumerate(self._near) if near >= READINGS and self._free[i]]
+        return max(found, key=self._near.__getitem__, default=None)
+
+
+def side_of(angle_rad: float) -> str:
+    """Return a direction in words and degrees, counter-clockwise from ahead."""
+    degrees = math.degrees(math.remainder(angle_rad, math.tau))
+    return f"{_SIDES[round(degrees / 45.0) % 8]} ({degrees:.0f} degrees)"
+
+
+def judge_hands(ring: RingConfig, answered: Sequence[int | None]) -> list[str]:
+    """Return what is wrong, a line each; none if each sensor answered in its place.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        Without servos.
+    answered : sequence of int, optional
+        Which sensor answered the hand in the place of each; None if none did.
+    """
+    axes = [mount.angle_rad for mount in ring.mounts]
+    if all(answer is None for answer in answered):
+        return [
+            "NO SENSOR heard the hand: the ring is mounted the other way round, or no echo reaches the board: check "
+            "the 5 V of the sensors and the wires of trigger and echo; an echo of 5 V needs a divider to the board's "
+            "3.3 V, and without one the pin is destroyed"
+        ]
+    wrong = [(i, answer) for i, answer in enumerate(answered) if answer is not None and answer != i]
+    turns = [math.remainder(axes[i] - axes[answer], math.tau) for i, answer in wrong]
+    if len(wrong) > 1 and len(wrong) == sum(answer is not None for answer in answered):
+        apart = max(abs(math.remainder(turn - turns[0], math.tau)) for turn in turns)
+        if apart < _SAME_RAD:
+            return [
+                f"TURNED: the ring is mounted turned by {abs(math.degrees(turns[0])):.0f} degrees against the robot "
+                f"file: turn it, or correct the order of SENSORS or of ring.sensors"
+            ]
+    lines = [
+        f"EXCHANGED: a hand {side_of(axes[i])} is heard by sensor {answer}, and sensor {i} belongs there: exchange "
+        f"their wires, or correct the order of SENSORS or of ring.sensors"
+        for i, answer in wrong
+    ]
+    lines += [
+        f"sensor {i} DOES NOT HEAR a hand {side_of(axes[i])}: check its 5 V and its wires of trigger and echo; an "
+        f"echo of 5 V needs a divider to the board's 3.3 V"
+        for i, answer in enumerate(answered)
+        if answer is None
+    ]
+    return lines
