@@ -1,6 +1,8 @@
-"""The schemas that a mission's step can name: the one list of them.
+"""The functions of the schemas that a mission's step can name.
 
-A further schema is a file of its own, its settings in `config.mission_step.SchemaUse`, and a line here.
+A further schema is a file of its own, its settings in `config.mission_step`, a line in
+`config.schema_use.SchemaUse`, and a line here. One that an
+installed package adds needs none of these: its settings have a method `answer`.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 from behaviors.approach_object import approach_object
 from behaviors.avoid_past import avoid_past
@@ -35,11 +37,19 @@ from config.mission_step import (
     MoveToGoalUse,
     NoiseUse,
     SwirlUse,
+    Use,
 )
 from config.places import PlacesConfig, no_such_place
 
 Schema: TypeAlias = Callable[[Scene, Memory, Any], Answer]
 """A schema: what it sees, what it has kept, and its settings in the step, of the type that has its name."""
+
+
+class PluggedUse(Protocol):
+    """The settings of a schema that an installed package adds (`config.plugins.SCHEMAS`)."""
+
+    def answer(self, scene: Scene, memory: Memory) -> Answer:
+        """Return the schema's vector, and what it keeps for the next cycle; pure."""
 
 
 def ahead_in_step(scene: Scene, memory: Memory, use: MoveAheadUse) -> Answer:
@@ -191,3 +201,19 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
     }
 )
 """Every schema by its name in a step."""
+
+
+def schema_of(use: Use) -> Schema:
+    """Return the function of a schema in a step.
+
+    Parameters
+    ----------
+    use
+        The schema with its settings; one of an installed package brings its function with it.
+    """
+    shipped = SCHEMAS.get(use.name)
+    return _own_answer if shipped is None else shipped
+
+
+def _own_answer(scene: Scene, memory: Memory, use: PluggedUse) -> Answer:
+    return use.answer(scene, memory)

@@ -15,12 +15,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from io import FileIO
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
 from config.layers import Source
+from config.plugins import FILES, plugged
 
 Kind: TypeAlias = Literal["robots", "worlds", "models", "runs", "missions", "studies"]
 """Kind of a file, and the folder of the shipped files of that kind."""
@@ -83,9 +85,15 @@ class DocumentRead(NamedTuple):
 
 
 def list_shipped(kind: Kind) -> tuple[str, ...]:
-    """Return the names of the shipped files of a kind, in alphabetical order."""
-    names = (entry.name for entry in (files("config") / kind).iterdir())
-    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
+    """Return the names of the files of a kind that are shipped or that installed packages add, in order."""
+    return tuple(sorted(_shipped_files(kind)))
+
+
+def _shipped_files(kind: Kind) -> dict[str, Traversable]:
+    """Return the files of a kind by their names; a shipped one takes precedence."""
+    added = [files(entry.value) for entry in plugged(FILES.format(kind)).values()]
+    found = (entry for folder in (*added, files("config") / kind) for entry in folder.iterdir())
+    return {entry.name.removesuffix(".toml"): entry for entry in found if entry.name.endswith(".toml")}
 
 
 def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | None = None) -> Document:
@@ -303,16 +311,16 @@ def _note(read: DocumentRead) -> None:
 
 def _read_shipped(kind: Kind, name: str, named_by: Source | None) -> Document:
     """Return the shipped file of a bare name."""
-    known = list_shipped(kind)
+    known = _shipped_files(kind)
     if name in known:
-        data = (files("config") / kind / f"{name}.toml").read_bytes()
+        data = known[name].read_bytes()
         shown = f"{kind}/{name}.toml"
         _note(DocumentRead(kind, shown, None))
         return Document(parse_document(data, shown), Source(shown))
     what = "study" if kind == "studies" else kind.removesuffix("s")
     shown = f'{what} "{one_line(name)[:80]}"'
     where = shown if named_by is None else f"{named_by.name}: {shown}"
-    hint = did_you_mean(name, known) + _file_hint(name, Path() if named_by is None else named_by.base)
+    hint = did_you_mean(name, tuple(known)) + _file_hint(name, Path() if named_by is None else named_by.base)
     raise ConfigError(f"{where}: no such {what}{hint}; {_known(kind)}; a path ends in .toml or contains a slash")
 
 

@@ -19,6 +19,7 @@ from config.mission import MissionConfig
 from config.model import ModelConfig
 from config.overrides import apply_overrides, parse_override, parse_overrides
 from config.places import check_places
+from config.plugins import plugged_table
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
 from config.settings import GoalConfig, Settings
@@ -342,7 +343,7 @@ def _robot_layer(names: Layers) -> tuple[Layers, list[str]]:
     except ConfigError as error:
         return Layers(named_by), list(error.problems)
     source, table = document.source, document.table
-    stray = [key for key in table if key not in RobotConfig.model_fields]
+    stray = [key for key in table if key not in RobotConfig.model_fields and plugged_table(key) is None]
     layers = Layers(source)
     layers.lay({key: value for key, value in table.items() if key not in stray}, source)
     return layers, [f"{source.name}: {dotted((key,))}: {unknown_key((key,), RobotConfig)}" for key in stray]

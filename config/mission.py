@@ -15,22 +15,18 @@ from config.files import did_you_mean
 from config.mission_step import (
     DONE,
     FAILED,
-    HELPERS,
     NEXT,
     STEPS_MAX,
     TARGETS,
     ApproachObjectUse,
     Condition,
-    FollowWallUse,
-    MoveAheadUse,
     MoveToGoalUse,
     Name,
     ReachedCondition,
-    SchemaUse,
     SeenCondition,
     UnseenCondition,
-    WanderUse,
 )
+from config.schema_use import SchemaUse
 from config.strict import Strict, TomlList
 
 
@@ -52,7 +48,7 @@ class StepConfig(Strict):
     @property
     def arrives(self) -> bool:
         """Whether a schema of the step can arrive."""
-        return sum(map(_arrives, self.schemas)) > 0
+        return sum(use.arrives for use in self.schemas) > 0
 
     @cached_property
     def goal(self) -> MoveToGoalUse | None:
@@ -62,7 +58,7 @@ class StepConfig(Strict):
     @cached_property
     def gains(self) -> dict[str, float]:
         """The gains that the step gives the schemas which lead nowhere by themselves, by their names."""
-        return {use.name: use.gain for use in self.schemas if use.name in HELPERS}
+        return {use.name: getattr(use, "gain", 1.0) for use in self.schemas if not use.leads}
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -71,7 +67,7 @@ class StepConfig(Strict):
 
     @model_validator(mode="after")
     def _can_end(self) -> StepConfig:
-        if sum(map(_arrives, self.schemas)) > 1:
+        if sum(use.arrives for use in self.schemas) > 1:
             raise ValueError("two of the schemas can arrive, so `reached` has two meanings: make two steps of them")
         names = [use.name for use in self.schemas]
         if "turn" in names and len(names) > 1:
@@ -87,13 +83,13 @@ class StepConfig(Strict):
 
     def _check_helpers(self, names: Sequence[str]) -> None:
         """Refuse schemas that lead nowhere by themselves where they have nothing to work on, or stand twice."""
-        for name in HELPERS:
+        for name in self.gains:
             if names.count(name) > 1:
                 raise ValueError(f"the schema {name} stands twice: leave one of them out")
         if "leave_canyon" in names and self.goal is None:
             raise ValueError("leave_canyon goes round what closes the way to a goal: add move_to_goal")
         for name in {"follow_valley", "swirl"}.intersection(names):
-            if not set(names).difference(HELPERS):
+            if not any(use.leads for use in self.schemas):
                 raise ValueError(f"{name} needs a way: add a schema that leads somewhere, for example move_ahead")
 
 
@@ -143,13 +139,6 @@ class MissionConfig(Strict):
         return {
             part.object for part in parts if isinstance(part, ApproachObjectUse | SeenCondition | UnseenCondition)
         }
-
-
-def _arrives(use: SchemaUse) -> bool:
-    """Return whether a schema can arrive."""
-    if use.name in HELPERS or isinstance(use, WanderUse | FollowWallUse):
-        return False
-    return not isinstance(use, MoveAheadUse) or use.distance_m is not None
 
 
 def _name_problems(names: list[str]) -> Iterator[str]:

@@ -1,9 +1,9 @@
-"""The parts of a mission's step: the schemas that it can name, with their settings, and its conditions."""
+"""The parts of a mission's step: the settings of the schemas that it can name, and its conditions."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -50,7 +50,22 @@ Gain: TypeAlias = Annotated[
 ]
 
 
-class MoveAheadUse(Strict):
+class Use(Strict):
+    """A schema with its settings in a step: what each schema's class inherits. Its first key is `name`, a literal."""
+
+    can_arrive: ClassVar[bool] = False
+    """Whether it comes to an end by itself, so that a step may end when it is `reached`."""
+    leads: ClassVar[bool] = True
+    """Whether it leads somewhere by itself; the others only change where those lead."""
+    name: str
+
+    @property
+    def arrives(self) -> bool:
+        """Whether it comes to an end by itself with these settings."""
+        return self.can_arrive
+
+
+class MoveAheadUse(Use):
     """`move_ahead`: a vector along a direction; arrives after `distance_m`, if that is given."""
 
     name: Literal["move_ahead"]
@@ -63,10 +78,16 @@ class MoveAheadUse(Strict):
     distance_m: float | None = Field(default=None, gt=0.0, le=1000.0)
     """Distance along the direction from where the step begins, m."""
 
+    @property
+    def arrives(self) -> bool:
+        """Whether a distance is given."""
+        return self.distance_m is not None
 
-class MoveToGoalUse(Strict):
+
+class MoveToGoalUse(Use):
     """`move_to_goal`: a vector towards a place; arrives there, and turns to the final heading if one is given."""
 
+    can_arrive: ClassVar[bool] = True
     name: Literal["move_to_goal"]
     """Of the schema."""
     gain: Gain = 1.0
@@ -94,9 +115,10 @@ class MoveToGoalUse(Strict):
         return None if self.x_m is None or self.y_m is None else (self.x_m, self.y_m)
 
 
-class TurnUse(Strict):
+class TurnUse(Use):
     """`turn`: turns on the spot; arrives when the robot looks that way."""
 
+    can_arrive: ClassVar[bool] = True
     name: Literal["turn"]
     """Of the schema."""
     heading_deg: Degrees
@@ -105,7 +127,7 @@ class TurnUse(Strict):
     """What the heading counts from."""
 
 
-class WanderUse(Strict):
+class WanderUse(Use):
     """`wander`: drives in a random direction in which the way is free, then in another; does not arrive."""
 
     name: Literal["wander"]
@@ -119,7 +141,7 @@ class WanderUse(Strict):
     """Free way beyond the rim that a new direction should have, m."""
 
 
-class FollowWallUse(Strict):
+class FollowWallUse(Use):
     """`follow_wall`: drives along a wall with one side to it; does not arrive."""
 
     name: Literal["follow_wall"]
@@ -133,9 +155,10 @@ class FollowWallUse(Strict):
     """A wall farther than this from the rim is not followed: the robot drives ahead until it finds one, m."""
 
 
-class StayOnPathUse(Strict):
+class StayOnPathUse(Use):
     """`stay_on_path`: follows a chain of straight lines; arrives at its end."""
 
+    can_arrive: ClassVar[bool] = True
     name: Literal["stay_on_path"]
     """Of the schema."""
     gain: Gain = 1.0
@@ -153,9 +176,10 @@ class StayOnPathUse(Strict):
         return self
 
 
-class ApproachObjectUse(Strict):
+class ApproachObjectUse(Use):
     """`approach_object`: drives to an object, stops before it and looks at it; arrives there (docking)."""
 
+    can_arrive: ClassVar[bool] = True
     name: Literal["approach_object"]
     """Of the schema."""
     gain: Gain = 1.0
@@ -171,9 +195,10 @@ class ApproachObjectUse(Strict):
     frame: Frame = "odom"
 
 
-class SearchUse(Strict):
+class SearchUse(Use):
     """`search`: covers an area line by line or in a growing square; arrives when it has covered all of it."""
 
+    can_arrive: ClassVar[bool] = True
     name: Literal["search"]
     """Of the schema."""
     gain: Gain = 1.0
@@ -193,68 +218,51 @@ class SearchUse(Strict):
         return self
 
 
-class FollowValleyUse(Strict):
+class FollowValleyUse(Use):
     """`follow_valley`: the free valley nearest to where the step's other schemas lead (VFH+)."""
 
+    leads: ClassVar[bool] = False
     name: Literal["follow_valley"]
     """Of the schema."""
     gain: Gain = 1.0
     """With `move_to_goal`, which is driven so in any case, 0 drives straight to the goal."""
 
 
-class LeaveCanyonUse(Strict):
+class LeaveCanyonUse(Use):
     """`leave_canyon`: beside `move_to_goal`, which is driven with it in any case: its gain in this step."""
 
+    leads: ClassVar[bool] = False
     name: Literal["leave_canyon"]
     """Of the schema."""
     gain: Gain = 1.0
     """0 does not go round dead ends."""
 
 
-class AvoidPastUse(Strict):
+class AvoidPastUse(Use):
     """`avoid_past`: away from where the robot has been in this step; its distances are those of the run's table."""
 
+    leads: ClassVar[bool] = False
     name: Literal["avoid_past"]
     """Of the schema."""
     gain: Gain = 1.0
 
 
-class NoiseUse(Strict):
+class NoiseUse(Use):
     """`noise`: a random direction, kept for a while; persistence and seed are those of the run's table."""
 
+    leads: ClassVar[bool] = False
     name: Literal["noise"]
     """Of the schema."""
     gain: Gain = 1.0
 
 
-class SwirlUse(Strict):
+class SwirlUse(Use):
     """`swirl`: round obstacles, on the side of the way on which the step's other schemas lead."""
 
+    leads: ClassVar[bool] = False
     name: Literal["swirl"]
     """Of the schema."""
     gain: Gain = 1.0
-
-
-SchemaUse: TypeAlias = Annotated[
-    MoveAheadUse
-    | MoveToGoalUse
-    | TurnUse
-    | WanderUse
-    | FollowWallUse
-    | StayOnPathUse
-    | ApproachObjectUse
-    | SearchUse
-    | FollowValleyUse
-    | LeaveCanyonUse
-    | AvoidPastUse
-    | NoiseUse
-    | SwirlUse,
-    Field(discriminator="name"),
-]
-"""A schema of a step with its settings; `behaviors.schema_registry` has a function for each."""
-
-HELPERS: Final = ("follow_valley", "leave_canyon", "avoid_past", "noise", "swirl")
-"""Schemas that lead nowhere by themselves."""
 
 
 class ReachedCondition(Strict):

@@ -17,6 +17,7 @@ from pydantic_core import ErrorDetails
 
 from config.files import did_you_mean, dotted
 from config.layers import Layers, Location
+from config.plugins import SCHEMAS, plugged, plugged_table, plugged_use
 
 EXPECTED = MappingProxyType(
     {
@@ -134,6 +135,7 @@ def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> 
     source = layers.source_of(location)
     path = dotted(source.local(_written(location, model)))
     tags = [tag for member in _members(_unwrapped(_annotation_at(model, location))) for tag in _tags(member)]
+    tags += plugged(SCHEMAS) if "move_ahead" in tags else ()
     if kind == "union_tag_not_found":
         return f"{source.name}: {path}.{_tag_key(context)}: missing; must be one of {', '.join(tags)}"
     if kind == "union_tag_invalid":
@@ -229,7 +231,8 @@ def _members(annotation: object) -> list[type[BaseModel]]:
 
 def _tagged(annotation: object, tag: str | int) -> object:
     """Return the table of a union that has this value of its first key."""
-    return next((member for member in _members(annotation) if tag in _tags(member)), None)
+    found = next((member for member in _members(annotation) if tag in _tags(member)), None)
+    return plugged_use(str(tag)) if found is None else found
 
 
 def _tag_key(context: Mapping[str, object]) -> str:
@@ -265,7 +268,8 @@ def _annotation_at(model: object, location: Location) -> object:
             annotation = _tagged(annotation, key)
         else:
             field = _fields(annotation).get(key)
-            annotation = None if field is None else field.annotation
+            is_own = field is None and annotation is model and "robot" in _fields(model)
+            annotation = plugged_table(key) if is_own else None if field is None else field.annotation
     return annotation
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from config.mission import MissionConfig
 from config.model import ModelConfig
+from config.plugins import DRIVERS, SCHEMAS, PluginError, plugged, plugged_table, plugged_use
 from config.robot import RobotConfig
 from config.settings import Settings
 from config.strict import description
@@ -65,11 +67,27 @@ def settings_of(file: str) -> Iterator[Setting]:
     # A run file names these files, whose keys are listed with them.
     others = {*RobotConfig.model_fields, "models", "world", "known_room", "mission"}
     yield from _settings(file, model, "", others if model is Settings else set())
+    for table, own in _plugged_tables(file).items():
+        yield from _settings(file, own, table, set())
+
+
+def _plugged_tables(file: str) -> dict[str, type[BaseModel]]:
+    """Return what installed packages add to one kind of file, by the tables' names; a broken one adds nothing."""
+    group, find, table = (
+        (DRIVERS, plugged_table, "{}") if file == "robot" else (SCHEMAS, plugged_use, "step[].schemas[{}]")
+    )
+    tables = {}
+    for name in plugged(group) if file in {"robot", "mission"} else ():
+        with contextlib.suppress(PluginError):
+            tables[table.format(name)] = find(name)
+    return {name: found for name, found in tables.items() if found is not None}
 
 
 def table_help(file: str, table: str) -> str:
     """Return what a table is for: the first paragraph of its model's documentation."""
     model: type[BaseModel] = next(model for name, model, _ in FILES if name == file)
+    if (own := _plugged_tables(file).get(table)) is not None:
+        return " ".join((own.__doc__ or "").split("\n\n")[0].split())
     for name in table.removesuffix("[]").split(".") if table else ():
         key, _, kind = name.removesuffix("]").partition("[")
         options = list(_models(model.model_fields[key].annotation))

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Final, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    model_validator,
+)
 
 from config.families.arcos import ArcosConfig
 from config.families.rflex import RflexConfig
 from config.families.ros2 import Ros2Config
+from config.plugins import with_own_tables
 from config.strict import Strict, TomlList
 
+M = TypeVar("M", bound=BaseModel)
 SOUND_SPEED_M_S = 343.0
 """Speed of sound in dry air at 20 °C, m/s; the ring's electronics assume it."""
 
@@ -308,7 +317,12 @@ class CalibrationConfig(Strict):
 
 
 class RobotConfig(Strict):
-    """A robot file: `[robot]`, `[ring]`, `[body]`, `[link]`, `[calibration]`, and a section of the driver's own."""
+    """A robot file: `[robot]`, `[ring]`, `[body]`, `[link]`, `[calibration]`, and a section of the driver's own.
+
+    An installed driver's own section has the driver's name, and is what `own_table` returns.
+    """
+
+    model_config = ConfigDict(extra="allow")
 
     robot: DriverConfig = DriverConfig()
     ring: RingConfig
@@ -321,6 +335,25 @@ class RobotConfig(Strict):
     """Of the driver "rflex", for the B21r, ATRV-Jr and Magellan."""
     ros2: Ros2Config = Ros2Config()
     """Of the driver "ros2", for robots that run ROS 2."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_own_tables(cls, data: object, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Validate the sections of installed drivers by their own models; any other key is unknown."""
+        return with_own_tables(cls, data, handler)
+
+    def own_table(self, name: str, model: type[M]) -> M:
+        """Return the section of an installed driver; the model's defaults where the file has none.
+
+        Parameters
+        ----------
+        name
+            The driver's, which is that of the section.
+        model
+            The driver's `Config`.
+        """
+        found = (self.model_extra or {}).get(name)
+        return found if isinstance(found, model) else model()
 
     @model_validator(mode="after")
     def _can_turn(self) -> RobotConfig:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypedDict, cast
 
 from config.robot import CalibrationConfig
 from drivers.calibrated_driver import CalibratedDriver
+from drivers.capabilities import CAPABILITIES
 from drivers.driver import DriverError
 from drivers.firing_pattern import firing_pattern
 from drivers.latched_ranges import FreshDriver
@@ -83,6 +84,17 @@ GIVES_FIRINGS: Final = frozenset({"arcos", "denning", "rflex"})
 def known_drivers() -> dict[str, EntryPoint]:
     """Return all installed drivers by name; a shipped driver takes precedence over another of its name."""
     return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **SHIPPED}
+
+
+def capabilities(config: RobotConfig) -> frozenset[str]:
+    """Return what the robots of a driver can do; a family that lists nothing in `HAS` can do all.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
+    """
+    return frozenset(getattr(_family(config.robot.driver), "HAS", CAPABILITIES))
 
 
 def make_driver(config: RobotConfig) -> RobotDriver:

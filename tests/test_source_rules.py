@@ -15,6 +15,7 @@ from typing import Final
 
 import pytest
 
+from drivers.contract.plugin import PARTS
 from drivers.registry import SHIPPED
 from runtime.cli.app import COMMANDS, place_of
 
@@ -108,6 +109,7 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "drivers/firmware/board/robot_config_pico.py",
         ),
         "tests/runtime/cli/commands/test_init_files.py calls its commands": ("runtime/cli/commands/init.py",),
+        "the contract of drivers drives everything through it": ("drivers/contract/cable.py",),
         "`make ros2` runs it beside real nodes, see test_real_nodes.py": (
             "drivers/ros2/gateway.py",
             "runtime/bridges/ros2/bridge.py",
@@ -239,6 +241,7 @@ def test_every_module_is_reached_from_an_entry_point() -> None:
     library = (ROOT / "echolocate.py").read_text("utf-8")
     left = [*named_modules("echolocate.py", library), "runtime.cli.__main__", "runtime.cli.terminal.__main__"]
     left += [family.module for family in SHIPPED.values()]
+    left += ["drivers.contract.plugin", *(f"drivers.contract.{part}" for part in PARTS)]
     left += [place_of(name).partition(":")[0] for commands in COMMANDS.values() for name in commands]
     reached: set[str] = set()
     while left:

@@ -21,8 +21,9 @@ from behaviors.missions.mission import VISITED_MAX, Mission, Progress, goes_to, 
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.schema_call import Answer, Memory, Scene, Visited
-from behaviors.schema_registry import SCHEMAS
-from config.mission_step import HELPERS, Condition, SchemaUse, SeenCondition, UnseenCondition
+from behaviors.schema_registry import schema_of
+from config.mission_step import Condition, SeenCondition, UnseenCondition
+from config.schema_use import SchemaUse
 from perception.percept import Pose
 
 TURNED_RAD: Final = 0.1
@@ -84,7 +85,7 @@ def drive_mission(mission: Mission, scene: Scene) -> MissionDrive:
     if _is_waiting(mission, answers):
         return MissionDrive(mission, hold_reason=_waiting_reason(mission, answers))
     own = [answer.own_echoes for answer in answers if answer.own_echoes is not None]
-    named = [(use.name in HELPERS, answer.response) for use, answer in _named(mission, answers)]
+    named = [(not use.leads, answer.response) for use, answer in _named(mission, answers)]
     return MissionDrive(
         mission,
         tuple(response for helps, response in named if not helps),
@@ -150,12 +151,10 @@ def _answered(mission: Mission, scene: Scene) -> tuple[Mission, tuple[Answer, ..
         scene, start=progress.start or scene.percept.pose, step_s=progress.step_s, visited=progress.visited
     )
     used = list(zip(mission.step.schemas, progress.memories, strict=True))
-    leads = [SCHEMAS[use.name](scene, memory, use) for use, memory in used if use.name not in HELPERS]
+    leads = [schema_of(use)(scene, memory, use) for use, memory in used if use.leads]
     scene = replace(scene, way_rad=_way_rad(leads, scene.percept.pose))
     rest = iter(leads)
-    answers = tuple(
-        SCHEMAS[use.name](scene, memory, use) if use.name in HELPERS else next(rest) for use, memory in used
-    )
+    answers = tuple(schema_of(use)(scene, memory, use) if not use.leads else next(rest) for use, memory in used)
     visited: tuple[Visited, ...] = tuple(
         answer.visited for answer in answers if answer.visited is not None and answer.visited not in progress.visited
     )
@@ -185,7 +184,7 @@ def _watched(mission: Mission, scene: Scene, answers: tuple[Answer, ...]) -> Mis
 
 def _is_waiting(mission: Mission, answers: tuple[Answer, ...]) -> bool:
     """Return whether the schemas that lead somewhere all ask for no motion; others alone do not."""
-    leads = [answer for use, answer in _named(mission, answers) if use.name not in HELPERS]
+    leads = [answer for use, answer in _named(mission, answers) if use.leads]
     return all(answer.waits_for is not None for answer in leads) if leads else not answers
 
 

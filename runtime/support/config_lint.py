@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from config.settings import Settings
+from drivers.capabilities import missing
+from drivers.registry import capabilities
 from runtime.support.blind_sides import blind_notes
 from runtime.support.pattern_check import pattern_speed_m_s
 
@@ -46,4 +48,5 @@ def lint_settings(settings: Settings) -> list[str]:
             f"behaviors.avoid_static_obstacle.echo_age_max_s = {avoid.echo_age_max_s:g}: the robot stops until that "
             "sensor answers again; fire more sensors at a time, or let beams overlap"
         )
-    return [*warnings, *blind_notes(settings)]
+    lacks = missing(capabilities(settings)).values()
+    return [*warnings, *(f"robot.driver = {settings.robot.driver}: {text}" for text in lacks), *blind_notes(settings)]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from config.mission_step import Condition, SchemaUse, SearchUse, StayOnPathUse
+from config.mission_step import Condition, SearchUse, StayOnPathUse
+from config.schema_use import SchemaUse
 
 USES: TypeAdapter[SchemaUse] = TypeAdapter(SchemaUse)
 CONDITIONS: TypeAdapter[Condition] = TypeAdapter(Condition)

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from config.robot import BodyConfig, LinkConfig, RobotConfig
 from config.world import AcousticsConfig, DrumConfig, OdometryConfig, StartConfig, WallConfig, WorldConfig
+from drivers.contract.family import script
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.device import DenningDevice
 from drivers.denning.frames import (
@@ -16,9 +17,11 @@ from drivers.denning.frames import (
     Frame,
     Odom,
 )
-from drivers.emulator.faults import Fault, FaultScript
+from drivers.emulator.faults import Fault
 from drivers.messages import Flags
 from tests.drivers.ring import RING
+
+__all__ = ["ALL", "WORLD", "Host", "host", "next_event_s", "robot_config", "script"]
 
 F = TypeVar("F", bound=Frame)
 
@@ -98,7 +101,3 @@ def host(world: WorldConfig = WORLD, faults: Sequence[Fault] = (), seed: int = 1
     clock_start_us = more.pop("clock_start_us", 0)
     robot = DenningDevice(robot_config(baud, **more), world, seed, faults=faults, clock_start_us=clock_start_us)
     return Host(robot)
-
-
-def script(**fault: Any) -> tuple[Fault, ...]:
-    return FaultScript.model_validate({"fault": [fault]}).fault

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from drivers import registry
+from drivers.contract.family import Family
 from drivers.registry import GROUP
-from tests.drivers.contract.families import CHIRP_ENTRY, FAMILIES, Family
+from tests.drivers.contract.families import CHIRP_ENTRY, FAMILIES
 
 
 @pytest.fixture(autouse=True)

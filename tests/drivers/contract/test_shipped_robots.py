@@ -8,10 +8,15 @@ import pytest
 
 from config.files import list_shipped
 from config.load import load_robot
+from drivers.contract.measuring import fired, sets_of
 from drivers.firing_pattern import firing_pattern
 from drivers.messages import Flags
+from drivers.registry import SHIPPED
 from tests.drivers.contract.families import FAMILIES
-from tests.drivers.contract.test_measuring import fired, sets_of
+
+
+def test_every_shipped_family_is_under_contract() -> None:
+    assert SHIPPED.keys() <= {family.name for family in FAMILIES.values()}
 
 
 @pytest.mark.parametrize("name", list_shipped("robots"))

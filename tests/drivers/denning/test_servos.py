@@ -9,12 +9,13 @@ import pytest
 
 from config.load import load_robot
 from config.robot import RobotConfig
+from drivers.contract.family import ROOM
 from drivers.denning.device import DenningDevice
 from drivers.denning.frames import Ack, Echo2, Echo3, Hello, Ident, Nak, Pattern, Scan, Sweep
 from drivers.denning.wire_units import sweep_bearing, wire_pattern, wire_scan
 from drivers.driver import LineState
 from tests.drivers.cable import ROBOT, Cable
-from tests.drivers.contract.families import ROOM, SERVO1
+from tests.drivers.contract.families import SERVO1
 from tests.drivers.device_host import WORLD, Host
 
 SERVO1_FILE = load_robot("servo1")

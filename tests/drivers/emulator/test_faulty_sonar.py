@@ -11,13 +11,14 @@ import pytest
 
 from config.robot import RingConfig
 from config.world import AcousticsConfig, WorldConfig
+from drivers.contract.family import ROOM, Family
 from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import Fault
 from drivers.emulator.faulty_sonar import KINDS, FaultySonar
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Pose
-from tests.drivers.contract.families import AHEAD, ARCOS, DENNING, RFLEX, ROOM, ROS2, Family
+from tests.drivers.contract.families import ARCOS, DENNING, RFLEX, ROS2
 from tests.drivers.device_host import script
 from tests.drivers.emulator.one_sensor import wall
 from tests.promises import ROOT
@@ -142,7 +143,7 @@ def family(request: pytest.FixtureRequest) -> Family:
 
 def heard(family: Family, kind: str, **values: Any) -> Iterator[tuple[int, list[float]]]:
     """Yield each sensor with the ranges that it reports half a second into a lie, while the robot drives."""
-    ring = family.driving(AHEAD, lie(kind, at_s=BEGIN_S, duration_s=99.0, **values), world=ROOM)
+    ring = family.driving(None, lie(kind, at_s=BEGIN_S, duration_s=99.0, **values), world=ROOM)
     ring.run(BEGIN_S - ring.now_s)
     ring.run(0.5)
     ring.firings.clear()
@@ -169,7 +170,7 @@ def test_a_latched_clock_stamps_everything_alike() -> None:
     stamps = [steps.clock_us(us) for us in (900_000, 1_300_000, 1_600_000, 3_100_000)]
     assert stamps == [900_000, 1_000_000, 1_500_000, 3_100_000]
     for family in (DENNING, RFLEX, ROS2):
-        cable = family.driving(AHEAD, lie("clock_error", at_s=BEGIN_S, duration_s=99.0))
+        cable = family.driving(None, lie("clock_error", at_s=BEGIN_S, duration_s=99.0))
         cable.run(BEGIN_S - cable.now_s + 0.1)
         cable.odometry.clear()
         cable.run(0.3)
@@ -178,7 +179,7 @@ def test_a_latched_clock_stamps_everything_alike() -> None:
 
 @pytest.mark.parametrize("factor", [0.0, -1.0])
 def test_the_odometry_counts_by_a_factor(family: Family, factor: float) -> None:
-    cable = family.driving(AHEAD, lie("odometry_error", at_s=BEGIN_S, duration_s=9.0, factor=factor))
+    cable = family.driving(None, lie("odometry_error", at_s=BEGIN_S, duration_s=9.0, factor=factor))
     cable.run(BEGIN_S - cable.now_s + 0.2)
     reported, true = cable.odometry[-1].pose.x, cable.robot.truth.pose.x
     cable.run(1.0)
@@ -189,7 +190,7 @@ def test_the_odometry_counts_by_a_factor(family: Family, factor: float) -> None:
 
 def test_a_drum_appears_ahead_and_stops_the_body(family: Family) -> None:
     drum = lie("sudden_object", at_s=BEGIN_S, duration_s=2.0, distance_m=0.2, radius_m=0.1)
-    cable = family.driving(AHEAD, drum)
+    cable = family.driving(None, drum)
     cable.run(BEGIN_S - cable.now_s - 0.01)
     here, contacts = cable.robot.truth.pose.x, cable.robot.truth.contacts
     assert (contacts, cable.robot.truth.contact_m_s) == (0, 0.0)

@@ -15,16 +15,13 @@ from typing import cast
 import pytest
 
 from config.world import WorldConfig
+from drivers.contract import connecting, failing, measuring, motion
+from drivers.contract.family import ROOM, Family, ring_with
 from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
 from drivers.messages import Flags
 from drivers.registry import make_driver
 from tests.drivers.cable import Cable
-from tests.drivers.contract import test_connecting as connecting
-from tests.drivers.contract import test_failing as failing
-from tests.drivers.contract import test_measuring as measuring
-from tests.drivers.contract import test_motion as motion
-from tests.drivers.contract.families import ROOM, Family, ring_with
 from tests.drivers.firmware.board import install
 from tests.drivers.firmware.device import FirmwareDevice
 
@@ -32,7 +29,7 @@ Clause = Callable[[Family], None]
 pytestmark = pytest.mark.compiled
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareFamily(Family):
     """The family whose robots run the firmware, each in its own folder."""
 

@@ -7,6 +7,7 @@ import pytest
 from config.load import load_robot
 from config.robot import RobotConfig
 from config.world import WorldConfig
+from drivers.contract.family import ROOM
 from drivers.messages import Flags, Twist
 from drivers.rflex.codec import (
     BRAKE_RELEASE,
@@ -25,7 +26,6 @@ from drivers.rflex.codec import (
     sonar_run,
 )
 from drivers.rflex.device import RflexDevice
-from tests.drivers.contract.families import ROOM
 
 B21R = load_robot("b21r")
 

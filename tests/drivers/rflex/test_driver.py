@@ -6,6 +6,7 @@ import itertools
 from dataclasses import replace
 
 from config.load import load_robot
+from drivers.contract.family import PLAIN
 from drivers.driver import LineState
 from drivers.messages import Flags, Twist
 from drivers.registry import make_driver
@@ -20,7 +21,7 @@ from drivers.rflex.codec import (
     report_request,
     sonar_run,
 )
-from tests.drivers.contract.families import PLAIN, RFLEX
+from tests.drivers.contract.families import RFLEX
 from tests.drivers.device_host import script
 
 

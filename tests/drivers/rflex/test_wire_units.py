@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from config.load import load_robot
+from drivers.contract.family import ring_with
 from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError
 from drivers.messages import Twist
@@ -17,7 +18,6 @@ from drivers.rflex.wire_units import (
     stop_commands,
     without_escape,
 )
-from tests.drivers.contract.families import ring_with
 
 B21R = load_robot("b21r")
 

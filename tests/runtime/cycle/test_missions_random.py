@@ -15,7 +15,7 @@ from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.load import load_settings
 from config.mission import MissionConfig
-from config.mission_step import HELPERS
+from config.schema_use import HELPERS
 from drivers.driver import LineState
 from drivers.messages import Flags, Pose, Twist
 from perception.detected_object import DetectedObject

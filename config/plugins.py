@@ -1,0 +1,125 @@
+"""What installed packages add by their entry points: drivers, schemas, and files of settings (docs/extending.md).
+
+Nothing of a package is imported before a file names it. Names that are shipped take precedence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from importlib.metadata import EntryPoint, entry_points
+from typing import Final, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import InitErrorDetails
+
+from config.errors import WRONG_CALL, UserError
+
+M = TypeVar("M", bound=BaseModel)
+DRIVERS: Final = "echolocate.drivers"
+"""Each names a module with the functions of `drivers.registry.DriverFamily`; its class `Config` is the driver's own
+table in a robot file."""
+SCHEMAS: Final = "echolocate.schemas"
+"""Each names a subclass of `config.mission_step.Use` that has a method `answer`."""
+FILES: Final = "echolocate.{}"
+"""With the kind of the files, as `echolocate.models`: each names a package whose folder holds such TOML files."""
+
+
+class PluginError(UserError):
+    """An installed package does not provide what its entry point says."""
+
+    exit_code = WRONG_CALL
+
+
+def plugged(group: str) -> dict[str, EntryPoint]:
+    """Return the installed entry points of a group by name."""
+    return {entry.name: entry for entry in entry_points(group=group)}
+
+
+def load_plugin(entry: EntryPoint) -> object:
+    """Return what an entry point names.
+
+    Raises
+    ------
+    PluginError
+        It cannot be imported.
+    """
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as error:
+        raise PluginError(
+            f'the plug-in "{entry.name}" cannot be loaded from {entry.value} ({error}); reinstall or update the '
+            f"package that provides it"
+        ) from error
+
+
+def plugged_table(name: str) -> type[BaseModel] | None:
+    """Return the model of an installed driver's own table in a robot file; None if there is none of this name."""
+    entry = plugged(DRIVERS).get(name)
+    model = None if entry is None else getattr(load_plugin(entry), "Config", None)
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+
+
+def plugged_use(name: str) -> type[BaseModel] | None:
+    """Return an installed schema of this name with its settings, None if there is none.
+
+    Raises
+    ------
+    PluginError
+        It is no schema.
+    """
+    entry = plugged(SCHEMAS).get(name)
+    if entry is None:
+        return None
+    use = load_plugin(entry)
+    if isinstance(use, type) and issubclass(use, BaseModel) and callable(getattr(use, "answer", None)):
+        return use
+    raise PluginError(
+        f'the schema "{name}" of {entry.value} is none: it needs a subclass of config.mission_step.Use with a method '
+        f"answer; correct or update the package that provides it"
+    )
+
+
+def located(error: ValidationError, *at: str | int) -> Iterable[InitErrorDetails]:
+    """Yield the problems of a table that was validated by itself, each at its place in the table that holds it."""
+    for found in error.errors(include_url=False):
+        details = InitErrorDetails(type=found["type"], loc=(*at, *found["loc"]), input=found["input"])
+        yield InitErrorDetails(**details, ctx=found["ctx"]) if "ctx" in found else details
+
+
+def with_own_tables(model: type[M], data: object, validate: Callable[[object], M]) -> M:
+    """Return a robot file whose further tables are validated by the installed drivers of these names.
+
+    Parameters
+    ----------
+    model
+        The robot file's.
+    data
+        The file's content.
+    validate
+        Validates the model's own fields.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        A field or a table is wrong, or no driver has a table of this name.
+    """
+    own = {key: data[key] for key in data if key not in model.model_fields} if isinstance(data, dict) else {}
+    if not isinstance(data, dict) or not own:
+        return validate(data)
+    problems, tables, config = list[InitErrorDetails](), dict[str, BaseModel](), None
+    try:
+        config = validate({key: value for key, value in data.items() if key not in own})
+    except ValidationError as error:
+        problems += located(error)
+    for key, value in own.items():
+        table = plugged_table(key)
+        if table is None:
+            problems.append(InitErrorDetails(type="extra_forbidden", loc=(key,), input=value))
+            continue
+        try:
+            tables[key] = table.model_validate(value)
+        except ValidationError as error:
+            problems += located(error, key)
+    if problems or config is None:
+        raise ValidationError.from_exception_data(model.__name__, problems)
+    return config.model_copy(update=tables)

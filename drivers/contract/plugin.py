@@ -1,0 +1,74 @@
+"""The contract of drivers as a plug-in of pytest: `pytest --echolocate-family skippy`, wherever it is installed.
+
+The name is that of a robot, or its file, or `module:FAMILY`, a `drivers.contract.family.Family`. What the robot
+cannot do is skipped, and named with what follows from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+if TYPE_CHECKING:
+    from drivers.contract.family import Family
+
+PARTS: Final = ("connecting", "motion", "measuring", "failing")
+OPTION: Final = "--echolocate-family"
+MARKERS: Final = (
+    "needs(capability): a promise of robots that have it (drivers.capabilities)",
+    "promise(id, …): verifies the promises with these IDs",
+    "compiled: takes long without compiled kernels",
+    "soak: the long form of another test",
+)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option."""
+    text = "run the contract of drivers on a robot: its name, its file, or module:FAMILY"
+    parser.getgroup("echolocate").addoption(OPTION, metavar="NAME", default=None, help=text)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Collect the contract, and nothing else, where the option is given."""
+    for marker in MARKERS:
+        config.addinivalue_line("markers", marker)
+    if config.getoption(OPTION) is not None:
+        pytest.register_assert_rewrite("drivers.contract.cable")
+        config.args = [str(Path(__file__).with_name(f"{part}.py")) for part in PARTS]
+        config.option.reportchars += "s"
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the long forms, unless markers are asked for."""
+    if config.getoption(OPTION) is not None and not config.option.markexpr:
+        items[:] = [item for item in items if item.get_closest_marker("soak") is None]
+
+
+@pytest.fixture
+def family(request: pytest.FixtureRequest) -> Family:
+    """Return the robot that the option names."""
+    from drivers.contract.family import find_family
+
+    name = request.config.getoption(OPTION)
+    if name is None:
+        pytest.skip(f"no robot: give one with {OPTION}")
+    return find_family(name)
+
+
+@pytest.fixture
+def measured() -> Callable[[str], None]:
+    """Return what takes a measurement; the page of promises, which has them, is this repository's."""
+    return lambda _text: None
+
+
+@pytest.fixture(autouse=True)
+def _needs(request: pytest.FixtureRequest) -> None:
+    """Skip what the robot cannot do."""
+    needs = [mark.args[0] for mark in request.node.iter_markers("needs")]
+    if needs and "family" in request.fixturenames:
+        lacks = request.getfixturevalue("family").lacks
+        if found := [lacks[name] for name in needs if name in lacks]:
+            pytest.skip("; ".join(found))

@@ -1,0 +1,104 @@
+"""What an installed package adds is known by its name, checked by its own model, and named where it is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from config.files import ConfigError, list_shipped
+from config.load import load_any, load_model, load_robot, load_settings, override_settings
+from config.plugins import DRIVERS, PluginError, plugged_use
+from config.reference import markdown, settings_of
+from config.settings import Settings
+from tests.installed import install
+
+FAMILY = '''
+"""A family."""
+from pydantic import Field
+from config.strict import Strict
+
+class Config(Strict):
+    """Of the driver "skippy"."""
+    trim: float = Field(default=1.0, gt=0.0, le=2.0)
+    """Counts of the left wheel over those of the right one."""
+'''
+CRATE = 'name = "tub"\nclosed = true\nvertices_m = [[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]\n'
+ROBOT = """
+[robot]
+driver = "skippy"
+[ring]
+count = 6
+radius_m = 0.1
+beam_half_angle_deg = 15.0
+resolution_m = 0.01
+range_min_m = 0.05
+range_max_m = 3.0
+firing = "single"
+[body]
+radius_m = 0.12
+speed_max_m_s = 0.25
+turn_max_rad_s = 1.0
+"""
+
+
+@pytest.fixture(autouse=True)
+def _package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    files = {
+        "plug_family.py": FAMILY, "plug_broken.py": "import plug_missing\n", "plug_data/__init__.py": "",
+        "plug_data/models/tub.toml": CRATE, "plug_data/robots/skippy.toml": ROBOT + "[skippy]\ntrim = 1.1\n",
+        "plug_data/models/drum.toml": CRATE,
+    }  # fmt: skip
+    install(monkeypatch, tmp_path / "site", files, {
+        DRIVERS: {"skippy": "plug_family", "broken": "plug_broken"},
+        "echolocate.schemas": {"none": "plug_family"},
+        "echolocate.models": {"mine": "plug_data.models"}, "echolocate.robots": {"mine": "plug_data.robots"},
+    })  # fmt: skip
+
+
+def test_files_are_known_by_name_and_a_shipped_one_comes_first() -> None:
+    assert {"tub", "drum"} <= set(list_shipped("models"))
+    assert load_model("tub").name == "tub"
+    assert load_model("drum").name == "drum"
+    assert "skippy" in list_shipped("robots")
+
+
+def test_a_drivers_own_table_is_validated_by_its_own_model_and_goes_with_the_settings(tmp_path: Path) -> None:
+    robot = load_robot("skippy")
+    assert robot.model_dump()["skippy"] == {"trim": 1.1}
+    settings = load_settings(None, ["skippy.trim=1.2"], robot="skippy")
+    assert settings.model_dump(mode="json")["skippy"] == {"trim": 1.2}
+    assert Settings.model_validate(settings.model_dump()) == settings
+    assert override_settings(settings, "x", ["skippy.trim=1.3"]).model_dump()["skippy"] == {"trim": 1.3}
+    plain = tmp_path / "plain.toml"
+    plain.write_text(ROBOT)
+    assert "skippy" not in load_robot(plain).model_dump()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[skippy]\ntrim = 3.0\n", "skippy.trim = 3.0: must be at most 2"),
+        ("[skippy]\ntrimm = 1.0\n", "skippy.trimm: unknown key; did you mean trim?"),
+        ("[skipy]\ntrim = 1.0\n", "skipy: unknown key"),
+        ("[broken]\ntrim = 1.0\n", 'the plug-in "broken" cannot be loaded'),
+    ],
+)
+def test_what_is_wrong_in_it_is_named_with_its_place(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(ROBOT + text)
+    for load in (load_robot, load_any):
+        with pytest.raises((ConfigError, PluginError)) as caught:
+            load(path)
+        assert said in str(caught.value)
+
+
+def test_the_reference_lists_it() -> None:
+    (found,) = (one for one in settings_of("robot") if one.table == "skippy")
+    assert (found.key, found.default, found.bounds) == ("trim", "1.0", "> 0, ≤ 2")
+    assert 'Of the driver "skippy"' in markdown().replace("broken", "")
+
+
+def test_what_is_no_schema_is_refused() -> None:
+    with pytest.raises(PluginError, match="needs a subclass"):
+        plugged_use("none")

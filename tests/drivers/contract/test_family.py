@@ -1,0 +1,28 @@
+"""A family of a robot that its file alone describes: its times and speeds follow from the file."""
+
+from __future__ import annotations
+
+import pytest
+
+from config.load import load_robot
+from drivers.base_model import stop_s
+from drivers.contract.family import family_of, find_family
+from drivers.messages import Twist
+from tests.drivers.contract.families import CHIRP
+
+
+def test_a_slower_robot_drives_slower_and_may_take_as_much_longer() -> None:
+    quick = load_robot("denning")
+    body = quick.body.model_copy(update={"speed_max_m_s": 0.25, "acceleration_max_m_s2": 0.1})
+    slow = family_of(quick.model_copy(update={"body": body}))
+    assert family_of(quick).at(0.3, 0.4) == Twist(0.3, 0.4)
+    assert slow.at(0.3, 0.4) == Twist(0.15, 0.2)
+    assert slow.halt_s >= stop_s(slow.ahead, body)
+    assert family_of(quick, halt_s=0.1).halt_s == 0.1
+
+
+def test_it_is_found_by_a_robots_name_or_in_a_module() -> None:
+    assert find_family("p3dx").robot == load_robot("p3dx")
+    assert find_family("tests.drivers.contract.families:CHIRP") is CHIRP
+    with pytest.raises(TypeError, match="expected a"):
+        find_family("tests.drivers.contract.families:CHIRP_RING")

@@ -1,0 +1,28 @@
+"""A package as if it were installed: its modules and its entry points in a folder on the path."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+
+def install(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, files: Mapping[str, str], entries: Mapping[str, Mapping[str, str]]
+) -> None:
+    """Write a package's files and entry points, by their groups, and make them known to this process."""
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    roots = {name.partition("/")[0].removesuffix(".py") for name in files}
+    for module in [name for name in sys.modules if name.partition(".")[0] in roots]:
+        monkeypatch.delitem(sys.modules, module)
+    (folder / "plug-1.0.dist-info").mkdir()
+    (folder / "plug-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: plug\nVersion: 1.0\n")
+    groups = (f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in names.items()) for group, names in entries.items())
+    (folder / "plug-1.0.dist-info" / "entry_points.txt").write_text("".join(groups))
+    monkeypatch.syspath_prepend(str(folder))
+    importlib.invalidate_caches()
