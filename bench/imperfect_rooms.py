@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
@@ -12,14 +13,17 @@ from bench.trials.imperfect_trials import figures, try_room
 from config.load import load_settings
 from config.settings import Settings
 from config.units import FOOT_M
-from config.world import AcousticsConfig
+from config.world import AcousticsConfig, DrumConfig, PolygonConfig, WorldConfig
 from runtime.simulation.open_loop import HallOutcome, run_hall
 from runtime.simulation.scenes import Hall, halls
 
 ROBOTS: Final = ("denning", "p3dx")
+RASTER_M: Final = 0.02
+"""Cell of AMRISim's raster."""
 HALL_ACOUSTICS: Final = {
     "ray": AcousticsConfig(model="rays", rays=1),
     "3 rays": AcousticsConfig(model="rays", rays=3),
+    "ray, raster": AcousticsConfig(model="rays", rays=1),
     "10 rays": AcousticsConfig(model="rays", rays=10),
     "cone": AcousticsConfig(model="cone"),
 }
@@ -76,14 +80,35 @@ def measure_halls(seeds: Iterable[int], report: Callable[[str], None]) -> dict[s
         settings = load_settings("hallway", ["perception.method=bayes"], robot=robot)
         for name, acoustics in HALL_ACOUSTICS.items():
             outcomes: list[HallOutcome] = []
-            world = hall.world.model_copy(
-                update={"acoustics": acoustics}
-            )  # fmt: skip
+            world = hall.world.model_copy(update={"acoustics": acoustics})
+            heard = rastered(world) if name.endswith("raster") else world
             for seed in seeds:
                 report(f"paper's hall: {robot}, {name}, seed {seed}")
-                outcomes.append(run_hall(settings, Hall(hall.name, world), seed))
+                outcomes.append(run_hall(settings, Hall(hall.name, world), seed, Hall(hall.name, heard)))
             rows[f"{robot}, {name}"] = _hall_figures(outcomes)
     return rows
+
+
+def rastered(world: WorldConfig, cell_m: float = RASTER_M) -> WorldConfig:
+    """Return a world whose drums are made of the cells of a raster, as AMRISim and Stage have them."""
+    outlines = tuple(_cells_of(drum, cell_m) for drum in world.drum)
+    return world.model_copy(update={"drum": (), "polygon": (*world.polygon, *outlines)})
+
+
+def _cells_of(drum: DrumConfig, cell_m: float) -> PolygonConfig:
+    """Return the outline of the cells in whose column or row a drum has its middle, counter-clockwise."""
+    below, above = list[tuple[float, float]](), list[tuple[float, float]]()
+    for column in range(
+        math.floor((drum.x_m - drum.radius_m) / cell_m), math.ceil((drum.x_m + drum.radius_m) / cell_m)
+    ):
+        off = (column + 0.5) * cell_m - drum.x_m
+        if abs(off) < drum.radius_m:
+            half = math.sqrt(drum.radius_m**2 - off**2)
+            low, high = math.floor((drum.y_m - half) / cell_m), math.ceil((drum.y_m + half) / cell_m)
+            for edge in (column, column + 1):
+                below.append((edge * cell_m, low * cell_m))
+                above.append((edge * cell_m, high * cell_m))
+    return PolygonConfig(vertices_m=tuple(dict.fromkeys([*below, *reversed(above)])))
 
 
 def _hall_figures(outcomes: Sequence[HallOutcome]) -> dict[str, float]:

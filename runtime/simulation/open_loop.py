@@ -72,7 +72,7 @@ def perceive(perception: Perception, firing: Firing) -> tuple[DetectedObject, ..
     return perception.objects()
 
 
-def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
+def run_hall(settings: Settings, hall: Hall, seed: int, heard_in: Hall | None = None) -> HallOutcome:
     """Drive through a hall once and return how the recognised objects compare with the truth.
 
     Parameters
@@ -83,10 +83,12 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
         The world and the path.
     seed : int
         Of the noise.
+    heard_in : Hall, optional
+        The hall as it sounds, if it is another one than what recognition is compared with.
     """
     perception = Perception(settings.ring, settings.models, settings.perception)
     seen: tuple[DetectedObject, ...] = ()
-    heard = list(readings(settings.ring, hall, seed))
+    heard = list(readings(settings.ring, heard_in or hall, seed))
     cycle_stats = CycleStats(late_after_s=math.inf)
     fix_tracker = FirstFixTracker(() if hall.path else hall.world.drum)
     for firing in heard:
