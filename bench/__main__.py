@@ -14,7 +14,7 @@ from bench.batch_commands import replay, scheduler, sweep, tune
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
-from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, stand_bound
+from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, servo, stand_bound
 from bench.estimator import Peer
 from bench.figures import PAGE, renew
 from bench.lie_commands import lies
@@ -292,6 +292,7 @@ app.command(sweep)
 app.command(scheduler)
 app.command(replay)
 app.command(one_stand)
+app.command(servo)
 app.command(stand_bound)
 app.command(naming_bound)
 app.command(ear_cost)

@@ -7,6 +7,7 @@ from rich.console import Console
 from bench.table import report, rows_table, wide
 from config.load import load_robot
 from runtime.simulation.scene_names import SceneName
+from runtime.support.kernel_cache import use_kernel_cache
 
 
 def cross_paths(*, json: str = "cross_paths.json", rooms: int = 30, first: int = 0) -> int:
@@ -150,3 +151,29 @@ def ear_cost(
             status.update(what)
             rows |= costs(what, range(first, first + max(1, seeds)))
     return report(json, rows, rows_table("a firing of eight sensors", rows))
+
+
+def servo(*, json: str = "servo.json", stands: int = 20, halls: int = 1, first: int = 0) -> int:
+    """Measure what one sensor on a servo finds: drums and walls at a stand, and drums in a drive at .15 m/s.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    stands
+        Stands among two drums and two walls, by each robot and model of the reflection.
+    halls
+        Seeds of ten halls with moved drums each, to drive through.
+    first
+        The first seed.
+    """
+    from bench.servo import measure_drives, measure_stands
+
+    use_kernel_cache()
+    with Console(stderr=True).status("bench") as status:
+        rows = measure_stands(range(first, first + max(1, stands)), status.update)
+        report(json, rows, rows_table("one stand of a sensor on a servo, and of the Denning", rows))
+        if halls > 0:
+            drives = measure_drives(range(first, first + halls), status.update)
+            return report(json, {**rows, **drives}, rows_table("drives at .15 m/s", drives))
+    return 0

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
+from perception.constant_depth import constant_depths
 from perception.echo_kind import EchoKind, echo_kind
 from perception.kernel import Floats
 from perception.sensor_mounts import mounts_array, mounts_at
@@ -101,6 +102,8 @@ def _is_still(one: Firing, other: Firing) -> bool:
 def surfaces_of_stand(ring: RingConfig, firings: Sequence[Firing]) -> tuple[StandSurface, ...]:
     """Return the surfaces that were heard over at least three different paths from one place, the nearest first.
 
+    Those of a ring with servos are its regions of constant depth.
+
     Parameters
     ----------
     ring : RingConfig
@@ -110,6 +113,9 @@ def surfaces_of_stand(ring: RingConfig, firings: Sequence[Firing]) -> tuple[Stan
     """
     if not firings:
         return ()
+    if ring.has_servo:
+        surfaces = (StandSurface(*one) for one in constant_depths(ring, firings))
+        return tuple(sorted(surfaces, key=lambda one: one.echo.range_m))
     mounts = mounts_at(firings[-1], mounts_array(ring.mounts), ring.turning)
     readings, noise_m = _steady(_heard(firings))
     left, found = np.ones(len(readings), dtype=np.bool_), list[StandSurface]()
