@@ -27,7 +27,7 @@ from runtime.recording.conventions.headings import (
 from runtime.recording.conventions.not_fired import find_not_fired, option_of, without_not_fired
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.repeats import find_repeats
-from runtime.recording.conventions.sensor_order import Shift, find_shift, mirrored_columns
+from runtime.recording.conventions.sensor_order import Shift, find_exchange, find_shift, mirrored_columns
 from runtime.recording.conventions.silence import Silence, check_near, find_silence
 from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
 from runtime.recording.conventions.units import Units, check_scale, find_units, way_ratios
@@ -243,6 +243,13 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
         shift = find_shift(table, robot, forward, reach, LENGTHS[units.length] / reach, echoes.values())
     if shift.surely > SURE:
         raise RingLogError(f"later echoes fall on earlier ones only if {shift.words(robot.ring)}")
+    if motion.is_related and options.sensor_order == "auto":
+        reach = LENGTHS[units.range_]
+        others = [default, *near]
+        way = max(forward, key=lambda one: float(echoes[one].mean()) if one in echoes else -math.inf)
+        exchange = find_exchange(table, robot, way, reach, LENGTHS[units.length] / reach, others)
+        if exchange is not None and exchange.surely > 0.5 * SURE:
+            raise RingLogError(f"later echoes fall on earlier ones only if {exchange.words(robot.ring, others)}")
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
         doubts = [one for one in left if sureness(echoes[one], echoes[default]) > 0.5 * SURE]

@@ -199,18 +199,37 @@ def echo_scores(
     reach = mounts_per_unit * table.ranges[rows, sensors]
     scores = {}
     for one in choices:
-        yaw = one.yaw(table.pose[rows, 3])
-        scale = mounts_per_unit * length_per_range
-        x, y = scale * table.pose[rows, 0], scale * HEADINGS[one.heading].hand * table.pose[rows, 1]
-        c, s, bearing = np.cos(yaw), np.sin(yaw), yaw + mounts[:, 2]
-        px = x + c * mounts[:, 0] - s * mounts[:, 1] + reach * np.cos(bearing)
-        py = y + s * mounts[:, 0] + c * mounts[:, 1] + reach * np.sin(bearing)
+        px, py = echo_places(table.pose[rows], one, mounts, reach, mounts_per_unit * length_per_range)
         squared = (px[:, None] - px) ** 2 + (py[:, None] - py) ** 2
         near = np.tril((1.0 + squared / kernel_m**2) ** -1.5, -1)
         density = near.sum(axis=1)[1:] / np.arange(1, len(px))
         tail = np.log(density + 1e-3)[len(px) // 10 :]
         scores[one] = np.array([block.mean() for block in np.array_split(tail, BLOCKS)])
     return scores
+
+
+def echo_places(poses: Floats, one: Angles, mounts: Floats, reach: Floats, scale: float) -> tuple[Floats, Floats]:
+    """Return x and y of echoes on the axes of their sensors, m.
+
+    Parameters
+    ----------
+    poses : (echoes, 4) float
+        In the file's units.
+    one : Angles
+        How headings are counted.
+    mounts : (echoes, 3) float
+        Of the sensors; axes before may broadcast.
+    reach : (echoes,) float
+        Ranges, m.
+    scale : float
+        The unit of positions, m.
+    """
+    yaw = one.yaw(poses[:, 3])
+    x, y = scale * poses[:, 0], scale * HEADINGS[one.heading].hand * poses[:, 1]
+    c, s, bearing = np.cos(yaw), np.sin(yaw), yaw + mounts[..., 2]
+    px = x + c * mounts[..., 0] - s * mounts[..., 1] + reach * np.cos(bearing)
+    py = y + s * mounts[..., 0] + c * mounts[..., 1] + reach * np.sin(bearing)
+    return px, py
 
 
 def sureness(better: Floats, worse: Floats) -> float:

@@ -1,7 +1,9 @@
-"""The order of a ring log's columns: as in the robot file, mirrored, or counted from another sensor."""
+"""The order of a ring log's columns: as in the robot file, mirrored, counted from another sensor, or exchanged."""
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
@@ -10,7 +12,14 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig, RobotConfig
 from drivers.messages import Floats
-from runtime.recording.conventions.headings import Angles, echo_scores, sureness
+from runtime.recording.conventions.headings import (
+    KERNEL_M,
+    Angles,
+    echo_places,
+    echo_scores,
+    mirror_image,
+    sureness,
+)
 from runtime.recording.conventions.table import HEADINGS, Table
 from runtime.recording.ring_log import RingLogError
 
@@ -18,6 +27,17 @@ MIRROR_M: Final = 0.02
 """How far a sensor's mirror image may lie from the sensor that takes its column, m and rad."""
 FEW_ECHOES, LIKELY = 400, 3
 """Echoes by which the likeliest of all orders are found, and how many of these are then compared by all echoes."""
+
+EACH: Final = 100
+"""Echoes of a column by which it is tried on every sensor."""
+TRIED: Final = 3.5
+"""Standard errors by which an exchange of two columns must gain before the other half of the echoes is asked."""
+PLACED: Final = 800
+"""Echoes that these are compared with."""
+PARTS: Final = 12
+"""Parts of the time in which an exchange is judged."""
+ROUNDS: Final = 3
+"""How often columns are tried: each time against the echoes as the last order places them."""
 
 
 def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
@@ -96,3 +116,144 @@ def find_shift(
         return Shift(way, 0, 0.0)
     found = likely[way, shift]
     return Shift(way, shift, min(sureness(found, other) for other in (scores(way, 0), *others)))
+
+
+class Exchange(NamedTuple):
+    """Columns that belong to one another's sensors."""
+
+    angles: Angles
+    sensors: NDArray[np.int64]
+    """Of each column."""
+    surely: float
+    """By how many standard errors the echoes agree better than in the file's order."""
+
+    def words(self, ring: RingConfig, others: Sequence[Angles]) -> str:
+        """Return what it means, and what to do.
+
+        Parameters
+        ----------
+        ring : RingConfig
+            The robot's.
+        others : sequence of Angles
+            How headings may be counted. The mirror image of an order says the same with that of the headings; the one
+            that moves fewer columns is named, or both.
+        """
+        readings, image = [self], mirror_image(self.angles)
+        if image in others:
+            with contextlib.suppress(RingLogError):  # a ring without a mirror image
+                readings.append(Exchange(image, mirrored_columns(ring)[self.sensors], self.surely))
+        fewest = min(len(one.moved) for one in readings)
+        readings = [one for one in readings if len(one.moved) == fewest]
+        readings.sort(key=lambda one: HEADINGS[one.angles.heading].hand, reverse=True)
+        named = []
+        for one in readings:
+            columns = ", ".join(f"r{column:02d} is sensor {one.sensors[column]}" for column in one.moved)
+            named.append(f"{columns} of the robot file, and {one.angles.words}")
+        return (
+            f"columns are exchanged: {'; or '.join(named)} (put them in order, or write the sensors into the robot "
+            "file in the log's order; or say --sensor-order file if they are right)"
+        )
+
+    @property
+    def moved(self) -> list[int]:
+        """The columns that are not those of their sensors."""
+        columns: list[int] = np.flatnonzero(self.sensors != np.arange(len(self.sensors))).tolist()
+        return columns
+
+
+def find_exchange(
+    table: Table,
+    robot: RobotConfig,
+    way: Angles,
+    range_m: float,
+    length_per_range: float,
+    others: Sequence[Angles],
+) -> Exchange | None:
+    """Return the exchanged columns by which the echoes agree best; None if no exchange makes them agree better.
+
+    An order is sought by half of the echoes and judged by the others, so that one that only chance favours fails.
+
+    Parameters
+    ----------
+    table : Table
+        Of a robot that moved, in the file's units, without silence and repeats.
+    robot : RobotConfig
+        Its ring.
+    way : Angles
+        How headings are counted; where that leaves a mirror image open, either.
+    range_m, length_per_range : float
+        The unit of the ranges, m, and that of positions over it.
+    others : sequence of Angles
+        How headings may be counted in the file's order.
+    """
+    is_first = np.random.default_rng(0).random(table.ranges.shape) < 0.5
+    first, second = (table._replace(ranges=np.where(kept, table.ranges, np.nan)) for kept in (is_first, ~is_first))
+    own = np.arange(table.ranges.shape[1])
+    orders = [own]
+    for _ in range(ROUNDS):
+        fits = _fits(first, robot, way, (range_m, range_m * length_per_range), orders[-1])
+        tried = _exchanged(fits, orders[-1])
+        if not tried:
+            break
+        orders += tried
+    if len(orders) == 1:
+        return None
+    kept = echo_scores(second, robot, list(others), range_m, length_per_range).values()
+    exchanges = []
+    for order in (orders[1], orders[-1]):
+        ordered = second._replace(ranges=second.ranges[:, np.argsort(order)])
+        scores = echo_scores(ordered, robot, [way], range_m, length_per_range)[way]
+        exchanges.append(Exchange(way, order, min(sureness(scores, other) for other in kept)))
+    return max(exchanges, key=lambda one: one.surely)
+
+
+def _fits(
+    table: Table, robot: RobotConfig, way: Angles, units: tuple[float, float], order: NDArray[np.int64]
+) -> list[Floats]:
+    """Return for each column how well the other columns' echoes explain each of its own, (sensors, echoes).
+
+    Parameters
+    ----------
+    table, robot, way
+        As of `find_exchange`.
+    units
+        Of ranges and of positions, m.
+    order
+        The sensor of each column, for the others' echoes.
+    """
+    mounts, (range_m, length_m) = np.array(robot.ring.mounts), units
+    rng = np.random.default_rng(0)
+    rows, columns = np.nonzero(np.isfinite(table.ranges))
+    some = rng.permutation(len(rows))[:PLACED]
+    reach = range_m * table.ranges[rows[some], columns[some]]
+    x, y = echo_places(table.pose[rows[some]], way, mounts[order[columns[some]]], reach, length_m)
+    fits = []
+    for column in range(len(mounts)):
+        own, others = rows[columns == column], columns[some] != column
+        own = np.sort(rng.permutation(own)[:EACH])
+        reach = range_m * table.ranges[own, column]
+        px, py = echo_places(table.pose[own], way, mounts[:, None], reach, length_m)
+        squared = (px[..., None] - x[others]) ** 2 + (py[..., None] - y[others]) ** 2
+        spread = 1.0 + squared / KERNEL_M**2
+        density = (1.0 / (spread * np.sqrt(spread))).sum(axis=-1) / max(1, int(others.sum()))
+        fits.append(np.log(density + 1e-3))
+    return fits
+
+
+def _exchanged(fits: list[Floats], order: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return the orders after one exchange of two columns that both gain by it, after two, …; greatest gain first."""
+    orders = [order]
+    while True:
+        order, best, gain = orders[-1], None, 0.0
+        for i, j in itertools.combinations(range(len(order)), 2):
+            gains = (fits[i][order[j]] - fits[i][order[i]], fits[j][order[i]] - fits[j][order[j]])
+            total = sum(float(each.sum()) for each in gains)
+            if total > gain and all(len(each) >= PARTS and each.mean() > 0.0 for each in gains):
+                parts = zip(*(np.array_split(each, PARTS) for each in gains), strict=True)
+                sums = np.array([sum(float(part.sum()) for part in both) for both in parts])
+                if sureness(sums, np.zeros(PARTS)) > TRIED:
+                    best, gain = [i, j], total
+        if best is None:
+            return orders[1:]
+        orders.append(order.copy())
+        orders[-1][best] = order[best[::-1]]

@@ -71,6 +71,8 @@ class Convention:
     mirrored: bool = False
     shift: int = 0
     """The column of the robot file's first sensor."""
+    order: tuple[int, ...] = ()
+    """The sensor of each column, where columns are exchanged."""
 
 
 def _room(rng: np.random.Generator, acoustics: AcousticsConfig) -> tuple[WorldConfig, tuple[float, float]]:
@@ -190,6 +192,8 @@ def written(drive: Drive, how: Convention, rng: np.random.Generator, path: Path)
     theta, yaw = (rule.turn * (rule.hand * a - rule.offset_rad) for a in (theta, yaw))
     if how.heading == "sensors-cw" or how.mirrored:
         ranges = ranges[:, mirrored_columns(drive.settings.ring)]
+    if how.order:
+        ranges = ranges[:, list(how.order)]
     ranges = np.roll(ranges, how.shift, axis=1)
     if how.wrapped != "no":
         low = 0.0 if how.wrapped == "positive" else -math.pi

@@ -7,8 +7,9 @@ import pytest
 
 from config.load import load_settings
 from runtime.recording.conventions.headings import SURE, Angles, echo_scores, mirror_image
-from runtime.recording.conventions.sensor_order import find_shift, mirrored_columns
+from runtime.recording.conventions.sensor_order import find_exchange, find_shift, mirrored_columns
 from runtime.recording.conventions.table import Table
+from tests.recordings import recording
 from tests.runtime.recording.conventions.tables import make_drive
 
 RING = load_settings("hallway", robot="p3dx").ring
@@ -40,3 +41,42 @@ def test_columns_that_begin_with_another_sensor_are_found(robot: str, shift: int
     if shift and is_mirrored:
         image = mirrored_columns(ring)[found.sensor]
         assert f"or r00 is sensor {image} and the columns run the other way round" in found.words(ring)
+
+
+def exchanges(count: int) -> dict[str, list[int]]:
+    """Return orders of columns that a table may have by mistake."""
+    half, swapped, neighbours = count // 2, list(range(count)), list(range(count))
+    swapped[1], swapped[half] = half, 1
+    neighbours[2:4] = 3, 2
+    return {
+        "two": swapped,
+        "neighbours": neighbours,
+        "one array backward": [*reversed(range(half)), *range(half, count)],
+    }
+
+
+@pytest.mark.parametrize("robot", ["denning", "p3dx", "amigo"])
+@pytest.mark.parametrize("model", ["cone", "specular"])
+def test_columns_that_are_exchanged_are_found_and_others_are_not(robot: str, model: str) -> None:
+    drive = make_drive(13, robot, "room", model, 150.0)
+    ranges = np.where(np.isinf(drive.ranges), np.nan, drive.ranges)
+    ways = [Angles(), mirror_image(Angles())]
+    table = Table(drive.t, drive.pose, ranges)
+    found = find_exchange(table, drive.settings, Angles(), 1.0, 1.0, ways)
+    assert found is None or found.surely < 0.0
+    for order in exchanges(ranges.shape[1]).values():
+        exchanged = table._replace(ranges=ranges[:, order])
+        found = find_exchange(exchanged, drive.settings, Angles(), 1.0, 1.0, ways)
+        assert found is not None
+        assert found.surely > SURE
+        assert (found.sensors == order).mean() > 0.6
+
+
+@pytest.mark.parametrize("name", ["corridor", "ring24"])
+def test_real_recordings_are_in_their_order(name: str) -> None:
+    robot, rows = recording(name)
+    ranges = np.array([row.ranges_m for row in rows])
+    pose = np.array([(row.pose.x, row.pose.y, row.pose.theta, row.ring_yaw) for row in rows])
+    table = Table(np.array([row.robot_s for row in rows]), pose, np.where(np.isinf(ranges), np.nan, ranges))
+    found = find_exchange(table, robot, Angles(), 1.0, 1.0, [Angles(), mirror_image(Angles())])
+    assert found is None or found.surely <= 0.0
