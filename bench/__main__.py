@@ -17,7 +17,7 @@ from bench.console import measure as measure_console
 from bench.ear_commands import cross_paths, ear_cost, ear_halls, naming_bound, one_stand, servo, stand_bound
 from bench.estimator import Peer
 from bench.figures import PAGE, renew
-from bench.lie_commands import lies
+from bench.lie_commands import few_sensors, lies
 from bench.map_commands import (
     corner_bound,
     false_canyons,
@@ -258,6 +258,7 @@ def figures_page(*, results: Path | None = None) -> int:
 
 
 for command in (
+    few_sensors,
     lies,
     localization,
     known_room,

@@ -12,6 +12,37 @@ from runtime.support.kernel_cache import use_kernel_cache
 from runtime.support.kernel_warmup import prepare_kernels
 
 
+def few_sensors(
+    *,
+    json: str = "few-sensors.json",
+    robots: str = "front-1,hobby3,front-5,hobby8,round-12,parking12",
+    rooms: int = 20,
+    first: int = 0,
+    minutes: float = 10.0,
+) -> int:
+    """Drive robots with few sensors from goal to goal: contacts, arrivals, drums; among mirrors and among echoes.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    robots
+        Shipped robots and those of `bench.sparse_rings`, with commas between them.
+    rooms, first
+        Number of rooms, and the first one's seed.
+    minutes
+        Length of the drives in each room.
+    """
+    use_kernel_cache()
+    from bench.few_sensors import few_sensors_table, measure
+
+    console = Console(stderr=True)
+    prepare_kernels(load_settings("hallway"), console)
+    with console.status("bench") as status:
+        results = measure(robots.split(","), range(first, first + max(1, rooms)), 60.0 * minutes, status.update)
+    return report(json, [asdict(one) for one in results], few_sensors_table(results))
+
+
 def lies(
     *,
     json: str = "lies.json",

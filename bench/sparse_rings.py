@@ -18,6 +18,10 @@ BEAM_HALF_ANGLE_DEG: Final = 15.0
 """Half the width of a beam: the beams of neighbours 20° apart overlap."""
 STEP_PERIOD_S: Final = 0.04
 RINGS: Final[Mapping[str, tuple[float, ...]]] = MappingProxyType({
+    "front-1": (0.0,),
+    "front-3": (-25.0, 0.0, 25.0),
+    "front-5": (-50.0, -25.0, 0.0, 25.0, 50.0),
+    "round-12": (0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0, -150.0, -120.0, -90.0, -60.0, -30.0),
     "front-4": (-30.0, -10.0, 10.0, 30.0),
     "front-6": (-50.0, -30.0, -10.0, 10.0, 30.0, 50.0),
     "front-9": (-100.0, -75.0, -50.0, -25.0, 0.0, 25.0, 50.0, 75.0, 100.0),

@@ -36,7 +36,12 @@ MIDDLE_M: Final = 0.6
 """Free room about the middle, so that the drive has a place to begin."""
 
 
-def drumless_room(seed: int, acoustics: AcousticsConfig, is_cluttered: bool) -> FurnishedRoom:
+def drumless_room(
+    seed: int,
+    acoustics: AcousticsConfig,
+    is_cluttered: bool,
+    spans_m: tuple[tuple[float, float], tuple[float, float]] = (WIDTH_M, DEPTH_M),
+) -> FurnishedRoom:
     """Return a room.
 
     Parameters
@@ -47,9 +52,11 @@ def drumless_room(seed: int, acoustics: AcousticsConfig, is_cluttered: bool) -> 
         Its acoustics.
     is_cluttered : bool
         Whether clutter stands in it besides the boxes.
+    spans_m : tuple of tuple of float
+        Least and greatest width and depth.
     """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 16]))
-    width_m, depth_m, turn_rad = (float(rng.uniform(*span)) for span in (WIDTH_M, DEPTH_M, (-math.pi, math.pi)))
+    width_m, depth_m, turn_rad = (float(rng.uniform(*span)) for span in (*spans_m, (-math.pi, math.pi)))
     room = FurnishedRoom(WorldConfig(acoustics=acoustics), width_m, depth_m, turn_rad)
     corners = [
         np.array(room.place(a, b)) + rng.uniform(-SKEW_M, SKEW_M, 2)

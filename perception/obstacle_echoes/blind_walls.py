@@ -42,6 +42,9 @@ AGAIN_SHARE: Final = 0.5
 """Once a direction ahead is unknown, those count as unknown, too, that were looked in farther away than this share of
 `KEPT_M`: so the robot looks round in one place."""
 
+SILENT_M: Final = 0.25
+"""A look counts only within this while the ring hears nothing and has lost what it heard, m."""
+
 
 class BlindWall(Record):
     """What is remembered of a direction."""
@@ -144,6 +147,8 @@ class BlindWalls:
         self._walls = zeros(BlindWall, TURN_DIRECTIONS)
         self.records = records(BlindWall, self._walls)
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
+        self.has_looked_round = False
+        """Whether the robot was to look everywhere in this silence."""
 
     def update(self, firing: Firing) -> None:
         """Enter a firing."""
@@ -160,7 +165,9 @@ class BlindWalls:
         )
 
     def sides(self, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats]:
-        """Return what is known of the directions in which no sensor looks now, within 90° of the robot's heading.
+        """Return what is known of the directions in which no sensor looks now, and what is not, within 90° of ahead.
+
+        Walls behind count, too: one that no longer counted once it was abeam made a robot beside it turn to and fro.
 
         Parameters
         ----------
@@ -184,7 +191,7 @@ class BlindWalls:
         away = self._walls["offset"] - pose.x * c - pose.y * s
         is_known = self._walls["is_known"] == 1
         is_wall = is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
-        stands = is_ahead & is_wall & (nearest > self._half_angle)
+        stands = is_wall & (nearest > self._half_angle)
         # What lies partly in a beam is seen as the robot turns a little; beams that touch miss nothing between them.
         is_unseen = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
         # At the edge of what is unseen it is looked at whole: else the robot would turn to and fro between two edges.
@@ -192,6 +199,21 @@ class BlindWalls:
         is_edge &= np.roll(is_unseen, 1) | np.roll(is_unseen, -1)
         is_unknown = is_ahead & (is_unseen | is_edge)
         return np.stack([pose.x + away * c, pose.y + away * s], axis=1)[stands], directions[is_unknown]
+
+    def look_again(self, x: float, y: float, is_lasting: bool) -> None:
+        """Have the robot look where it last looked from farther than `SILENT_M` away; walls stay remembered.
+
+        Parameters
+        ----------
+        x, y
+            Place of the ring, which has lost what it heard and hears nothing else, m: few sensors often do.
+        is_lasting
+            Whether it has for long: then the robot looks everywhere, once.
+        """
+        walls, has_looked = self._walls, self.has_looked_round
+        if is_lasting and not has_looked:
+            walls["is_known"], self.has_looked_round = 0, True
+        walls["is_known"] &= np.hypot(walls["x"] - x, walls["y"] - y) <= SILENT_M
 
     def clear(self) -> None:
         """Forget everything."""

@@ -325,9 +325,22 @@ class FreshEchoes:
         )
         if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
             since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
-            keep_sudden(self._points, self._times, self._heard, since, pose[0], pose[1], self.unheard.records)
+            heard = self._heard if self._blind_walls is None else self._in_beams(pose, mounts)
+            keep_sudden(self._points, self._times, heard, since, pose[0], pose[1], self.unheard.records)
         if self._blind_walls is not None:
+            if self.unheard.is_ring_silent:
+                self._blind_walls.look_again(pose[0], pose[1], self.unheard.has_been_silent)
+            elif not self.unheard.has_been_silent:
+                self._blind_walls.has_looked_round = False
             self._blind_walls.update(firing)
+
+    def _in_beams(self, pose: RingPose, mounts: Floats) -> NDArray[np.bool_]:
+        """Return which echoes lie in a beam now, shape (n, looks): a turn takes few sensors away from all others."""
+        x, y, yaw = pose
+        bearings = np.arctan2(self._points[..., 1] - y, self._points[..., 0] - x)
+        off = np.remainder(bearings[..., None] - yaw - mounts[:, 2] + math.pi, math.tau) - math.pi
+        inside: NDArray[np.bool_] = self._heard & (np.abs(off) <= self._half_angle).any(axis=-1)
+        return inside
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
         """Return a copy of the echoes no older than `age_max_s` at the robot's time `robot_s`: shape (k, 2), m."""

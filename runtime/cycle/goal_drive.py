@@ -191,13 +191,15 @@ def _arbitrate(
 ) -> Decision:
     """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily.
 
-    One that is pushed turns away as fast as its base can.
+    One that is pushed turns away as fast as its base can, and one that has looked aside turns back so.
     """
     config, expected = settings.behaviors.move_to_goal, tuple(r.schema for r in responses)
     rate_rad_s = config.turn_rate_max_rad_s
     change_rad_s = config.turn_acceleration_max_rad_s2 / settings.cycle.rate_hz
     if any(r.schema == AVOID and (r.x, r.y) != (0.0, 0.0) for r in responses):
         change_rad_s = math.inf
+    if abs(last_rad_s) > rate_rad_s:  # it has looked to its blind sides: it turns back as fast
+        rate_rad_s = change_rad_s = math.inf
     limits = max(-rate_rad_s, last_rad_s - change_rad_s), min(rate_rad_s, last_rad_s + change_rad_s)
     return arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected, limits, commitment)
 

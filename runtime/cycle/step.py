@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
 from behaviors.move_ahead import Leg
@@ -51,7 +51,7 @@ from runtime.cycle.line_messages import blind_reason
 from runtime.cycle.modes import ARMING_MAX_S, Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.stalled_drives import DriveMemory
-from runtime.cycle.unheard_limit import limit_unheard
+from runtime.cycle.unheard_limit import limit_unheard, lost_ahead
 from runtime.cycle.velocity_limits import ZoneLimits, wants_map, way_refused, zone_limits
 from runtime.timing.phases import Phase, ignore_phase
 
@@ -72,9 +72,6 @@ __all__ = [
     "apply_settings",
     "step",
 ]
-
-LOST_AHEAD_M: Final = 0.4
-"""A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
 
 
 class Order(Enum):
@@ -324,13 +321,10 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     blind_s = min(*view.sensor_ages_s.tolist(), now_s)  # numpy's call would take longer
     if blind_s > age_max_s:
         return Stop(blind_reason(blind_s, inputs.line_problem, fires=now_s - state.last_firing_robot_s <= age_max_s))
-    clear_m = settings.body.radius_m + behaviors.arbiter.clearance_m
-    lost_m = state.perception.unheard.take_ahead(odometry.pose, clear_m + LOST_AHEAD_M, clear_m)
-    if lost_m is not None:
-        return Stop(
-            f"the ring hears nothing any more, not even what stood {lost_m:.1f} m ahead: unless that is gone, check "
-            f"the ring's power and cables, then re-arm"
-        )
+    unheard = state.perception.unheard
+    lost = lost_ahead(unheard, odometry.pose, len(view.unknown_rad) > 0, state.drive_request, settings)
+    if lost is not None:
+        return Stop(lost)
     if inputs.preparing is not None and needs_recognition(state.drive_request):
         state.hold_reason, state.drive_memory = inputs.preparing, DriveMemory()
         return Drive(STANDSTILL)

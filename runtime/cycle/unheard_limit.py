@@ -6,13 +6,17 @@ import math
 from typing import Final
 
 from behaviors.surroundings.clearance import stoppable_speed_m_s
+from behaviors.teleoperation import Teleoperate
 from config.settings import Settings
 from drivers.messages import Pose, Twist
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
 from perception.percept import Percept
+from runtime.cycle.drive_requests import DriveRequest
 
 CREEP_M_S: Final = 0.04
 """Speed that is always left, m/s: most of what falls silent is a mirror that left the beam, and a bumper bears it."""
+LOST_AHEAD_M: Final = 0.4
+"""A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
 LOST: Final = (
     "the ring hears nothing new any more, not even what it heard a moment ago: the robot drives slowly until it "
     "hears something; check the ring's power and cables"
@@ -21,6 +25,38 @@ UNHEARD: Final = (
     "the ring no longer hears what stood in the way, although the robot has come nearer: the robot drives slowly "
     "until the ring hears it again, or something behind it; if this returns, check that the ring hears what is near"
 )
+
+
+def lost_ahead(
+    unheard: UnheardEchoes, pose: Pose, has_unknown: bool, request: DriveRequest, settings: Settings
+) -> str | None:
+    """Return why the robot must stop before what a silent ring heard last; None if it need not.
+
+    One that is about to look to its blind sides stands and does that first: few sensors often hear nothing.
+
+    Parameters
+    ----------
+    unheard
+        The echoes.
+    pose
+        The robot's, in odometry's frame.
+    has_unknown
+        Whether there are directions of which nothing is known.
+    request
+        What is driven; by teleoperation the robot does not look round by itself.
+    settings
+        The base and the arbiter's clearance.
+    """
+    if has_unknown and not (settings.body.synchro or isinstance(request, Teleoperate)):
+        return None
+    clear_m = settings.body.radius_m + settings.behaviors.arbiter.clearance_m
+    lost_m = unheard.take_ahead(pose, clear_m + LOST_AHEAD_M, clear_m)
+    if lost_m is None:
+        return None
+    return (
+        f"the ring hears nothing any more, not even what stood {lost_m:.1f} m ahead: unless that is gone, check the "
+        f"ring's power and cables, then re-arm"
+    )
 
 
 def limit_unheard(

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 from config.settings import Settings
 from drivers.capabilities import missing
 from drivers.registry import capabilities
 from runtime.support.blind_sides import blind_notes
-from runtime.support.pattern_check import pattern_speed_m_s
+from runtime.support.pattern_check import gap_note, pattern_speed_m_s
 
 
 def lint_settings(settings: Settings) -> list[str]:
     """Return warnings about these settings, one sentence each."""
     warnings = []
-    blind_m = settings.ring.range_min_m
+    inside_m = min(
+        settings.body.radius_m - mount.x_m * math.cos(mount.angle_rad) - mount.y_m * math.sin(mount.angle_rad)
+        for mount in settings.ring.mounts
+    )
+    blind_m = settings.ring.range_min_m - max(0.0, inside_m)
     avoid, arbiter = settings.behaviors.avoid_static_obstacle, settings.behaviors.arbiter
     margins = {
         "behaviors.avoid_static_obstacle.avoid_obstacle_safety_margin_m": avoid.avoid_obstacle_safety_margin_m,
@@ -21,8 +27,9 @@ def lint_settings(settings: Settings) -> list[str]:
     for path, margin_m in margins.items():
         if margin_m <= blind_m:
             warnings.append(
-                f"{path} = {margin_m} is not above ring.range_min_m = {blind_m}: nearer obstacles are "
-                "never reported, so this margin has no effect; make it larger"
+                f"{path} = {margin_m} is not above ring.range_min_m = {settings.ring.range_min_m}: nearer obstacles "
+                "are never reported, so this margin has no effect; make it larger, or set the sensors back from "
+                "the rim"
             )
     firing_hz = 1.0 / settings.ring.firing.step_period_s
     if settings.cycle.rate_hz < 0.5 * firing_hz:
@@ -37,7 +44,9 @@ def lint_settings(settings: Settings) -> list[str]:
             "--map FILE or with perception.localization.correct_drift = true, or name places in odom"
         )
     speed_m_s = pattern_speed_m_s(settings)
-    if speed_m_s < min(arbiter.base_velocity_m_s, settings.body.speed_max_m_s):
+    if (gap := gap_note(settings)) is not None:
+        warnings.append(gap)
+    elif speed_m_s < min(arbiter.base_velocity_m_s, settings.body.speed_max_m_s):
         warnings.append(
             f"ring.firing: the pattern looks ahead so seldom that it limits the speed to {speed_m_s:.2f} m/s, below "
             f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; fire more sensors at a time"

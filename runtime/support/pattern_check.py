@@ -52,9 +52,11 @@ def refuse_undrivable(settings: Settings) -> None:
         if not math.isfinite(oldest_s):
             unseen = unseen_way(percept, course, body, arbiter.clearance_m)
             left_out = [] if unseen is None else [i for i in unseen.sensors if math.isinf(view.sensor_ages_s[i])]
-            remedy = f"add sensors to the sets: {listed(left_out)}" if left_out else _gaps_ahead(settings, course)
+            if not left_out:  # `gap_note` says what it can do
+                continue
             raise FiringError(
-                f"ring.firing: the pattern does not look {where}, so that the robot could not drive there; {remedy}"
+                f"ring.firing: the pattern does not look {where}, so that the robot could not drive there; add "
+                f"sensors to the sets: {listed(left_out)}"
             )
         if view.reach_m <= body.radius_m + arbiter.clearance_m:
             raise FiringError(
@@ -96,8 +98,17 @@ def courses_rad(settings: Settings) -> tuple[float, ...]:
     return (out, out + math.pi) if ahead.distance_m is not None and ahead.at_end == "turn_back" else (out,)
 
 
-def _gaps_ahead(settings: Settings, course_rad: float) -> str:
-    """Return which gaps between beams lie in the robot's path on a course, and what closes them."""
+def gap_note(settings: Settings) -> str | None:
+    """Return which gaps between beams lie in the robot's path, and what that costs; None where there are none."""
+    for course in courses_rad(settings):
+        half_angle = path_half_angle_rad(settings.body, settings.behaviors.arbiter.clearance_m)
+        if not math.isfinite(oldest_look_s(oldest_percept(settings, course).field_of_view, course, half_angle)):
+            return _gap_note(settings, course)
+    return None
+
+
+def _gap_note(settings: Settings, course_rad: float) -> str:
+    """Return the text for a course that has a gap."""
     view = oldest_percept(settings, 0.0).field_of_view
     axes = np.sort(np.degrees(view.axes_rad[np.isfinite(view.sensor_ages_s)] - course_rad + math.pi) % 360.0) - 180.0
     beam_deg = math.degrees(view.half_angle_rad)
@@ -110,9 +121,27 @@ def _gaps_ahead(settings: Settings, course_rad: float) -> str:
         if end - begin > 2.0 * beam_deg and begin + beam_deg < path_deg and end - beam_deg > -path_deg
     ]
     return (
-        f"no beam covers {' and '.join(gaps)} (counter-clockwise from the ring's front), and the path needs every "
-        f"direction within {path_deg:.0f}° of the way: add sensors there, or correct ring.beam_half_angle_deg"
+        f"ring: no beam covers {' and '.join(gaps)} (counter-clockwise from the ring's front), and the path needs "
+        f"every direction within {path_deg:.0f}° of the way: the robot may turn, but never drives there; "
+        f"{ring_that_drives(beam_deg, path_deg)}, or correct ring.beam_half_angle_deg or body.radius_m"
     )
+
+
+def ring_that_drives(beam_deg: float, path_deg: float) -> str:
+    """Return which sensors look along the whole path: the fewest in front, and all round.
+
+    Parameters
+    ----------
+    beam_deg
+        Half the width of a beam, degrees.
+    path_deg
+        The path's directions, to either side of the way, degrees.
+    """
+    count = max(1, math.ceil(path_deg / beam_deg - 1e-6))
+    apart_deg = math.floor(2.0 * beam_deg + 1e-6)
+    in_front = "one ahead" if count == 1 else f"{count} in front, {apart_deg}° apart at most"
+    all_round = math.ceil(180.0 / beam_deg - 1e-6)
+    return f"of sensors with a beam of ±{beam_deg:g}° it needs {in_front}, or {all_round} all round"
 
 
 def oldest_percept(settings: Settings, course_rad: float, missed: int = 0) -> Percept:

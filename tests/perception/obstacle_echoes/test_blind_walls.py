@@ -9,7 +9,7 @@ import pytest
 
 from config.load import load_robot
 from drivers.messages import Firing, Floats, Pose
-from perception.obstacle_echoes.blind_walls import KEPT_M, BlindWalls, has_blind_sides
+from perception.obstacle_echoes.blind_walls import KEPT_M, SILENT_M, BlindWalls, has_blind_sides
 from perception.sensor_mounts import mounts_array
 
 HALF = math.radians(15.0)
@@ -122,3 +122,30 @@ def test_a_robot_that_hears_nothing_and_turns_to_what_is_unknown_soon_knows_all(
             break
         theta += math.copysign(0.02, towards[np.abs(towards).argmin()])
     assert turns < 200
+
+
+def test_a_wall_abeam_stays_as_the_robot_turns_past_it() -> None:
+    """As one that left at 90° from the heading, it made a robot beside it turn to and fro."""
+    walls = BlindWalls(MOUNTS, HALF)
+    look_round(walls, 0.0, 0.0, 0.0, 1.0)
+    for turned_deg in (60.0, 89.0, 91.0, 120.0, 180.0):
+        points, _ = sides(walls, Pose(0.0, 0.0, math.radians(turned_deg)))
+        assert np.abs(points - (1.0, 0.0)).max(axis=1).min() < 0.06
+
+
+def test_a_ring_that_fell_silent_looks_again_and_once_everywhere_if_that_lasts() -> None:
+    walls = BlindWalls(MOUNTS, HALF)
+    look_round(walls, 0.0, 0.0, 0.5, 1.0)
+    start, on = Pose(0.0, 0.0, 0.0), Pose(2.0 * SILENT_M, 0.0, 0.0)
+    walls.look_again(start.x, start.y, is_lasting=False)
+    assert not len(sides(walls, start)[1])
+    known = len(sides(walls, Pose(0.0, 0.0, 1.7))[0])
+    walls.look_again(on.x, on.y, is_lasting=False)
+    assert len(sides(walls, on)[1]) >= 6
+    look_round(walls, on.x, on.y, 0.5, 1.0)
+    walls.look_again(on.x, on.y, is_lasting=True)
+    assert len(sides(walls, on)[1]) >= 6
+    assert known
+    look_round(walls, on.x, on.y, 0.5, 1.0)
+    walls.look_again(on.x, on.y, is_lasting=True)
+    assert not len(sides(walls, on)[1]), "a failed ring would have it turn for ever"

@@ -155,3 +155,15 @@ def test_it_is_gone_where_the_robot_could_have_heard_it_again_or_stands_on_it() 
     ring = lost()
     ring.clear()
     assert len(ring.unheard.points()) == 0
+
+
+def test_few_sensors_that_turn_away_from_what_they_heard_have_not_lost_it() -> None:
+    """Three in front hear nothing beside a wall; those of a ring all round would have heard it again."""
+    mounts = mounts_array(load_robot("hobby3").ring.mounts)
+    for turn_rad, is_lost in ((1.6, False), (0.1, True)):
+        ring, beam = FreshEchoes(mounts, math.radians(15.0), (), REACH_M), math.radians(15.0)
+        for k in range(6):
+            ring.update(Firing(0.1 * k, Pose(1.0, 0.0, 0.0), 0.0, heard(mounts, 1.0, 0.0, beam)))
+        for k in range(6, 10):
+            ring.update(Firing(0.1 * k, Pose(1.0, 0.0, turn_rad), turn_rad, np.full(3, math.inf)))
+        assert ring.unheard.is_ring_silent == is_lost

@@ -8,18 +8,23 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from behaviors.arbiter import Drive
 from behaviors.leave_canyon import leave_canyon
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
+from config.load import load_settings
 from drivers.messages import Pose, Twist
+from perception.percept import Percept
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.goal_drive import GoalDrive
+from runtime.cycle.goal_drive import GoalDrive, drive_to_goal
 from runtime.cycle.step import STANDSTILL
 from runtime.recording.channels import decode, encode
 from runtime.recording.schema import Keyframe, carried_state, keyframe, state_fields
+from tests.behaviors.views import EVERYWHERE
 from tests.runtime.cycle.requested_robot import RequestedRobot, driving, hold_reason
 
 FAR = Goal(5.5, 0.0)
@@ -200,3 +205,18 @@ def test_a_robot_that_has_stood_turns_to_its_way_before_the_next_look_ahead_and_
     assert len(set(started[100:150])) == 1, "it has stood for 5 s, and turns"
     assert len(set(started[:100])) > 3
     assert started[-1] not in started[:150], "it has turned"
+
+
+def test_a_robot_that_has_looked_aside_turns_back_as_fast() -> None:
+    """Slowing down as on its way, it turned on by a quarter, and back for seven seconds."""
+    settings = load_settings("office", robot="hobby3")
+    looking = replace(EVERYWHERE, unknown_rad=np.array([1.2]))
+    drive, rates = None, list[float]()
+    for view in (looking, EVERYWHERE, EVERYWHERE):
+        percept = Percept(Pose(0.0, 0.0, 0.5 if drive else 0.0), np.empty((0, 2)), view)
+        _, drive, _, decision, _ = drive_to_goal(FAR, drive, percept, 1.0, (), settings)
+        assert isinstance(decision, Drive)
+        rates.append(decision.twist.w)
+    limit = settings.behaviors.move_to_goal.turn_rate_max_rad_s
+    assert rates[0] > 2.0 * limit
+    assert rates[1] == rates[2] == pytest.approx(-0.5 * settings.behaviors.arbiter.turn_gain_per_s)

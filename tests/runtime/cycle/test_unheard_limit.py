@@ -7,12 +7,15 @@ import math
 import numpy as np
 import pytest
 
+from behaviors.move_to_goal import Goal
 from behaviors.surroundings.clearance import stoppable_speed_m_s
+from behaviors.teleoperation import Teleoperate
 from config.load import load_settings
 from drivers.messages import Twist
 from perception.obstacle_echoes.unheard_echoes import ALONE, UnheardEchoes
 from perception.percept import Percept, Pose
-from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard
+from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard, lost_ahead
 from tests.behaviors.views import EVERYWHERE
 
 SETTINGS = load_settings("room", robot="denning")
@@ -56,3 +59,20 @@ def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() ->
     assert twist.v == pytest.approx(CREEP_M_S)
     assert reason == LOST
     assert limited(Twist(0.0, 1.0), (0.5, 0.0), silent=True) == (Twist(0.0, 1.0), None)
+
+
+@pytest.mark.parametrize("robot", ["hobby3", "denning"])
+def test_before_what_a_silent_ring_heard_a_robot_stops_unless_it_is_about_to_look_round(robot: str) -> None:
+    settings = load_settings("room", robot=robot)
+
+    def stops(request: DriveRequest, *, has_unknown: bool) -> bool:
+        unheard = UnheardEchoes(np.zeros((3, 3)))
+        for echo in unheard.records:
+            echo.state, echo.x, echo.y = ALONE, settings.body.radius_m + 0.3, 0.0
+        unheard.silences[:] = 100
+        pose = Pose(0.0, 0.0, 0.0)
+        return lost_ahead(unheard, pose, has_unknown, request, settings) is not None
+
+    assert stops(Goal(3.0, 0.0), has_unknown=False)
+    assert stops(Goal(3.0, 0.0), has_unknown=True) == settings.body.synchro
+    assert stops(Teleoperate(0.1, 0.0), has_unknown=True), "an operator's robot does not look by itself"

@@ -35,3 +35,10 @@ def test_a_ring_that_one_failed_reading_stops_is_named() -> None:
     (warning,) = lint_settings(load_settings("hallway", slow))
     assert "one reading that fails" in warning
     assert lint_settings(load_settings("hallway", [*slow, "behaviors.avoid_static_obstacle.echo_age_max_s=4"])) == []
+
+
+def test_sensors_behind_the_rim_hear_nearer_to_it() -> None:
+    """Parking sensors hear nothing nearer than 0.25 m; 0.13 m behind the rim they hear what is 0.12 m from it."""
+    assert lint_settings(load_settings("room", robot="parking12")) == []
+    at_the_rim = lint_settings(load_settings("room", ["body.radius_m=0.12"], robot="parking12"))
+    assert sum("set the sensors back from the rim" in text for text in at_the_rim) == 2

@@ -11,7 +11,13 @@ import pytest
 from config.load import list_shipped, load_settings
 from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError, firing_pattern
-from runtime.support.pattern_check import courses_rad, longest_gaps_s, pattern_speed_m_s, refuse_undrivable
+from runtime.support.pattern_check import (
+    courses_rad,
+    gap_note,
+    longest_gaps_s,
+    pattern_speed_m_s,
+    refuse_undrivable,
+)
 
 pytestmark = pytest.mark.promise("P24")
 
@@ -70,9 +76,15 @@ def test_a_pattern_that_looks_backwards() -> None:
 
 
 def test_a_ring_with_a_hole_ahead() -> None:
-    line = problem("ring.beam_half_angle_deg=7")
-    assert "could not drive there; no beam covers -38° to -37° and" in line
-    assert line.endswith("add sensors there, or correct ring.beam_half_angle_deg")
+    """It is good for a stand, a replay, or to turn on the spot: it is named, and the robot does not drive there."""
+    settings = load_settings("hallway", ["ring.beam_half_angle_deg=7"])
+    refuse_undrivable(settings)
+    assert pattern_speed_m_s(settings) == 0.0
+    note = gap_note(settings)
+    assert note is not None
+    assert "no beam covers -38° to -37° and" in note
+    assert "it needs 7 in front, 14° apart at most, or 26 all round" in note
+    assert gap_note(load_settings("hallway")) is None
 
 
 def test_a_window_that_ends_within_the_clearance() -> None:

@@ -11,7 +11,7 @@ from config.load import list_shipped
 from runtime.cli.app import run_command
 
 ROOT = Path(__file__).parents[4]
-WITH_BLIND_SIDES = {"amigo", "p3at", "p3dx-sh", "p3dx", "peoplebot"}
+WITH_BLIND_SIDES = {"amigo", "hobby3", "hobby8", "p3at", "p3dx-sh", "p3dx", "peoplebot"}
 """Robots whose sensors leave gaps."""
 SHIPPED = sorted(path for path in (ROOT / "config").rglob("*.toml"))
 

@@ -1,0 +1,55 @@
+"""Drives of robots with few sensors from goal to goal: how they are counted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from bench.few_sensors import (
+    AWAY_M,
+    few_sensors_table,
+    make_world,
+    measure,
+    next_goal,
+    run_room,
+    settings_of,
+)
+from bench.trials.navigation_trials import closed_room_m
+from bench.trials.shortest_way import free_space
+from drivers.emulator.acoustics import clearance
+from drivers.emulator.scene import compile_scene
+
+
+def test_goals_lie_far_away_and_are_free() -> None:
+    settings, world = settings_of("hobby3"), make_world(3, "specular")
+    assert world.drum
+    assert len(world.box) == 2
+    room_m = closed_room_m(settings)
+    asked = next_goal(np.random.default_rng(0), free_space(world, room_m), (-3.0, 0.0), (5.0, 4.0))
+    assert asked is not None
+    (there, way_m), scene = asked, compile_scene(world)
+    assert AWAY_M <= math.dist(there, (-3.0, 0.0)) <= 1.01 * way_m
+    assert clearance(*there, scene.circles, scene.segments) > room_m - 0.15
+
+
+@pytest.mark.compiled
+def test_a_drive_is_counted() -> None:
+    result = run_room("hobby8", "cone", 1, 8.0)
+    assert (result.contacts, result.arrived, result.goals) == (0, 0, 0)
+    assert result.way_m > 0.1
+    assert few_sensors_table([result]).row_count == 1
+
+
+@pytest.mark.soak
+@pytest.mark.compiled
+def test_three_sensors_in_front_touch_nothing_and_arrive(measured: Callable[[str], None]) -> None:
+    results = measure(["hobby3"], range(300, 305), 300.0, lambda _: None)
+    assert sum(one.contacts for one in results) == 0
+    goals, arrived = sum(one.goals for one in results), sum(one.arrived for one in results)
+    assert arrived >= 0.8 * goals
+    measured(
+        f"{len(results)} rooms, {arrived} of {goals} goals, {sum(one.way_m for one in results):.0f} m: no contact"
+    )
