@@ -191,7 +191,7 @@ def _arbitrate(
 ) -> Decision:
     """Return the arbiter's decision for a robot that turns no faster than it should on its way, and steadily.
 
-    One that is pushed turns away as fast as its base can, and one that has looked aside turns back so.
+    One that is pushed turns away as fast as its base can, and one that has looked to its blind sides turns back so.
     """
     config, expected = settings.behaviors.move_to_goal, tuple(r.schema for r in responses)
     rate_rad_s = config.turn_rate_max_rad_s

@@ -207,7 +207,7 @@ def test_a_robot_that_has_stood_turns_to_its_way_before_the_next_look_ahead_and_
     assert started[-1] not in started[:150], "it has turned"
 
 
-def test_a_robot_that_has_looked_aside_turns_back_as_fast() -> None:
+def test_a_robot_that_has_looked_to_a_blind_side_turns_back_as_fast() -> None:
     """Slowing down as on its way, it turned on by a quarter, and back for seven seconds."""
     settings = load_settings("office", robot="hobby3")
     looking = replace(EVERYWHERE, unknown_rad=np.array([1.2]))
