@@ -164,7 +164,7 @@ def _preset_as_table(value: object) -> object:
 class RingConfig(Strict):
     """The ring of sensors: regular (count and radius_m) or listed individually (sensors)."""
 
-    count: int | None = Field(default=None, ge=2, le=SENSORS_MAX)
+    count: int | None = Field(default=None, ge=1, le=SENSORS_MAX)
     """Number of sensors of a regular ring; sensor 0 looks forward, the others follow counter-clockwise."""
     radius_m: float | None = Field(default=None, ge=0.0, le=10.0)
     """Radius of a regular ring, m."""

@@ -20,7 +20,9 @@ def robot(
     *,
     driver: Literal["denning", "arcos", "rflex", "ros2"] | None = None,
     name: str | None = None,
+    layout: Literal["all-round", "in-front", "one-by-one"] | None = None,
     sensors: int | None = None,
+    spacing: float | None = None,
     ring_radius: float | None = None,
     beam_half_angle: float | None = None,
     range_min: float | None = None,
@@ -35,7 +37,7 @@ def robot(
     yes: Yes = False,
     force: Force = False,
 ) -> int:
-    """Write a robot file: a regular ring of sensors, the body, the line and the driver.
+    """Write a robot file: where the sensors look, the body, the line and the driver.
 
     Parameters
     ----------
@@ -45,8 +47,13 @@ def robot(
         The robot's protocol: denning (also rings that you build), arcos (Pioneer), rflex (B21r, Magellan) or ros2.
     name
         What the robot is called.
+    layout
+        Where the sensors look: all round, equally spaced, the first one forward; in front; or one by one, which is
+        asked for each.
     sensors
-        Number of sensors of the ring, equally spaced; the first looks forward.
+        Number of sensors.
+    spacing
+        Of sensors in front, degrees from one to the next.
     ring_radius
         Distance of the sensors from the middle, m.
     beam_half_angle

@@ -4,110 +4,27 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Final
 
 import orjson
 
 from config.errors import DONE, WRONG_CALL, UserError
-from config.files import one_line
 from config.load import list_shipped, load_any, load_model, load_world
 from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
 from drivers.firing_pattern import FiringError
+from runtime.cli.commands.init_ring import Described, ask_mounting
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.cli.commands.questions import Given, Questions
 from runtime.support.config_lint import lint_settings
 from runtime.support.pattern_check import refuse_undrivable
 
-Given = Mapping[str, Any]
-T = TypeVar("T")
 DRIVERS: Final = ("denning", "arcos", "rflex", "ros2")
 AT_A_TIME: Final = ((8, "octets"), (4, "quadrants"), (3, "thirds"), (2, "opposite_pairs"), (1, "single"))
 SOUND_M_S: Final = 343.0
 CORNERS: Final = 16
 """Of the outline of a round model."""
-
-
-class Questions:
-    """Asks for what no option gives, where a person can answer; otherwise takes the defaults.
-
-    Parameters
-    ----------
-    given : mapping
-        The options; None for one that was not given.
-    asks : bool
-        Whether to ask.
-    """
-
-    def __init__(self, given: Given, *, asks: bool) -> None:
-        self._given = given
-        self._asks = asks
-
-    def text(self, name: str, question: str, default: str) -> str:
-        """Return a text."""
-        return self._answer(name, question, default, str)
-
-    def number(self, name: str, question: str, default: float, low: float, high: float) -> float:
-        """Return a number from `low` to `high`; another answer is asked for again, another option refused."""
-
-        def parse(answer: str) -> float:
-            problem = f"expected a number from {low:g} to {high:g}"
-            try:
-                value = float(answer.replace(",", "."))
-            except ValueError:
-                raise ValueError(problem) from None
-            if not low <= value <= high:
-                raise ValueError(problem)
-            return value
-
-        return self._answer(name, question, default, parse)
-
-    def count(self, name: str, question: str, default: int, low: int, high: int) -> int:
-        """Return a whole number from `low` to `high`."""
-
-        def parse(answer: str) -> int:
-            problem = f"expected a whole number from {low} to {high}"
-            try:
-                value = int(answer)
-            except ValueError:
-                raise ValueError(problem) from None
-            if not low <= value <= high:
-                raise ValueError(problem)
-            return value
-
-        return self._answer(name, question, default, parse)
-
-    def choice(self, name: str, question: str, choices: tuple[str, ...]) -> str:
-        """Return one of the choices, the first by default."""
-
-        def parse(answer: str) -> str:
-            if answer not in choices:
-                raise ValueError(f"expected one of {', '.join(choices)}")
-            return answer
-
-        return self._answer(name, f"{question} ({', '.join(choices)})", choices[0], parse)
-
-    def _answer(self, name: str, question: str, default: T, parse: Callable[[str], T]) -> T:
-        given = self._given.get(name)
-        if given is not None:
-            try:
-                return parse(str(given))
-            except ValueError as error:
-                raise UserError(f"--{name.replace('_', '-')} {one_line(str(given))}: {error}", WRONG_CALL) from error
-        while self._asks:
-            sys.stderr.write(f"{question} [{default}]: ")
-            sys.stderr.flush()
-            line = sys.stdin.readline()
-            if not line:
-                raise UserError("the questions were not answered to their end; nothing was written", WRONG_CALL)
-            if not line.strip():
-                break
-            try:
-                return parse(line.strip())
-            except ValueError as error:
-                sys.stderr.write(f"  {one_line(str(error))}\n")
-        return default
 
 
 def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
@@ -119,39 +36,50 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
         As of `runtime.cli.commands.init.robot`.
     """
     ask = _questions(file, given, yes=yes, force=force)
+    while True:
+        try:
+            return _write(file, robot_text(_robot_draft(file, ask)), force=force)
+        except UserError as error:
+            if not ask.asks:
+                raise
+            ask.again(str(error))
+
+
+def _robot_draft(file: str, ask: Questions) -> RobotDraft:
+    """Return the robot as options and answers describe it."""
     driver = ask.choice("driver", "The robot's protocol", DRIVERS)
     name = ask.text("name", "What the robot is called", Path(file).stem)
     most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}[driver]
-    sensors = ask.count("sensors", "Number of sensors, equally spaced", 16 if driver != "denning" else 24, 2, most)
+    body = ask.number("body_radius", "Radius of the body, m", 0.3, 0.01, 10.0)
+    beam = ask.number("beam_half_angle", "Half the width of a beam, degrees", 12.0, 0.5, 80.0)
+    mounting = ask_mounting(ask, Described(body, beam, most, 16 if driver != "denning" else 24))
+    sensors = len(mounting.sensors or ()) or mounting.count or 0
     if driver in {"arcos", "rflex"} and sensors % ARRAY:
         raise UserError(
             f"--sensors {sensors}: the driver {driver} has arrays of {ARRAY}: give {ARRAY}, {2 * ARRAY} "
             f"or another multiple, and describe a smaller array in the file",
             WRONG_CALL,
         )
-    body = ask.number("body_radius", "Radius of the body, m", 0.3, 0.01, 10.0)
-    ring = ask.number("ring_radius", "Distance of the sensors from the middle, m", body, 0.0, 10.0)
-    beam = ask.number("beam_half_angle", "Half the width of a beam, degrees", 12.0, 0.5, 80.0)
     low = ask.number("range_min", "Least range of a sensor, m", 0.15, 0.0, 50.0)
     high = ask.number("range_max", "Greatest range of a sensor, m", 5.0, low + 0.1, 100.0)
     resolution = ask.number("resolution", "Step of the ranges, m (0: none)", 0.01, 0.0, 0.5)
     speed = ask.number("speed_max", "Largest speed, m/s", 0.5, 0.01, 10.0)
     turn = ask.number("turn_max", "Largest turning rate, rad/s", 1.0, 0.01, 20.0)
-    synchro = bool(given.get("synchro")) or (
+    synchro = ask.is_given("synchro") or (
         driver not in {"ros2", "arcos"}
         and ask.choice("wheels", "Do the wheels turn without the body?", ("no", "yes")) == "yes"
     )
     usual = ARCOS_BAUD if driver == "arcos" else BAUD
     baud = ask.count("baud", "Speed of the line, bits per second", usual, 300, 4000000)
     port = "" if driver == "ros2" else ask.text("port", "Serial port (empty: named when it runs)", "")
-    preset = _preset(driver, sensors)
+    preset = _preset(driver, sensors) if mounting.sensors is None else "single"
     step_s = max(0.05 if driver == "denning" else 0.041, math.ceil(1100.0 * 2.0 * high / SOUND_M_S) * 1e-3)
-    draft = RobotDraft(
+    return RobotDraft(
         name,
         driver,
-        sensors,
-        ring,
-        None,
+        mounting.count,
+        mounting.radius_m,
+        mounting.sensors,
         beam,
         resolution,
         low,
@@ -165,7 +93,6 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
         baud,
         port,
     )
-    return _write(file, robot_text(draft), force=force)
 
 
 def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:
@@ -270,6 +197,7 @@ def _questions(file: str, given: Given, *, yes: bool, force: bool) -> Questions:
 def _preset(driver: str, sensors: int) -> str:
     """Return the pattern that fires as many sensors at a time as the robot can."""
     at_a_time = {"arcos": sensors // ARRAY, "rflex": sensors // ARRAY, "ros2": 1}.get(driver, 8)
+    at_a_time = min(at_a_time, max(1, sensors // 2))  # neighbours hear each other
     return next(name for count, name in AT_A_TIME if count <= at_a_time and sensors % count == 0)
 
 

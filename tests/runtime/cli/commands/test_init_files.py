@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import tomllib
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from config.load import load_settings
 from runtime.cli.app import run_command
 from runtime.cli.commands.init_files import models_for
 from runtime.cycle.modes import Mode
+from runtime.support.pattern_check import pattern_speed_m_s
 from tests.runtime.emulated_run import Run
 
 
@@ -34,6 +36,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     [
         ("robot", "--driver", "denning"),
         ("robot", "--driver", "denning", "--sensors", "20", "--range-max", "3"),
+        ("robot", "--sensors", "1"),
+        ("robot", "--layout", "in-front", "--beam-half-angle", "15", "--body-radius", "0.1"),
+        ("robot", "--layout", "in-front", "--sensors", "12", "--spacing", "30"),
+        ("robot", "--layout", "one-by-one", "--sensors", "5"),
         ("robot", "--driver", "arcos", "--sensors", "16"),
         ("robot", "--driver", "rflex", "--sensors", "24", "--port", "/dev/ttyUSB0"),
         ("robot", "--driver", "ros2", "--sensors", "16"),
@@ -73,11 +79,11 @@ def test_a_robot_that_is_described_with_the_defaults_can_be_driven(driver: str) 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("robot", "--sensors", "1"), "--sensors 1: expected a whole number from 2 to 24"),
+        (("robot", "--sensors", "0"), "--sensors 0: expected a whole number from 1 to 24"),
         (("robot", "--driver", "arcos", "--sensors", "12"), "has arrays of 8"),
         (("robot", "--range-max", "0.2"), "--range-max 0.2: expected a number from 0.25"),
         (("robot", "--sensors", "many"), "--sensors"),
-        (("robot", "--sensors", "5"), "the pattern does not look ahead"),
+        (("robot", "--layout", "behind"), "--layout"),
         (("run", "--robot", "absent.toml"), "absent.toml"),
         (("model", "--name", "a b"), "nothing was written"),
     ],
@@ -103,6 +109,39 @@ def test_what_no_option_gives_is_asked_for_on_a_terminal(
     monkeypatch.setattr("sys.stdin", Person(""))
     assert run_command(["init", "model", "other.toml"]) == WRONG_CALL
     assert not Path("other.toml").exists()
+
+
+@pytest.mark.parametrize("layout", ["all-round", "in-front"])
+@pytest.mark.parametrize("sensors", [1, 2, 3, 5, 8, 12])
+def test_any_number_of_sensors_is_written_and_what_it_cannot_do_is_said(
+    layout: str, sensors: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of nine counts and five beams, all but a few ended in "the ring has no sensor there", after 13 questions."""
+    words = ["--layout", layout, "--sensors", str(sensors), "--beam-half-angle", "15", "--body-radius", "0.1"]
+    assert run_command(["init", "robot", "mine.toml", *words]) == DONE
+    said = capsys.readouterr().out
+    drives = sensors == 12 or (layout == "in-front" and sensors > 1)
+    assert ("never drives there; of sensors with a beam of ±15° it needs 2 in front" in said) == (not drives)
+    assert ("no sensor looks from" in said) == (not (layout == "all-round" and drives))
+    assert (pattern_speed_m_s(load_settings("room", robot="mine.toml")) > 0.0) == drives
+
+
+def test_a_person_is_told_what_an_answer_costs_and_keeps_the_answers_when_one_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Driver, body, beam, layout, sensors, distance, spacing, ranges …; the second round mends the line's speed."""
+    first = ["", "0.1", "15", "in-front", "3", "0.09", "", "0.02", "4", "0.003", "0.4", "2", "no", "300", ""]
+    second = [""] * 13 + ["115200", ""]
+    monkeypatch.setattr("sys.stdin", Person("\n".join([*first, *second, ""])))
+    assert run_command(["init", "robot", "mine.toml", "--name", "Rosa"]) == DONE
+    asked = capsys.readouterr().err
+    assert "every direction within 23° of its way: of sensors with a beam of ±15° it needs 2 in front" in asked
+    assert "never drives backwards" in asked
+    assert "a line of 300 baud" in asked
+    assert "Once more: Enter keeps an answer." in asked
+    assert "Number of sensors [3]: " in asked
+    ring = load_settings("room", robot="mine.toml").ring
+    assert [round(math.degrees(mount.angle_rad)) for mount in ring.mounts] == [25, 0, -25]
 
 
 @pytest.mark.parametrize(

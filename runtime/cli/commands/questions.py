@@ -1,0 +1,119 @@
+"""Questions of the command line: options first, then a person's answers, otherwise the defaults."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from config.errors import WRONG_CALL, UserError
+from config.files import one_line
+
+Given = Mapping[str, Any]
+T = TypeVar("T")
+
+
+class Questions:
+    """Asks for what no option gives, where a person can answer; otherwise takes the defaults.
+
+    Parameters
+    ----------
+    given : mapping
+        The options; None for one that was not given.
+    asks : bool
+        Whether to ask.
+    """
+
+    def __init__(self, given: Given, *, asks: bool) -> None:
+        self._given = given
+        self.asks = asks
+        """Whether a person is asked."""
+        self._answers: dict[str, Any] = {}
+        self._asked = 0
+
+    def text(self, name: str, question: str, default: str) -> str:
+        """Return a text."""
+        return self._answer(name, question, default, str)
+
+    def number(self, name: str, question: str, default: float, low: float, high: float) -> float:
+        """Return a number from `low` to `high`; another answer is asked for again, another option refused."""
+
+        def parse(answer: str) -> float:
+            problem = f"expected a number from {low:g} to {high:g}"
+            try:
+                value = float(answer.replace(",", "."))
+            except ValueError:
+                raise ValueError(problem) from None
+            if not low <= value <= high:
+                raise ValueError(problem)
+            return value
+
+        return self._answer(name, question, default, parse)
+
+    def count(self, name: str, question: str, default: int, low: int, high: int) -> int:
+        """Return a whole number from `low` to `high`."""
+
+        def parse(answer: str) -> int:
+            problem = f"expected a whole number from {low} to {high}"
+            try:
+                value = int(answer)
+            except ValueError:
+                raise ValueError(problem) from None
+            if not low <= value <= high:
+                raise ValueError(problem)
+            return value
+
+        return self._answer(name, question, default, parse)
+
+    def choice(self, name: str, question: str, choices: tuple[str, ...]) -> str:
+        """Return one of the choices, the first by default."""
+
+        def parse(answer: str) -> str:
+            if answer not in choices:
+                raise ValueError(f"expected one of {', '.join(choices)}")
+            return answer
+
+        return self._answer(name, f"{question} ({', '.join(choices)})", choices[0], parse)
+
+    def is_given(self, name: str) -> bool:
+        """Return whether an option is given that is a flag."""
+        return bool(self._given.get(name))
+
+    def again(self, refusal: str) -> None:
+        """Say why the answers together are refused, and keep them as the defaults of the next round.
+
+        Raises
+        ------
+        UserError
+            Nothing was asked: the options alone are refused.
+        """
+        if not self._asked:
+            raise UserError(refusal, WRONG_CALL)
+        self._asked = 0
+        sys.stderr.write(f"{one_line(refusal)}\nOnce more: Enter keeps an answer.\n")
+
+    def _answer(self, name: str, question: str, default: T, parse: Callable[[str], T]) -> T:
+        given = self._given.get(name)
+        if given is not None:
+            try:
+                return parse(str(given))
+            except ValueError as error:
+                raise UserError(f"--{name.replace('_', '-')} {one_line(str(given))}: {error}", WRONG_CALL) from error
+        default = self._answers.get(name, default)
+        while self.asks:
+            self._asked += 1
+            sys.stderr.write(f"{question} [{default}]: ")
+            sys.stderr.flush()
+            line = sys.stdin.readline()
+            if not line:
+                raise UserError("the questions were not answered to their end; nothing was written", WRONG_CALL)
+            if not line.strip():
+                break
+            try:
+                default = parse(line.strip())
+            except ValueError as error:
+                sys.stderr.write(f"  {one_line(str(error))}\n")
+            else:
+                self._answers[name] = default
+                break
+        return default
