@@ -126,7 +126,7 @@ def test_any_number_of_sensors_is_written_and_what_it_cannot_do_is_said(
     assert (pattern_speed_m_s(load_settings("room", robot="mine.toml")) > 0.0) == drives
 
 
-def test_a_person_is_told_what_an_answer_costs_and_keeps_the_answers_when_one_is_refused(
+def test_a_person_sees_what_an_answer_costs_and_keeps_the_answers_when_one_is_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Driver, body, beam, layout, sensors, distance, spacing, ranges …; the second round mends the line's speed."""
