@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Final, Protocol
 
 from config.settings import Settings
@@ -72,11 +72,16 @@ class RunningPreparation:
         self._task: asyncio.Task[None] | None = None
         self._logged_run_s = -math.inf
 
-    async def start(self, settings: Settings) -> None:
-        """Prepare what the first cycle needs; then go on to prepare recognition beside the cycles."""
+    async def start(self, settings: Settings, connect: Callable[[], Awaitable[None]]) -> None:
+        """Prepare what the first cycle needs and connect; go on to prepare recognition beside that and the cycles."""
         if self._preparation is not None:
             await self._preparation.ring(settings)
             self._task = asyncio.create_task(self._preparation(settings), name="preparation")
+        try:
+            await connect()
+        except BaseException:  # nothing else would end it
+            await self.close()
+            raise
 
     @property
     def is_running(self) -> bool:

@@ -209,8 +209,7 @@ class RobotProcess:
             The port cannot be opened, or the robot does not answer as it should.
         """
         with self.health.catching_unhandled_errors():
-            await self._preparation.start(self._settings)
-            await self._connection.connect(self._stop.is_set)
+            await self._preparation.start(self._settings, lambda: self._connection.connect(self._stop.is_set))
             self._is_connected = True
             self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             link_task = asyncio.create_task(self._link.run(), name="link")

@@ -16,6 +16,7 @@ from config.errors import FAILED, UserError
 from config.load import load_mission, load_settings
 from config.settings import Settings
 from drivers.driver import LineState, Received, RobotDriver
+from drivers.emulator.faults import Mute
 from runtime.cycle.drive_requests import NO_MAP, DriveRequest
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.modes import Mode
@@ -194,6 +195,17 @@ def test_a_run_can_end_before_recognition_is_ready(monkeypatch: pytest.MonkeyPat
     run.drive(3.0, {1.0: RobotProcess.stop})
     assert preparation.is_cancelled
     assert run.summary["preparing"] == Preparation.progress
+
+
+def test_a_robot_that_does_not_answer_ends_the_preparation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the loop ends with a task that it destroys, which is said on the terminal below the reason."""
+    preparation = Preparation(seconds=1e6)
+    mute = Mute(kind="mute", at_s=0.0, duration_s=1e6)
+    with in_virtual_time(monkeypatch, faults=(mute,)) as (loop, settings, _robot, _links):
+        process = RobotProcess(settings, structlog.get_logger(), clock=loop.time, preparation=preparation)
+        with pytest.raises(UserError, match="nothing is received"):
+            loop.run_until_complete(process.run(arm=True, seconds=None))
+    assert preparation.is_cancelled
 
 
 def test_a_preparation_that_fails_halts_and_ends_the_run_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
