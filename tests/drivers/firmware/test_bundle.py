@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
 
+from config.errors import DONE
+from config.load import load_robot, load_settings
 from config.robot import RobotConfig
 from drivers.denning.wire_units import wire_pattern
 from drivers.firmware.bundle import (
@@ -18,8 +22,13 @@ from drivers.firmware.bundle import (
     read_config,
     robot_file,
 )
+from runtime.cli.app import run_command
+from runtime.cycle.modes import Mode
+from tests.runtime.emulated_run import Run
 
 BOARDS: tuple[Board, ...] = get_args(Board)
+PAGE = (Path(__file__).parents[3] / "docs/build-a-ring.md").read_text("utf-8")
+OF_THE_PAGE = dict(re.findall(r"```python\n# (\w+)\n(.*?)```", PAGE, re.DOTALL))
 
 
 def values(board: Board = "pico", **changes: Any) -> dict[str, Any]:
@@ -113,3 +122,31 @@ def test_nine_echo_pins_are_more_than_there_are_state_machines() -> None:
     with pytest.raises(FirmwareError, match='9 echo pins, and ECHO_TIMING = "pio" times 8'):
         check_pins(values(SENSORS=nine, FIRING="single"), "pico", CONFIG_NAME)
     check_pins(values(SENSORS=nine, FIRING="single", ECHO_TIMING="irq"), "pico", CONFIG_NAME)
+
+
+@pytest.mark.parametrize("name", ["hobby3", "hobby8", "parking12"])
+def test_the_robots_of_the_page_are_the_shipped_ones(name: str) -> None:
+    """Wired as docs/build-a-ring.md says, each gives the ring, the pattern and the base of its robot file."""
+    changes = read_config(OF_THE_PAGE[name], "the page")
+    check_pins(values(**changes), "pico", CONFIG_NAME)
+    built, shipped = config(**changes), load_robot(name)
+    assert built.body == shipped.body
+    assert built.ring == shipped.ring
+
+
+def test_the_commands_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From parts to driving: write the firmware, put the page's lines in, write it again, check, run (emulated)."""
+    monkeypatch.chdir(tmp_path)
+    words = next(line.split("`")[1] for line in PAGE.splitlines() if "echolocate firmware" in line).split()[1:]
+    assert words == ["firmware", "--board", "pico", "--out", "my-ring"]
+    assert run_command(words) == DONE
+    place = tmp_path / "my-ring" / CONFIG_NAME
+    lines = place.read_text("utf-8")
+    place.write_text(f"{lines}\n{OF_THE_PAGE['hobby3']}", encoding="utf-8")
+    assert run_command(words) == DONE
+    assert run_command(["check", "my-ring/robot.toml"]) == DONE
+    assert load_robot("my-ring/robot.toml").ring == load_robot("hobby3").ring
+    settings = load_settings("room", ["perception.method=paper"], robot="my-ring/robot.toml")
+    assert settings.world is not None
+    run = Run(settings, settings.world, 0)
+    run.until_true(lambda: run.mode is Mode.DRIVE, 4.0)
