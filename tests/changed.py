@@ -25,6 +25,26 @@ QUICK = (
     "tests/test_source_rules.py",
 )
 """Files that take seconds and cover every package, for a change that maps to no test."""
+RELATED = {
+    "config/": (
+        "tests/config/test_every_field.py",
+        "tests/config/test_reference.py",
+        "tests/config/test_shipped.py",
+        "tests/runtime/cli/commands/test_settings.py",
+    ),
+    "config/mission": ("tests/behaviors/test_schema_registry.py", "tests/config/test_schema_use.py"),
+    "config/schema_use": ("tests/behaviors/test_schema_registry.py", "tests/runtime/cycle/test_missions_random.py"),
+    "behaviors/schema": ("tests/config/test_schema_use.py", "tests/behaviors/missions"),
+    "drivers/": ("tests/drivers/test_registry.py",),
+    "drivers/contract/": ("tests/drivers/contract",),
+    "runtime/cli/": ("tests/runtime/cli/test_app.py", "tests/test_docs.py"),
+    "docs/": ("tests/test_docs.py", "tests/drivers/contract/test_example.py"),
+    "runtime/cycle/step": ("tests/runtime/recording/test_schema.py", "tests/runtime/cycle/test_modes.py"),
+    "pyproject.toml": ("tests/test_packaging.py",),
+}
+"""Tests that hold a list, a page or a rule for all files whose path begins so, by that beginning."""
+EVERY = ("tests/test_source_rules.py",)
+"""Tests of rules that any file of Python can break; they take seconds."""
 KERNELS = ("perception/", "behaviors/valley/", "drivers/emulator/")
 """After a change of these, tests run without the compiler: compiling the kernels again takes a minute."""
 
@@ -49,8 +69,10 @@ def find_tests(files: Iterable[str], root: Path = ROOT) -> list[str]:
     found: set[str] = set()
     for name in files:
         path = Path(name)
+        found |= {test for begin, tests in RELATED.items() if name.startswith(begin) for test in tests}
         if path.suffix != ".py":
             continue
+        found |= {*EVERY}
         if path.parts[0] != "tests":
             found.add(f"tests/{path.parent.as_posix()}/test_{path.name}")
         elif path.name.startswith("test_"):
@@ -84,7 +106,7 @@ def main() -> int:
         marked += " and not compiled"
     sys.stdout.write(f"{len(files)} changed files, {len(tests) or 'no'} test files by their paths\n")
     sys.stdout.flush()
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-m", marked, *(tests or QUICK)]
+    command = [sys.executable, "-m", "pytest", "-q", "-m", marked, *(tests or QUICK)]
     code = subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
     nothing_collected = 5
     return 0 if tests and code == nothing_collected else code

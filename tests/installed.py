@@ -20,9 +20,14 @@ def install(
     roots = {name.partition("/")[0].removesuffix(".py") for name in files}
     for module in [name for name in sys.modules if name.partition(".")[0] in roots]:
         monkeypatch.delitem(sys.modules, module)
+    if entries:
+        _write_entries(folder, entries)
+    monkeypatch.syspath_prepend(str(folder))
+    importlib.invalidate_caches()
+
+
+def _write_entries(folder: Path, entries: Mapping[str, Mapping[str, str]]) -> None:
     (folder / "plug-1.0.dist-info").mkdir()
     (folder / "plug-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: plug\nVersion: 1.0\n")
     groups = (f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in names.items()) for group, names in entries.items())
     (folder / "plug-1.0.dist-info" / "entry_points.txt").write_text("".join(groups))
-    monkeypatch.syspath_prepend(str(folder))
-    importlib.invalidate_caches()

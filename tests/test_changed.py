@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.changed import QUICK, ROOT, find_tests
+from tests.changed import EVERY, QUICK, RELATED, ROOT, find_tests
 
 
 @pytest.fixture
@@ -41,4 +41,10 @@ def test_a_change_maps_to_tests_by_path(root: Path, changed: list[str], tests: l
 
 
 def test_the_quick_tests_exist() -> None:
-    assert all((ROOT / name).exists() for name in QUICK)
+    related = (name for names in RELATED.values() for name in names)
+    assert [name for name in (*QUICK, *EVERY, *related) if not (ROOT / name).exists()] == []
+
+
+def test_a_change_of_what_lists_hold_runs_the_tests_of_the_lists() -> None:
+    found = find_tests(["config/mission_step.py"])
+    assert {"tests/behaviors/test_schema_registry.py", "tests/runtime/cli/commands/test_settings.py"} <= {*found}

@@ -1,4 +1,4 @@
-"""The commands that write a first file of one's own: `init robot`, `init world`, `init model`, `init run`."""
+"""The commands that write a first file of one's own: robot, world, model, run; and a package, `init plugin`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def robot(
     file: str,
     /,
     *,
-    driver: Literal["denning", "arcos", "rflex", "ros2"] | None = None,
+    driver: str | None = None,
     name: str | None = None,
     layout: Literal["all-round", "in-front", "one-by-one"] | None = None,
     sensors: int | None = None,
@@ -44,7 +44,8 @@ def robot(
     file
         The file to write, as my-robot.toml.
     driver
-        The robot's protocol: denning (also rings that you build), arcos (Pioneer), rflex (B21r, Magellan) or ros2.
+        The robot's protocol: denning (also rings that you build), arcos (Pioneer), rflex (B21r, Magellan), ros2, or
+        that of an installed package.
     name
         What the robot is called.
     layout
@@ -186,3 +187,19 @@ def run_file(
     from runtime.cli.commands.init_files import write_run
 
     return write_run(file, given, yes=yes, force=force)
+
+
+@app.command
+def plugin(name: str, /, *, kind: Literal["robot", "schema"] = "robot") -> int:
+    """Write a package of your own into a new folder: a robot that speaks lines, with its emulator, or a schema.
+
+    Parameters
+    ----------
+    name
+        Of the robot or the schema, of its package and of the folder.
+    kind
+        Robot or schema.
+    """
+    from runtime.cli.commands.init_plugin import write_plugin
+
+    return write_plugin(name, kind)

@@ -11,9 +11,11 @@ import orjson
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import list_shipped, load_any, load_model, load_world
+from config.robot import SENSORS_MAX
 from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
 from drivers.firing_pattern import FiringError
+from drivers.registry import known_drivers
 from runtime.cli.commands.init_ring import Described, ask_mounting
 from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.cli.commands.questions import Given, Questions
@@ -47,9 +49,9 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
 
 def _robot_draft(file: str, ask: Questions) -> RobotDraft:
     """Return the robot as options and answers describe it."""
-    driver = ask.choice("driver", "The robot's protocol", DRIVERS)
+    driver = ask.choice("driver", "The robot's protocol", (*DRIVERS, *(known_drivers().keys() - {*DRIVERS})))
     name = ask.text("name", "What the robot is called", Path(file).stem)
-    most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}[driver]
+    most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}.get(driver, SENSORS_MAX)
     body = ask.number("body_radius", "Radius of the body, m", 0.3, 0.01, 10.0)
     beam = ask.number("beam_half_angle", "Half the width of a beam, degrees", 12.0, 0.5, 80.0)
     mounting = ask_mounting(ask, Described(body, beam, most, 16 if driver != "denning" else 24))
