@@ -21,7 +21,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+
+try:
+    from hypothesis import HealthCheck, settings
+except ModuleNotFoundError:
+    pytest.exit("the tests of this repository need its extra dev: pip install -e '.[dev]'", returncode=4)
 
 from tests import line_coverage
 

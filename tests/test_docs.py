@@ -123,6 +123,22 @@ def test_what_is_read_first_stays_short(document: str, most: int) -> None:
 
 
 @pytest.mark.compiled
+def test_the_examples_of_the_library_run_in_an_empty_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Virtual time, a world, and a ring log; one hall of fifty, and a second of each drive."""
+    monkeypatch.chdir(tmp_path)
+    still = "".join(f"{0.05 * k:.2f},0,0,0" + ",1.5" * 24 + "\n" for k in range(20))
+    (tmp_path / "drive.csv").write_text("t,x,y,theta," + ",".join(f"r{k:02}" for k in range(24)) + "\n" + still)
+    blocks = (ROOT / "docs" / "library.md").read_text("utf-8").split("```python\n")[1:]
+    found = [text.partition("```")[0] for text in blocks]
+    run = [text for text in found if any(name in text for name in ("simulate(", "WorldConfig(", "read_ring_log("))]
+    assert len(run) == 3
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        for text in run:
+            exec(text.replace("range(50)", "range(1)").replace("seconds_max=20.0", "seconds_max=1.0"), {})
+    assert printed.getvalue().startswith("0 ")
+
+
+@pytest.mark.compiled
 def test_the_notebook_prints_what_it_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     names: dict[str, object] = {}
