@@ -150,3 +150,18 @@ def test_the_commands_of_the_page_run(tmp_path: Path, monkeypatch: pytest.Monkey
     assert settings.world is not None
     run = Run(settings, settings.world, 0)
     run.until_true(lambda: run.mode is Mode.DRIVE, 4.0)
+
+
+def test_a_sensor_on_a_servo_is_in_the_robot_file_and_needs_its_place() -> None:
+    one = {"SENSORS": (("hc-sr04", 0, 4),), "SERVOS": ((0, 26, 1500, 2400, 13, 180),), "FIRING": "single"}
+    robot = config(**one, MOUNTS=((10, 0, 0),), STEP_PERIOD_S=0.06)
+    (sensor,) = robot.ring.sensors or ()
+    assert (sensor.servo, sensor.bearings, sensor.sweep_deg, sensor.x_m) == (True, 13, 180.0, 0.01)
+    check_pins(values(**one, MOUNTS=((10, 0, 0),)), "pico", CONFIG_NAME)
+    with pytest.raises(FirmwareError, match="SERVOS without MOUNTS"):
+        config(**one)
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_a_trigger_has_20_us_as_shipped(board: Board) -> None:
+    assert values(board)["TRIGGER_US"] == 20
