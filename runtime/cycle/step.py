@@ -45,6 +45,7 @@ from runtime.cycle.drive_requests import (
 )
 from runtime.cycle.drive_state import DriveState, Moment
 from runtime.cycle.driving import commit, drive
+from runtime.cycle.echo_watch import EchoWatch
 from runtime.cycle.goal_drive import can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.line_messages import blind_reason
@@ -115,6 +116,7 @@ class State(DriveState):
     """Why the robot does not move although it may drive; None if it moves."""
     motion_monitor: Annotated[MotionMonitor, CONSISTENT] = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
+    echo_watch: EchoWatch = field(default_factory=EchoWatch)
     clock_monitor: ClockMonitor = field(default_factory=ClockMonitor)
     """Whether the robot's clock keeps time."""
     ring_problem: str | None = None
@@ -221,8 +223,7 @@ def _perceive(state: State, inputs: Inputs, settings: Settings) -> int:
     if inputs.received.rebooted:
         state.perception.reset()
         state.odometry = None
-        state.motion_monitor = MotionMonitor()
-        state.clock_monitor = ClockMonitor()
+        state.motion_monitor, state.clock_monitor, state.echo_watch = MotionMonitor(), ClockMonitor(), EchoWatch()
         state.leg = None
         state.drive_request = after_reboot(state.drive_request)  # a goal is a place in the odometry before the reboot
         state.last_firing_robot_s = 0.0
@@ -232,6 +233,7 @@ def _perceive(state: State, inputs: Inputs, settings: Settings) -> int:
     new_segments = sum(map(state.perception.observe, inputs.received.firings))
     for firing in inputs.received.firings[-1:]:
         state.last_firing_robot_s = firing.robot_s
+    state.echo_watch = state.echo_watch.observe(inputs.received.odometry, inputs.received.firings)
     state.ring_problem = state.perception.ring_monitor.take_problem()
     return new_segments
 
@@ -313,8 +315,9 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
-    if state.ring_problem is not None:
-        return Stop(state.ring_problem)
+    state.echo_watch, problem = state.echo_watch.stopped(state.ring_problem)
+    if problem is not None:
+        return Stop(problem)
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
     now_s = state.clock_monitor.now_s(odometry.robot_s, inputs.run_s)
     view, obstacles = state.perception.surroundings(now_s, odometry.ring_yaw, odometry.pose, age_max_s)

@@ -21,6 +21,7 @@ from pydantic_core import core_schema, to_jsonable_python
 from config.bounded import COUNT_MAX, Coordinate, Count, Seconds
 from perception.snapshot import Snapshot, fixed_shape
 from runtime.cycle.clock_monitor import ClockMonitor
+from runtime.cycle.echo_watch import EchoWatch
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import MotionMonitor
 from runtime.cycle.stalled_drives import DriveMemory
@@ -215,6 +216,7 @@ _ADDED: Final = MappingProxyType(
         "drive_memory": DriveMemory(),
         "motion_monitor": MotionMonitor(),
         "clock_monitor": ClockMonitor(),
+        "echo_watch": EchoWatch(is_over=True),
         "goal_place": None,
         "goal_drive": None,
         "trail": (),

@@ -153,7 +153,11 @@ def test_the_commands_of_the_page_run(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_sensor_on_a_servo_is_in_the_robot_file_and_needs_its_place() -> None:
-    one = {"SENSORS": (("hc-sr04", 0, 4),), "SERVOS": ((0, 26, 1500, 2400, 13, 180),), "FIRING": "single"}
+    one: dict[str, Any] = {
+        "SENSORS": (("hc-sr04", 0, 4),),
+        "SERVOS": ((0, 26, 1500, 2400, 13, 180),),
+        "FIRING": "single",
+    }
     robot = config(**one, MOUNTS=((10, 0, 0),), STEP_PERIOD_S=0.06)
     (sensor,) = robot.ring.sensors or ()
     assert (sensor.servo, sensor.bearings, sensor.sweep_deg, sensor.x_m) == (True, 13, 180.0, 0.01)

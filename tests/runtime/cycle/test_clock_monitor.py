@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
-from config.world import WorldConfig
+from config.world import DrumConfig, WorldConfig
 from drivers.emulator.faults import ClockError
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from runtime.cycle.clock_monitor import ClockMonitor, ClockState
@@ -108,7 +108,8 @@ def test_no_echo_is_younger_than_the_time_since_its_arrival() -> None:
 @pytest.mark.compiled
 def test_a_latched_clock_stops_the_drive_and_refuses_to_arm() -> None:
     settings = load_settings("hallway")
-    run = Run(settings, WorldConfig(), 0, (ClockError(kind="clock_error", at_s=4.0, duration_s=99.0),))
+    world = WorldConfig(drum=(DrumConfig(x_m=-2.0, y_m=0.0, radius_m=0.3),))  # behind, so that the ring hears
+    run = Run(settings, world, 0, (ClockError(kind="clock_error", at_s=4.0, duration_s=99.0),))
     run.until_true(lambda: run.mode is Mode.SAFE_STOP, 4.5)
     assert (run.state.mode.reason, 4.0 < run.run_s < 4.5) == (CLOCK_REASONS[ClockState.STANDS], True)
     run.until(5.0)

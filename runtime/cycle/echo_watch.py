@@ -1,0 +1,53 @@
+"""The watch on a ring that has never heard an echo: wires that carry none look like open space.
+
+A pin that a 5 V echo destroyed, a ring without its supply, a ring under a cover: each firing reports silence. So
+does open ground. The robot is stopped once, after a short way, with what to try; armed again it drives on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from config.bounded import Coordinate
+from drivers.messages import Firing, Odometry, Pose
+
+WAY_MAX_M: Final = 1.0
+"""Way without an echo since the start after which the robot stops, m. Few rooms let a robot drive so far away from
+everything, and a robot of .3 m/s is stopped within 4 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class EchoWatch:
+    """Whether the ring has heard an echo since the start; immutable, as keyframes hold it."""
+
+    is_over: bool = False
+    """An echo was heard, or the robot was stopped for want of one."""
+    way_m: Coordinate = 0.0
+    """Driven without any, m."""
+    at: Pose | None = None
+    """Where the robot was by its newest odometry."""
+
+    def observe(self, odometry: Odometry | None, firings: Sequence[Firing]) -> EchoWatch:
+        """Return the watch after a cycle, given what arrived in it."""
+        if self.is_over:
+            return self
+        if any(math.isfinite(r) for firing in firings for r in firing.ranges_m.tolist()):
+            return EchoWatch(is_over=True)
+        if odometry is None or not firings:
+            return self
+        pose = odometry.pose
+        way = 0.0 if self.at is None else math.dist((pose.x, pose.y), (self.at.x, self.at.y))
+        return replace(self, way_m=min(self.way_m + way, WAY_MAX_M), at=pose)
+
+    def stopped(self, problem: str | None = None) -> tuple[EchoWatch, str | None]:
+        """Return the watch, and why the robot must stop; then it is over. Another problem comes first."""
+        if problem is not None or self.is_over or self.way_m < WAY_MAX_M:
+            return self, problem
+        return EchoWatch(is_over=True), (
+            f"no sensor has heard an echo since the start, over {self.way_m:.1f} m: if anything stands within range, "
+            f"check the sensors' supply, the wires of trigger and echo, and what covers the ring (`echolocate "
+            f"ring-test --hand` shows which), then re-arm; in the open re-arm and it drives on"
+        )

@@ -1,0 +1,79 @@
+"""A ring that never hears an echo stops the robot once, before it has driven far; one echo ends the watch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.world import WorldConfig
+from drivers.emulator.faults import SilentRing
+from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from runtime.cycle.echo_watch import WAY_MAX_M, EchoWatch
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
+from tests.runtime.emulated_run import Run
+
+TOUCH_M_S = 0.05
+
+
+def at(x_m: float) -> Odometry:
+    return Odometry(x_m, Pose(x_m, 0.0, 0.0), 0.0, Twist(0.3, 0.0), Flags.NONE, 0)
+
+
+def heard(*ranges_m: float) -> tuple[Firing, ...]:
+    return (Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.array(ranges_m)),)
+
+
+def test_silence_counts_while_the_robot_drives_and_is_named_once() -> None:
+    watch = EchoWatch()
+    for k in range(11):
+        watch, reason = watch.observe(at(0.1 * k), heard(math.inf, math.nan)).stopped()
+        assert (reason is None) is (k < 10)
+    assert reason is not None
+    assert "no sensor has heard an echo since the start, over 1.0 m" in reason
+    assert watch.observe(at(9.0), heard(math.inf)).stopped()[1] is None, "armed again it drives on"
+
+
+def test_an_echo_ends_the_watch_and_cycles_without_firings_do_not_count() -> None:
+    watch = EchoWatch().observe(at(0.0), heard(math.inf, 2.0))
+    assert watch.observe(at(5.0), heard(math.inf)).stopped()[1] is None
+    assert EchoWatch().observe(at(0.0), ()).observe(at(9.0), ()).way_m == 0.0
+    assert EchoWatch().observe(None, heard(math.inf)).way_m == 0.0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("robot", ["servo1", "denning"])
+def test_a_ring_that_never_hears_stops_the_robot_before_it_touches(
+    robot: str, measured: Callable[[str], None]
+) -> None:
+    """As with a 5 V echo on a pin of 3.3 V."""
+    settings = load_settings("room", robot=robot)
+    assert settings.world is not None
+    silent = SilentRing(kind="silent_ring", at_s=0.0, duration_s=1e3)
+    run = Run(settings, settings.world, 1, (silent,), preparing="left out")
+    while run.mode is not Mode.SAFE_STOP:
+        run.cycle()
+        assert run.run_s < 30.0
+    assert "ring-test --hand" in str(run.state.mode.reason)
+    assert run.truths[-1].contact_m_s <= TOUCH_M_S
+    measured(f"{robot} that never hears an echo: stopped after {run.run_s:.1f} s")
+
+
+@pytest.mark.compiled
+def test_in_the_open_a_robot_that_is_armed_again_drives_on() -> None:
+    run = Run(load_settings("room", robot="denning"), WorldConfig(), 1, preparing="left out")
+
+    def drives() -> bool:
+        return run.mode is Mode.DRIVE
+
+    run.until_true(drives, 5.0)
+    run.until_true(lambda: not drives(), 30.0)
+    before = run.truths[-1].pose.x
+    run.until_true(drives, 5.0, Request.ARM)
+    run.until(run.run_s + 10.0)
+    assert drives()
+    assert run.truths[-1].pose.x > before + 2.0 * WAY_MAX_M
