@@ -30,7 +30,7 @@ RELATED = {
         "tests/config/test_every_field.py",
         "tests/config/test_reference.py",
         "tests/config/test_shipped.py",
-        "tests/runtime/cli/commands/test_settings.py",
+        "tests/test_docs.py",
     ),
     "config/mission": ("tests/behaviors/test_schema_registry.py", "tests/config/test_schema_use.py"),
     "config/schema_use": ("tests/behaviors/test_schema_registry.py", "tests/runtime/cycle/test_missions_random.py"),

@@ -47,4 +47,4 @@ def test_the_quick_tests_exist() -> None:
 
 def test_a_change_of_what_lists_hold_runs_the_tests_of_the_lists() -> None:
     found = find_tests(["config/mission_step.py"])
-    assert {"tests/behaviors/test_schema_registry.py", "tests/runtime/cli/commands/test_settings.py"} <= {*found}
+    assert {"tests/behaviors/test_schema_registry.py", "tests/test_docs.py"} <= {*found}
