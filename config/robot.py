@@ -259,6 +259,10 @@ class BodyConfig(Strict):
     """Synchro drive: the wheels turn, the body with its ring does not, but for sensors with `turns_with_wheels`."""
 
 
+NO_BODY: Final = BodyConfig(radius_m=0.3, speed_max_m_s=10.0, turn_max_rad_s=20.0)
+"""Of a robot file without a body, which is good for replays and stands of a ring that moves anyhow; a run refuses it."""
+
+
 class LinkConfig(Strict):
     """The serial line to the robot and its timeouts."""
 
@@ -326,7 +330,7 @@ class RobotConfig(Strict):
 
     robot: DriverConfig = DriverConfig()
     ring: RingConfig
-    body: BodyConfig
+    body: BodyConfig = NO_BODY
     link: LinkConfig = LinkConfig()
     calibration: CalibrationConfig = CalibrationConfig()
     arcos: ArcosConfig = ArcosConfig()

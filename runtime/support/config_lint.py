@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from config.robot import NO_BODY
 from config.settings import Settings
 from drivers.capabilities import missing
 from drivers.registry import capabilities
@@ -13,6 +14,8 @@ from runtime.support.pattern_check import gap_note, pattern_speed_m_s
 
 def lint_settings(settings: Settings) -> list[str]:
     """Return warnings about these settings, one sentence each."""
+    if settings.body == NO_BODY:
+        return ["body: none is described: the file is good for replays, stands and maps; to drive, add a [body]"]
     warnings = []
     inside_m = min(
         settings.body.radius_m - mount.x_m * math.cos(mount.angle_rad) - mount.y_m * math.sin(mount.angle_rad)

@@ -18,6 +18,7 @@ from behaviors.surroundings.field_of_view import (
     seen_speed_m_s,
     unseen_way,
 )
+from config.robot import NO_BODY
 from config.settings import Settings
 from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensors, time_of_flight_s
 from drivers.registry import make_driver
@@ -40,6 +41,8 @@ def refuse_undrivable(settings: Settings) -> None:
         for the age limit, or listens no farther than the clearance.
     """
     make_driver(settings)
+    if settings.body == NO_BODY:  # a run refuses it, and nothing else drives
+        return
     arbiter, body = settings.behaviors.arbiter, settings.body
     age_path = "behaviors.avoid_static_obstacle.echo_age_max_s"
     for course in courses_rad(settings):

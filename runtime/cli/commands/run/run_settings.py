@@ -10,6 +10,7 @@ from config.files import is_utf8, one_line, utf8
 from config.load import ConfigError, list_shipped, load_settings, load_world, with_goal, with_known_room
 from config.mission_step import Frame
 from config.places import check_places, no_such_place
+from config.robot import NO_BODY
 from config.settings import GoalConfig, Settings
 from runtime.support.user_folders import kept_places
 
@@ -105,6 +106,12 @@ def refuse_impossible(settings: Settings) -> None:
     from runtime.support.blind_sides import refuse_blind_ways
     from runtime.support.pattern_check import refuse_undrivable
 
+    if settings.body == NO_BODY:
+        raise UserError(
+            "body: the robot file describes none, so it is good for replays, stands and maps only; to drive, add a "
+            "[body] with radius_m, speed_max_m_s and turn_max_rad_s",
+            WRONG_CALL,
+        )
     refuse_undrivable(settings)
     refuse_blind_ways(settings)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import pytest
 
-from config.errors import UserError
+from config.errors import DONE, UserError
 from config.load import ConfigError, load_settings
 from config.settings import GoalConfig
+from runtime.cli.app import run_command
 from runtime.cli.commands.run.run_settings import SettingsFiles, with_port
+from runtime.support.config_lint import lint_settings
 
 BACKWARDS = "ring.firing={sets=[[10, 12, 14]]}"
 
@@ -60,3 +63,15 @@ def test_a_shipped_world_is_driven_as_the_run_of_its_name_says_unless_a_run_is_n
     assert office.goal is not None
     assert office.perception.grid.method == "directed"
     assert SettingsFiles("hallway", world="office").read().goal is None
+
+
+def test_a_robot_without_a_body_is_good_for_replays_and_no_run(tmp_path: Path) -> None:
+    file = tmp_path / "ring.toml"
+    file.write_text("[ring]\nbeam_half_angle_deg = 15\nresolution_m = 0.0\nrange_min_m = 0.02\nrange_max_m = 4.0\n"
+                    "sensors = [{x_m = 0.0, y_m = 0.0, angle_deg = 0}]\nfiring = 'single'\n")  # fmt: skip
+    assert lint_settings(load_settings("room", robot=str(file))) == [
+        "body: none is described: the file is good for replays, stands and maps; to drive, add a [body]"
+    ]
+    assert run_command(["check", str(file)]) == DONE
+    with pytest.raises(UserError, match=r"add a \[body\] with radius_m"):
+        SettingsFiles(robot=str(file)).read()
