@@ -260,7 +260,8 @@ class BodyConfig(Strict):
 
 
 NO_BODY: Final = BodyConfig(radius_m=0.3, speed_max_m_s=10.0, turn_max_rad_s=20.0)
-"""Of a robot file without a body, which is good for replays and stands of a ring that moves anyhow; a run refuses it."""
+"""Of a robot file without a body, which is good for replays and stands; a run refuses it. A replay takes what moves a
+ring for wrong units only beyond these speeds."""
 
 
 class LinkConfig(Strict):
