@@ -132,7 +132,7 @@ class Perception:
 
     @property
     def _can_localize(self) -> bool:
-        return self.known_room is not None and self.known_room.can_refine
+        return (self.known_room or self.map_frame).can_refine
 
     @property
     def counts(self) -> MapCounts:
@@ -188,8 +188,8 @@ class Perception:
             radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
             self.canyon_map.refine(self._in_odometry(self.vacant.outside(self.method.labelled_objects())), radii_m)
             return 1
-        if self.known_room is not None and self._can_localize:
-            self.known_room.refine()
+        if self._can_localize:
+            (self.known_room or self.map_frame).refine()
             return 1
         return next((one.refine() for one in self._refined()[1:] if one.can_refine), 0)
 
@@ -395,6 +395,6 @@ class Perception:
             The snapshot was made with other settings.
         """
         put_back(self, snapshot)
-        for part in (*self._methods(), self.vacant, self.grid, self.surfaces, self.known_room):
+        for part in (*self._methods(), self.vacant, self.grid, self.surfaces, self.map_frame, self.known_room):
             if part is not None:
                 part.drop_caches()

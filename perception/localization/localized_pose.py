@@ -22,3 +22,14 @@ class LocalizedPose(NamedTuple):
     status: Status
     probability: float
     """Share of the expected echoes that came lately: near 1 where pose and map are right."""
+
+
+class Moment(NamedTuple):
+    """A moment of a run, whose pose may become known better later on."""
+
+    submap: int
+    """Number of the map of a few metres of way that goes on then."""
+    odometry: Floats
+    """The ring's pose by odometry, x, y (m) and direction (rad), which is not wrapped; shape (3,)."""
+    turned: float
+    """Direction of travel less that of the ring, rad."""

@@ -15,6 +15,7 @@ from typing import Final, TypeAlias
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
+from perception.bounds import PLACE, bounds
 from perception.detected_object import DetectedObject, turned_object, worst_sigma
 from perception.edits import (
     Evidence,
@@ -28,8 +29,9 @@ from perception.edits import (
 )
 from perception.kernel import Floats
 from perception.localization.drift.drift_correction import DriftCorrection, LandmarkPlace, SeenObject
-from perception.localization.localized_pose import LocalizedPose
+from perception.localization.localized_pose import LocalizedPose, Moment
 from perception.localization.odometry_frame import AnyEdit, OdometryFrame
+from perception.localization.submaps.submap_graph import SubmapGraph
 from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
@@ -51,10 +53,18 @@ class MapFrame(OdometryFrame):
     ----------
     drift : DriftCorrection
         The landmark filter.
+    submaps : SubmapGraph
+        Where no landmark refutes odometry: the pose by maps of a few metres of way. What is recognised stays in
+        odometry's frame then.
     """
+
+    BOUNDS: Final = bounds(_turned=PLACE)
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
         self.drift = DriftCorrection(ring)
+        self.submaps = SubmapGraph(ring)
+        self._turned = 0.0
+        """Direction of travel less that of the ring at the last firing, rad."""
         self._near: set[int] = set()
         self.set_models(models)
 
@@ -70,6 +80,20 @@ class MapFrame(OdometryFrame):
     def reset(self) -> None:
         """Start again: the next firing's odometry defines the map frame."""
         self.drift.reset()
+        self.submaps.reset()
+
+    @property
+    def can_refine(self) -> bool:
+        """Whether the pose by maps waits for quanta."""
+        return not self.drift.is_applied and self.submaps.can_refine
+
+    def refine(self) -> None:
+        """Do one quantum."""
+        self.submaps.refine()
+
+    def drop_caches(self) -> None:
+        """Forget what follows from the rest, after a snapshot was put back."""
+        self.submaps.drop_caches()
 
     def follow(
         self, firing: Firing, objects: Sequence[DetectedObject], shift: Callable[[int, float, float], object]
@@ -95,22 +119,42 @@ class MapFrame(OdometryFrame):
             and seen.number is not None
         )
         self.drift.observe(firing)
+        if not self.drift.is_applied:
+            self.submaps.observe(firing)
+            self._turned = firing.pose.theta - firing.ring_yaw
         for number, dx, dy in self.drift.moved_landmarks(SHIFT_MIN_M, self._near):
             shift(number, dx, dy)
         return self.drift.corrected(firing)
 
     def localized(self) -> LocalizedPose:
-        """Return where the robot was at the last firing."""
-        return self.drift.localized()
+        """Return where the robot was at the last firing: by landmarks where there are some, or by maps of the way."""
+        here = self.drift.localized()
+        is_placed = here.status == "lost" or (here.status == "tracking" and not self.submaps.is_applied)
+        if self.drift.is_applied or is_placed:
+            return here
+        found = self.submaps.localized(self._turned)
+        return found if self.submaps.is_applied else found._replace(pose=here.pose, ring_yaw=here.ring_yaw)
+
+    def moment(self) -> Moment | None:
+        """Return the moment of the last firing, for `as_known_now`; None where landmarks correct the pose."""
+        return None if self.drift.is_applied else Moment(*self.submaps.anchor(), self._turned)
+
+    def as_known_now(self, then: LocalizedPose, moment: Moment | None) -> LocalizedPose:
+        """Return where the robot was at a moment, as known now; by landmarks that is what was known then."""
+        if moment is None or self.drift.is_applied or not self.submaps.is_applied:
+            return then
+        x, y, yaw = self.submaps.placed(moment.submap, moment.odometry).tolist()
+        return then._replace(pose=Pose(x, y, yaw + moment.turned), ring_yaw=yaw)
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
-        return self.drift.odometry_from_map()
+        return self.drift.odometry_from_map() if self.drift.is_applied else self.submaps.odometry_from_map()
 
     def in_map(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the filter's frame in the map frame."""
         if not self.drift.is_applied:
-            return tuple(objects)
+            to = self.submaps.odometry_from_map().inverse()
+            return tuple(turned_object(to, seen) for seen in objects) if self.submaps.is_applied else tuple(objects)
         to = self.drift.map_from_filter()
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
 

@@ -10,7 +10,7 @@ from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.edits import AreaEdit, Evidence, MapEdit
 from perception.kernel import Floats
-from perception.localization.localized_pose import LocalizedPose
+from perception.localization.localized_pose import LocalizedPose, Moment
 from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
@@ -31,6 +31,17 @@ class OdometryFrame:
     def reset(self) -> None:
         """Start again: the next firing's odometry defines the map frame."""
 
+    @property
+    def can_refine(self) -> bool:
+        """Whether a pose waits for quanta."""
+        return False
+
+    def refine(self) -> None:
+        """Do one quantum."""
+
+    def drop_caches(self) -> None:
+        """Forget what follows from the rest, after a snapshot was put back."""
+
     def follow(
         self, firing: Firing, _objects: Sequence[DetectedObject], _shift: Callable[[int, float, float], object]
     ) -> Firing:
@@ -40,6 +51,14 @@ class OdometryFrame:
     def localized(self) -> LocalizedPose | None:
         """Return where the robot was at the last firing; None where the map frame is odometry's."""
         return None
+
+    def moment(self) -> Moment | None:
+        """Return the moment of the last firing, for `as_known_now`; None where its pose will not change."""
+        return None
+
+    def as_known_now(self, then: LocalizedPose, _moment: Moment | None) -> LocalizedPose:
+        """Return where the robot was at a moment, as known now, instead of as it was known then."""
+        return then
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame."""

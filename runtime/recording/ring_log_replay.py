@@ -77,7 +77,10 @@ class FiringReplayer:
 
 
 def replay_localized(
-    settings: Settings, firings: Iterable[Firing], on_pose: Callable[[float, LocalizedPose], None]
+    settings: Settings,
+    firings: Iterable[Firing],
+    on_pose: Callable[[float, LocalizedPose], None],
+    on_path: Callable[[float, LocalizedPose], None] | None = None,
 ) -> ReplaySummary:
     """Run perception over firings, correct drift by what it recognises, and return what it perceived.
 
@@ -89,14 +92,23 @@ def replay_localized(
         In order of time.
     on_pose : callable
         Called after each firing with its time (s) and the robot's pose as known then.
+    on_path : callable, optional
+        Called at the end for each firing with its time and the robot's pose as known at the end.
     """
     config = settings.perception.model_copy(update={"localization": LocalizationConfig(correct_drift=True)})
     replayer = FiringReplayer(settings.model_copy(update={"perception": config}), firings)
     perception = replayer.perception
+    frame, moments = perception.map_frame, []
     for firing in replayer:
+        while frame.can_refine:  # a log has time for all that can be known
+            frame.refine()
         here = perception.localized()
         if here is not None:
             on_pose(firing.robot_s, here)
+            moments.append((firing.robot_s, here, frame.moment()))
+    if on_path is not None:
+        for time_s, then, moment in moments:
+            on_path(time_s, frame.as_known_now(then, moment))
     summary = replayer.summary(perception.odometry_from_map().inverse(), perception.mapped_objects())
     summary["frame"], here = "map", perception.localized()
     if here is not None:

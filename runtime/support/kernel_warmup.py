@@ -178,12 +178,8 @@ def _look_for_points(memory: Memory, constants: SettingsRecord) -> None:
     enter_point_of_line(memory.s, constants, 0, 0.0, False)  # noqa: FBT003 - a kernel takes no keywords
 
 
-def _polygons(settings: Settings) -> None:
-    _drive_and_edit(settings, BAYES, (*settings.models, _square()))
-
-
-def _paper(settings: Settings) -> None:
-    _drive_and_edit(settings, PAPER, (*settings.models, _square()))
+def _polygons(settings: Settings, method: str = BAYES) -> None:
+    _drive_and_edit(settings, method, (*settings.models, _square()))
 
 
 def _emulator(settings: Settings) -> None:
@@ -201,18 +197,23 @@ def _emulator(settings: Settings) -> None:
 
 
 def _localization(settings: Settings) -> None:
-    """Drive past objects that become landmarks and vanish; corrections and every kind of range are entered."""
+    """Drive past objects that become landmarks and vanish; enter every kind of range, and match maps of the way."""
     import numpy as np
 
     from drivers.messages import Firing, Pose
     from perception.localization.drift.drift_correction import DriftCorrection, SeenObject
+    from perception.localization.submaps.submap_graph import SubmapGraph
 
-    drift = DriftCorrection(settings.ring)
+    drift, graph = DriftCorrection(settings.ring), SubmapGraph(settings.ring)
     objects = [SeenObject(k, 2.0 * math.cos(k), 2.0 * math.sin(k), 0.3) for k in range(1, 5)]
-    for k in range(FIRINGS):
+    for k in range(2 * FIRINGS):
         ranges = np.full(len(settings.ring.mounts), 1.3 if k % 2 else math.inf)
+        firing = Firing(0.1 * k, Pose(0.15 * k, 0.0, 0.1 * k), 0.0, ranges)
         drift.learn(objects[k // 12 :])
-        drift.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.1 * k), 0.0, ranges))
+        drift.observe(firing)
+        graph.observe(firing)
+        while graph.can_refine:
+            graph.refine()
 
 
 def _known_room(settings: Settings) -> None:
@@ -247,7 +248,7 @@ def _valley(settings: Settings) -> None:
 
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
-    EMULATOR: _emulator, RING: _ring, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper,
+    EMULATOR: _emulator, RING: _ring, BAYES: _circles, POLYGONS: _polygons, PAPER: partial(_polygons, method=PAPER),
     LOCALIZATION: _localization, KNOWN_ROOM: _known_room, VALLEY: _valley, SURFACES: _surfaces,
     **{method: partial(_grid, method=method) for method in GRIDS},
 })  # fmt: skip

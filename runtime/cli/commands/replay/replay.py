@@ -24,6 +24,7 @@ def replay(
     speed: float | None = None,
     localize: Annotated[bool, Flag] = False,
     trajectory: str | None = None,
+    path: str | None = None,
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
     robot: RobotFile = None,
     model: ModelFiles = (),
@@ -50,13 +51,15 @@ def replay(
     speed
         Show the run this many times as fast as it was; by default it is replayed as fast as possible.
     localize
-        Correct the drift of a ring log's odometry by what is recognised; objects are then in the map frame, which is
-        the odometry's at the first row.
+        Correct the drift of a ring log's odometry by round objects and by maps of its way; objects are then in the
+        map frame, which is the odometry's at the first row.
     map_file
         With --localize, the known room: a world file, or the name of a shipped one. The start is then unknown, and
         the map frame is the file's.
     trajectory
-        With --localize, a file for the robot's poses in the map frame (CSV), one row a firing.
+        With --localize, a file for the robot's poses in the map frame (CSV), one row a firing, as known at its time.
+    path
+        The same as known at the end: later matches of the map correct earlier poses, too.
     robot
         Robot file for a ring log; a recording contains its robot.
     model
@@ -80,8 +83,11 @@ def replay(
     from runtime.recording.reader import is_recording
 
     common = ReplayOptions(sets, robot, model, json, force, units)
-    if trajectory is not None and not localize:
-        raise UserError("--trajectory gives poses in the map frame: give --localize too", WRONG_CALL)
+    if not (trajectory is None and path is None) and not localize:
+        raise UserError(
+            f"{'--path' if trajectory is None else '--trajectory'} gives poses in the map frame: give --localize too",
+            WRONG_CALL,
+        )
     if map_file is not None and not localize:
         raise UserError("--map names the room in which the robot is: give --localize too", WRONG_CALL)
     if localize and is_recording(Path(log)):
@@ -98,4 +104,6 @@ def replay(
         )
     from runtime.cli.commands.replay.replay_ring_log import replay_log
 
-    return replay_log(log, common, localize=localize, trajectory=trajectory, map_file=map_file, options=options)
+    return replay_log(
+        log, common, localize=localize, trajectory=trajectory, path=path, map_file=map_file, options=options
+    )

@@ -31,6 +31,7 @@ def replay_log(
     *,
     localize: bool = False,
     trajectory: str | None = None,
+    path: str | None = None,
     map_file: str | None = None,
     options: RingLogOptions = AUTO,
 ) -> int:
@@ -38,7 +39,7 @@ def replay_log(
 
     Parameters
     ----------
-    log, localize, trajectory, map_file, options
+    log, localize, trajectory, path, map_file, options
         As of `runtime.cli.commands.replay.replay.replay`.
     common
         What a recording is given, too.
@@ -48,31 +49,36 @@ def replay_log(
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file, "--trajectory": trajectory}, (log,), force=common.force)
+    check_outputs({"--json": json_file, "--trajectory": trajectory, "--path": path}, (log,), force=common.force)
     corrects_drift = localize and map_file is None
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
 
     rows: list[str] = []
+    path_rows: list[str] = []
     warnings: list[str] = []
 
     def on_pose(t: float, here: LocalizedPose) -> None:
         rows.append(trajectory_row(t, here))
+
+    def on_path(t: float, here: LocalizedPose) -> None:
+        path_rows.append(trajectory_row(t, here))
 
     with progress(console, "replaying") as step:
         firings = _each(open_ring_log(Path(log), settings, options, warnings.append), step)
         if map_file is not None:
             summary = replay_in_known_room(settings, firings, on_pose)
         elif corrects_drift:
-            summary = replay_localized(settings, firings, on_pose)
+            summary = replay_localized(settings, firings, on_pose, on_path)
         else:
             summary = replay_firings(settings, firings)
     for warning in warnings:
         console.print(f"echolocate: {warning}")
-    if trajectory is not None:
-        with writing("--trajectory", trajectory):
-            Path(trajectory).write_text("\n".join([TRAJECTORY_HEADER, *rows, ""]), "utf-8")
+    for option, file, poses in (("--trajectory", trajectory, rows), ("--path", path, path_rows or rows)):
+        if file is not None:
+            with writing(option, file):
+                Path(file).write_text("\n".join([TRAJECTORY_HEADER, *poses, ""]), "utf-8")
     if json_file is not None:
         write_json(json_file, summary)
     output = EscapingConsole()

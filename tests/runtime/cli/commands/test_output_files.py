@@ -51,6 +51,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "--localize",
         "--json {0}",
         "--trajectory {1}",
+        "--path {2}",
     ),
     "settings": ("settings", "--out {0}"),
     "init": ("init", "run {0}", "--yes"),

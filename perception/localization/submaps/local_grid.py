@@ -1,0 +1,153 @@
+"""A map of a few metres of way: where echoes came from, and what ranges went past, by expectation maximisation.
+
+A range does not say where on its arc the echo began; the other ranges do. Each echo is shared among the cells of its
+arc in proportion to what the map says of them so far, and shared again as the map improves (Thrun, "Learning
+occupancy grid maps with forward sensor models", Autonomous Robots 15, 2003). Such a map holds for as long as odometry
+is good. It is coarser than `perception.mapping.surfaces`: it is compared with others thousands of times.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import Floats, kernel
+
+CELL_M: Final = 0.1
+CELLS: Final = 140
+"""A map is a square about the ring's place in the middle of its way: half of that way and a range of 5 m fit."""
+HALF: Final = CELLS // 2
+REACH_M: Final = 4.9
+"""Echoes from farther are taken as silence, whose cone is clear up to `CLEAR_M` only: mirrors are silent, too."""
+CLEAR_M: Final = 2.5
+ROUNDS: Final = 6
+"""Rounds of expectation maximisation."""
+PASS_RAYS: Final = 21
+"""Rays of a beam along which a range is entered as passed: 0.1 m apart at 5 m and ±12°."""
+ELSEWHERE: Final = 0.005
+"""Weight of an echo's origin outside its arc, among cells that answer with probabilities up to 1."""
+PRIOR_HITS: Final = 0.015
+PRIOR_READINGS: Final = 0.5
+"""A cell that was not looked at answers with 3 %, as the sum of half a reading."""
+HITS: Final = 3.0
+"""A surface is about three cells thick once it is blurred, which divide each echo among them."""
+
+
+@kernel
+def enter_passes(readings: Floats, begin: int, end: int, half: float, passes: Floats) -> None:
+    """Add what ranges passed.
+
+    Parameters
+    ----------
+    readings : (n, 4) float
+        Sensor's place x, y (m) and direction (rad) in the map's frame, and the range, m; infinite if silent.
+    begin, end : int
+        Those to be entered.
+    half : float
+        Half of the beam's opening, rad.
+    passes : (CELLS, CELLS) float
+        Updated: a range in the middle of the beam counts 1, one at its edge ½.
+    """
+    for k in range(begin, end):
+        x, y, axis, range_m = readings[k]
+        clear = range_m - CELL_M if range_m <= REACH_M else CLEAR_M
+        for ray in range(PASS_RAYS):
+            t = 2.0 * (ray + 0.5) / PASS_RAYS - 1.0
+            c, s = math.cos(axis + t * half), math.sin(axis + t * half)
+            for step in range(int(clear / CELL_M)):
+                along = (step + 0.5) * CELL_M
+                i = math.floor((x + along * c) / CELL_M) + HALF
+                j = math.floor((y + along * s) / CELL_M) + HALF
+                if 0 <= i < CELLS and 0 <= j < CELLS:
+                    share = min(1.0, 2.0 * half * along / (PASS_RAYS * CELL_M))
+                    passes[i, j] += share * (1.0 - 0.5 * t * t)
+
+
+@kernel
+def share_echoes(readings: Floats, count: int, half: float, passes: Floats, hits: Floats, shared: Floats) -> None:
+    """Do one round of expectation maximisation: share all echoes anew by what the map says.
+
+    Parameters
+    ----------
+    readings : (n, 4) float
+        As of `enter_passes`.
+    count : int
+        How many there are.
+    half : float
+        Half of the beam's opening, rad.
+    passes : (CELLS, CELLS) float
+        Of all readings.
+    hits : (CELLS, CELLS) float
+        Blurred over 3 × 3 cells: those of the round before, zero in the first one. Overwritten.
+    shared : (CELLS, CELLS) float
+        Overwritten.
+    """
+    shared[:] = 0.0
+    for k in range(count):
+        x, y, axis, range_m = readings[k]
+        if range_m > REACH_M:
+            continue
+        places = max(3, int(4.0 * half * range_m / CELL_M) + 1)
+        total = ELSEWHERE
+        for enters in range(2):
+            for place in range(places):
+                t = 2.0 * (place + 0.5) / places - 1.0
+                i = math.floor((x + range_m * math.cos(axis + t * half)) / CELL_M) + HALF
+                j = math.floor((y + range_m * math.sin(axis + t * half)) / CELL_M) + HALF
+                if 1 <= i < CELLS - 1 and 1 <= j < CELLS - 1:
+                    weight = (1.0 - 0.5 * t * t) * _answer(hits[i, j], passes[i, j]) / places
+                    if enters:
+                        shared[i, j] += weight / total
+                    else:
+                        total += weight
+    for i in range(1, CELLS - 1):
+        for j in range(1, CELLS - 1):
+            beside = shared[i - 1, j] + shared[i + 1, j] + shared[i, j - 1] + shared[i, j + 1]
+            across = shared[i - 1, j - 1] + shared[i - 1, j + 1] + shared[i + 1, j - 1] + shared[i + 1, j + 1]
+            hits[i, j] = (4.0 * shared[i, j] + 2.0 * beside + across) / 16.0
+
+
+@kernel
+def _answer(hits: float, passes: float) -> float:
+    """Return the probability that a cell answers."""
+    return (HITS * hits + PRIOR_HITS) / (HITS * hits + passes + PRIOR_READINGS)
+
+
+@kernel
+def add_map(
+    hits: Floats, passes: Floats, x: float, y: float, theta: float, to_hits: Floats, to_passes: Floats
+) -> None:
+    """Add a map to another one, in which it lies at a pose (m, rad); its cells are interpolated."""
+    c, s = math.cos(theta) / CELL_M, math.sin(theta) / CELL_M
+    for a in range(CELLS):
+        for b in range(CELLS):
+            dx, dy = (a - HALF + 0.5) * CELL_M - x, (b - HALF + 0.5) * CELL_M - y
+            row, column = c * dx + s * dy + HALF - 0.5, c * dy - s * dx + HALF - 0.5
+            i, j = math.floor(row), math.floor(column)
+            if 0 <= i < CELLS - 1 and 0 <= j < CELLS - 1:
+                u, v = row - i, column - j
+                for down in range(2):
+                    for right in range(2):
+                        share = (u if down else 1.0 - u) * (v if right else 1.0 - v)
+                        to_hits[a, b] += share * hits[i + down, j + right]
+                        to_passes[a, b] += share * passes[i + down, j + right]
+
+
+@kernel
+def answers_of(hits: Floats, passes: Floats, answers: Floats, known: Floats) -> None:
+    """Compute how each cell answers.
+
+    Parameters
+    ----------
+    hits, passes : (CELLS, CELLS) float
+        Of one map or several.
+    answers : (CELLS, CELLS) float
+        Overwritten: probability that a cell answers.
+    known : (CELLS, CELLS) float
+        Overwritten: 0 where no range came, near 1 where many did.
+    """
+    for i in range(CELLS):
+        for j in range(CELLS):
+            looks = HITS * hits[i, j] + passes[i, j]
+            answers[i, j] = _answer(hits[i, j], passes[i, j])
+            known[i, j] = looks / (looks + 1.0)

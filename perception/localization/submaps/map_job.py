@@ -1,0 +1,211 @@
+"""The comparison of a map with those before it, and what follows from it for all: a job in steps of bounded work."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.messages import wrap_angle
+from perception.kernel import Floats
+from perception.localization.submaps.local_grid import (
+    CELLS,
+    ROUNDS,
+    add_map,
+    answers_of,
+    enter_passes,
+    share_echoes,
+)
+from perception.localization.submaps.map_match import Comparison, Match
+from perception.localization.submaps.pose_graph import (
+    SCALE_SIGMA,
+    SCALES,
+    Link,
+    Node,
+    begin_step,
+    go_on,
+    linearise,
+    spread_from,
+)
+from perception.localization.submaps.submap_records import between, match_link, pose_of
+from perception.records import records, zeros
+
+NEAR_M: Final = 6.0
+"""Maps nearer to each other than this may overlap."""
+RUN_MAX: Final = 8
+"""Maps that are joined to be compared with."""
+MATCH_M: Final = 0.04
+MATCH_RAD: Final = 0.02
+"""Error of a match beside that of its readings."""
+KNOWN_MIN: Final = 20.0
+"""Known readings that a match needs."""
+MISFIT_MAX: Final = 0.5
+"""By how much a reading of a match may be less likely than is usual, nat."""
+GATE: Final = 27.0
+"""Squared deviation of a match from what was expected, over its covariance."""
+REACH_M: Final = (0.3, 1.2)
+REACH_RAD: Final = (0.1, 0.3)
+REACH_SIGMAS: Final = 2.5
+"""A match is looked for so many standard deviations about what is expected, within these limits."""
+EXPECTED_LEAST: Final = (0.01, 0.01, 0.001)
+"""Added to the variance of what is expected, m² and rad²: the search is coarse."""
+STEPS_MAX: Final = 6
+ITERATIONS: Final = 24
+"""Gauss-Newton steps after a map, and iterations of one quantum."""
+SOLVED: Final = 1e-6
+STEP_MIN: Final = 1e-4
+CHUNK: Final = 64
+"""Readings whose passes are entered in one quantum."""
+
+
+class Maps(NamedTuple):
+    """What a job begins with: the maps up to the one to be compared, which is the last."""
+
+    submaps: NDArray[Any]
+    nodes: NDArray[Any]
+    links: NDArray[Any]
+    scales: Floats
+    usual: Floats
+    """Sum of the log likelihoods of known readings where maps fitted, and their number, shape (2,)."""
+    grids: dict[int, Floats]
+    """Hits and passes of maps by number, shape (2, CELLS, CELLS) each: what was computed is kept here."""
+
+
+class Outcome(NamedTuple):
+    """What a job ends with."""
+
+    nodes: NDArray[Any]
+    links: NDArray[Any]
+    scales: Floats
+    usual: Floats
+    gain: float
+    """Log likelihood of the matches with drift less that without."""
+    spread: Floats
+    """Variance of place (m²) and direction (rad²) of the map in the map frame."""
+
+
+def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
+    """Compare the last map with those before; yield None after each quantum, and the outcome last."""
+    number = len(maps.submaps) - 1
+    for grid in _make_grid(maps.submaps[number], half_angle):
+        maps.grids[number] = grid
+        yield None
+    nodes, links, usual = maps.nodes, maps.links, maps.usual.copy()
+    spread = np.full((number + 1, 2), math.inf)
+    spread[number] = 0.0
+    spread_from(records(Link, links), len(links), records(Node, nodes), spread)
+    here = pose_of(nodes[number])
+    distances = np.hypot(nodes["x"][:number] - here[0], nodes["y"][:number] - here[1])
+    found: list[NDArray[Any]] = []
+    count = int(maps.submaps[number]["count"])
+    readings = np.ascontiguousarray(maps.submaps[number]["readings"][:count])
+    for run in _runs(np.flatnonzero(distances < NEAR_M).tolist()) if count else ():
+        nearest = min(run, key=lambda k: distances[k])
+        joined = np.zeros((2, CELLS, CELLS))
+        for member in run:
+            x, y, theta = between(pose_of(nodes[nearest]), pose_of(nodes[member])).tolist()
+            hits, passes = _grid_of(maps, member, half_angle)
+            add_map(hits, passes, x, y, theta, joined[0], joined[1])
+            yield None
+        answers = np.empty((2, CELLS, CELLS))
+        answers_of(joined[0], joined[1], answers[0], answers[1])
+        expected = between(pose_of(nodes[nearest]), here)
+        place, turn = spread[nearest].tolist()
+        beam = np.array([half_angle, usual[0] / usual[1]])
+        match: Match | None = None
+        for match in Comparison(readings, answers, beam).best_match(
+            expected, _reach(place, turn), np.diag(1.0 / (np.array([place, place, turn]) + EXPECTED_LEAST))
+        ):
+            if match is None:
+                yield None
+        if match is None:
+            continue
+        log_likelihood = match.log_likelihood + match.known * beam[1]
+        if number - 1 in run:
+            usual += log_likelihood, match.known
+        covariance = np.linalg.inv(match.information) + np.diag([MATCH_M**2, MATCH_M**2, MATCH_RAD**2])
+        off = match.pose - expected
+        off[2] = wrap_angle(off[2])
+        chi = off @ np.linalg.inv(covariance + np.diag([place, place, turn])) @ off
+        misfit = usual[0] / usual[1] - log_likelihood / max(match.known, 1.0)
+        if match.known >= KNOWN_MIN and misfit <= MISFIT_MAX and chi <= GATE:
+            found.append(
+                match_link(nearest, number, match.pose, np.linalg.inv(covariance), is_next=number - 1 in run)
+            )
+    links = np.concatenate([links, *found])
+    yield from _solve(Maps(maps.submaps, nodes, links, maps.scales, usual, maps.grids), is_new=len(found) > 0)
+
+
+def _make_grid(submap: NDArray[Any], half_angle: float) -> Iterator[Floats]:
+    """Make the map of hits and passes; yield it after each quantum."""
+    count, readings = int(submap["count"]), np.ascontiguousarray(submap["readings"])
+    grid, shared = np.zeros((2, CELLS, CELLS)), np.empty((CELLS, CELLS))
+    for begin in range(0, count, CHUNK):
+        enter_passes(readings, begin, min(begin + CHUNK, count), half_angle, grid[1])
+        yield grid
+    for _ in range(ROUNDS):
+        share_echoes(readings, count, half_angle, grid[1], grid[0], shared)
+        yield grid
+
+
+def _grid_of(maps: Maps, number: int, half_angle: float) -> Floats:
+    """Return hits and passes of a map before; made again at once if the process has started since then."""
+    if number not in maps.grids:
+        *_, maps.grids[number] = _make_grid(maps.submaps[number], half_angle)
+    return maps.grids[number]
+
+
+def _runs(numbers: Sequence[int]) -> list[list[int]]:
+    """Return runs of consecutive maps: odometry places those of one run well to each other."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1 and len(runs[-1]) < RUN_MAX:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return runs
+
+
+def _reach(place: float, turn: float) -> Floats:
+    reach_m = min(max(REACH_M[0], REACH_SIGMAS * math.sqrt(place)), REACH_M[1])
+    return np.array([reach_m, reach_m, min(max(REACH_RAD[0], REACH_SIGMAS * math.sqrt(turn)), REACH_RAD[1])])
+
+
+def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
+    """Find the likeliest poses and scales; yield None after each quantum, and the outcome last."""
+    links, nodes, scales = records(Link, maps.links), records(Node, maps.nodes), maps.scales.copy()
+    count, size = len(maps.links), SCALES + 3 * len(maps.nodes)
+    jacobians, residuals, vectors = np.empty((count, 3, 6 + SCALES)), np.empty((count, 3)), np.empty((6, size))
+    for _ in range(STEPS_MAX if is_new else 0):
+        linearise(links, count, nodes, scales, jacobians, residuals)
+        begin_step(links, count, scales, jacobians, residuals, vectors)
+        least = SOLVED**2 * max(1.0, float(vectors[1] @ vectors[5]))
+        for _ in range(0, size, ITERATIONS):
+            left = go_on(links, count, jacobians, vectors, ITERATIONS)
+            yield None
+            if left <= least:
+                break
+        step = vectors[0]
+        scales += step[:SCALES]
+        for k, name in enumerate(("x", "y", "theta")):
+            maps.nodes[name] += step[SCALES + k :: 3]
+        if np.abs(step).max() < STEP_MIN:
+            break
+    cost = (
+        linearise(links, count, nodes, scales, jacobians, residuals) + 0.5 * float(scales @ scales) / SCALE_SIGMA**2
+    )
+    of_odometry = maps.links["is_match"] == 0
+    off = residuals[of_odometry]
+    cost += 0.5 * float(np.einsum("ij,ijk,ik->", off, maps.links["information"][of_odometry], off))
+    weights = maps.links["weight"].copy()
+    exact = zeros(Node, len(maps.nodes))
+    exact["x"], exact["y"], exact["theta"] = maps.submaps["pose"].T
+    at_odometry = linearise(links, count, records(Node, exact), np.zeros(SCALES), jacobians, residuals)
+    maps.links["weight"] = weights
+    spread = np.full((len(maps.nodes), 2), math.inf)
+    spread[0] = 0.0
+    spread_from(links, count, nodes, spread)
+    yield Outcome(maps.nodes, maps.links, scales, maps.usual, at_odometry - cost, spread[-1])

@@ -1,0 +1,310 @@
+"""Drift without known objects: maps of a few metres of way as landmarks, matched with each other.
+
+Within a map odometry is taken as good. Each map that ends is compared with those that overlap it, joined in runs of
+consecutive ones; the graph of all poses and the odometry's scales follow from the matches. The ring's pose is that of
+the last map and the way since then by odometry. A firing is only taken down; all else is done in quanta, the steps of
+a job that can be repeated: a snapshot holds only their number.
+
+Odometry is exact until refuted: nothing is corrected before the matches are likelier by `REFUTED` with drift.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from config.robot import RingConfig
+from drivers.messages import Firing, Pose, wrap_angle
+from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, up_to
+from perception.kernel import Floats
+from perception.localization.localized_pose import LocalizedPose, Status
+from perception.localization.submaps.map_job import Maps, Outcome, match_map
+from perception.localization.submaps.pose_graph import SCALES
+from perception.localization.submaps.submap_records import (
+    READINGS_MAX,
+    Links,
+    Nodes,
+    Submap,
+    Submaps,
+    between,
+    compose,
+    node_at,
+    odometry_link,
+    pose_of,
+    scaled,
+)
+from perception.records import zeros
+from perception.sensor_mounts import mounts_array, mounts_at
+
+SUBMAP_M: Final = 3.0
+SUBMAP_RAD: Final = 2.0
+"""A map ends after this way or these turns: scales of 3 % deform it by one cell."""
+READING_M: Final = 0.1
+READING_RAD: Final = math.radians(6.0)
+"""Readings of one sensor from nearer poses have the same error."""
+WALK_RAD: Final = 0.02
+WALK_M: Final = 0.03
+"""Random walk of odometry's heading, rad/√m, and of its place, m/√m, beside the scales."""
+TURN_WAY: Final = 0.3
+"""A turn of 1 rad walks as so much way, m/rad."""
+LEAST_VARIANCE: Final = 1e-5
+USUAL_LOG: Final = -0.7
+USUAL_READINGS: Final = 100.0
+"""Log likelihood of a known reading where maps fit, and how many readings that is worth at the start."""
+REFUTED: Final = 6.0
+REFUTED_A_MAP: Final = 0.5
+"""Log likelihood by which matches refute odometry: what is fitted to noise gains ½ nat for each number that it
+determines, about one a map (drives with exact poses: 0.2 to 0.45)."""
+
+
+class SubmapGraph:
+    """The pose by maps of a few metres of way.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+
+    Attributes
+    ----------
+    is_applied : bool
+        Whether matches have refuted odometry, so that poses are corrected.
+    """
+
+    SCRATCH: Final = ("_grids", "_job")
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT,
+        _half_angle=CONSTANT,
+        _latest=PLACE._replace(infinite=True),
+        _readings=PLACE._replace(infinite=True),
+        _count=up_to(READINGS_MAX),
+        _here=PLACE,
+        _begin=PLACE,
+        _trail=PLACE,
+        _trail_count=up_to(READINGS_MAX),
+        _matched=COUNT,
+        _quanta=COUNT,
+        _scales=FINITE,
+        _usual=FINITE,
+        _spread=POSITIVE,
+    )
+
+    def __init__(self, ring: RingConfig) -> None:
+        self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
+        self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._readings = np.zeros((READINGS_MAX, 5))
+        """Of the map that goes on, in odometry's frame: sensor's pose, range, and the ring's direction."""
+        self._trail = np.zeros((READINGS_MAX, 5))
+        """The ring's poses of the map that goes on, with way and turns until there."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again: the next firing's odometry defines the map frame."""
+        self._submaps, self._nodes, self._links = Submaps(), Nodes(), Links()
+        self._grids: dict[int, Floats] = {}
+        self._job: Iterator[Outcome | None] | None = None
+        self._readings[:] = self._trail[:] = 0.0
+        self._latest = np.full((len(self._mounts), 3), math.inf)
+        """The ring's pose at each sensor's last reading of the map that goes on."""
+        self._count = self._trail_count = 0
+        self._here, self._begin = np.zeros(5), np.zeros(5)
+        """The ring's pose by odometry, not wrapped, with way (m) and turns (rad): now, and as the map began."""
+        self._has_begun = self.is_applied = False
+        self._matched, self._quanta = 0, 0
+        """Maps that were compared with those before, and quanta done of the next one."""
+        self._scales, self._usual = np.zeros(SCALES), np.array([USUAL_LOG * USUAL_READINGS, USUAL_READINGS])
+        self._spread = np.zeros(2)
+        """Variance of place (m²) and direction (rad²) of the last map in the map frame."""
+
+    def observe(self, firing: Firing) -> None:
+        """Take down a firing with its pose by odometry."""
+        x, y, yaw = firing.pose.x, firing.pose.y, firing.ring_yaw
+        here = self._here
+        if not self._has_begun:
+            self._has_begun = True
+            here[:3] = x, y, yaw
+            self._begin[:] = here
+        turn = wrap_angle(yaw - here[2])
+        here[3] += math.hypot(x - here[0], y - here[1])
+        here[4] += abs(turn)
+        here[:3] = x, y, here[2] + turn
+        self._take_down(firing)
+        way, turns = (here[3:] - self._begin[3:]).tolist()
+        if way >= SUBMAP_M or turns >= SUBMAP_RAD or self._count > READINGS_MAX - len(self._mounts):
+            self._end_map()
+
+    def _take_down(self, firing: Firing) -> None:
+        here, ranges = self._here, firing.ranges_m
+        last = self._trail[self._trail_count - 1]
+        if self._trail_count == 0 or (_is_apart(here - last) and self._trail_count < READINGS_MAX):
+            self._trail[self._trail_count] = here
+            self._trail_count += 1
+        apart = here[:3] - self._latest
+        fresh = ~np.isnan(ranges) & (
+            (np.abs(apart[:, 2]) >= READING_RAD) | (np.hypot(apart[:, 0], apart[:, 1]) >= READING_M)
+        )
+        if fresh.any():
+            mounts = mounts_at(firing, self._mounts, self._turning)[fresh]
+            c, s = math.cos(here[2]), math.sin(here[2])
+            rows = self._readings[self._count : self._count + len(mounts)]
+            rows[:, 0] = here[0] + c * mounts[:, 0] - s * mounts[:, 1]
+            rows[:, 1] = here[1] + s * mounts[:, 0] + c * mounts[:, 1]
+            rows[:, 2], rows[:, 3], rows[:, 4] = here[2] + mounts[:, 2], ranges[fresh], here[2]
+            self._count += len(mounts)
+            self._latest[fresh] = here[:3]
+
+    def _end_map(self) -> None:
+        """End the map that goes on, and begin the next one."""
+        middle = self._trail[self._trail_count // 2].copy()
+        row = zeros(Submap, 1)
+        row["pose"], row["way"], row["turn"], row["count"] = middle[:3], middle[3], middle[4], self._count
+        rows = self._readings[: self._count]
+        turns = rows[:, 4] - middle[2]
+        c, s = np.cos(-middle[2] + 0.5 * self._scales[1] * turns), np.sin(-middle[2] + 0.5 * self._scales[1] * turns)
+        dx, dy = (1.0 + self._scales[0]) * (rows[:, :2] - middle[:2]).T
+        placed = np.column_stack(
+            [c * dx - s * dy, s * dx + c * dy, rows[:, 2] - middle[2] + self._scales[1] * turns, rows[:, 3]]
+        )
+        row["readings"][0, : self._count] = placed
+        before = self._submaps.archived_rows
+        self._submaps.archived_rows = np.concatenate([before, row])
+        if len(before) == 0:
+            node = middle[:3]
+        else:
+            moved = between(before[-1]["pose"], middle[:3])
+            node = compose(pose_of(self._nodes.archived_rows[-1]), scaled(moved, self._scales))
+            way, turn = middle[3] - before[-1]["way"], middle[4] - before[-1]["turn"]
+            covariance = walk(moved, way, turn)
+            link = odometry_link(len(before) - 1, moved, np.asarray(np.linalg.inv(covariance), dtype=np.float64))
+            self._links.archived_rows = np.concatenate([self._links.archived_rows, link])
+            self._spread += (
+                covariance[0, 0] + covariance[1, 1] + self._spread[1] * (moved[0] ** 2 + moved[1] ** 2),
+                covariance[2, 2],
+            )
+        self._nodes.archived_rows = np.concatenate([self._nodes.archived_rows, node_at(node)])
+        self._begin[:] = self._here
+        self._latest[:] = math.inf
+        self._count = self._trail_count = 0
+
+    @property
+    def can_refine(self) -> bool:
+        """Whether a map waits to be compared with those before."""
+        return self._matched < len(self._submaps.archived_rows)
+
+    def refine(self) -> None:
+        """Do one quantum."""
+        if self._job is None:
+            self._job = self._begin_job()
+            for _ in range(self._quanta):  # of a snapshot
+                next(self._job)
+        self._quanta += 1
+        outcome = next(self._job)
+        if outcome is not None:
+            self._take(outcome)
+
+    def _begin_job(self) -> Iterator[Outcome | None]:
+        links = self._links.archived_rows
+        maps = Maps(
+            self._submaps.archived_rows[: self._matched + 1],
+            self._nodes.archived_rows[: self._matched + 1].copy(),
+            links[links["to"] <= self._matched],
+            self._scales.copy(),
+            self._usual.copy(),
+            self._grids,
+        )
+        return match_map(maps, self._half_angle)
+
+    def _take(self, outcome: Outcome) -> None:
+        """Use what the comparison of a map has given; maps that have ended since then follow by odometry."""
+        self._scales[:], self._usual[:], self._spread[:] = outcome.scales, outcome.usual, outcome.spread
+        if self._matched == 0:
+            self._spread[:] = 0.0
+        links, nodes = self._links.archived_rows, self._nodes.archived_rows
+        later = links["to"] > self._matched
+        self._links.archived_rows = np.concatenate([outcome.links, links[later]])
+        nodes[: self._matched + 1] = outcome.nodes
+        for k in range(self._matched + 1, len(nodes)):
+            poses = self._submaps.archived_rows["pose"]
+            moved = scaled(between(poses[k - 1], poses[k]), self._scales)
+            nodes[k : k + 1] = node_at(compose(pose_of(nodes[k - 1]), moved))
+        self.is_applied = self.is_applied or outcome.gain > REFUTED + REFUTED_A_MAP * self._matched
+        self._matched += 1
+        self._quanta, self._job = 0, None
+
+    def drop_caches(self) -> None:
+        """Forget what follows from the rest, after a snapshot was put back."""
+        self._grids, self._job = {}, None
+
+    def anchor(self) -> tuple[int, Floats]:
+        """Return the number of the map that goes on, and the ring's pose by odometry, for `placed`."""
+        return len(self._submaps.archived_rows), self._here[:3].copy()
+
+    def placed(self, number: int, odometry: Floats) -> Floats:
+        """Return the ring's pose in the map frame at a moment of a map, as known now, x, y (m) and direction (rad).
+
+        Parameters
+        ----------
+        number : int
+            Of the map.
+        odometry : (3,) float
+            The ring's pose by odometry, its direction not wrapped.
+        """
+        submaps = self._submaps.archived_rows
+        if not self.is_applied or len(submaps) == 0:
+            return odometry
+        number = min(number, len(submaps) - 1)
+        moved = scaled(between(submaps[number]["pose"], odometry), self._scales)
+        return compose(pose_of(self._nodes.archived_rows[number]), moved)
+
+    def localized(self, travel: float) -> LocalizedPose:
+        """Return where the robot was at the last firing, in the map frame.
+
+        Parameters
+        ----------
+        travel : float
+            Direction of travel less that of the ring, rad.
+        """
+        number, here = self.anchor()
+        x, y, yaw = self.placed(number, here).tolist()
+        submaps = self._submaps.archived_rows
+        start = submaps[-1] if len(submaps) else None
+        way, turn = (self._here[3:] - (0.0 if start is None else (start["way"], start["turn"]))).tolist()
+        moved = between(here if start is None else start["pose"], here)
+        covariance = walk(moved, way, turn)
+        covariance[:2, :2] += np.eye(2) * (self._spread[0] + self._spread[1] * (moved[0] ** 2 + moved[1] ** 2))
+        covariance[2, 2] += self._spread[1]
+        status: Status = "tracking" if self._matched > 0 else "localizing"
+        return LocalizedPose(Pose(x, y, yaw + travel), yaw, covariance, status, 1.0)
+
+    def odometry_from_map(self) -> Pose:
+        """Return the pose of the map frame in odometry's frame, at the last firing."""
+        if not self.is_applied:
+            return Pose(0.0, 0.0, 0.0)
+        number, here = self.anchor()
+        return Pose(*here.tolist()).compose(Pose(*self.placed(number, here).tolist()).inverse())
+
+
+def _is_apart(moved: Floats) -> bool:
+    return math.hypot(moved[0], moved[1]) >= READING_M or abs(moved[2]) >= READING_RAD
+
+
+def walk(moved: Floats, way: float, turn: float) -> Floats:
+    """Return the covariance of a motion by odometry beside its scales, shape (3, 3).
+
+    Parameters
+    ----------
+    moved : (3,) float
+        x, y (m) and direction (rad) of its end in the frame of its begin.
+    way, turn : float
+        Length (m) and turns (rad) of it. The heading walks evenly along it.
+    """
+    place = WALK_M**2 * way + LEAST_VARIANCE
+    heading = WALK_RAD**2 * (way + TURN_WAY * turn) + LEAST_VARIANCE
+    lever = np.array([-0.5 * moved[1], 0.5 * moved[0], 1.0])
+    covariance = heading * np.outer(lever, lever)
+    covariance[0, 0] += place + heading * way * way / 12.0
+    covariance[1, 1] += place + heading * way * way / 12.0
+    return covariance

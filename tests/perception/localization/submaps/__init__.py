@@ -1,0 +1,1 @@
+"""Tests of the pose by maps of a few metres of way."""

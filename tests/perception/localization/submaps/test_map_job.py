@@ -1,0 +1,69 @@
+"""The comparison of one map with those before: runs of maps, bounded steps, and the same outcome from any caches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from perception.localization.submaps import map_job
+from perception.localization.submaps.local_grid import CELLS
+from perception.localization.submaps.map_job import Maps, Outcome, match_map
+from perception.localization.submaps.pose_graph import Link
+from perception.localization.submaps.submap_records import Submap, node_at, odometry_link, pose_of
+from perception.records import zeros
+from tests.perception.localization.submaps.test_local_grid import BEAM
+from tests.perception.localization.submaps.test_map_match import room_readings
+
+
+def two_maps(error: tuple[float, float, float] = (0.1, -0.05, 0.03)) -> Maps:
+    """Two maps of a room from poses a little apart; odometry's second one is wrong."""
+    moved = np.array([0.3, 0.2, 0.1])
+    submaps = zeros(Submap, 2)
+    for k, readings in enumerate((room_readings(), room_readings(*moved))):
+        submaps[k]["count"] = len(readings)
+        submaps[k]["readings"][: len(readings)] = readings
+    submaps[1]["pose"] = moved + error
+    nodes = np.concatenate([node_at(submaps[k]["pose"]) for k in range(2)])
+    links = odometry_link(0, moved + error, np.diag([50.0, 50.0, 200.0]))
+    return Maps(submaps, nodes, links, np.zeros(3), np.array([-70.0, 100.0]), {})
+
+
+@pytest.mark.compiled
+def test_a_map_is_matched_with_the_one_before() -> None:
+    *steps, outcome = match_map(two_maps(), BEAM)
+    *first, alone = match_map(two_maps()._replace(links=zeros(Link, 0)), BEAM)
+    assert set(steps) == {None}
+    assert len(first) > 0
+    assert isinstance(outcome, Outcome)
+    assert isinstance(alone, Outcome)
+    assert outcome.links["is_match"].tolist() == [0, 1]
+    assert outcome.gain > 0.0
+    off = np.abs(pose_of(outcome.nodes[1]) - (0.3, 0.2, 0.1))
+    assert np.all(off < (0.05, 0.05, 0.03))
+
+
+@pytest.mark.compiled
+def test_caches_change_nothing() -> None:
+    cold, warm = two_maps(), two_maps()
+    *_, warm.grids[0] = map_job._make_grid(warm.submaps[0], BEAM)
+    *mine, one = match_map(cold, BEAM)
+    *its, other = match_map(warm, BEAM)
+    assert len(mine) == len(its)
+    assert isinstance(one, Outcome)
+    assert isinstance(other, Outcome)
+    assert one.nodes.tolist() == other.nodes.tolist()
+    assert cold.grids[0].shape == (2, CELLS, CELLS)
+
+
+def test_the_first_map_has_nothing_to_be_compared_with() -> None:
+    maps = two_maps()
+    alone = Maps(zeros(Submap, 1), maps.nodes[:1], zeros(Link, 0), np.zeros(3), np.array([-70.0, 100.0]), {})
+    *_, outcome = match_map(alone, BEAM)
+    assert isinstance(outcome, Outcome)
+    assert outcome.gain == 0.0
+    assert outcome.spread.tolist() == [0.0, 0.0]
+
+
+def test_runs_are_consecutive_and_short() -> None:
+    assert map_job._runs([0, 1, 2, 5, 6, 9]) == [[0, 1, 2], [5, 6], [9]]
+    assert [len(run) for run in map_job._runs(list(range(20)))] == [8, 8, 4]

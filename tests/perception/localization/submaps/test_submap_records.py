@@ -1,0 +1,69 @@
+"""Poses are composed as matrices would be; motions by odometry are stretched and bent by its scales."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.kernel import Floats
+from perception.localization.submaps.pose_graph import Link
+from perception.localization.submaps.submap_records import (
+    Links,
+    Nodes,
+    Submaps,
+    between,
+    compose,
+    match_link,
+    node_at,
+    odometry_link,
+    pose_of,
+    scaled,
+)
+
+
+def matrix(pose: Floats) -> Floats:
+    """Return the homogeneous matrix of a pose: the oracle."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0.0, 0.0, 1.0]])
+
+
+def test_poses_compose_as_matrices() -> None:
+    a, b = np.array([1.0, -2.0, 0.7]), np.array([0.3, 0.9, -2.0])
+    np.testing.assert_allclose(matrix(compose(a, b)), matrix(a) @ matrix(b))
+    np.testing.assert_allclose(between(a, compose(a, b)), b)
+
+
+def test_scales_stretch_a_way_and_bend_its_turn() -> None:
+    """The oracle: an even arc, step by step."""
+    scales, steps = np.array([0.05, 0.1, 0.0]), 2000
+    raw, true = np.zeros(3), np.zeros(3)
+    step = np.array([2.0 / steps, 0.0, 0.8 / steps])
+    for _ in range(steps):
+        raw, true = compose(raw, step), compose(true, step * (1.05, 1.0, 1.1))
+    np.testing.assert_allclose(scaled(raw, scales), true, atol=0.02)
+
+
+def test_derivatives_by_scales_are_those_of_the_motion() -> None:
+    moved = np.array([1.5, 0.2, 0.4])
+    row = odometry_link(3, moved, np.eye(3))[0]
+    for k in range(2):
+        scales = np.zeros(3)
+        scales[k] = 1e-6
+        np.testing.assert_allclose((scaled(moved, scales) - moved) / 1e-6, row["by_scale"][k], atol=1e-5)
+    assert (row["of"], row["to"], row["is_match"]) == (3, 4, 0)
+
+
+@pytest.mark.parametrize("is_next", [True, False])
+def test_a_match_of_the_next_map_may_lose_way(is_next: bool) -> None:
+    row = match_link(1, 4, np.array([1.0, 0.5, 7.0]), np.eye(3), is_next=is_next)[0]
+    assert row["pose"][2] == pytest.approx(7.0 - 2.0 * math.pi)
+    assert row["by_scale"][2].tolist() == ([1.0, 0.5, 0.0] if is_next else [0.0, 0.0, 0.0])
+
+
+def test_a_pose_survives_as_a_record() -> None:
+    pose = np.array([1.0, 2.0, 3.0])
+    assert pose_of(node_at(pose)[0]).tolist() == pose.tolist()
+    assert [len(rows().archived_rows) for rows in (Submaps, Nodes, Links)] == [0, 0, 0]
+    assert Links().archived_rows.dtype == Link.DTYPE
