@@ -112,7 +112,7 @@ class SubmapGraph:
         self._count = self._trail_count = 0
         self._here, self._begin = np.zeros(5), np.zeros(5)
         """The ring's pose by odometry, not wrapped, with way (m) and turns (rad): now, and as the map began."""
-        self._has_begun = self.is_applied = False
+        self._is_started = self.is_applied = False
         self._matched, self._quanta = 0, 0
         """Maps that were compared with those before, and quanta done of the next one."""
         self._scales, self._usual = np.zeros(SCALES), np.array([USUAL_LOG * USUAL_READINGS, USUAL_READINGS])
@@ -123,8 +123,8 @@ class SubmapGraph:
         """Take down a firing with its pose by odometry."""
         x, y, yaw = firing.pose.x, firing.pose.y, firing.ring_yaw
         here = self._here
-        if not self._has_begun:
-            self._has_begun = True
+        if not self._is_started:
+            self._is_started = True
             here[:3] = x, y, yaw
             self._begin[:] = here
         turn = wrap_angle(yaw - here[2])

@@ -35,7 +35,7 @@ def test_poses_compose_as_matrices() -> None:
     np.testing.assert_allclose(between(a, compose(a, b)), b)
 
 
-def test_scales_stretch_a_way_and_bend_its_turn() -> None:
+def test_scales_lengthen_a_way_and_bend_its_turn() -> None:
     """The oracle: an even arc, step by step."""
     scales, steps = np.array([0.05, 0.1, 0.0]), 2000
     raw, true = np.zeros(3), np.zeros(3)
