@@ -44,6 +44,7 @@ from bench.place_commands import (
     navigation,
     nees,
     place_bound,
+    real_places,
     sightings,
     slips,
 )  # fmt: skip
@@ -275,6 +276,7 @@ for command in (
     corner_bound,
     false_drums,
     false_walls,
+    real_places,
     real_rooms,
     false_canyons,
     free_cells,

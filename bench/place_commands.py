@@ -13,8 +13,10 @@ from rich.console import Console
 from bench.in_rooms import try_in_rooms
 from bench.table import report, rows_table
 from config.errors import UserError
+from config.load import load_settings
 from config.settings import Settings
-from runtime.support.kernel_cache import EMULATOR, use_kernel_cache
+from runtime.support.kernel_cache import EMULATOR, LOCALIZATION, needed_parts, use_kernel_cache
+from runtime.support.kernel_warmup import prepare_kernels
 
 
 def localization(*, json: str = "localization.json", rooms: int = 100, first: int = 0) -> int:
@@ -302,3 +304,23 @@ def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> 
 
         rows["gtsam iSAM2"] = gtsam_sightings.figures(data, found.odometer_scale, found.turn_scale)
     return report(json, rows, rows_table("sightings of posts at unknown places", rows))
+
+
+def real_places(drives: tuple[Path, ...], *, json: str = "real_places.json") -> int:
+    """Measure the place without a map on drives through real rooms, whose odometry drifts, and with exact odometry.
+
+    Parameters
+    ----------
+    drives
+        Folders with ring.csv, robot.toml and truth.csv.
+    json
+        File to write.
+    """
+    use_kernel_cache()
+    from bench.real_places import measure
+
+    console, settings = Console(stderr=True), load_settings("hallway").of_log()
+    prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
+    with console.status("bench") as status:
+        rows = measure(drives, status.update)
+    return report(json, rows, rows_table("real drives: errors of the place, m, and shares", rows))

@@ -1,0 +1,38 @@
+"""The place on a drive that is written here: exact odometry stays exact, and errors are those of plain geometry."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.real_places import aligned_errors, measure
+from tests.bench.test_real_rooms import ROBOT, write
+
+
+def test_a_turned_and_shifted_way_is_not_off() -> None:
+    truth = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.5, 1.5]])
+    c, s = math.cos(0.7), math.sin(0.7)
+    turned = truth @ np.array([[c, s], [-s, c]]) + (3.0, -1.0)
+    np.testing.assert_allclose(aligned_errors(turned, truth), 0.0, atol=1e-12)
+    turned[:2] += (0.1, 0.0)
+    assert aligned_errors(turned, truth).max() < 0.1
+
+
+@pytest.mark.compiled
+def test_exact_odometry_stays_exact(tmp_path: Path) -> None:
+    drive = tmp_path / "aisle-cone"
+    drive.mkdir()
+    (drive / "robot.toml").write_text(ROBOT)
+    xs = [0.05 * k for k in range(80)]
+    write(
+        drive / "ring.csv", "t,x,y,theta,r00,r01", [[0.1 * k, 1.02 * x, 0, 0, 1.0, "inf"] for k, x in enumerate(xs)]
+    )
+    write(drive / "truth.csv", "x,y,theta", [[x, 0.0, 0.0] for x in xs])
+    rows = measure([drive], lambda _: None)
+    assert rows["aisle-cone"]["odometry"] == pytest.approx(0.02 * float(np.std(xs)))
+    assert rows["aisle-cone, exact"]["end"] < 1e-9
+    assert rows["aisle-cone, exact"]["wrong"] == 0.0
+    assert rows["aisle-cone, exact"]["not tracking"] < 1.0
