@@ -25,6 +25,15 @@ MARKERS: Final = (
 )
 
 
+class _Measurements:
+    """The fixture of what is measured, where the repository's page of promises, which has its own, is not."""
+
+    @pytest.fixture
+    def measured(self) -> Callable[[str], None]:
+        """Return what takes a measurement."""
+        return lambda _text: None
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option."""
     text = "run the contract of drivers on a robot: its name, its file, or module:FAMILY"
@@ -39,6 +48,7 @@ def pytest_configure(config: pytest.Config) -> None:
         pytest.register_assert_rewrite("drivers.contract.cable")
         config.args = [str(Path(__file__).with_name(f"{part}.py")) for part in PARTS]
         config.option.reportchars += "s"
+        config.pluginmanager.register(_Measurements())
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -56,12 +66,6 @@ def family(request: pytest.FixtureRequest) -> Family:
     if name is None:
         pytest.skip(f"no robot: give one with {OPTION}")
     return find_family(name)
-
-
-@pytest.fixture
-def measured() -> Callable[[str], None]:
-    """Return what takes a measurement; the page of promises, which has them, is this repository's."""
-    return lambda _text: None
 
 
 @pytest.fixture(autouse=True)

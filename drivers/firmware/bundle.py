@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from config.errors import WRONG_CALL, UserError
 from config.robot import RobotConfig
-from drivers.firing_pattern import sensor_masks, sensors
+from drivers.firing_pattern import firing_pattern, sensor_masks, sensors
 
 Board: TypeAlias = Literal["pico", "esp32"]
 CONFIG_NAME: Final = "robot_config.py"
@@ -115,6 +115,7 @@ def check_pins(values: Mapping[str, Any], board: Board, place: str) -> None:
             f'{place}: SENSORS have {echoes} echo pins, and ECHO_TIMING = "pio" times {_MACHINES}; let sensors that '
             f'do not fire together share echo pins through diodes, or set ECHO_TIMING = "irq"'
         )
+    firing_pattern(ring)  # refuses steps in which sound does not come back
     for mask in sensor_masks(ring):
         triggers = {wires[i][0] for i in sensors(mask) if i in wires}
         firing = [i for i, (trigger, _) in wires.items() if trigger in triggers]

@@ -47,6 +47,7 @@ PACKAGES: Final = (
     "perception.localization.room",
     "perception.localization.known_room",
     "perception.localization.drift",
+    "perception.localization.submaps",
     "perception.mapping.grid",
     "perception.mapping.surfaces",
     "behaviors.valley",

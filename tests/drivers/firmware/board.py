@@ -1,4 +1,4 @@
-"""The firmware in the real MicroPython with 64 kB of heap, on a fake board, in virtual time or on a pty."""
+"""The firmware in the real MicroPython with 72 kB of heap, on a fake board, in virtual time or on a pty."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from config.robot import RobotConfig
 from drivers.firmware.bundle import CONFIG_NAME, Board, board_files, read_config, robot_file
 
 FAKE = Path(__file__).with_name("fake")
-HEAP = "64k"
-HEAP_WITH_SERVOS = "68k"
+HEAP = "72k"
 LOCKSTEP = "LINE = (0, 0, 1, 115200)"
 
 

@@ -7,7 +7,6 @@ import pytest
 from drivers.denning.frames import Ack, Echo2, Echo3, Hello, Ident, Nak, Pattern, Scan, Sweep
 from drivers.denning.wire_units import sweep_bearing, wire_scan
 from drivers.firmware.bundle import Board
-from tests.drivers.firmware.board import HEAP_WITH_SERVOS
 from tests.drivers.firmware.conftest import Boards
 from tests.drivers.firmware.talk import host, run
 
@@ -27,7 +26,7 @@ def pulse_us(bearing: int) -> float:
 
 @pytest.mark.parametrize("board", ["pico", "esp32"])
 def test_a_servo_scans_and_each_of_its_echoes_says_where_it_looked(boards: Boards, board: Board) -> None:
-    robot = boards(board, SERVO, heap=HEAP_WITH_SERVOS)
+    robot = boards(board, SERVO)
     assert wire_scan(robot.config.ring) == (SWEEP,)
     h = host(robot)
     h.send(Hello, 2)
@@ -56,7 +55,7 @@ def test_a_servo_scans_and_each_of_its_echoes_says_where_it_looked(boards: Board
 
 
 def test_a_scan_beyond_the_servo_is_refused_and_a_ring_without_servos_does_not_know_it(boards: Boards) -> None:
-    h = host(boards("pico", SERVO, heap=HEAP_WITH_SERVOS))
+    h = host(boards("pico", SERVO))
     h.send(Hello, 2)
     for wrong in (SWEEP._replace(first=-31416), SWEEP._replace(sensor=1), SWEEP._replace(bearings=1)):
         h.send(Scan, (wrong,))

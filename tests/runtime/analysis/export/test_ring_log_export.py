@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from config.load import load_settings
 from drivers.driver import Received
 from drivers.messages import CrossPaths, Firing, Pose
 from runtime.analysis.export.ring_log_export import write_log
@@ -22,6 +23,7 @@ class StubRecording:
     """A recording, reduced to what its cycles received."""
 
     path = Path("stub.mcap")
+    settings = SimpleNamespace(ring=load_settings("hallway").ring)
 
     def __init__(self, *received: Received) -> None:
         self._received = received

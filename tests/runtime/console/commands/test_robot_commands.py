@@ -36,11 +36,10 @@ async def test_the_file_of_a_robot_is_one_that_check_accepts(changes: dict[str, 
 
 
 @pytest.mark.parametrize(("changes", "error"), [
-    ({"count": 1}, "ring.count"), ({"radius_m": -1.0}, "ring.radius_m"), ({"range_min_m": 5.0}, "range_max_m"),
+    ({"count": 0}, "ring.count"), ({"radius_m": -1.0}, "ring.radius_m"), ({"range_min_m": 5.0}, "range_max_m"),
     ({"preset": "all"}, "preset"), ({"driver": "none"}, "none"), ({"sensors": []}, "sensors"),
     ({"count": 10, "preset": "octets"}, ""), ({"step_period_s": 0.005}, "step_period_s"),
     ({"body_radius_m": 0.0}, "body.radius_m"),
-    ({"sensors": [[-0.1, 0.0, 180.0], [-0.1, 0.1, 170.0]], "preset": "single"}, "ahead"),
 ])  # fmt: skip
 async def test_a_robot_that_cannot_be_is_refused_with_the_reason(changes: dict[str, Any], error: str) -> None:
     async with open_console() as case:

@@ -61,10 +61,10 @@ async def test_the_files_are_those_of_the_run(run: Run) -> None:
 async def test_a_change_is_checked_with_the_whole_run_and_saved(run: Run) -> None:
     number = run.number("mine.toml")
     held = await run.files.read(number)
-    wrong = held["text"].replace("count = 24", "count = 1")
+    wrong = held["text"].replace("count = 24", "count = 0")
     found = await run.files.check(number, wrong)
-    assert [problem["line"] for problem in found["problems"]] == [wrong.splitlines().index("count = 1") + 1]
-    assert "-count = 24\n+count = 1" in found["difference"]
+    assert [problem["line"] for problem in found["problems"]] == [wrong.splitlines().index("count = 0") + 1]
+    assert "-count = 24\n+count = 0" in found["difference"]
     assert run.robot.read_text() == held["text"], "a check writes nothing"
     with pytest.raises(CommandError, match="not saved"):
         await run.files.save(number, wrong, held["digest"])
