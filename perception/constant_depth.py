@@ -17,9 +17,9 @@ from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.echo_kind import EchoKind
 
-NOISE_M: Final = 3e-3
+DEPTH_NOISE_M: Final = 3e-3
 """Standard deviation of a range of ultrasonic modules; with the resolution it says which ranges are the same."""
-SAME_SIGMAS: Final = 3.0
+SAME_DEPTH_SIGMAS: Final = 3.0
 WIDTH_MIN: Final = 0.5
 """A region is at least so many beams wide; narrower ones are strays and ends of others."""
 _UNDECIDED: Final = (0.25, 0.25, 0.25, 0.25)
@@ -49,7 +49,7 @@ def constant_depths(ring: RingConfig, firings: Sequence[Firing]) -> list[tuple[E
                 step = (sensor.views[1].angle_rad - sensor.views[0].angle_rad) % math.tau
                 # Each end of the region is uniform over a step.
                 sigma, paths = step / math.sqrt(24.0), last + 1 - first
-                sigma_m = math.hypot(NOISE_M, ring.resolution_m / math.sqrt(12.0)) / math.sqrt(paths)
+                sigma_m = math.hypot(DEPTH_NOISE_M, ring.resolution_m / math.sqrt(12.0)) / math.sqrt(paths)
                 surface = EchoKind(math.atan2(y, x), math.hypot(x, y), sigma, sigma_m, _UNDECIDED, math.nan, 1.0)
                 found.append((surface, paths))
         begin += count
@@ -64,7 +64,7 @@ def _median(values: list[float]) -> float:
 
 def _regions(ranges: list[float], ring: RingConfig, *, endless: bool) -> list[tuple[int, int]]:
     """Return the first and last bearing of each region; on an endless turn numbers go on beyond the last bearing."""
-    count, same_m = len(ranges), SAME_SIGMAS * NOISE_M + ring.resolution_m
+    count, same_m = len(ranges), SAME_DEPTH_SIGMAS * DEPTH_NOISE_M + ring.resolution_m
     sensor_steps = [
         s.sweep_deg / (s.bearings if s.is_endless else s.bearings - 1) for s in ring.sensors or () if s.servo
     ]

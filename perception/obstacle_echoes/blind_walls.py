@@ -42,7 +42,7 @@ AGAIN_SHARE: Final = 0.5
 """Once a direction ahead is unknown, those count as unknown, too, that were looked in farther away than this share of
 `KEPT_M`: so the robot looks round in one place."""
 
-SILENT_M: Final = 0.25
+SILENT_WAY_M: Final = 0.25
 """A look counts only within this while the ring hears nothing and has lost what it heard, m."""
 
 
@@ -201,7 +201,7 @@ class BlindWalls:
         return np.stack([pose.x + away * c, pose.y + away * s], axis=1)[stands], directions[is_unknown]
 
     def look_again(self, x: float, y: float, is_lasting: bool) -> None:
-        """Have the robot look where it last looked from farther than `SILENT_M` away; walls stay remembered.
+        """Have the robot look where it last looked from farther than `SILENT_WAY_M` away; walls stay remembered.
 
         Parameters
         ----------
@@ -213,7 +213,7 @@ class BlindWalls:
         walls, has_looked = self._walls, self.has_looked_round
         if is_lasting and not has_looked:
             walls["is_known"], self.has_looked_round = 0, True
-        walls["is_known"] &= np.hypot(walls["x"] - x, walls["y"] - y) <= SILENT_M
+        walls["is_known"] &= np.hypot(walls["x"] - x, walls["y"] - y) <= SILENT_WAY_M
 
     def clear(self) -> None:
         """Forget everything."""

@@ -13,23 +13,23 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 
-CELL_M: Final = 0.1
-CELLS: Final = 140
+SUBMAP_CELL_M: Final = 0.1
+SUBMAP_CELLS: Final = 140
 """A map is a square about the ring's place in the middle of its way: half of that way and a range of 5 m fit."""
-HALF: Final = CELLS // 2
-REACH_M: Final = 4.9
-"""Echoes from farther are taken as silence, whose cone is clear up to `CLEAR_M` only: mirrors are silent, too."""
-CLEAR_M: Final = 2.5
-ROUNDS: Final = 6
+HALF_CELLS: Final = SUBMAP_CELLS // 2
+ECHO_MAX_M: Final = 4.9
+"""Echoes from farther count as silence, whose cone is clear up to `SILENT_CLEAR_M` only: mirrors are silent, too."""
+SILENT_CLEAR_M: Final = 2.5
+SHARING_ROUNDS: Final = 6
 """Rounds of expectation maximisation."""
 PASS_RAYS: Final = 21
 """Rays of a beam along which a range is entered as passed: 0.1 m apart at 5 m and ±12°."""
 ELSEWHERE: Final = 0.005
 """Weight of an echo's origin outside its arc, among cells that answer with probabilities up to 1."""
 PRIOR_HITS: Final = 0.015
-PRIOR_READINGS: Final = 0.5
+PRIOR_LOOKS: Final = 0.5
 """A cell that was not looked at answers with 3 %, as the sum of half a reading."""
-HITS: Final = 3.0
+THICKNESS: Final = 3.0
 """A surface is about three cells thick once it is blurred, which divide each echo among them."""
 
 
@@ -45,21 +45,21 @@ def enter_passes(readings: Floats, begin: int, end: int, half: float, passes: Fl
         Those to be entered.
     half : float
         Half of the beam's opening, rad.
-    passes : (CELLS, CELLS) float
+    passes : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Updated: a range in the middle of the beam counts 1, one at its edge ½.
     """
     for k in range(begin, end):
         x, y, axis, range_m = readings[k]
-        clear = range_m - CELL_M if range_m <= REACH_M else CLEAR_M
+        clear = range_m - SUBMAP_CELL_M if range_m <= ECHO_MAX_M else SILENT_CLEAR_M
         for ray in range(PASS_RAYS):
             t = 2.0 * (ray + 0.5) / PASS_RAYS - 1.0
             c, s = math.cos(axis + t * half), math.sin(axis + t * half)
-            for step in range(int(clear / CELL_M)):
-                along = (step + 0.5) * CELL_M
-                i = math.floor((x + along * c) / CELL_M) + HALF
-                j = math.floor((y + along * s) / CELL_M) + HALF
-                if 0 <= i < CELLS and 0 <= j < CELLS:
-                    share = min(1.0, 2.0 * half * along / (PASS_RAYS * CELL_M))
+            for step in range(int(clear / SUBMAP_CELL_M)):
+                along = (step + 0.5) * SUBMAP_CELL_M
+                i = math.floor((x + along * c) / SUBMAP_CELL_M) + HALF_CELLS
+                j = math.floor((y + along * s) / SUBMAP_CELL_M) + HALF_CELLS
+                if 0 <= i < SUBMAP_CELLS and 0 <= j < SUBMAP_CELLS:
+                    share = min(1.0, 2.0 * half * along / (PASS_RAYS * SUBMAP_CELL_M))
                     passes[i, j] += share * (1.0 - 0.5 * t * t)
 
 
@@ -75,33 +75,33 @@ def share_echoes(readings: Floats, count: int, half: float, passes: Floats, hits
         How many there are.
     half : float
         Half of the beam's opening, rad.
-    passes : (CELLS, CELLS) float
+    passes : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Of all readings.
-    hits : (CELLS, CELLS) float
+    hits : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Blurred over 3 × 3 cells: those of the round before, zero in the first one. Overwritten.
-    shared : (CELLS, CELLS) float
+    shared : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Overwritten.
     """
     shared[:] = 0.0
     for k in range(count):
         x, y, axis, range_m = readings[k]
-        if range_m > REACH_M:
+        if range_m > ECHO_MAX_M:
             continue
-        places = max(3, int(4.0 * half * range_m / CELL_M) + 1)
+        places = max(3, int(4.0 * half * range_m / SUBMAP_CELL_M) + 1)
         total = ELSEWHERE
         for enters in range(2):
             for place in range(places):
                 t = 2.0 * (place + 0.5) / places - 1.0
-                i = math.floor((x + range_m * math.cos(axis + t * half)) / CELL_M) + HALF
-                j = math.floor((y + range_m * math.sin(axis + t * half)) / CELL_M) + HALF
-                if 1 <= i < CELLS - 1 and 1 <= j < CELLS - 1:
+                i = math.floor((x + range_m * math.cos(axis + t * half)) / SUBMAP_CELL_M) + HALF_CELLS
+                j = math.floor((y + range_m * math.sin(axis + t * half)) / SUBMAP_CELL_M) + HALF_CELLS
+                if 1 <= i < SUBMAP_CELLS - 1 and 1 <= j < SUBMAP_CELLS - 1:
                     weight = (1.0 - 0.5 * t * t) * _answer(hits[i, j], passes[i, j]) / places
                     if enters:
                         shared[i, j] += weight / total
                     else:
                         total += weight
-    for i in range(1, CELLS - 1):
-        for j in range(1, CELLS - 1):
+    for i in range(1, SUBMAP_CELLS - 1):
+        for j in range(1, SUBMAP_CELLS - 1):
             beside = shared[i - 1, j] + shared[i + 1, j] + shared[i, j - 1] + shared[i, j + 1]
             across = shared[i - 1, j - 1] + shared[i - 1, j + 1] + shared[i + 1, j - 1] + shared[i + 1, j + 1]
             hits[i, j] = (4.0 * shared[i, j] + 2.0 * beside + across) / 16.0
@@ -110,7 +110,7 @@ def share_echoes(readings: Floats, count: int, half: float, passes: Floats, hits
 @kernel
 def _answer(hits: float, passes: float) -> float:
     """Return the probability that a cell answers."""
-    return (HITS * hits + PRIOR_HITS) / (HITS * hits + passes + PRIOR_READINGS)
+    return (THICKNESS * hits + PRIOR_HITS) / (THICKNESS * hits + passes + PRIOR_LOOKS)
 
 
 @kernel
@@ -118,13 +118,13 @@ def add_map(
     hits: Floats, passes: Floats, x: float, y: float, theta: float, to_hits: Floats, to_passes: Floats
 ) -> None:
     """Add a map to another one, in which it lies at a pose (m, rad); its cells are interpolated."""
-    c, s = math.cos(theta) / CELL_M, math.sin(theta) / CELL_M
-    for a in range(CELLS):
-        for b in range(CELLS):
-            dx, dy = (a - HALF + 0.5) * CELL_M - x, (b - HALF + 0.5) * CELL_M - y
-            row, column = c * dx + s * dy + HALF - 0.5, c * dy - s * dx + HALF - 0.5
+    c, s = math.cos(theta) / SUBMAP_CELL_M, math.sin(theta) / SUBMAP_CELL_M
+    for a in range(SUBMAP_CELLS):
+        for b in range(SUBMAP_CELLS):
+            dx, dy = (a - HALF_CELLS + 0.5) * SUBMAP_CELL_M - x, (b - HALF_CELLS + 0.5) * SUBMAP_CELL_M - y
+            row, column = c * dx + s * dy + HALF_CELLS - 0.5, c * dy - s * dx + HALF_CELLS - 0.5
             i, j = math.floor(row), math.floor(column)
-            if 0 <= i < CELLS - 1 and 0 <= j < CELLS - 1:
+            if 0 <= i < SUBMAP_CELLS - 1 and 0 <= j < SUBMAP_CELLS - 1:
                 u, v = row - i, column - j
                 for down in range(2):
                     for right in range(2):
@@ -139,15 +139,15 @@ def answers_of(hits: Floats, passes: Floats, answers: Floats, known: Floats) -> 
 
     Parameters
     ----------
-    hits, passes : (CELLS, CELLS) float
+    hits, passes : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Of one map or several.
-    answers : (CELLS, CELLS) float
+    answers : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Overwritten: probability that a cell answers.
-    known : (CELLS, CELLS) float
+    known : (SUBMAP_CELLS, SUBMAP_CELLS) float
         Overwritten: 0 where no range came, near 1 where many did.
     """
-    for i in range(CELLS):
-        for j in range(CELLS):
-            looks = HITS * hits[i, j] + passes[i, j]
+    for i in range(SUBMAP_CELLS):
+        for j in range(SUBMAP_CELLS):
+            looks = THICKNESS * hits[i, j] + passes[i, j]
             answers[i, j] = _answer(hits[i, j], passes[i, j])
             known[i, j] = looks / (looks + 1.0)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
 from perception.localization.submaps.local_grid import (
-    CELLS,
-    ROUNDS,
+    SHARING_ROUNDS,
+    SUBMAP_CELLS,
     add_map,
     answers_of,
     enter_passes,
@@ -21,7 +21,7 @@ from perception.localization.submaps.local_grid import (
 )
 from perception.localization.submaps.map_match import Comparison, Match
 from perception.localization.submaps.pose_graph import (
-    SCALE_SIGMA,
+    GRAPH_SCALE_SIGMA,
     SCALES,
     Link,
     Node,
@@ -33,7 +33,7 @@ from perception.localization.submaps.pose_graph import (
 from perception.localization.submaps.submap_records import between, match_link, pose_of
 from perception.records import records, zeros
 
-NEAR_M: Final = 6.0
+OVERLAP_M: Final = 6.0
 """Maps nearer to each other than this may overlap."""
 RUN_MAX: Final = 8
 """Maps that are joined to be compared with."""
@@ -44,15 +44,15 @@ KNOWN_MIN: Final = 20.0
 """Known readings that a match needs."""
 MISFIT_MAX: Final = 0.5
 """By how much a reading of a match may be less likely than is usual, nat."""
-GATE: Final = 27.0
+MATCH_GATE: Final = 27.0
 """Squared deviation of a match from what was expected, over its covariance."""
-REACH_M: Final = (0.3, 1.2)
-REACH_RAD: Final = (0.1, 0.3)
-REACH_SIGMAS: Final = 2.5
+SEARCH_REACH_M: Final = (0.3, 1.2)
+SEARCH_REACH_RAD: Final = (0.1, 0.3)
+SEARCH_REACH_SIGMAS: Final = 2.5
 """A match is looked for so many standard deviations about what is expected, within these limits."""
 EXPECTED_LEAST: Final = (0.01, 0.01, 0.001)
 """Added to the variance of what is expected, m² and rad²: the search is coarse."""
-STEPS_MAX: Final = 6
+GRAPH_STEPS_MAX: Final = 6
 ITERATIONS: Final = 24
 """Gauss-Newton steps after a map, and iterations of one quantum."""
 SOLVED: Final = 1e-6
@@ -71,7 +71,7 @@ class Maps(NamedTuple):
     usual: Floats
     """Sum of the log likelihoods of known readings where maps fitted, and their number, shape (2,)."""
     grids: dict[int, Floats]
-    """Hits and passes of maps by number, shape (2, CELLS, CELLS) each: what was computed is kept here."""
+    """Hits and passes of maps by number, shape (2, SUBMAP_CELLS, SUBMAP_CELLS) each: what was computed is kept."""
 
 
 class Outcome(NamedTuple):
@@ -102,15 +102,15 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
     found: list[NDArray[Any]] = []
     count = int(maps.submaps[number]["count"])
     readings = np.ascontiguousarray(maps.submaps[number]["readings"][:count])
-    for run in _runs(np.flatnonzero(distances < NEAR_M).tolist()) if count else ():
+    for run in _runs(np.flatnonzero(distances < OVERLAP_M).tolist()) if count else ():
         nearest = min(run, key=lambda k: distances[k])
-        joined = np.zeros((2, CELLS, CELLS))
+        joined = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS))
         for member in run:
             x, y, theta = between(pose_of(nodes[nearest]), pose_of(nodes[member])).tolist()
             hits, passes = _grid_of(maps, member, half_angle)
             add_map(hits, passes, x, y, theta, joined[0], joined[1])
             yield None
-        answers = np.empty((2, CELLS, CELLS))
+        answers = np.empty((2, SUBMAP_CELLS, SUBMAP_CELLS))
         answers_of(joined[0], joined[1], answers[0], answers[1])
         expected = between(pose_of(nodes[nearest]), here)
         place, turn = spread[nearest].tolist()
@@ -131,7 +131,7 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         off[2] = wrap_angle(off[2])
         chi = off @ np.linalg.inv(covariance + np.diag([place, place, turn])) @ off
         misfit = usual[0] / usual[1] - log_likelihood / max(match.known, 1.0)
-        if match.known >= KNOWN_MIN and misfit <= MISFIT_MAX and chi <= GATE:
+        if match.known >= KNOWN_MIN and misfit <= MISFIT_MAX and chi <= MATCH_GATE:
             found.append(
                 match_link(nearest, number, match.pose, np.linalg.inv(covariance), is_next=number - 1 in run)
             )
@@ -142,11 +142,11 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
 def _make_grid(submap: NDArray[Any], half_angle: float) -> Iterator[Floats]:
     """Make the map of hits and passes; yield it after each quantum."""
     count, readings = int(submap["count"]), np.ascontiguousarray(submap["readings"])
-    grid, shared = np.zeros((2, CELLS, CELLS)), np.empty((CELLS, CELLS))
+    grid, shared = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS)), np.empty((SUBMAP_CELLS, SUBMAP_CELLS))
     for begin in range(0, count, CHUNK):
         enter_passes(readings, begin, min(begin + CHUNK, count), half_angle, grid[1])
         yield grid
-    for _ in range(ROUNDS):
+    for _ in range(SHARING_ROUNDS):
         share_echoes(readings, count, half_angle, grid[1], grid[0], shared)
         yield grid
 
@@ -170,8 +170,10 @@ def _runs(numbers: Sequence[int]) -> list[list[int]]:
 
 
 def _reach(place: float, turn: float) -> Floats:
-    reach_m = min(max(REACH_M[0], REACH_SIGMAS * math.sqrt(place)), REACH_M[1])
-    return np.array([reach_m, reach_m, min(max(REACH_RAD[0], REACH_SIGMAS * math.sqrt(turn)), REACH_RAD[1])])
+    reach_m = min(max(SEARCH_REACH_M[0], SEARCH_REACH_SIGMAS * math.sqrt(place)), SEARCH_REACH_M[1])
+    return np.array(
+        [reach_m, reach_m, min(max(SEARCH_REACH_RAD[0], SEARCH_REACH_SIGMAS * math.sqrt(turn)), SEARCH_REACH_RAD[1])]
+    )
 
 
 def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
@@ -179,7 +181,7 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
     links, nodes, scales = records(Link, maps.links), records(Node, maps.nodes), maps.scales.copy()
     count, size = len(maps.links), SCALES + 3 * len(maps.nodes)
     jacobians, residuals, vectors = np.empty((count, 3, 6 + SCALES)), np.empty((count, 3)), np.empty((6, size))
-    for _ in range(STEPS_MAX if is_new else 0):
+    for _ in range(GRAPH_STEPS_MAX if is_new else 0):
         linearise(links, count, nodes, scales, jacobians, residuals)
         begin_step(links, count, scales, jacobians, residuals, vectors)
         least = SOLVED**2 * max(1.0, float(vectors[1] @ vectors[5]))
@@ -195,7 +197,8 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
         if np.abs(step).max() < STEP_MIN:
             break
     cost = (
-        linearise(links, count, nodes, scales, jacobians, residuals) + 0.5 * float(scales @ scales) / SCALE_SIGMA**2
+        linearise(links, count, nodes, scales, jacobians, residuals)
+        + 0.5 * float(scales @ scales) / GRAPH_SCALE_SIGMA**2
     )
     of_odometry = maps.links["is_match"] == 0
     off = residuals[of_odometry]

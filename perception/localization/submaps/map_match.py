@@ -14,31 +14,37 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from perception.kernel import Floats, kernel
-from perception.localization.submaps.local_grid import CELL_M, CELLS, CLEAR_M, HALF, REACH_M
+from perception.localization.submaps.local_grid import (
+    ECHO_MAX_M,
+    HALF_CELLS,
+    SILENT_CLEAR_M,
+    SUBMAP_CELL_M,
+    SUBMAP_CELLS,
+)
 
-RAYS: Final = 7
+MATCH_RAYS: Final = 7
 """Rays of a beam along which the map is asked."""
 ANSWERS: Final = 0.2
 """Share of a cell's probability with which one ray is answered. With more, beams end before the surface: drives with
 known poses were matched 5 cm short with 0.6, without a bias with 0.2, where their readings also are likeliest."""
-OUTLIERS: Final = 0.1
-NOISE_M: Final = 0.08
+MATCH_OUTLIERS: Final = 0.1
+MATCH_NOISE_M: Final = 0.08
 """Of a range in cells of 0.1 m."""
-STEPS: Final = 50
-UNKNOWN: Final = 0.03
+BEAM_CELLS: Final = 50
+UNKNOWN_ANSWER: Final = 0.03
 """Probability that a cell outside the map answers."""
-TEMPER: Final = 0.1
+MATCH_TEMPER: Final = 0.1
 """Weight of a reading: those of a few metres of way share the errors of their maps. With 0.1, matches of maps of
 real drives deviate as they say (the median of their squared errors over their covariance is 1 to 2 for 3 degrees)."""
 STEP: Final = np.array([0.08, 0.08, 0.03])
 """Differences of place (m) and direction (rad) by which the likelihood's slope and curvature are taken."""
-MOVE_MAX_M: Final = 0.15
-TURN_MAX_RAD: Final = 0.06
+STEP_MOVE_MAX_M: Final = 0.15
+STEP_TURN_MAX_RAD: Final = 0.06
 """The most by which one step changes a match."""
 INFORMATION_MIN: Final = 1.0
 """A direction that readings leave free is known to 1 m, or 1 rad."""
-SEARCH_M: Final = 0.15
-SEARCH_RAD: Final = 0.05
+SEARCH_STEP_M: Final = 0.15
+SEARCH_STEP_RAD: Final = 0.05
 """Steps of a search."""
 SEARCHED: Final = 8
 """Poses of a search in one quantum."""
@@ -71,9 +77,9 @@ def fit_of(
         Pose of their frame in the map's, m and rad.
     beam : (2,) float
         Half of its opening, rad, and the log likelihood of a known reading where maps fit.
-    maps : (2, CELLS, CELLS) float
+    maps : (2, SUBMAP_CELLS, SUBMAP_CELLS) float
         Probability that a cell answers, and how well it is known.
-    goes_on : (STEPS,) float
+    goes_on : (BEAM_CELLS,) float
         Overwritten.
     fit : (2,) float
         Overwritten: log likelihood of all readings less the usual one, and the number of known readings.
@@ -83,41 +89,43 @@ def fit_of(
     total = weight = 0.0
     for k in range(0, count, step):
         range_m = readings[k, 3]
-        x = (at[0] + c * readings[k, 0] - s * readings[k, 1]) / CELL_M + HALF
-        y = (at[1] + s * readings[k, 0] + c * readings[k, 1]) / CELL_M + HALF
+        x = (at[0] + c * readings[k, 0] - s * readings[k, 1]) / SUBMAP_CELL_M + HALF_CELLS
+        y = (at[1] + s * readings[k, 0] + c * readings[k, 1]) / SUBMAP_CELL_M + HALF_CELLS
         axis = at[2] + readings[k, 2]
-        is_silent = range_m > REACH_M
-        last = STEPS if is_silent else min(STEPS, int(range_m / CELL_M) + 3)
-        end = int((CLEAR_M if is_silent else range_m) / CELL_M)
+        is_silent = range_m > ECHO_MAX_M
+        last = BEAM_CELLS if is_silent else min(BEAM_CELLS, int(range_m / SUBMAP_CELL_M) + 3)
+        end = int((SILENT_CLEAR_M if is_silent else range_m) / SUBMAP_CELL_M)
         known = 0.0
         for n in range(last):
             goes_on[n] = 1.0
-        for ray in range(RAYS):
-            t = 2.0 * (ray + 0.5) / RAYS - 1.0
+        for ray in range(MATCH_RAYS):
+            t = 2.0 * (ray + 0.5) / MATCH_RAYS - 1.0
             dx, dy = math.cos(axis + t * half), math.sin(axis + t * half)
             row, column = x + 0.5 * dx, y + 0.5 * dy
             answers = ANSWERS * (1.0 - 0.5 * t * t)
             for n in range(last):
-                if 0.0 <= row < CELLS and 0.0 <= column < CELLS:
+                if 0.0 <= row < SUBMAP_CELLS and 0.0 <= column < SUBMAP_CELLS:
                     i, j = int(row), int(column)
                     goes_on[n] *= 1.0 - answers * maps[0, i, j]
                     if end - 1 <= n <= end:
                         known += maps[1, i, j]
                 else:
-                    goes_on[n] *= 1.0 - answers * UNKNOWN
+                    goes_on[n] *= 1.0 - answers * UNKNOWN_ANSWER
                 row += dx
                 column += dy
-        known /= 2 * RAYS
+        known /= 2 * MATCH_RAYS
         passes, density = 1.0, 0.0
         for n in range(last):
-            off = (n + 0.5) * CELL_M - range_m
-            if abs(off) < 3.0 * NOISE_M:
-                density += passes * (1.0 - goes_on[n]) * math.exp(-0.5 * (off / NOISE_M) ** 2)
+            off = (n + 0.5) * SUBMAP_CELL_M - range_m
+            if abs(off) < 3.0 * MATCH_NOISE_M:
+                density += passes * (1.0 - goes_on[n]) * math.exp(-0.5 * (off / MATCH_NOISE_M) ** 2)
             passes *= goes_on[n]
         if is_silent:
-            likelihood = (1.0 - OUTLIERS) * passes + 0.5 * OUTLIERS
+            likelihood = (1.0 - MATCH_OUTLIERS) * passes + 0.5 * MATCH_OUTLIERS
         else:
-            likelihood = (1.0 - OUTLIERS) * density / (NOISE_M * math.sqrt(2.0 * math.pi)) + OUTLIERS / REACH_M
+            likelihood = (1.0 - MATCH_OUTLIERS) * density / (
+                MATCH_NOISE_M * math.sqrt(2.0 * math.pi)
+            ) + MATCH_OUTLIERS / ECHO_MAX_M
         total += known * (math.log(likelihood) - usual)
         weight += known
     fit[0], fit[1] = step * total, step * weight
@@ -149,21 +157,21 @@ def search(
         The best pose so far and its tempered log density, negative infinity before the first one. Updated; the rest
         is overwritten.
     """
-    rows, turns = int(lattice[1, 0] / SEARCH_M), int(lattice[1, 2] / SEARCH_RAD)
+    rows, turns = int(lattice[1, 0] / SEARCH_STEP_M), int(lattice[1, 2] / SEARCH_STEP_RAD)
     side, headings = 2 * rows + 1, 2 * turns + 1
     total = side * side * headings
     at, fit = best[4:7], best[7:9]
     for number in range(begin, min(begin + SEARCHED, total)):
         place, turn = number // headings, number % headings
-        dx, dy = (place // side - rows) * SEARCH_M, (place % side - rows) * SEARCH_M
-        if dx * dx + dy * dy > (lattice[1, 0] + 0.5 * SEARCH_M) ** 2:
+        dx, dy = (place // side - rows) * SEARCH_STEP_M, (place % side - rows) * SEARCH_STEP_M
+        if dx * dx + dy * dy > (lattice[1, 0] + 0.5 * SEARCH_STEP_M) ** 2:
             continue
-        dt = (turn - turns) * SEARCH_RAD
+        dt = (turn - turns) * SEARCH_STEP_RAD
         at[0], at[1], at[2] = lattice[0, 0] + dx, lattice[0, 1] + dy, lattice[0, 2] + dt
         fit_of(readings, count, step, at, beam, maps, goes_on, fit)
         chi = lattice[2, 0] * dx * dx + lattice[3, 1] * dy * dy + lattice[4, 2] * dt * dt
         chi += 2.0 * (lattice[2, 1] * dx * dy + lattice[2, 2] * dx * dt + lattice[3, 2] * dy * dt)
-        score = TEMPER * fit[0] - 0.5 * chi
+        score = MATCH_TEMPER * fit[0] - 0.5 * chi
         if score > best[3]:
             best[0], best[1], best[2], best[3] = at[0], at[1], at[2], score
     return total
@@ -189,7 +197,7 @@ class Comparison:
     ----------
     readings : (n, 4) float
         As of `fit_of`.
-    maps : (2, CELLS, CELLS) float
+    maps : (2, SUBMAP_CELLS, SUBMAP_CELLS) float
         As of `fit_of`.
     beam : (2,) float
         As of `fit_of`.
@@ -197,7 +205,7 @@ class Comparison:
 
     def __init__(self, readings: Floats, maps: Floats, beam: Floats) -> None:
         self._readings, self._maps, self._beam = readings, maps, beam
-        self._goes_on, self._fit = np.empty(STEPS), np.empty(2)
+        self._goes_on, self._fit = np.empty(BEAM_CELLS), np.empty(2)
         self._step = max(1, len(readings) // FIT_READINGS)
 
     def best_match(self, about: Floats, reach: Floats, information: Floats) -> Iterator[Match | None]:
@@ -238,16 +246,18 @@ class Comparison:
             values = np.maximum(values, INFORMATION_MIN)
             move = axes @ ((axes.T @ slope) / values)
             share = min(
-                1.0, MOVE_MAX_M / max(1e-9, math.hypot(move[0], move[1])), TURN_MAX_RAD / max(1e-9, abs(move[2]))
+                1.0,
+                STEP_MOVE_MAX_M / max(1e-9, math.hypot(move[0], move[1])),
+                STEP_TURN_MAX_RAD / max(1e-9, abs(move[2])),
             )
             at = at + share * move
         log_density = self._log_density(at)
-        yield Match(at, (axes * values) @ axes.T, log_density / TEMPER, float(self._fit[1]))
+        yield Match(at, (axes * values) @ axes.T, log_density / MATCH_TEMPER, float(self._fit[1]))
 
     def _log_density(self, at: Floats) -> float:
         count = len(self._readings)
         fit_of(self._readings, count, self._step, at, self._beam, self._maps, self._goes_on, self._fit)
-        return TEMPER * float(self._fit[0])
+        return MATCH_TEMPER * float(self._fit[0])
 
 
 _AXES: Final = np.eye(3)

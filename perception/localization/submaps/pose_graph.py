@@ -19,7 +19,7 @@ from perception.records import Record, Records
 SCALES: Final = 3
 """Unknowns beside the poses: shares by which way and turns are longer than by odometry, and by which a match of a map
 and the one before has lost way, because what comes into view ahead fits less well."""
-SCALE_SIGMA: Final = 0.03
+GRAPH_SCALE_SIGMA: Final = 0.03
 """Standard deviation of each before any match."""
 CAUCHY: Final = 2.0
 """A match that is off by so many standard deviations counts half."""
@@ -122,7 +122,7 @@ def multiply(links: Records[Link], count: int, jacobians: Floats, given: Floats,
     """
     result[:] = 0.0
     for k in range(SCALES):
-        result[k] = given[k] / SCALE_SIGMA**2
+        result[k] = given[k] / GRAPH_SCALE_SIGMA**2
     for m in range(count):
         of, to, j, weight = SCALES + 3 * links[m].of, SCALES + 3 * links[m].to, jacobians[m], links[m].weight
         information = links[m].information
@@ -167,7 +167,7 @@ def begin_step(
     vectors[:] = 0.0
     left, diagonal = vectors[1], vectors[4]
     for k in range(SCALES):
-        left[k], diagonal[k] = -scales[k] / SCALE_SIGMA**2, 1.0 / SCALE_SIGMA**2
+        left[k], diagonal[k] = -scales[k] / GRAPH_SCALE_SIGMA**2, 1.0 / GRAPH_SCALE_SIGMA**2
     for m in range(count):
         link, j, r = links[m], jacobians[m], residuals[m]
         for column in range(6 + SCALES):

@@ -24,7 +24,7 @@ from perception.localization.localized_pose import LocalizedPose, Status
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import SCALES
 from perception.localization.submaps.submap_records import (
-    READINGS_MAX,
+    SUBMAP_READINGS_MAX,
     Links,
     Nodes,
     Submap,
@@ -80,11 +80,11 @@ class SubmapGraph:
         _half_angle=CONSTANT,
         _latest=PLACE._replace(infinite=True),
         _readings=PLACE._replace(infinite=True),
-        _count=up_to(READINGS_MAX),
+        _count=up_to(SUBMAP_READINGS_MAX),
         _here=PLACE,
         _begin=PLACE,
         _trail=PLACE,
-        _trail_count=up_to(READINGS_MAX),
+        _trail_count=up_to(SUBMAP_READINGS_MAX),
         _matched=COUNT,
         _quanta=COUNT,
         _scales=FINITE,
@@ -95,9 +95,9 @@ class SubmapGraph:
     def __init__(self, ring: RingConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self._half_angle = math.radians(ring.beam_half_angle_deg)
-        self._readings = np.zeros((READINGS_MAX, 5))
+        self._readings = np.zeros((SUBMAP_READINGS_MAX, 5))
         """Of the map that goes on, in odometry's frame: sensor's pose, range, and the ring's direction."""
-        self._trail = np.zeros((READINGS_MAX, 5))
+        self._trail = np.zeros((SUBMAP_READINGS_MAX, 5))
         """The ring's poses of the map that goes on, with way and turns until there."""
         self.reset()
 
@@ -133,13 +133,13 @@ class SubmapGraph:
         here[:3] = x, y, here[2] + turn
         self._take_down(firing)
         way, turns = (here[3:] - self._begin[3:]).tolist()
-        if way >= SUBMAP_M or turns >= SUBMAP_RAD or self._count > READINGS_MAX - len(self._mounts):
+        if way >= SUBMAP_M or turns >= SUBMAP_RAD or self._count > SUBMAP_READINGS_MAX - len(self._mounts):
             self._end_map()
 
     def _take_down(self, firing: Firing) -> None:
         here, ranges = self._here, firing.ranges_m
         last = self._trail[self._trail_count - 1]
-        if self._trail_count == 0 or (_is_apart(here - last) and self._trail_count < READINGS_MAX):
+        if self._trail_count == 0 or (_is_apart(here - last) and self._trail_count < SUBMAP_READINGS_MAX):
             self._trail[self._trail_count] = here
             self._trail_count += 1
         apart = here[:3] - self._latest

@@ -14,7 +14,7 @@ from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import Link, Node
 from perception.records import Record, zeros
 
-READINGS_MAX: Final = 512
+SUBMAP_READINGS_MAX: Final = 512
 """Of one map, which ends with them."""
 
 
@@ -26,8 +26,8 @@ class Submap(Record):
     way: Finite
     turn: Finite
     """Way (m) and turns (rad) until there."""
-    count: Annotated[int, up_to(READINGS_MAX)]
-    readings: Annotated[Floats, READINGS_MAX, 4, PLACE._replace(infinite=True)]
+    count: Annotated[int, up_to(SUBMAP_READINGS_MAX)]
+    readings: Annotated[Floats, SUBMAP_READINGS_MAX, 4, PLACE._replace(infinite=True)]
     """Sensor's place x, y (m), direction (rad), and range, m; infinite if silent."""
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from config.load import load_robot
 from drivers.messages import Firing, Floats, Pose
-from perception.obstacle_echoes.blind_walls import KEPT_M, SILENT_M, BlindWalls, has_blind_sides
+from perception.obstacle_echoes.blind_walls import KEPT_M, SILENT_WAY_M, BlindWalls, has_blind_sides
 from perception.sensor_mounts import mounts_array
 
 HALF = math.radians(15.0)
@@ -136,7 +136,7 @@ def test_a_wall_abeam_stays_as_the_robot_turns_past_it() -> None:
 def test_a_ring_that_fell_silent_looks_again_and_once_everywhere_if_that_lasts() -> None:
     walls = BlindWalls(MOUNTS, HALF)
     look_round(walls, 0.0, 0.0, 0.5, 1.0)
-    start, on = Pose(0.0, 0.0, 0.0), Pose(2.0 * SILENT_M, 0.0, 0.0)
+    start, on = Pose(0.0, 0.0, 0.0), Pose(2.0 * SILENT_WAY_M, 0.0, 0.0)
     walls.look_again(start.x, start.y, is_lasting=False)
     assert not len(sides(walls, start)[1])
     known = len(sides(walls, Pose(0.0, 0.0, 1.7))[0])

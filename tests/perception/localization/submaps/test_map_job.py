@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from perception.localization.submaps import map_job
-from perception.localization.submaps.local_grid import CELLS
+from perception.localization.submaps.local_grid import SUBMAP_CELLS
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import Link
 from perception.localization.submaps.submap_records import Submap, node_at, odometry_link, pose_of
@@ -52,7 +52,7 @@ def test_caches_change_nothing() -> None:
     assert isinstance(one, Outcome)
     assert isinstance(other, Outcome)
     assert one.nodes.tolist() == other.nodes.tolist()
-    assert cold.grids[0].shape == (2, CELLS, CELLS)
+    assert cold.grids[0].shape == (2, SUBMAP_CELLS, SUBMAP_CELLS)
 
 
 def test_the_first_map_has_nothing_to_be_compared_with() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from perception.kernel import Floats
-from perception.localization.submaps.local_grid import CELLS, answers_of
-from perception.localization.submaps.map_match import STEPS, Comparison, Match, fit_of
+from perception.localization.submaps.local_grid import SUBMAP_CELLS, answers_of
+from perception.localization.submaps.map_match import BEAM_CELLS, Comparison, Match, fit_of
 from tests.perception.localization.submaps.test_local_grid import BEAM, grid_of
 
 USUAL = np.array([BEAM, -0.7])
@@ -34,7 +34,7 @@ def room_readings(x: float = 0.0, y: float = 0.0, theta: float = 0.0) -> Floats:
 def room_map() -> Floats:
     """Return how the cells of a map of the room answer."""
     hits, passes = grid_of(room_readings())
-    maps = np.empty((2, CELLS, CELLS))
+    maps = np.empty((2, SUBMAP_CELLS, SUBMAP_CELLS))
     answers_of(hits, passes, maps[0], maps[1])
     return maps
 
@@ -51,28 +51,28 @@ def test_readings_are_found_where_they_were_made(moved: tuple[float, float, floa
 
 
 def test_where_no_range_came_a_reading_says_nothing() -> None:
-    maps, fit = np.zeros((2, CELLS, CELLS)), np.empty(2)
+    maps, fit = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS)), np.empty(2)
     maps[0] = 0.03
     readings = room_readings()
-    fit_of(readings, 3, 1, np.zeros(3), USUAL, maps, np.empty(STEPS), fit)
+    fit_of(readings, 3, 1, np.zeros(3), USUAL, maps, np.empty(BEAM_CELLS), fit)
     assert fit.tolist() == [0.0, 0.0]
 
 
 def test_beyond_the_map_nothing_is_read() -> None:
     fit = np.empty(2)
-    fit_of(room_readings(), 4, 1, np.array([30.0, -30.0, 1.0]), USUAL, room_free(), np.empty(STEPS), fit)
+    fit_of(room_readings(), 4, 1, np.array([30.0, -30.0, 1.0]), USUAL, room_free(), np.empty(BEAM_CELLS), fit)
     assert fit.tolist() == [0.0, 0.0]
 
 
 def room_free() -> Floats:
     """Return a map that is known everywhere, and free."""
-    maps = np.ones((2, CELLS, CELLS))
+    maps = np.ones((2, SUBMAP_CELLS, SUBMAP_CELLS))
     maps[0] = 0.0
     return maps
 
 
 def test_an_echo_where_all_is_free_is_an_outlier() -> None:
     fit = np.empty(2)
-    fit_of(room_readings(), 1, 1, np.zeros(3), USUAL, room_free(), np.empty(STEPS), fit)
+    fit_of(room_readings(), 1, 1, np.zeros(3), USUAL, room_free(), np.empty(BEAM_CELLS), fit)
     assert fit[1] == pytest.approx(1.0)
     assert fit[0] == pytest.approx(math.log(0.1 / 4.9) + 0.7)

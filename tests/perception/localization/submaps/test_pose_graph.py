@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import (
-    SCALE_SIGMA,
+    GRAPH_SCALE_SIGMA,
     SCALES,
     Link,
     Node,
@@ -74,9 +74,9 @@ def test_a_step_is_that_of_dense_algebra() -> None:
     jacobians, residuals = np.empty((len(links), 3, 6 + SCALES)), np.empty((len(links), 3))
     linearise(held, len(links), at, scales, jacobians, residuals)
     matrix = np.zeros((size, size))
-    matrix[range(SCALES), range(SCALES)] = 1.0 / SCALE_SIGMA**2
+    matrix[range(SCALES), range(SCALES)] = 1.0 / GRAPH_SCALE_SIGMA**2
     gradient = np.zeros(size)
-    gradient[:SCALES] = -scales / SCALE_SIGMA**2
+    gradient[:SCALES] = -scales / GRAPH_SCALE_SIGMA**2
     for link, part, residual in zip(links, jacobians, residuals, strict=True):
         whole = np.zeros((3, size))
         whole[:, SCALES + 3 * link["of"] : SCALES + 3 * link["of"] + 3] = part[:, :3]
