@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from bench.beacons import errors_when_aligned
 from bench.range_statistics import POSE_COLUMNS, read_tables
 from bench.real_rooms import Row
 from config.load import load_settings
@@ -22,20 +23,6 @@ from runtime.recording.ring_log_replay import replay_localized
 WRONG_M: Final = 0.5
 WRONG_SIGMAS: Final = 3.5
 """A place that is off by more than both is wrong."""
-
-
-def aligned_errors(poses: Floats, truth: Floats) -> Floats:
-    """Return how far places are off, m, after the turn and shift that fit them best (Kabsch 1976).
-
-    Parameters
-    ----------
-    poses, truth : (n, 2 or more) float
-        Places in columns 0 and 1, m.
-    """
-    here, there = poses[:, :2].mean(axis=0), truth[:, :2].mean(axis=0)
-    u, _, v = np.linalg.svd((poses[:, :2] - here).T @ (truth[:, :2] - there))
-    turn = v.T @ np.diag([1.0, np.sign(np.linalg.det(v.T @ u.T))]) @ u.T
-    return np.asarray(np.hypot(*((poses[:, :2] - here) @ turn.T + there - truth[:, :2]).T))
 
 
 def measure(folders: Iterable[Path], tell: Callable[[str], None]) -> dict[str, Row]:
@@ -65,10 +52,10 @@ def _score(settings: Settings, firings: list[Firing], odometry: Floats, truth: F
     turn = Pose(*odometry[0].tolist()).compose(Pose(*truth[0].tolist()).inverse())
     from_start = np.array([(at.x, at.y) for at in (turn.compose(Pose(*row)) for row in truth.tolist())])
     off = np.hypot(*(said - from_start).T)
-    at_end = aligned_errors(np.array([(here.pose.x, here.pose.y) for here in end]), truth)
+    at_end = errors_when_aligned(np.array([(here.pose.x, here.pose.y) for here in end]), truth[:, :2])
     return {
-        "odometry": _rms(aligned_errors(odometry, truth)),
-        "now": _rms(aligned_errors(said, truth)),
+        "odometry": _rms(errors_when_aligned(odometry[:, :2], truth[:, :2])),
+        "now": _rms(errors_when_aligned(said, truth[:, :2])),
         "end": _rms(at_end),
         "worst": float(at_end.max()),
         "wrong": float((is_tracking & (off > np.maximum(WRONG_M, WRONG_SIGMAS * sigma))).mean()),
