@@ -15,7 +15,6 @@ from typing import Final, TypeAlias
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose
-from perception.bounds import PLACE, bounds
 from perception.detected_object import DetectedObject, turned_object, worst_sigma
 from perception.edits import (
     Evidence,
@@ -58,13 +57,9 @@ class MapFrame(OdometryFrame):
         odometry's frame then.
     """
 
-    BOUNDS: Final = bounds(_turned=PLACE)
-
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
         self.drift = DriftCorrection(ring)
         self.submaps = SubmapGraph(ring)
-        self._turned = 0.0
-        """Direction of travel less that of the ring at the last firing, rad."""
         self._near: set[int] = set()
         self.set_models(models)
 
@@ -121,7 +116,6 @@ class MapFrame(OdometryFrame):
         self.drift.observe(firing)
         if not self.drift.is_applied:
             self.submaps.observe(firing)
-            self._turned = firing.pose.theta - firing.ring_yaw
         for number, dx, dy in self.drift.moved_landmarks(SHIFT_MIN_M, self._near):
             shift(number, dx, dy)
         return self.drift.corrected(firing)
@@ -132,18 +126,18 @@ class MapFrame(OdometryFrame):
         is_placed = here.status == "lost" or (here.status == "tracking" and not self.submaps.is_applied)
         if self.drift.is_applied or is_placed:
             return here
-        found = self.submaps.localized(self._turned)
+        found = self.submaps.localized()
         return found if self.submaps.is_applied else found._replace(pose=here.pose, ring_yaw=here.ring_yaw)
 
     def moment(self) -> Moment | None:
         """Return the moment of the last firing, for `as_known_now`; None where landmarks correct the pose."""
-        return None if self.drift.is_applied else Moment(*self.submaps.anchor(), self._turned)
+        return None if self.drift.is_applied else self.submaps.moment()
 
     def as_known_now(self, then: LocalizedPose, moment: Moment | None) -> LocalizedPose:
         """Return where the robot was at a moment, as known now; by landmarks that is what was known then."""
         if moment is None or self.drift.is_applied or not self.submaps.is_applied:
             return then
-        x, y, yaw = self.submaps.placed(moment.submap, moment.odometry).tolist()
+        x, y, yaw = self.submaps.placed(moment).tolist()
         return then._replace(pose=Pose(x, y, yaw + moment.turned), ring_yaw=yaw)
 
     def odometry_from_map(self) -> Pose:

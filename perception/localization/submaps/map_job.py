@@ -19,7 +19,7 @@ from perception.localization.submaps.local_grid import (
     enter_passes,
     share_echoes,
 )
-from perception.localization.submaps.map_match import Comparison, Match
+from perception.localization.submaps.map_match import Match, best_match
 from perception.localization.submaps.pose_graph import (
     GRAPH_SCALE_SIGMA,
     SCALES,
@@ -28,9 +28,8 @@ from perception.localization.submaps.pose_graph import (
     begin_step,
     go_on,
     linearise,
-    spread_from,
 )
-from perception.localization.submaps.submap_records import between, match_link, pose_of
+from perception.localization.submaps.submap_records import between, match_link, pose_of, spread_about
 from perception.records import records, zeros
 
 OVERLAP_M: Final = 6.0
@@ -83,8 +82,6 @@ class Outcome(NamedTuple):
     usual: Floats
     gain: float
     """Log likelihood of the matches with drift less that without."""
-    spread: Floats
-    """Variance of place (m²) and direction (rad²) of the map in the map frame."""
 
 
 def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
@@ -94,9 +91,7 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         maps.grids[number] = grid
         yield None
     nodes, links, usual = maps.nodes, maps.links, maps.usual.copy()
-    spread = np.full((number + 1, 2), math.inf)
-    spread[number] = 0.0
-    spread_from(records(Link, links), len(links), records(Node, nodes), spread)
+    spread = spread_about(number, links, nodes)
     here = pose_of(nodes[number])
     distances = np.hypot(nodes["x"][:number] - here[0], nodes["y"][:number] - here[1])
     found: list[NDArray[Any]] = []
@@ -116,8 +111,13 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         place, turn = spread[nearest].tolist()
         beam = np.array([half_angle, usual[0] / usual[1]])
         match: Match | None = None
-        for match in Comparison(readings, answers, beam).best_match(
-            expected, _reach(place, turn), np.diag(1.0 / (np.array([place, place, turn]) + EXPECTED_LEAST))
+        for match in best_match(
+            readings,
+            answers,
+            beam,
+            expected,
+            _reach(place, turn),
+            np.diag(1.0 / (np.array([place, place, turn]) + EXPECTED_LEAST)),
         ):
             if match is None:
                 yield None
@@ -181,6 +181,9 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
     links, nodes, scales = records(Link, maps.links), records(Node, maps.nodes), maps.scales.copy()
     count, size = len(maps.links), SCALES + 3 * len(maps.nodes)
     jacobians, residuals, vectors = np.empty((count, 3, 6 + SCALES)), np.empty((count, 3)), np.empty((6, size))
+    exact = zeros(Node, len(maps.nodes))
+    exact["x"], exact["y"], exact["theta"] = maps.submaps["pose"].T
+    at_odometry = linearise(links, count, records(Node, exact), np.zeros(SCALES), jacobians, residuals)
     for _ in range(GRAPH_STEPS_MAX if is_new else 0):
         linearise(links, count, nodes, scales, jacobians, residuals)
         begin_step(links, count, scales, jacobians, residuals, vectors)
@@ -203,12 +206,4 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
     of_odometry = maps.links["is_match"] == 0
     off = residuals[of_odometry]
     cost += 0.5 * float(np.einsum("ij,ijk,ik->", off, maps.links["information"][of_odometry], off))
-    weights = maps.links["weight"].copy()
-    exact = zeros(Node, len(maps.nodes))
-    exact["x"], exact["y"], exact["theta"] = maps.submaps["pose"].T
-    at_odometry = linearise(links, count, records(Node, exact), np.zeros(SCALES), jacobians, residuals)
-    maps.links["weight"] = weights
-    spread = np.full((len(maps.nodes), 2), math.inf)
-    spread[0] = 0.0
-    spread_from(links, count, nodes, spread)
-    yield Outcome(maps.nodes, maps.links, scales, maps.usual, at_odometry - cost, spread[-1])
+    yield Outcome(maps.nodes, maps.links, scales, maps.usual, at_odometry - cost)

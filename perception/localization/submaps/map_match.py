@@ -52,6 +52,7 @@ SEARCH_READINGS: Final = 80
 FIT_READINGS: Final = 250
 """Readings of a search, and of the match that follows."""
 NEWTON_STEPS: Final = 4
+_AXES: Final = np.eye(3)
 
 
 @kernel
@@ -190,74 +191,61 @@ class Match(NamedTuple):
     """Number of known readings."""
 
 
-class Comparison:
-    """Readings and the map with which they are compared.
+def best_match(
+    readings: Floats, maps: Floats, beam: Floats, about: Floats, reach: Floats, information: Floats
+) -> Iterator[Match | None]:
+    """Search for the pose at which readings fit best, and climb to the best one near it.
 
     Parameters
     ----------
-    readings : (n, 4) float
+    readings, maps, beam
         As of `fit_of`.
-    maps : (2, SUBMAP_CELLS, SUBMAP_CELLS) float
-        As of `fit_of`.
-    beam : (2,) float
-        As of `fit_of`.
+    about, reach : (3,) float
+        Expected pose, and how far from it is looked, m and rad.
+    information : (3, 3) float
+        Of the expected pose, for the search; the match is what the readings say alone.
+
+    Yields
+    ------
+    Match or None
+        None after each quantum, and the match last.
     """
+    count, goes_on, fit = len(readings), np.empty(BEAM_CELLS), np.empty(2)
+    lattice, best = np.vstack([about, reach, information]), np.full(9, -math.inf)
+    step, begin, total = max(1, count // SEARCH_READINGS), 0, 1
+    while begin < total:
+        total = search(readings, count, step, lattice, beam, maps, begin, goes_on, best)
+        begin += SEARCHED
+        yield None
+    step = max(1, count // FIT_READINGS)
 
-    def __init__(self, readings: Floats, maps: Floats, beam: Floats) -> None:
-        self._readings, self._maps, self._beam = readings, maps, beam
-        self._goes_on, self._fit = np.empty(BEAM_CELLS), np.empty(2)
-        self._step = max(1, len(readings) // FIT_READINGS)
+    def log_density(at: Floats) -> float:
+        fit_of(readings, count, step, at, beam, maps, goes_on, fit)
+        return MATCH_TEMPER * float(fit[0])
 
-    def best_match(self, about: Floats, reach: Floats, information: Floats) -> Iterator[Match | None]:
-        """Search for the pose and climb to the best one near it; yield None after each quantum, and the match last.
-
-        Parameters
-        ----------
-        about, reach : (3,) float
-            Expected pose, and how far from it is looked, m and rad.
-        information : (3, 3) float
-            Of the expected pose, for the search; the match is what the readings say alone.
-        """
-        lattice = np.vstack([about, reach, information])
-        best = np.full(9, -math.inf)
-        step, begin, total = max(1, len(self._readings) // SEARCH_READINGS), 0, 1
-        while begin < total:
-            total = search(
-                self._readings, len(self._readings), step, lattice, self._beam, self._maps, begin, self._goes_on, best
-            )
-            begin += SEARCHED
+    at = best[:3].copy()
+    for _ in range(NEWTON_STEPS):
+        here, slope = log_density(at), np.zeros(3)
+        plus, minus, curvature = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+        for i in range(3):
+            plus[i], minus[i] = log_density(at + STEP * _AXES[i]), log_density(at - STEP * _AXES[i])
+            slope[i] = (plus[i] - minus[i]) / (2.0 * STEP[i])
+            curvature[i, i] = (plus[i] + minus[i] - 2.0 * here) / STEP[i] ** 2
             yield None
-        at = best[:3].copy()
-        for _ in range(NEWTON_STEPS):
-            here, slope = self._log_density(at), np.zeros(3)
-            plus, minus, curvature = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-            for i in range(3):
-                plus[i], minus[i] = self._log_density(at + STEP * _AXES[i]), self._log_density(at - STEP * _AXES[i])
-                slope[i] = (plus[i] - minus[i]) / (2.0 * STEP[i])
-                curvature[i, i] = (plus[i] + minus[i] - 2.0 * here) / STEP[i] ** 2
-                yield None
-            for i, j in ((1, 0), (2, 0), (2, 1)):
-                both = STEP * (_AXES[i] + _AXES[j])
-                mixed = self._log_density(at + both) + self._log_density(at - both)
-                mixed += 2.0 * here - plus[i] - minus[i] - plus[j] - minus[j]
-                curvature[i, j] = curvature[j, i] = mixed / (2.0 * STEP[i] * STEP[j])
-                yield None
-            values, axes = np.linalg.eigh(-curvature)
-            values = np.maximum(values, INFORMATION_MIN)
-            move = axes @ ((axes.T @ slope) / values)
-            share = min(
-                1.0,
-                STEP_MOVE_MAX_M / max(1e-9, math.hypot(move[0], move[1])),
-                STEP_TURN_MAX_RAD / max(1e-9, abs(move[2])),
-            )
-            at = at + share * move
-        log_density = self._log_density(at)
-        yield Match(at, (axes * values) @ axes.T, log_density / MATCH_TEMPER, float(self._fit[1]))
-
-    def _log_density(self, at: Floats) -> float:
-        count = len(self._readings)
-        fit_of(self._readings, count, self._step, at, self._beam, self._maps, self._goes_on, self._fit)
-        return MATCH_TEMPER * float(self._fit[0])
-
-
-_AXES: Final = np.eye(3)
+        for i, j in ((1, 0), (2, 0), (2, 1)):
+            both = STEP * (_AXES[i] + _AXES[j])
+            mixed = log_density(at + both) + log_density(at - both)
+            mixed += 2.0 * here - plus[i] - minus[i] - plus[j] - minus[j]
+            curvature[i, j] = curvature[j, i] = mixed / (2.0 * STEP[i] * STEP[j])
+            yield None
+        values, axes = np.linalg.eigh(-curvature)
+        values = np.maximum(values, INFORMATION_MIN)
+        move = axes @ ((axes.T @ slope) / values)
+        share = min(
+            1.0,
+            STEP_MOVE_MAX_M / max(1e-9, math.hypot(move[0], move[1])),
+            STEP_TURN_MAX_RAD / max(1e-9, abs(move[2])),
+        )
+        at = at + share * move
+    log_likelihood = log_density(at) / MATCH_TEMPER
+    yield Match(at, (axes * values) @ axes.T, log_likelihood, float(fit[1]))

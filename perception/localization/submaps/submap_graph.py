@@ -20,21 +20,20 @@ from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, up_to
 from perception.kernel import Floats
-from perception.localization.localized_pose import LocalizedPose, Status
+from perception.localization.localized_pose import LocalizedPose, Moment, Status
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
-from perception.localization.submaps.pose_graph import SCALES
+from perception.localization.submaps.pose_graph import SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
     SUBMAP_READINGS_MAX,
-    Links,
-    Nodes,
+    Rows,
     Submap,
-    Submaps,
     between,
     compose,
     node_at,
     odometry_link,
     pose_of,
     scaled,
+    spread_about,
 )
 from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
@@ -83,6 +82,7 @@ class SubmapGraph:
         _count=up_to(SUBMAP_READINGS_MAX),
         _here=PLACE,
         _begin=PLACE,
+        _turned=PLACE,
         _trail=PLACE,
         _trail_count=up_to(SUBMAP_READINGS_MAX),
         _matched=COUNT,
@@ -96,23 +96,27 @@ class SubmapGraph:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._readings = np.zeros((SUBMAP_READINGS_MAX, 5))
-        """Of the map that goes on, in odometry's frame: sensor's pose, range, and the ring's direction."""
+        """Of the map that goes on: sensor's place and ring's direction by odometry, sensor's direction on the ring,
+        range."""
         self._trail = np.zeros((SUBMAP_READINGS_MAX, 5))
-        """The ring's poses of the map that goes on, with way and turns until there."""
+        """The ring's poses of the map that goes on, as of `_here`."""
         self.reset()
 
     def reset(self) -> None:
         """Start again: the next firing's odometry defines the map frame."""
-        self._submaps, self._nodes, self._links = Submaps(), Nodes(), Links()
+        self._submaps, self._nodes, self._links = Rows(Submap), Rows(Node), Rows(Link)
         self._grids: dict[int, Floats] = {}
         self._job: Iterator[Outcome | None] | None = None
         self._readings[:] = self._trail[:] = 0.0
         self._latest = np.full((len(self._mounts), 3), math.inf)
         """The ring's pose at each sensor's last reading of the map that goes on."""
         self._count = self._trail_count = 0
-        self._here, self._begin = np.zeros(5), np.zeros(5)
-        """The ring's pose by odometry, not wrapped, with way (m) and turns (rad): now, and as the map began."""
-        self._is_started = self.is_applied = False
+        self._here, self._turned = np.zeros(5), 0.0
+        """The ring's pose by odometry, not wrapped, with way (m) and turns (rad) until there; and the direction of
+        travel less the ring's, rad."""
+        self._begin = np.zeros(2)
+        """Way and turns until the map before ended."""
+        self.is_applied = False
         self._matched, self._quanta = 0, 0
         """Maps that were compared with those before, and quanta done of the next one."""
         self._scales, self._usual = np.zeros(SCALES), np.array([USUAL_LOG * USUAL_READINGS, USUAL_READINGS])
@@ -123,16 +127,14 @@ class SubmapGraph:
         """Take down a firing with its pose by odometry."""
         x, y, yaw = firing.pose.x, firing.pose.y, firing.ring_yaw
         here = self._here
-        if not self._is_started:
-            self._is_started = True
+        if self._trail_count == 0 and len(self._submaps.archived_rows) == 0:  # the first one
             here[:3] = x, y, yaw
-            self._begin[:] = here
         turn = wrap_angle(yaw - here[2])
         here[3] += math.hypot(x - here[0], y - here[1])
         here[4] += abs(turn)
-        here[:3] = x, y, here[2] + turn
+        here[:3], self._turned = (x, y, here[2] + turn), firing.pose.theta - yaw
         self._take_down(firing)
-        way, turns = (here[3:] - self._begin[3:]).tolist()
+        way, turns = (here[3:] - self._begin).tolist()
         if way >= SUBMAP_M or turns >= SUBMAP_RAD or self._count > SUBMAP_READINGS_MAX - len(self._mounts):
             self._end_map()
 
@@ -152,7 +154,7 @@ class SubmapGraph:
             rows = self._readings[self._count : self._count + len(mounts)]
             rows[:, 0] = here[0] + c * mounts[:, 0] - s * mounts[:, 1]
             rows[:, 1] = here[1] + s * mounts[:, 0] + c * mounts[:, 1]
-            rows[:, 2], rows[:, 3], rows[:, 4] = here[2] + mounts[:, 2], ranges[fresh], here[2]
+            rows[:, 2], rows[:, 3], rows[:, 4] = here[2], mounts[:, 2], ranges[fresh]
             self._count += len(mounts)
             self._latest[fresh] = here[:3]
 
@@ -162,30 +164,22 @@ class SubmapGraph:
         row = zeros(Submap, 1)
         row["pose"], row["way"], row["turn"], row["count"] = middle[:3], middle[3], middle[4], self._count
         rows = self._readings[: self._count]
-        turns = rows[:, 4] - middle[2]
-        c, s = np.cos(-middle[2] + 0.5 * self._scales[1] * turns), np.sin(-middle[2] + 0.5 * self._scales[1] * turns)
-        dx, dy = (1.0 + self._scales[0]) * (rows[:, :2] - middle[:2]).T
-        placed = np.column_stack(
-            [c * dx - s * dy, s * dx + c * dy, rows[:, 2] - middle[2] + self._scales[1] * turns, rows[:, 3]]
-        )
-        row["readings"][0, : self._count] = placed
+        placed = scaled(between(middle, rows[:, :3]), self._scales)
+        placed[:, 2] += rows[:, 3]
+        row["readings"][0, : self._count] = np.column_stack([placed, rows[:, 4]])
         before = self._submaps.archived_rows
-        self._submaps.archived_rows = np.concatenate([before, row])
+        self._submaps.append(row)
         if len(before) == 0:
             node = middle[:3]
         else:
-            moved = between(before[-1]["pose"], middle[:3])
+            moved = between(before[-1]["pose"], middle)
             node = compose(pose_of(self._nodes.archived_rows[-1]), scaled(moved, self._scales))
-            way, turn = middle[3] - before[-1]["way"], middle[4] - before[-1]["turn"]
-            covariance = walk(moved, way, turn)
-            link = odometry_link(len(before) - 1, moved, np.asarray(np.linalg.inv(covariance), dtype=np.float64))
-            self._links.archived_rows = np.concatenate([self._links.archived_rows, link])
-            self._spread += (
-                covariance[0, 0] + covariance[1, 1] + self._spread[1] * (moved[0] ** 2 + moved[1] ** 2),
-                covariance[2, 2],
-            )
-        self._nodes.archived_rows = np.concatenate([self._nodes.archived_rows, node_at(node)])
-        self._begin[:] = self._here
+            covariance = walk(moved, middle[3] - before[-1]["way"], middle[4] - before[-1]["turn"])
+            information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
+            self._links.append(odometry_link(len(before) - 1, moved, information))
+        self._nodes.append(node_at(node))
+        self._renew_spread()
+        self._begin[:] = self._here[3:]
         self._latest[:] = math.inf
         self._count = self._trail_count = 0
 
@@ -219,9 +213,7 @@ class SubmapGraph:
 
     def _take(self, outcome: Outcome) -> None:
         """Use what the comparison of a map has given; maps that have ended since then follow by odometry."""
-        self._scales[:], self._usual[:], self._spread[:] = outcome.scales, outcome.usual, outcome.spread
-        if self._matched == 0:
-            self._spread[:] = 0.0
+        self._scales[:], self._usual[:] = outcome.scales, outcome.usual
         links, nodes = self._links.archived_rows, self._nodes.archived_rows
         later = links["to"] > self._matched
         self._links.archived_rows = np.concatenate([outcome.links, links[later]])
@@ -233,42 +225,33 @@ class SubmapGraph:
         self.is_applied = self.is_applied or outcome.gain > REFUTED + REFUTED_A_MAP * self._matched
         self._matched += 1
         self._quanta, self._job = 0, None
+        self._renew_spread()
+
+    def _renew_spread(self) -> None:
+        self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""
         self._grids, self._job = {}, None
 
-    def anchor(self) -> tuple[int, Floats]:
-        """Return the number of the map that goes on, and the ring's pose by odometry, for `placed`."""
-        return len(self._submaps.archived_rows), self._here[:3].copy()
+    def moment(self) -> Moment:
+        """Return the moment of the last firing, for `placed`."""
+        return Moment(len(self._submaps.archived_rows), self._here[:3].copy(), self._turned)
 
-    def placed(self, number: int, odometry: Floats) -> Floats:
-        """Return the ring's pose in the map frame at a moment of a map, as known now, x, y (m) and direction (rad).
-
-        Parameters
-        ----------
-        number : int
-            Of the map.
-        odometry : (3,) float
-            The ring's pose by odometry, its direction not wrapped.
-        """
+    def placed(self, moment: Moment) -> Floats:
+        """Return the ring's pose in the map frame at a moment, as known now, x, y (m) and direction (rad)."""
         submaps = self._submaps.archived_rows
         if not self.is_applied or len(submaps) == 0:
-            return odometry
-        number = min(number, len(submaps) - 1)
-        moved = scaled(between(submaps[number]["pose"], odometry), self._scales)
+            return moment.odometry
+        number = min(moment.submap, len(submaps) - 1)
+        moved = scaled(between(submaps[number]["pose"], moment.odometry), self._scales)
         return compose(pose_of(self._nodes.archived_rows[number]), moved)
 
-    def localized(self, travel: float) -> LocalizedPose:
-        """Return where the robot was at the last firing, in the map frame.
-
-        Parameters
-        ----------
-        travel : float
-            Direction of travel less that of the ring, rad.
-        """
-        number, here = self.anchor()
-        x, y, yaw = self.placed(number, here).tolist()
+    def localized(self) -> LocalizedPose:
+        """Return where the robot was at the last firing, in the map frame."""
+        moment = self.moment()
+        x, y, yaw = self.placed(moment).tolist()
+        here = moment.odometry
         submaps = self._submaps.archived_rows
         start = submaps[-1] if len(submaps) else None
         way, turn = (self._here[3:] - (0.0 if start is None else (start["way"], start["turn"]))).tolist()
@@ -277,14 +260,14 @@ class SubmapGraph:
         covariance[:2, :2] += np.eye(2) * (self._spread[0] + self._spread[1] * (moved[0] ** 2 + moved[1] ** 2))
         covariance[2, 2] += self._spread[1]
         status: Status = "tracking" if self._matched > 0 else "localizing"
-        return LocalizedPose(Pose(x, y, yaw + travel), yaw, covariance, status, 1.0)
+        return LocalizedPose(Pose(x, y, yaw + self._turned), yaw, covariance, status, 1.0)
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
         if not self.is_applied:
             return Pose(0.0, 0.0, 0.0)
-        number, here = self.anchor()
-        return Pose(*here.tolist()).compose(Pose(*self.placed(number, here).tolist()).inverse())
+        moment = self.moment()
+        return Pose(*moment.odometry.tolist()).compose(Pose(*self.placed(moment).tolist()).inverse())
 
 
 def _is_apart(moved: Floats) -> bool:

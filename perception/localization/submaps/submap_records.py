@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from drivers.messages import wrap_angle
 from perception.bounds import PLACE, Finite, bounds, up_to
 from perception.kernel import Floats
-from perception.localization.submaps.pose_graph import Link, Node
-from perception.records import Record, zeros
+from perception.localization.submaps.pose_graph import Link, Node, spread_from
+from perception.records import Record, records, zeros
 
 SUBMAP_READINGS_MAX: Final = 512
 """Of one map, which ends with them."""
@@ -31,38 +31,31 @@ class Submap(Record):
     """Sensor's place x, y (m), direction (rad), and range, m; infinite if silent."""
 
 
-class Submaps:
-    """The maps' readings."""
+class Rows:
+    """Records whose number grows with the way.
 
-    BOUNDS: Final = bounds(archived_rows=Submap.BOUNDS)
+    Parameters
+    ----------
+    record : type of Record
+        Their kind.
+    """
 
-    def __init__(self) -> None:
-        self.archived_rows: NDArray[Any] = zeros(Submap, 0)
+    BOUNDS: Final = bounds(archived_rows=lambda self: self._record.BOUNDS)
 
+    def __init__(self, record: type[Record]) -> None:
+        self._record = record
+        self.archived_rows: NDArray[Any] = zeros(record, 0)
 
-class Nodes:
-    """The maps' poses in the map frame."""
-
-    BOUNDS: Final = bounds(archived_rows=Node.BOUNDS)
-
-    def __init__(self) -> None:
-        self.archived_rows: NDArray[Any] = zeros(Node, 0)
-
-
-class Links:
-    """Odometry from one map to the next, and matches."""
-
-    BOUNDS: Final = bounds(archived_rows=Link.BOUNDS)
-
-    def __init__(self) -> None:
-        self.archived_rows: NDArray[Any] = zeros(Link, 0)
+    def append(self, row: NDArray[Any]) -> None:
+        """Add one."""
+        self.archived_rows = np.concatenate([self.archived_rows, row])
 
 
 def between(of: Floats, to: Floats) -> Floats:
-    """Return a pose `to` in the frame of another one, x, y (m) and direction (rad), which is not wrapped."""
+    """Return poses in the frame of one, x, y (m) and direction (rad), which is not wrapped; shape (…, 3)."""
     c, s = math.cos(of[2]), math.sin(of[2])
-    dx, dy = to[0] - of[0], to[1] - of[1]
-    return np.array([c * dx + s * dy, c * dy - s * dx, to[2] - of[2]])
+    dx, dy = to[..., 0] - of[0], to[..., 1] - of[1]
+    return np.stack([c * dx + s * dy, c * dy - s * dx, to[..., 2] - of[2]], axis=-1)
 
 
 def compose(of: Floats, by: Floats) -> Floats:
@@ -72,11 +65,11 @@ def compose(of: Floats, by: Floats) -> Floats:
 
 
 def scaled(moved: Floats, scales: Floats) -> Floats:
-    """Return a motion of a few metres by odometry with its scales of way and turn; its turns are even on its way."""
-    half = 0.5 * scales[1] * moved[2]
-    c, s, share = math.cos(half), math.sin(half), 1.0 + scales[0]
-    x, y, turn = moved
-    return np.array([share * (c * x - s * y), share * (s * x + c * y), (1.0 + scales[1]) * turn])
+    """Return motions (…, 3) of a few metres by odometry with its scales; their turns are even on their way."""
+    x, y, turn = np.moveaxis(moved, -1, 0)
+    half, share = 0.5 * scales[1] * turn, 1.0 + scales[0]
+    c, s = np.cos(half), np.sin(half)
+    return np.stack([share * (c * x - s * y), share * (s * x + c * y), (1.0 + scales[1]) * turn], axis=-1)
 
 
 def odometry_link(of: int, moved: Floats, information: Floats) -> NDArray[Any]:
@@ -108,3 +101,11 @@ def node_at(pose: Floats) -> NDArray[Any]:
 def pose_of(node: NDArray[Any]) -> Floats:
     """Return the pose of a map's record, shape (3,)."""
     return np.array([node["x"], node["y"], node["theta"]])
+
+
+def spread_about(number: int, links: NDArray[Any], nodes: NDArray[Any]) -> Floats:
+    """Return how uncertain each map lies to one: variances of place (m²) and direction (rad²), shape (n, 2)."""
+    spread = np.full((len(nodes), 2), math.inf)
+    spread[number] = 0.0
+    spread_from(records(Link, links), len(links), records(Node, nodes), spread)
+    return spread

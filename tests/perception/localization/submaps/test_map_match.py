@@ -9,7 +9,7 @@ import pytest
 
 from perception.kernel import Floats
 from perception.localization.submaps.local_grid import SUBMAP_CELLS, answers_of
-from perception.localization.submaps.map_match import BEAM_CELLS, Comparison, Match, fit_of
+from perception.localization.submaps.map_match import BEAM_CELLS, Match, best_match, fit_of
 from tests.perception.localization.submaps.test_local_grid import BEAM, grid_of
 
 USUAL = np.array([BEAM, -0.7])
@@ -42,8 +42,9 @@ def room_map() -> Floats:
 @pytest.mark.compiled
 @pytest.mark.parametrize("moved", [(0.0, 0.0, 0.0), (0.21, -0.13, 0.07), (-0.24, 0.2, -0.06)])
 def test_readings_are_found_where_they_were_made(moved: tuple[float, float, float]) -> None:
-    comparison = Comparison(room_readings(*moved), room_map(), USUAL)
-    *_, match = comparison.best_match(np.zeros(3), np.array([0.3, 0.3, 0.1]), np.eye(3))
+    *_, match = best_match(
+        room_readings(*moved), room_map(), USUAL, np.zeros(3), np.array([0.3, 0.3, 0.1]), np.eye(3)
+    )
     assert isinstance(match, Match)
     np.testing.assert_allclose(match.pose, moved, atol=0.04)
     assert match.known > 50

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from perception.kernel import Floats
-from perception.localization.submaps.pose_graph import Link
+from perception.localization.submaps.pose_graph import Node
 from perception.localization.submaps.submap_records import (
-    Links,
-    Nodes,
-    Submaps,
+    Rows,
     between,
     compose,
     match_link,
@@ -65,5 +63,7 @@ def test_a_match_of_the_next_map_may_lose_way(is_next: bool) -> None:
 def test_a_pose_survives_as_a_record() -> None:
     pose = np.array([1.0, 2.0, 3.0])
     assert pose_of(node_at(pose)[0]).tolist() == pose.tolist()
-    assert [len(rows().archived_rows) for rows in (Submaps, Nodes, Links)] == [0, 0, 0]
-    assert Links().archived_rows.dtype == Link.DTYPE
+    rows = Rows(Node)
+    rows.append(node_at(pose))
+    assert rows.archived_rows["y"].tolist() == [2.0]
+    assert rows.archived_rows.dtype == Node.DTYPE
