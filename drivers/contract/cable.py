@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
+from drivers.driver import LineState
 from drivers.emulator.faults import Fault
 from drivers.messages import Firing, Flags, Odometry, Twist
 from drivers.registry import make_device, make_driver
@@ -37,6 +38,8 @@ class Cable:
         What the host drives at in every cycle; None = nothing.
     split
         How the bytes for the driver are split.
+    said, heard
+        What the robot has said, as far as it got through, and what it heard, each with its time, s.
     firings, odometry, notes, restarts, flags
         What the driver passed on: all firings, samples, notes, number of restarts, and all flags.
     """
@@ -51,6 +54,8 @@ class Cable:
     steps: int = 0
     plugged: bool = False
     frozen: bool = False
+    said: bytearray = field(default_factory=bytearray)
+    heard: list[tuple[float, bytes]] = field(default_factory=list)
     firings: list[Firing] = field(default_factory=list)
     odometry: list[Odometry] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -81,13 +86,17 @@ class Cable:
         if self.frozen:
             return
         if self.plugged:
-            for part in self.split(self._pass("to the host", said)):
+            through = self._pass("to the host", said)
+            self.said += through
+            for part in self.split(through):
                 self.driver.receive(part, self.now_s)
             self.driver.tick(self.now_s)
         if self.steps % CYCLE_STEPS == 0 and self.twist is not None:
             self.driver.drive(self.twist)
         if self.plugged:
-            self.robot.receive(self._pass("to the robot", self.driver.outgoing(writable=True)))
+            asked = self._pass("to the robot", self.driver.outgoing(writable=True))
+            self.heard.append((self.now_s, asked))
+            self.robot.receive(asked)
         self._take()
         if self.plugged and self.cut_after is not None and self.passed[self.cut_after[0]] == self.cut_after[1]:
             self.unplug()
@@ -118,6 +127,14 @@ class Cable:
             assert self.now_s - started <= timeout_s, f"no {what} within {timeout_s} s: {self.driver.problem}"
             self.step()
         return self.now_s - started
+
+    def until_state(self, state: LineState, timeout_s: float) -> float:
+        """Run until the driver is in a state, for `timeout_s` at most; return how long that took."""
+        return self.until(lambda: self.driver.state is state, timeout_s, state.name)
+
+    def until_cut(self, timeout_s: float) -> float:
+        """Run until the line is cut, for `timeout_s` at most; return how long that took."""
+        return self.until(lambda: not self.plugged, timeout_s, "cut")
 
     def until_echo(self, timeout_s: float) -> float:
         """Run until a firing arrives, for `timeout_s` at most; return how long that took."""

@@ -69,7 +69,7 @@ def test_an_unanswered_line_goes_down_with_a_reason_and_is_ready_once_the_robot_
     cable.passed = {"to the robot": 0, "to the host": 0}
     cable.steps = steps(run_s)
     cable.robot.advance(run_s)
-    cable.until(lambda: driver.state is LineState.READY, family.connect_s + 10.0, "READY")
+    cable.until_state(LineState.READY, family.connect_s + 10.0)
     assert driver.problem is None
 
 
@@ -119,10 +119,8 @@ def test_any_bytes_are_survived_at_both_ends(family: Family) -> None:
     for at_s in (0.0, 0.3 * family.connect_s, family.connect_s, family.connect_s + 0.5):
         cable = family.cable()
         cable.plug()
-        said: list[bytes] = []
-        cable.split = lambda data, said=said: [said.append(data) or data]  # type: ignore[misc]
         cable.run(at_s)
-        valid += b"".join(said)
+        valid += cable.said
         for _ in range(40):
             start = rng.randrange(len(valid) + 1)
             noise = rng.randbytes(rng.randrange(200)) + bytes(valid[start : start + rng.randrange(60)])
@@ -132,5 +130,5 @@ def test_any_bytes_are_survived_at_both_ends(family: Family) -> None:
             assert cable.driver.problem is None or "\n" not in cable.driver.problem
         cable.unplug()
         cable.plug()
-        cable.until(lambda cable=cable: cable.driver.state is LineState.READY, 10.0, "READY after noise")  # type: ignore[misc]
+        cable.until_state(LineState.READY, 10.0)
         cable.until_echo(2.0)

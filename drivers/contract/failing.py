@@ -38,7 +38,7 @@ def cut_before_bytes(family: Family, way: Way, outages_s: Sequence[float], strid
         cable.cut_after = (way, byte)
         for turn in range(2):
             cable.plug()
-            cable.until(lambda cable=cable: not cable.plugged, 2.0 * family.connect_s, "cut")  # type: ignore[misc]
+            cable.until_cut(2.0 * family.connect_s)
             cable.run(outages_s[(byte + turn) % len(outages_s)])
             assert cable.driver.state is LineState.CLOSED
         cable.cut_after = None
@@ -104,12 +104,12 @@ def test_a_robot_that_falls_silent_is_called_dead_and_comes_back(
     for phase in range(PHASES):
         at_s = family.connect_s + 2.0 + 0.1 / PHASES * phase
         cable = family.driving(None, *script(kind=kind, at_s=at_s, duration_s=4.0))
-        cable.until(lambda c=cable: c.driver.state is LineState.DOWN, 8.0, "DOWN")  # type: ignore[misc]
+        cable.until_state(LineState.DOWN, 8.0)
         worst_s = max(worst_s, -(-cable.now_s // cycle_s) * cycle_s - at_s)
         assert cable.driver.problem is not None
         assert "\n" not in cable.driver.problem
     cable.twist = None
-    cable.until(lambda: cable.driver.state is LineState.READY, 12.0, "READY")
+    cable.until_state(LineState.READY, 12.0)
     cable.until_echo(2.0)
     assert cable.driver.problem is None
     assert worst_s <= limit_s + 1e-9
@@ -130,7 +130,7 @@ def test_noise_gives_no_false_range_and_the_line_recovers(family: Family, kind: 
     quiet.run(1.0)
     cable.run(family.connect_s + 2.5 - cable.now_s)
     assert cable.driver.counts.bad > 0 or kind == "garbage", "garbage may look like no frame at all"
-    cable.until(lambda: cable.driver.state is LineState.READY, family.connect_s + 5.0, "READY")
+    cable.until_state(LineState.READY, family.connect_s + 5.0)
     cable.until_echo(2.0)
     true = {range_m for firing in quiet.firings for range_m in firing.ranges_m if range_m == range_m}
     heard = {range_m for firing in cable.firings for range_m in firing.ranges_m if range_m == range_m}

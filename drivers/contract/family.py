@@ -100,7 +100,7 @@ class Family:
 
     def until_ready(self, cable: Cable) -> None:
         """Run until the line is READY and the robot fires."""
-        cable.until(lambda: cable.driver.state is LineState.READY, self.connect_s, "READY")
+        cable.until_state(LineState.READY, self.connect_s)
         cable.until_echo(self.connect_s)
 
     def driving(self, twist: Twist | None = None, *faults: Fault, world: WorldConfig = PLAIN) -> Cable:

@@ -148,26 +148,16 @@ def test_the_device_is_the_same_for_the_same_seed_however_time_is_split(family: 
     reference = family.cable(*script(kind="bit_errors", at_s=0.5, duration_s=0.5, rate=1e-2))
     reference.plug()
     reference.twist = family.at(0.1, 0.2)
-    heard: list[tuple[float, bytes]] = []
-    said = bytearray()
-    receive = reference.robot.receive
-
-    def recording(data: bytes) -> None:
-        heard.append((reference.now_s, data))
-        receive(data)
-
-    reference.robot.receive = recording  # type: ignore[method-assign]
-    reference.split = lambda data: [said.extend(data) or data]  # type: ignore[func-returns-value]
     reference.run(1.5)
-    assert repeated(family, reference, heard, seed=1) == bytes(said)
-    assert repeated(family, reference, heard, seed=2) != bytes(said)
+    assert repeated(family, reference, seed=1) == bytes(reference.said)
+    assert repeated(family, reference, seed=2) != bytes(reference.said)
 
 
-def repeated(family: Family, reference: Cable, heard: list[tuple[float, bytes]], seed: int) -> bytes:
+def repeated(family: Family, reference: Cable, seed: int) -> bytes:
     """Return what a robot of this seed says to what another one heard."""
     rng, robot, before_s = random.Random(2), make_device(family.robot, ROOM, seed, faults=reference.faults), 0.0
     said = b""
-    for at_s, data in heard:
+    for at_s, data in reference.heard:
         for share in sorted(rng.random() for _ in range(rng.randrange(3))):
             said += robot.advance(before_s + share * (at_s - before_s))
         said += robot.advance(at_s)
