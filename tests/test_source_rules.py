@@ -238,10 +238,11 @@ def test_every_module_is_reached_from_an_entry_point() -> None:
     """Tests and measurements alone are no reason for a module of the product; firmware is read as files."""
     modules = {path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): path for path in MODULES}
     sources = {name: MODULES[path] for name, path in modules.items() if "firmware/board/" not in path}
-    library = (ROOT / "echolocate.py").read_text("utf-8")
-    left = [*named_modules("echolocate.py", library), "runtime.cli.__main__", "runtime.cli.terminal.__main__"]
+    left = ["runtime.cli.__main__", "runtime.cli.terminal.__main__"]
+    for library in ("echolocate.py", "echolocate_pytest.py"):
+        left += named_modules(library, (ROOT / library).read_text("utf-8"))
     left += [family.module for family in SHIPPED.values()]
-    left += ["drivers.contract.plugin", *(f"drivers.contract.{part}" for part in PARTS)]
+    left += [f"drivers.contract.{part}" for part in PARTS]
     left += ["drivers.lines.driver", "drivers.lines.device"]  # what the packages of `init plugin` are made of
     left += [place_of(name).partition(":")[0] for commands in COMMANDS.values() for name in commands]
     reached: set[str] = set()

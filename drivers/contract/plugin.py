@@ -1,7 +1,8 @@
-"""The contract of drivers as a plug-in of pytest: `pytest --echolocate-family skippy`, wherever it is installed.
+"""The contract of drivers in pytest: `pytest --echolocate-family skippy`, wherever it is installed.
 
-The name is that of a robot, or its file, or `module:FAMILY`, a `drivers.contract.family.Family`. What the robot
-cannot do is skipped, and named with what follows from it.
+`echolocate_pytest` has the option, and registers this plug-in where it is given. The name is that of a robot, or its
+file, or `module:FAMILY`, a `drivers.contract.family.Family`. What the robot cannot do is skipped, and named with what
+follows from it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from drivers.contract.family import Family
 
 PARTS: Final = ("connecting", "motion", "measuring", "failing")
-OPTION: Final = "--echolocate-family"
+OPTION: Final = "echolocate_family"
 MARKERS: Final = (
     "needs(capability): a promise of robots that have it (drivers.capabilities)",
     "promise(id, …): verifies the promises with these IDs",
@@ -34,26 +35,19 @@ class _Measurements:
         return lambda _text: None
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option."""
-    text = "run the contract of drivers on a robot: its name, its file, or module:FAMILY"
-    parser.getgroup("echolocate").addoption(OPTION, metavar="NAME", default=None, help=text)
-
-
 def pytest_configure(config: pytest.Config) -> None:
-    """Collect the contract, and nothing else, where the option is given."""
+    """Collect the contract, and nothing else."""
     for marker in MARKERS:
         config.addinivalue_line("markers", marker)
-    if config.getoption(OPTION) is not None:
-        pytest.register_assert_rewrite("drivers.contract.cable")
-        config.args = [str(Path(__file__).with_name(f"{part}.py")) for part in PARTS]
-        config.option.reportchars += "s"
-        config.pluginmanager.register(_Measurements())
+    pytest.register_assert_rewrite("drivers.contract.cable")
+    config.args = [str(Path(__file__).with_name(f"{part}.py")) for part in PARTS]
+    config.option.reportchars += "s"
+    config.pluginmanager.register(_Measurements())
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the long forms, unless markers are asked for."""
-    if config.getoption(OPTION) is not None and not config.option.markexpr:
+    if not config.option.markexpr:
         items[:] = [item for item in items if item.get_closest_marker("soak") is None]
 
 
@@ -62,10 +56,7 @@ def family(request: pytest.FixtureRequest) -> Family:
     """Return the robot that the option names."""
     from drivers.contract.family import find_family
 
-    name = request.config.getoption(OPTION)
-    if name is None:
-        pytest.skip(f"no robot: give one with {OPTION}")
-    return find_family(name)
+    return find_family(request.config.getoption(OPTION))
 
 
 @pytest.fixture(autouse=True)

@@ -40,14 +40,12 @@ def test_a_robot_is_a_package_that_keeps_the_contract_in_less_than_a_hundred_lin
     assert len(files) == 3
     assert sum(len(file.read_text().splitlines()) for file in files) < 100
     installed(tmp_path / "skippy")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "drivers.contract.plugin"]
+    options = "-q -p no:cacheprovider --disable-plugin-autoload -p echolocate_pytest --echolocate-family skippy"
+    command = [sys.executable, "-m", "pytest", *options.split()]
     environment = {**os.environ, "PYTHONPATH": f"{tmp_path / 'skippy'}:{ROOT}"}
     empty = tmp_path / "empty"
     empty.mkdir()
-    done = subprocess.run(
-        [*command, "--echolocate-family", "skippy"], cwd=empty, env=environment, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
+    done = subprocess.run(command, cwd=empty, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "40 passed, 7 skipped" in done.stdout
 
