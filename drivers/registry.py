@@ -97,6 +97,23 @@ def capabilities(config: RobotConfig) -> frozenset[str]:
     return frozenset(getattr(_family(config.robot.driver), "HAS", CAPABILITIES))
 
 
+def deadman_s(config: RobotConfig) -> float | None:
+    """Return the longest time without a command until a base stops by itself, s; None if it never does.
+
+    A family whose robot file says so has a function `deadman_s` of the file. The others' robots report their own, and
+    `link.deadman_max_s` is the longest with which a run begins.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
+    """
+    if "deadman" not in capabilities(config):
+        return None
+    of_file: Callable[[RobotConfig], float] | None = getattr(_family(config.robot.driver), "deadman_s", None)
+    return config.link.deadman_max_s if of_file is None else of_file(config)
+
+
 def make_driver(config: RobotConfig) -> RobotDriver:
     """Return a driver for the robot that `config` describes.
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from config.reference import markdown
-from tests import command_page, page_types
+from tests import command_page, page_types, safety_page
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
@@ -113,6 +113,11 @@ def test_the_page_of_settings_is_that_of_the_models() -> None:
 def test_the_page_of_commands_is_that_of_the_program() -> None:
     """Renew it with `python -m tests.command_page`."""
     assert command_page.words(command_page.PAGE.read_text("utf-8")) == command_page.words(command_page.page())
+
+
+def test_the_page_on_safety_is_that_of_the_program() -> None:
+    """Renew it with `python -m tests.safety_page`."""
+    assert safety_page.PAGE.read_text("utf-8") == safety_page.page()
 
 
 @pytest.mark.parametrize(

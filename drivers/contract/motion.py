@@ -7,14 +7,18 @@ import math
 import pytest
 
 from drivers.base_model import stop_s
-from drivers.contract.cable import STEP_S
+from drivers.capabilities import moves_on
+from drivers.contract.cable import CYCLE_STEPS, STEP_S
 from drivers.contract.family import PLAIN, ROOM, Family, script, steps
 from drivers.driver import LineState
 from drivers.messages import Flags, Twist
+from drivers.registry import deadman_s
 
 STILL = Twist(0.0, 0.0)
 RAMP_S = 0.3
 """Longest time from the deadman's end to standstill."""
+LINE_S = 0.1
+"""Longest time in which the last velocity gets through the line, and a base takes its ticks."""
 
 
 def test_nothing_moves_without_a_command(family: Family) -> None:
@@ -136,6 +140,21 @@ def test_the_base_stops_by_itself_when_the_host_is_gone(family: Family, how: str
         cable.unplug()
     cable.run(identity.deadman_s + max(RAMP_S, stop_s(family.ahead, family.robot.body) + RAMP_S / 3.0))
     assert cable.robot.truth.twist == STILL
+
+
+@pytest.mark.needs("deadman")
+def test_killed_at_full_speed_it_moves_no_longer_than_check_says(family: Family) -> None:
+    body = family.robot.body
+    said = moves_on(body, deadman_s(family.robot))
+    assert said is not None
+    cable = family.driving(Twist(body.speed_max_m_s, 0.0))
+    cable.run(STEP_S * CYCLE_STEPS)
+    cable.frozen = True
+    begins = cable.robot.truth.pose
+    cable.run(said.lasts_s + LINE_S)
+    stands = cable.robot.truth.pose
+    assert cable.robot.truth.twist == STILL
+    assert math.hypot(stands.x - begins.x, stands.y - begins.y) <= said.way_m + body.speed_max_m_s * LINE_S
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,11 @@ def make_driver(config: RobotConfig) -> RobotDriver:
     return DenningDriver(config)
 
 
+def deadman_s(config: RobotConfig) -> float:
+    """Return the time without a command after which the base begins to stop, s, as its file says."""
+    return config.ros2.deadman_s
+
+
 def make_device(
     config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
 ) -> RobotDevice:

@@ -25,7 +25,10 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     """
     from config.load import load_any
     from config.places import check_places
+    from config.robot import NO_BODY
     from config.settings import Settings
+    from drivers.capabilities import after_kill
+    from drivers.registry import deadman_s
     from runtime.support.blind_sides import refuse_blind_ways
     from runtime.support.config_lint import lint_settings
     from runtime.support.pattern_check import refuse_undrivable
@@ -37,5 +40,7 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
         check_places(settings.mission, settings.places)
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
+        if settings.body != NO_BODY:
+            sys.stdout.write(f"{config}: {after_kill(settings.body, deadman_s(settings))}\n")
     sys.stdout.write(f"{config}: good\n")
     return DONE
