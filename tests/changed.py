@@ -39,6 +39,7 @@ RELATED = {
     "drivers/contract/": ("tests/drivers/contract",),
     "runtime/cli/": ("tests/runtime/cli/test_app.py", "tests/test_docs.py"),
     "docs/": ("tests/test_docs.py", "tests/drivers/contract/test_example.py"),
+    "docs/library": ("tests/test_library_pages.py",),
     "runtime/cycle/step": ("tests/runtime/recording/test_schema.py", "tests/runtime/cycle/test_modes.py"),
     "pyproject.toml": ("tests/test_packaging.py",),
 }

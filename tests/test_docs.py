@@ -6,8 +6,6 @@ import ast
 import contextlib
 import functools
 import importlib
-import io
-import json
 import re
 from pathlib import Path
 
@@ -125,46 +123,6 @@ def test_the_page_on_safety_is_that_of_the_program() -> None:
 )
 def test_what_is_read_first_stays_short(document: str, most: int) -> None:
     assert len((ROOT / document).read_text("utf-8").splitlines()) <= most
-
-
-@pytest.mark.compiled
-def test_the_examples_of_the_library_run_in_an_empty_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Virtual time, a world, and a ring log; one hall of fifty, and a second of each drive."""
-    monkeypatch.chdir(tmp_path)
-    still = "".join(f"{0.05 * k:.2f},0,0,0" + ",1.5" * 24 + "\n" for k in range(20))
-    (tmp_path / "drive.csv").write_text("t,x,y,theta," + ",".join(f"r{k:02}" for k in range(24)) + "\n" + still)
-    blocks = (ROOT / "docs" / "library.md").read_text("utf-8").split("```python\n")[1:]
-    found = [text.partition("```")[0] for text in blocks]
-    run = [text for text in found if any(name in text for name in ("simulate(", "WorldConfig(", "read_ring_log("))]
-    assert len(run) == 3
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
-        for text in run:
-            exec(text.replace("range(50)", "range(1)").replace("seconds_max=20.0", "seconds_max=1.0"), {})
-    assert printed.getvalue().startswith("0 ")
-
-
-@pytest.mark.compiled
-def test_the_notebook_prints_what_it_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-    names: dict[str, object] = {}
-    for cell in json.loads((ROOT / "docs" / "library.ipynb").read_text("utf-8"))["cells"]:
-        if cell["cell_type"] == "code":
-            with contextlib.redirect_stdout(io.StringIO()) as printed:
-                exec("".join(cell["source"]), names)
-            shown = ("".join(output["text"]) for output in cell["outputs"])
-            assert printed.getvalue() == "".join(shown)
-
-
-@pytest.mark.compiled
-def test_the_notebook_runs_outside_the_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.chdir(tmp_path)
-    cells = json.loads((ROOT / "docs" / "library.ipynb").read_text("utf-8"))["cells"]
-    first, *_, last = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
-    names: dict[str, object] = {}
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
-        exec(first, names)
-        exec(last, names)
-    assert printed.getvalue().startswith("left out")
 
 
 def test_the_types_of_the_page_are_those_of_the_models() -> None:

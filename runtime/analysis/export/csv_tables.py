@@ -93,6 +93,7 @@ def _objects(timeline: Timeline) -> Table:
         "y_m": [float(o.y) for _, o in seen],
         "theta_rad": [float(o.theta) for _, o in seen],
         "sigma_m": [float(o.sigma) for _, o in seen],
+        "sigma_theta_rad": [o.sigma_theta for _, o in seen],
         "support": [int(o.support) for _, o in seen],
         "score": [float(o.score) for _, o in seen],
         "probability": [o.probability for _, o in seen],
