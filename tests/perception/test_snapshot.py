@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from config.load import load_settings
 from perception.pipeline import Perception
@@ -23,7 +27,7 @@ class Owner:
     SCRATCH = ("_work",)
 
     def __init__(self, size: int = 3) -> None:
-        self.array = np.arange(float(size))
+        self.array: NDArray[Any] = np.arange(float(size))
         self.count, self.done, self.part = 5, True, Part(0.5)
         self.settings, self.name, self._work = np.zeros(9), "not kept", np.zeros(4)
 
@@ -50,6 +54,23 @@ def test_scratch_inside_an_array_is_zero_in_a_snapshot_and_left_alone_by_it() ->
     owner.array[0] = (5.0, 6.0)
     put_back(owner, snapshot)
     assert owner.array.item() == (1.0, 6.0)
+
+
+@pytest.mark.parametrize("shape", [(), (0,), (1,), (3, 2)])
+def test_records_are_copied_whole(shape: tuple[int, ...]) -> None:
+    dtype = np.dtype(
+        [("a", "i1"), ("scratch", [("x", float, 3)]), ("b", [("y", "i8", (2, 2)), ("z", "?")])], align=True
+    )
+    owner, rng = Owner(), np.random.default_rng(0)
+    owner.array = np.frombuffer(rng.bytes(math.prod(shape) * dtype.itemsize), dtype).reshape(shape).copy()
+    for array in (owner.array, owner.array.T):  # one of which is not contiguous
+        owner.array = array
+        taken = snapshot_of(owner)["array"]
+        assert taken.dtype == dtype
+        assert not np.shares_memory(taken, array)
+        assert not taken["scratch"]["x"].any()
+        for name in ("a", "b"):
+            assert taken[name].tobytes() == array[name].tobytes()
 
 
 def test_a_snapshot_of_something_else_is_refused() -> None:

@@ -32,6 +32,17 @@ def test_the_clock_sampler_distinguishes_work_from_sleep() -> None:
     assert worked.host_s - slept.host_s >= 0.02
 
 
+def test_the_thread_s_time_is_of_now_and_not_of_the_last_tick() -> None:
+    sampler, sampled_s, worked_s = ClockSampler(), 0.0, 0.0
+    for _ in range(50):
+        outer_s = time.thread_time()
+        begin = sampler.read()
+        sum(range(20_000))  # a part of a tick
+        sampled_s += sampler.read().thread_s - begin.thread_s
+        worked_s += time.thread_time() - outer_s
+    assert 0.5 * worked_s < sampled_s <= worked_s
+
+
 def test_the_work_of_other_threads_is_read_once_in_a_millisecond() -> None:
     host_s = [5.0]
     sampler = ClockSampler(lambda: host_s[0])
