@@ -1,12 +1,16 @@
 """Run the tests of what changed since the last commit: `python -m tests.changed`, part of `make check`.
 
-The test of a/b.py is tests/a/test_b.py, so a path is enough to find it. A helper of tests stands for the test files
-that import it. Where nothing is found, a few quick files run instead.
+The test of a/b.py is tests/a/test_b.py, so a path is enough to find it. What a change breaks elsewhere is mostly
+found by the tests of the modules that import it, and by those that hold a list or a page for all (`RELATED`). A
+helper of tests stands for the test files that import it, a script of the page for the tests that touch the same
+elements. Where nothing is found, a few quick files run instead. `python -m tests.mutation.quick_check` shows what all
+this misses.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -40,7 +44,16 @@ RELATED = {
     "runtime/cli/": ("tests/runtime/cli/test_app.py", "tests/test_docs.py"),
     "docs/": ("tests/test_docs.py", "tests/drivers/contract/test_example.py"),
     "docs/library": ("tests/test_library_pages.py",),
-    "runtime/cycle/step": ("tests/runtime/recording/test_schema.py", "tests/runtime/cycle/test_modes.py"),
+    "config/models/": ("tests/test_library_pages.py",),
+    "runtime/cycle/": ("tests/runtime/recording/test_schema.py",),
+    "runtime/cycle/step": ("tests/runtime/cycle/test_modes.py",),
+    "runtime/console/": ("tests/test_docs.py",),
+    "runtime/console/frames/": ("tests/runtime/console/frames",),
+    "runtime/console/page/": ("tests/runtime/console/http/test_static_files.py",),
+    "README.md": ("tests/test_docs.py",),
+    "CONTRIBUTING.md": ("tests/test_docs.py",),
+    "mkdocs.yml": ("tests/test_docs.py",),
+    "docs/tutorial.md": ("tests/runtime/cli/test_tutorial.py",),
     "pyproject.toml": ("tests/test_packaging.py",),
 }
 """Tests that hold a list, a page or a rule for all files whose path begins so, by that beginning."""
@@ -48,6 +61,16 @@ EVERY = ("tests/test_source_rules.py",)
 """Tests of rules that any file of Python can break; they take seconds."""
 KERNELS = ("perception/", "behaviors/valley/", "drivers/emulator/")
 """After a change of these, tests run without the compiler: compiling the kernels again takes a minute."""
+
+
+PRODUCT = ("behaviors", "config", "drivers", "perception", "runtime")
+USERS_MAX = 5
+"""Tests of so many modules that import a changed one run as well, the nearest by their path first."""
+PAGE = "runtime/console/page/"
+DRAWN = "tests/browser/test_display.py"
+"""For a script that names no element: it draws."""
+PAGE_TESTS_MAX = 2
+"""Files of tests in a browser that run for a script of the page; each takes half a minute."""
 
 
 def changed_files() -> list[str]:
@@ -71,16 +94,53 @@ def find_tests(files: Iterable[str], root: Path = ROOT) -> list[str]:
     for name in files:
         path = Path(name)
         found |= {test for begin, tests in RELATED.items() if name.startswith(begin) for test in tests}
+        if name.startswith(PAGE) and path.suffix == ".js":
+            found |= touching(path, root)
         if path.suffix != ".py":
             continue
         found |= {*EVERY}
         if path.parts[0] != "tests":
-            found.add(f"tests/{path.parent.as_posix()}/test_{path.name}")
+            found |= {test_of(path), *users_tests(path, root)}
         elif path.name.startswith("test_"):
             found.add(name)
         else:
             found |= importing(path, root)
     return sorted(test for test in found if (root / test).exists())
+
+
+def test_of(module: Path) -> str:
+    """Return the test file of a module of the product."""
+    return f"tests/{module.parent.as_posix()}/test_{module.name}"
+
+
+def users_tests(module: Path, root: Path) -> list[str]:
+    """Return the tests of the modules that import a changed one, at most `USERS_MAX`, the nearest by path first."""
+    package, name = re.escape(".".join(module.parent.parts)), re.escape(module.stem)
+    imports = re.compile(rf"from {package}(\.{name} import| import \(?[^\n]*\b{name}\b)")
+    users = [
+        user.relative_to(root)
+        for folder in PRODUCT
+        for user in (root / folder).rglob("*.py")
+        if imports.search(user.read_text("utf-8"))
+    ]
+    users.sort(key=lambda user: (module.parent not in user.parents, module.parts[0] != user.parts[0], user))
+    tests = (test_of(user) for user in users)
+    return [test for test in tests if (root / test).exists()][:USERS_MAX]
+
+
+def touching(script: Path, root: Path) -> set[str]:
+    """Return the tests in a browser that name most of the elements and requests that a script of the page names."""
+    if not (root / script).exists():
+        return set()
+    text = (root / script).read_text("utf-8")
+    names = {*re.findall(r'(?:byId\(|type: )"([\w-]+)"', text)}
+    hits = {}
+    for test in sorted((root / "tests/browser").glob("test_*.py")):
+        said = test.read_text("utf-8")
+        own = test.stem == f"test_{script.stem}"
+        hits[test.relative_to(root).as_posix()] = (own, sum(name in said for name in names))
+    best = sorted(hits, key=lambda test: hits[test], reverse=True)[:PAGE_TESTS_MAX]
+    return {test for test in best if any(hits[test])} or {DRAWN}
 
 
 def importing(helper: Path, root: Path) -> set[str]:

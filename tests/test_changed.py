@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.changed import EVERY, QUICK, RELATED, ROOT, find_tests
+from tests.changed import DRAWN, EVERY, QUICK, RELATED, ROOT, find_tests
+from tests.mutation.quick_check import CHANGES, Change
 
 
 @pytest.fixture
@@ -42,9 +43,32 @@ def test_a_change_maps_to_tests_by_path(root: Path, changed: list[str], tests: l
 
 def test_the_quick_tests_exist() -> None:
     related = (name for names in RELATED.values() for name in names)
-    assert [name for name in (*QUICK, *EVERY, *related) if not (ROOT / name).exists()] == []
+    assert [name for name in (*QUICK, *EVERY, *related, DRAWN) if not (ROOT / name).exists()] == []
 
 
 def test_a_change_of_what_lists_hold_runs_the_tests_of_the_lists() -> None:
     found = find_tests(["config/mission_step.py"])
     assert {"tests/behaviors/test_schema_registry.py", "tests/test_docs.py"} <= {*found}
+
+
+@pytest.mark.parametrize(
+    ("changed", "test"),
+    [
+        ("runtime/console/frames/state_message.py", "tests/runtime/console/frames/test_frame_encoder.py"),
+        ("runtime/console/page/parameters.js", "tests/browser/test_drive.py"),
+        ("runtime/console/page/draw_grid.js", DRAWN),
+        ("runtime/cycle/inputs.py", "tests/runtime/recording/test_schema.py"),
+        ("behaviors/wander.py", "tests/behaviors/test_schema_registry.py"),
+        ("docs/tutorial.md", "tests/runtime/cli/test_tutorial.py"),
+    ],
+)
+def test_a_change_runs_what_it_breaks_elsewhere(changed: str, test: str) -> None:
+    assert test in find_tests([changed])
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.kind)
+def test_the_typical_changes_can_be_made(change: Change) -> None:
+    """`python -m tests.mutation.quick_check` makes them, and runs the quick check on each."""
+    kind, path, old, new = change
+    assert (ROOT / path).read_text("utf-8").replace(old, new, 1) != (ROOT / path).read_text("utf-8"), kind
+    assert find_tests([path]) != []
