@@ -89,6 +89,11 @@ def list_shipped(kind: Kind) -> tuple[str, ...]:
     return tuple(sorted(_shipped_files(kind)))
 
 
+def read_shipped(read: DocumentRead) -> bytes:
+    """Return a file that was read and has no path, since it is shipped or an installed package's."""
+    return _shipped_files(read.kind)[Path(read.name).stem].read_bytes()
+
+
 def _shipped_files(kind: Kind) -> dict[str, Traversable]:
     """Return the files of a kind by their names; a shipped one takes precedence."""
     added = [files(entry.value) for entry in plugged(FILES.format(kind)).values()]

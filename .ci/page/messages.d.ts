@@ -78,6 +78,7 @@ interface Commands {
   list_settings: { };
   read_settings: { file: number; };
   check_settings: { file: number; toml: string; };
+  change_settings: { file: number; toml: string; path: string; value: boolean | number | string | null; };
   save_settings: { file: number; toml: string; digest: string; };
   restart_run: { };
   save_toml: { };
@@ -147,6 +148,7 @@ interface Answers {
   list_settings: Array<SettingsRow>;
   read_settings: SettingsText;
   check_settings: SettingsCheck;
+  change_settings: string;
   save_settings: SettingsText;
   restart_run: null;
   save_toml: string;
@@ -423,6 +425,7 @@ interface PageElements {
   "settings-copy": HTMLButtonElement;
   "settings-difference": HTMLElement;
   "settings-file": HTMLSelectElement;
+  "settings-form": HTMLElement;
   "settings-lines": HTMLElement;
   "settings-open": HTMLButtonElement;
   "settings-problems": HTMLElement;
@@ -548,6 +551,27 @@ interface SettingsRow {
 interface SettingsText {
   text: string;
   digest: string;
+  form: Array<SettingsTable>;
+}
+
+/** A table of an installed package in a file, as a form. */
+interface SettingsTable {
+  title: string;
+  help: string;
+  fields: Array<Parameter>;
+}
+
+/** A setting as the page gets it. */
+interface Parameter {
+  path: string;
+  label: string;
+  value: boolean | number | string | null;
+  low: number | null;
+  high: number | null;
+  kind: string;
+  choices: Array<string> | null;
+  optional: boolean;
+  help: string;
 }
 
 /** What a changed text would mean. */
@@ -555,6 +579,7 @@ interface SettingsCheck {
   problems: Array<ProblemRow>;
   warnings: Array<string>;
   difference: string;
+  form: Array<SettingsTable>;
 }
 
 /** A problem of a text. */
@@ -639,19 +664,6 @@ interface SurfacesRow {
   drums: Array<[number, number, number]>;
   walls: Array<[number, number, number, number]>;
   polygons: Array<Array<[number, number]>>;
-}
-
-/** A setting as the page gets it. */
-interface Parameter {
-  path: string;
-  label: string;
-  value: boolean | number | string | null;
-  low: number | null;
-  high: number | null;
-  kind: string;
-  choices: Array<string> | null;
-  optional: boolean;
-  help: string;
 }
 
 /** A report or a map that is being made. */

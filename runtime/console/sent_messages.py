@@ -314,12 +314,23 @@ class SettingsRow(TypedDict):
     """Whether it comes with the program, and so is not changed."""
 
 
+class SettingsTable(TypedDict):
+    """A table of an installed package in a file, as a form."""
+
+    title: str
+    help: str
+    fields: list[Parameter]
+    """`path` leads from the top of the file, with indices of lists."""
+
+
 class SettingsText(TypedDict):
     """The text of a file."""
 
     text: str
     digest: str
     """Of the text; a change is saved only over the text that it was made from."""
+    form: list[SettingsTable]
+    """What installed packages have in it."""
 
 
 class ProblemRow(TypedDict):
@@ -337,3 +348,5 @@ class SettingsCheck(TypedDict):
     warnings: list[str]
     difference: str
     """From the file to the text, as `diff -u` writes it; empty where they are equal."""
+    form: list[SettingsTable]
+    """What installed packages have in the text; empty if it is not TOML."""

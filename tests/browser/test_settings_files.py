@@ -17,10 +17,10 @@ async def test_a_file_is_changed_checked_and_saved(server: FakeServer, opener: O
     server.data |= {
         "list_settings": [{"kind": "world", "name": "worlds/a.toml", "shipped": True},
                           {"kind": "robot", "name": "my.toml", "shipped": False}],
-        "read_settings": {"text": TEXT, "digest": "a" * 64},
+        "read_settings": {"text": TEXT, "digest": "a" * 64, "form": []},
         "check_settings": {"problems": [{"line": 2, "text": "ring.count = 1: <b>too few</b>"}], "warnings": [],
-                           "difference": "--- my.toml\n+++ my.toml, changed\n-count = 24\n+count = 1"},
-        "save_settings": {"text": "changed", "digest": "b" * 64},
+                           "difference": "--- my.toml\n+++ my.toml, changed\n-count = 24\n+count = 1", "form": []},
+        "save_settings": {"text": "changed", "digest": "b" * 64, "form": []},
     }  # fmt: skip
     opened = await opener.open(server.url)
     page = opened.page
@@ -38,7 +38,7 @@ async def test_a_file_is_changed_checked_and_saved(server: FakeServer, opener: O
     await expect(save).to_be_disabled()
     await page.locator("#settings-problems button").click()
     assert await text.evaluate("area => area.value.slice(area.selectionStart, area.selectionEnd)") == "count = 1"
-    server.data["check_settings"] = {"problems": [], "warnings": ["slow"], "difference": "+count = 23"}
+    server.data["check_settings"] = {"problems": [], "warnings": ["slow"], "difference": "+count = 23", "form": []}
     await text.fill("[ring]\ncount = 23\n")
     await opened.run_for(500)
     await expect(save).to_be_enabled()
@@ -55,8 +55,8 @@ async def test_a_change_is_not_lost_and_a_restart_waits_for_a_robot_that_stands(
 ) -> None:
     server.data |= {
         "list_settings": [{"kind": "robot", "name": "my.toml", "shipped": False}],
-        "read_settings": {"text": TEXT, "digest": "a" * 64},
-        "check_settings": {"problems": [], "warnings": [], "difference": "+x"},
+        "read_settings": {"text": TEXT, "digest": "a" * 64, "form": []},
+        "check_settings": {"problems": [], "warnings": [], "difference": "+x", "form": []},
     }
     opened = await opener.open(server.url)
     page = opened.page
@@ -81,9 +81,9 @@ async def test_a_change_is_not_lost_and_a_restart_waits_for_a_robot_that_stands(
 async def test_title_and_buttons_stay_in_view_on_a_phone(server: FakeServer, opener: Opener) -> None:
     server.data |= {
         "list_settings": [{"kind": "robot", "name": "my.toml", "shipped": False}],
-        "read_settings": {"text": TEXT + 60 * "# a line\n", "digest": "a" * 64},
+        "read_settings": {"text": TEXT + 60 * "# a line\n", "digest": "a" * 64, "form": []},
         "check_settings": {"problems": [{"line": 2, "text": 30 * "long "}], "warnings": [30 * "word "],
-                           "difference": 30 * "+x\n"},
+                           "difference": 30 * "+x\n", "form": []},
     }  # fmt: skip
     opened = await opener.open(server.url, PHONE)
     page = opened.page
@@ -100,3 +100,41 @@ async def test_title_and_buttons_stay_in_view_on_a_phone(server: FakeServer, ope
         assert bar is not None
         assert bar["y"] + bar["height"] <= box["y"], name
         assert box["y"] + box["height"] <= PHONE[1], name
+
+
+async def test_a_table_of_an_installed_package_is_a_form_that_changes_the_text(
+    server: FakeServer, opener: Opener
+) -> None:
+    trim = {"path": "skippy.trim", "label": "trim", "value": 1.0, "low": 0.0, "high": 2.0, "kind": "float",
+            "choices": None, "optional": False, "help": "Counts."}  # fmt: skip
+    form = [{"title": "skippy", "help": "Of <b>skippy</b>.", "fields": [trim]}]
+    server.data |= {
+        "list_settings": [{"kind": "robot", "name": "my.toml", "shipped": False},
+                          {"kind": "robot", "name": "robots/skippy.toml", "shipped": True}],
+        "read_settings": {"text": TEXT, "digest": "a" * 64, "form": form},
+        "check_settings": {"problems": [], "warnings": [], "difference": "+x",
+                           "form": [{**form[0], "fields": [{**trim, "value": 1.25}]}]},
+        "change_settings": TEXT + "[skippy]\ntrim = 1.25\n",
+    }  # fmt: skip
+    opened = await opener.open(server.url)
+    page = opened.page
+    await page.click("#tab-tune")
+    await page.click("#settings-open")
+    field = page.get_by_label("trim", exact=True)
+    await expect(field).to_have_value("1")
+    await expect(page.locator("#settings-form .hint")).to_have_text("Of <b>skippy</b>.")
+    await expect(page.locator("#settings-form .help")).to_have_text("Counts. 0 to 2.")
+    await field.fill("one")
+    await field.press("Enter")
+    await expect(page.locator("#settings-form .error")).to_have_text("a number is wanted")
+    await field.fill("1.25")
+    await field.press("Enter")
+    sent = await server.wait("change_settings")
+    assert sent == {"file": 0, "toml": TEXT, "path": "skippy.trim", "value": 1.25}
+    await expect(page.locator("#settings-text")).to_have_value(TEXT + "[skippy]\ntrim = 1.25\n")
+    await opened.run_for(500)
+    await expect(page.locator("#settings-save")).to_be_enabled()
+    await expect(page.locator("#settings-form .field.changed")).to_have_count(1)
+    await page.select_option("#settings-file", "1")
+    await page.locator("#dialog-buttons button").last.click()
+    await expect(field).to_be_disabled()

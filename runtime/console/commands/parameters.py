@@ -7,7 +7,7 @@ bounds, choices and descriptions of the schema.
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, TypedDict, Union, get_args, get_origin
 
@@ -55,6 +55,29 @@ def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
             yield from _within(value, location)
         elif Difference(location, None, None).live and (found := _parameter(location, field, value)) is not None:
             found["help"] = " ".join((description(type(model), name) or type(model).__doc__ or "").split())
+            yield found
+
+
+def fields_of(model: type[BaseModel], values: Mapping[str, Any], at: Location) -> Iterator[Parameter]:
+    """Yield every key of a table in a file that has a single plain value, whether the file gives it or not.
+
+    Parameters
+    ----------
+    model
+        The table's.
+    values
+        The table as the file has it; what it says need not be valid.
+    at
+        Where the table is in the file.
+    """
+    for name, field in model.model_fields.items():
+        location, inner = (*at, name), field.annotation
+        value = values.get(name, None if field.is_required() else field.get_default(call_default_factory=True))
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            yield from fields_of(inner, value if isinstance(value, Mapping) else {}, location)
+        elif (found := _parameter(location, field, value)) is not None and found["choices"] != [value]:
+            found["value"] = value if isinstance(value, bool | int | float | str | None) else str(value)
+            found["help"] = " ".join((description(model, name) or model.__doc__ or "").split())
             yield found
 
 

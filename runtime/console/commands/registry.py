@@ -81,6 +81,7 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("list_settings", NoArguments, TOKEN, settings_commands.list_settings),
     Command("read_settings", settings_commands.ReadSettings, TOKEN, settings_commands.read_settings),
     Command("check_settings", settings_commands.CheckSettings, TOKEN, settings_commands.check_settings),
+    Command("change_settings", settings_commands.ChangeSettings, TOKEN, settings_commands.change_settings),
     Command("save_settings", settings_commands.SaveSettings, CONTROL, settings_commands.save_settings),
     Command("restart_run", NoArguments, CONTROL, settings_commands.restart_run, always),
     Command("save_toml", NoArguments, TOKEN, handlers.save_toml),

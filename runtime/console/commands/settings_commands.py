@@ -9,7 +9,7 @@ from pydantic import Field
 
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
-from runtime.console.commands.messages import NoArguments, Number
+from runtime.console.commands.messages import NoArguments, Number, Scalar
 from runtime.console.protocols import NOT_AVAILABLE, SettingsFileControl
 from runtime.console.sent_messages import SettingsCheck, SettingsRow, SettingsText
 from runtime.cycle.modes import Mode
@@ -35,6 +35,16 @@ class CheckSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class ChangeSettings:
+    """Ask for a text in place of a settings file with another value of a field of its form; null removes its key."""
+
+    file: Number
+    toml: Annotated[str, Field(max_length=SETTINGS_MAX)]
+    path: Annotated[str, Field(min_length=1, max_length=200)]
+    value: Scalar
+
+
+@dataclass(frozen=True, slots=True)
 class SaveSettings:
     """Write another text in place of a settings file; `digest` is of the text that was changed."""
 
@@ -56,6 +66,11 @@ async def read_settings(call: Call, given: ReadSettings) -> SettingsText:
 async def check_settings(call: Call, given: CheckSettings) -> SettingsCheck:
     """Return what a changed text would mean."""
     return await _files(call).check(given.file, given.toml)
+
+
+async def change_settings(call: Call, given: ChangeSettings) -> str:
+    """Return the text with the change."""
+    return await _files(call).changed(given.file, given.toml, given.path, given.value)
 
 
 async def save_settings(call: Call, given: SaveSettings) -> SettingsText:

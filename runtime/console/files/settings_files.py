@@ -6,19 +6,20 @@ import asyncio
 import difflib
 import hashlib
 from collections.abc import Callable, Sequence
-from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
 from config.errors import UserError
-from config.files import ConfigError, DocumentRead, in_place_of, read_file
+from config.files import ConfigError, DocumentRead, in_place_of, read_file, read_shipped
 from config.load import parse_text, with_room
 from config.settings import Settings
+from config.toml_edit import Scalar
 from config.toml_lines import located
 from config.world import WorldConfig
 from runtime.analysis.export.world_file import text_with_places, with_places, world_text
 from runtime.console.commands.command_error import CommandError
+from runtime.console.files.settings_form import form_of, with_setting
 from runtime.console.sent_messages import ProblemRow, SettingsCheck, SettingsRow, SettingsText
 from runtime.support.config_lint import lint_settings
 from runtime.support.user_folders import kept_places
@@ -69,6 +70,16 @@ class SettingsFiles:
     async def check(self, number: int, text: str) -> SettingsCheck:
         """Return what the run's settings would be like with this text in place of a file; raises as `read`."""
         return await asyncio.to_thread(self._check, self._document(number), text)
+
+    async def changed(self, number: int, text: str, path: str, value: Scalar) -> str:
+        """Return a text in place of a file with another value of a field of its form.
+
+        Raises
+        ------
+        CommandError
+            There is no such file or field, or the text is written so that only a person can change it.
+        """
+        return await asyncio.to_thread(with_setting, self._document(number).kind, text, path, value)
 
     async def save(self, number: int, text: str, digest: str) -> SettingsText:
         """Write a text in place of a file, whole or not at all; return it as `read` would.
@@ -134,12 +145,11 @@ class SettingsFiles:
 
     def _read(self, document: DocumentRead) -> SettingsText:
         try:
-            shipped = files("config") / document.name
-            data = shipped.read_bytes() if document.path is None else read_file(document.path)
+            data = read_shipped(document) if document.path is None else read_file(document.path)
             text = data.decode("utf-8-sig")
         except (OSError, ValueError) as error:
             raise CommandError(f"{document.name}: cannot be read: {error}") from None
-        return {"text": text, "digest": hashlib.sha256(data).hexdigest()}
+        return {"text": text, "digest": hashlib.sha256(data).hexdigest(), "form": form_of(document.kind, text)}
 
     def _check(self, document: DocumentRead, text: str) -> SettingsCheck:
         before = self._read(document)["text"]
@@ -157,7 +167,8 @@ class SettingsFiles:
                 problems = [{"line": line, "text": said} for line, said in found]
             except UserError as error:
                 problems = [{"line": None, "text": str(error)}]
-        return {"problems": problems, "warnings": warnings, "difference": "\n".join(diff)}
+        form = form_of(document.kind, text)
+        return {"problems": problems, "warnings": warnings, "difference": "\n".join(diff), "form": form}
 
     def _save(self, document: DocumentRead, text: str, digest: str) -> SettingsText:
         if document.path is None:

@@ -3,14 +3,12 @@
 // gains appear in the drive panel as well; both places show the same value.
 
 import { messageOf, RequestError } from "./connection.js";
-import { byId, download, el, setAttribute, setText } from "./dom.js";
+import { byId, download, el, setText } from "./dom.js";
+import { makeField, refuse, showIn, valueIn } from "./fields.js";
 import { Panel } from "./panel.js";
-import { numberIn } from "./units.js";
 
 const GAIN = /^behaviors\.(?!arbiter)[a-z_]+\.[a-z_]*gain$/;
 const MODEL_BYTES_MAX = 60_000;
-/** @param {Input} input @returns {input is HTMLInputElement} */
-const isBox = (input) => input.type === "checkbox";
 /** @param {Element} field */
 const pathOf = (field) => field.getAttribute("data-path") ?? "";
 const LOADING_MAX_MS = 600_000; // the first model with corners may have to wait for its kernels to compile
@@ -64,57 +62,9 @@ export class Parameters extends Panel {
 
   /** @param {Parameter} parameter @param {string} place */
   #field(parameter, place) {
-    const { path, label, kind, choices, low, high, help } = parameter;
-    const id = `${place}-${path.replaceAll(".", "-")}`;
-    /** @type {Input} */
-    let input;
-    if (choices !== null)
-      input = el(
-        "select",
-        { id },
-        ...(parameter.optional ? ["", ...choices] : choices).map((choice) =>
-          el("option", { value: String(choice) }, String(choice)),
-        ),
-      );
-    else if (kind === "bool") input = el("input", { id, type: "checkbox" });
-    else
-      input = el("input", {
-        id,
-        type: "text",
-        inputmode: kind === "float" ? "decimal" : kind === "int" ? "numeric" : null,
-        autocomplete: "off",
-        spellcheck: "false",
-      });
-    input.className = "control";
-    const error = el("output", { class: "error", id: `${id}-error`, for: id });
-    const range = describeRange(low, high);
-    const text = [help, range, parameter.optional ? "Empty: none." : ""].filter(Boolean).join(" ");
-    setAttribute(input, "aria-describedby", `${id}-help ${id}-error`);
-    const element = el(
-      "div",
-      { class: "field", "data-path": path },
-      el("label", { for: id }, label),
-      input,
-      error,
-      el("span", { class: "help", id: `${id}-help` }, text),
-    );
-    const field = { parameter, first: parameter.value, element, input, error };
-    input.addEventListener("change", () => this.#set(field));
-    element.addEventListener("keydown", (event) => {
-      if (event.key === "Escape") this.#showIn(field, parameter.value);
-    });
-    this.#fields.set(path, [...(this.#fields.get(path) ?? []), field]);
-    this.#showIn(field, parameter.value);
-    return element;
-  }
-
-  /** @param {Field} field @param {Parameter["value"]} value */
-  #showIn({ first, input, error, element }, value) {
-    if (isBox(input)) input.checked = value === true;
-    else input.value = value === null ? "" : String(value);
-    setText(error, "");
-    input.removeAttribute("aria-invalid");
-    element.classList.toggle("changed", value !== first);
+    const field = makeField(parameter, place, (changed) => void this.#set(changed));
+    this.#fields.set(parameter.path, [...(this.#fields.get(parameter.path) ?? []), field]);
+    return field.element;
   }
 
   // Shows the values now in force in every field that displays them.
@@ -123,40 +73,28 @@ export class Parameters extends Panel {
     for (const { path, value } of parameters) {
       for (const field of this.#fields.get(path) ?? []) {
         field.parameter.value = value;
-        if (document.activeElement !== field.input) this.#showIn(field, value);
+        if (document.activeElement !== field.input) showIn(field, value);
       }
     }
   }
 
   /** @param {Field} field */
   async #set(field) {
-    const {
-      parameter: { path, kind, optional },
-      input,
-    } = field;
-    const value = read(kind, input, optional);
-    if (value === undefined) {
-      this.#refuse(field, kind === "int" ? "a whole number is wanted" : "a number is wanted");
-      return;
-    }
+    const { path } = field.parameter,
+      value = valueIn(field);
+    if (value === undefined) return;
     try {
       const data = await this.connection.request({ type: "set_parameter", path, value });
       for (const one of this.#fields.get(path) ?? []) {
         one.parameter.value = value;
-        this.#showIn(one, value);
+        showIn(one, value);
       }
       this.show(data); // more may have changed with it
     } catch (error) {
       const at = error instanceof RequestError ? error.field : null;
       const isOther = at !== null && at !== path && this.#fields.has(at);
-      this.#refuse(field, isOther ? `${at}: ${messageOf(error)}` : messageOf(error));
+      refuse(field, isOther ? `${at}: ${messageOf(error)}` : messageOf(error));
     }
-  }
-
-  /** @param {Field} field @param {string} text */
-  #refuse({ input, error }, text) {
-    setText(error, text);
-    setAttribute(input, "aria-invalid", "true");
   }
 
   async undo() {
@@ -208,23 +146,4 @@ export class Parameters extends Panel {
     }
     input.value = ""; // so that the same file can be chosen again after it was mended
   }
-}
-
-// What a field says: undefined where that is no value of its kind, null where it is empty and may be.
-/** @param {string} kind @param {Input} input @param {boolean} optional */
-function read(kind, input, optional) {
-  if (isBox(input)) return input.checked;
-  const text = input.value.trim();
-  if (text === "" && optional) return null;
-  if (kind !== "float" && kind !== "int") return text;
-  if (text === "") return undefined;
-  const value = numberIn(text) ?? 0;
-  return Number.isFinite(value) && (kind === "float" || Number.isInteger(value)) ? value : undefined;
-}
-
-/** @param {number | null} low @param {number | null} high */
-function describeRange(low, high) {
-  if (low !== null && high !== null) return `${low} to ${high}.`;
-  if (low !== null) return `${low} or more.`;
-  return high !== null ? `${high} or less.` : "";
 }

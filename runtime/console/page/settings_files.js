@@ -4,8 +4,10 @@
 
 import { messageOf } from "./connection.js";
 import { button, byId, download, el, setText } from "./dom.js";
+import { refuse, showIn } from "./fields.js";
 import { base } from "./files.js";
 import { Panel } from "./panel.js";
+import { SettingsForm } from "./settings_form.js";
 
 const CHECK_AFTER_MS = 400;
 
@@ -19,6 +21,7 @@ export class SettingsFiles extends Panel {
   /** @type {number | undefined} */
   #timer = undefined;
   #good = false;
+  #form = new SettingsForm((field, value) => void this.#setIn(field, value));
 
   /** @param {Panels} parts */
   constructor(parts) {
@@ -33,9 +36,10 @@ export class SettingsFiles extends Panel {
       download(base(this.#rows[this.#at].name), new Blob([byId("settings-text").value], { type: "application/toml" })),
     );
     on("settings-restart", () => this.#restart());
-    byId("settings-file").addEventListener("change", () =>
-      this.#leave(() => void this.#show(Number(byId("settings-file").value))),
-    );
+    byId("settings-file").addEventListener("change", () => {
+      const chosen = Number(byId("settings-file").value); // which a question puts back
+      this.#leave(() => void this.#show(chosen));
+    });
     const text = byId("settings-text");
     text.addEventListener("input", () => this.#changed());
     text.addEventListener("scroll", () => {
@@ -87,7 +91,7 @@ export class SettingsFiles extends Panel {
     const text = byId("settings-text");
     text.value = this.#held.text;
     text.readOnly = this.#rows[this.#at].shipped;
-    this.#list({ problems: [], warnings: [], difference: "" });
+    this.#list({ problems: [], warnings: [], difference: "", form: held.form });
     setText(
       byId("settings-state"),
       text.readOnly
@@ -131,6 +135,24 @@ export class SettingsFiles extends Panel {
     this.#timer = setTimeout(() => void this.#check(), CHECK_AFTER_MS);
   }
 
+  // Changes the text by a field of the form.
+  /** @param {Field} field @param {Parameter["value"]} value */
+  async #setIn(field, value) {
+    const text = byId("settings-text"),
+      toml = text.value,
+      { path } = field.parameter;
+    try {
+      const changed = await this.connection.request({ type: "change_settings", file: this.#at, toml, path, value });
+      if (toml !== text.value) throw new Error("the text was changed meanwhile: change it once more");
+      text.value = changed;
+      field.parameter.value = value;
+      showIn(field, value);
+      this.#changed();
+    } catch (error) {
+      refuse(field, messageOf(error));
+    }
+  }
+
   async #check() {
     const asked = ++this.#asked,
       toml = byId("settings-text").value;
@@ -146,7 +168,8 @@ export class SettingsFiles extends Panel {
   }
 
   /** @param {SettingsCheck} check */
-  #list({ problems, warnings, difference }) {
+  #list({ problems, warnings, difference, form }) {
+    this.#form.show(form, byId("settings-text").readOnly);
     this.#number(problems.map(({ line }) => line));
     byId("settings-problems").replaceChildren(
       ...problems.map(({ line, text }) =>

@@ -109,6 +109,7 @@ OTHERS: list[dict[str, Any]] = [
     {"type": "list_settings"},
     {"type": "read_settings", "file": 0},
     {"type": "check_settings", "file": 0, "toml": "robot = 1"},
+    {"type": "change_settings", "file": 0, "toml": "robot = 1", "path": "skippy.trim", "value": 1.5},
     {"type": "save_settings", "file": 0, "toml": "robot = 1", "digest": "0" * 64},
     {"type": "restart_run"},
 ]

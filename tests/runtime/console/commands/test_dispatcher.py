@@ -33,7 +33,7 @@ def test_commands_that_need_no_control() -> None:
     assert {name for name, command in COMMANDS.items() if command.permission is Permission.TOKEN} == {
         "halt", "take_control", "evidence", "show_grid", "save_toml", "list_recordings", "open_recording",
         "seek_recording", "play_recording", "step_recording", "close_recording",
-        "list_settings", "read_settings", "check_settings",
+        "list_settings", "read_settings", "check_settings", "change_settings",
         "read_mission", "save_route", "make_files", "list_jobs", "cancel_job", "robot_file",
             "read_places", "save_map",
     }  # fmt: skip
