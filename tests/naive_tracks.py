@@ -202,21 +202,22 @@ def residual_evidence(
 
 def place_readings(
     last: dict[int, Array], stands: dict[int, tuple[int, int]], mounts: Array, pose: tuple[float, float, float],
-    ranges: Array, reach: float, half_box: float, sigma: tuple[float, float],
+    ranges: Array, span: tuple[float, float], half_box: float, sigma: tuple[float, float],
 ) -> list[tuple[float, ...]]:  # fmt: skip
     """Return the new readings of this firing in the odometry's frame: x, y, axis, range, sensor.
 
+    The least range of the span is said of all that is nearer, so it is none.
     Of those from one place the first is new. Where the sensor began, and after three in turn that differ from the
     first one, or one more for each doubling of those before, the first, second, fourth and eighth are.
     """
     turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
     new = []
     for i, (mount, r) in enumerate(zip(mounts, ranges, strict=True)):
-        if not r >= 0:
+        if not r > span[0] + half_box:
             continue
         q = np.array([
             *(np.array(pose[:2]) + turn @ mount[:2]), *(turn @ [math.cos(mount[2]), math.sin(mount[2])]),
-            2 * SILENT if r >= reach else r,
+            2 * SILENT if r >= span[1] else r,
         ])  # fmt: skip
         old = last.get(i)
         moved = math.inf if old is None or q[2:4] @ old[2:4] <= 0.9998 else math.dist(q[:2], old[:2])

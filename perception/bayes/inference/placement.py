@@ -62,7 +62,9 @@ def place_readings(
 ) -> int:
     """Write the fired readings to the scratch in the odometry frame; return how many of them are not redundant.
 
-    An invalid pose or range is left out, because it would corrupt every sum.
+    An invalid pose or range is left out, because it would corrupt every sum. So is the least range that the ring can
+    report: whatever is nearer reads so, by up to a decimetre too far, and drums that were passed closely lost their
+    names.
 
     Parameters
     ----------
@@ -75,12 +77,13 @@ def place_readings(
     scratch = s[0].scratch
     var0, rel2 = noise_variance(s, p)
     half_box = p[0].half_resolution_m
+    least = p[0].range_min_m + half_box
     c = math.cos(yaw)
     sn = math.sin(yaw)
     m = 0
     for i in range(ranges.shape[0]):
         r = ranges[i]
-        if not r >= 0.0:  # also true for NaN
+        if not r > least:  # also true for NaN
             continue
         if r >= p[0].range_max_m:
             r = 2.0 * FAR

@@ -37,7 +37,7 @@ def test_readings_are_placed_and_remembered(examples: int) -> None:
     for pose, time_s, ranges in random_drive(rng, examples):
         m = placement.place_readings(memory.s, P, MOUNTS, *pose, ranges)
         want = naive_tracks.place_readings(
-            last, stands, MOUNTS, pose, ranges, S.range_max_m, S.half_resolution_m, pair(NOISES[0])
+            last, stands, MOUNTS, pose, ranges, (S.range_min_m, S.range_max_m), S.half_resolution_m, pair(NOISES[0])
         )
         assert m == len(want)
         fired = np.column_stack([numbers(scratch["fired"][0])[:m, :5], scratch["fired_sensors"][0, :m]])
@@ -55,3 +55,11 @@ def test_readings_are_placed_and_remembered(examples: int) -> None:
             mine = np.column_stack([history(memory, i)[:held], sensors["times_s"][i, :held]])
             assert rows(mine) == rows(memories[i])
     assert entered > 3 * examples
+
+
+def test_the_least_range_of_the_ring_is_no_reading() -> None:
+    memory = new_memory()
+    ranges = np.full(SENSORS, S.range_min_m)
+    assert placement.place_readings(memory.s, P, MOUNTS, 0.0, 0.0, 0.0, ranges) == 0
+    ranges[1] += S.half_resolution_m + 0.001
+    assert placement.place_readings(memory.s, P, MOUNTS, 0.0, 0.0, 0.0, ranges) == 1
