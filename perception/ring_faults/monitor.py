@@ -4,8 +4,8 @@
 can only be compared with how it moves. An honest ring among objects that stand still is compared with these:
 
 - *Repeating.* Every sensor that looks ahead repeats its last reading to the bit, although the odometry brings it
-  nearer to whatever answers. A wall along the path explains equal readings. A robot whose wheels slip looks the same,
-  so the reason names both.
+  nearer to whatever answers, or winds. A wall along the path explains equal readings. A robot whose wheels slip looks
+  the same, so the reason names both.
 - *Replaying.* Readings change, but as others did before, to the bit (`perception.ring_faults.replays`).
 - *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
   ranges are. How often an honest ring misses a known echo is learned on the way.

@@ -31,6 +31,10 @@ EQUAL_NAT: Final = math.log(0.5 / 0.98)
 resolution with noise, and two of a hundred without, as what is there may move. The evidence of each reading, nat."""
 SENSOR_NAT: Final = REPEATS_MAX * REPEAT_NAT
 """Greatest evidence of a sensor, nat."""
+WINDING_NAT: Final = math.log(1.0 / 0.05)
+"""Evidence of a reading that is equal to the bit although the robot winds, nat. Of 9,321 such looks in 36 honest
+drives of a minute, with noise and without, among mirrors and rough walls, 24 were equal, at most two in succession:
+the course of a robot that winds through a corridor is along its walls for a moment."""
 
 
 @kernel
@@ -192,6 +196,25 @@ def learn_noise(c: EchoTrace, r: float, x: float, y: float, axis: float, toleran
 
 
 @kernel
+def winds(c: EchoTrace, tolerance: float) -> bool:
+    """Return whether the robot turned and drove between the last two looks of a sensor, so that no range stays equal.
+
+    A robot that turns as it drives keeps its course along no wall: a turn by φ on a way d moves it across by some d·φ
+    more than on the way before. Ranges in coarse steps may be equal nevertheless.
+
+    Parameters
+    ----------
+    c : record
+        What is remembered of the sensor; its last look has been entered.
+    tolerance : float
+        As for `check_motion`.
+    """
+    now, then = c.latest, c.before
+    shift = math.hypot(now.x - then.x, now.y - then.y) * abs(wrapped(now.axis - then.axis))
+    return shift > tolerance and tolerance <= REPEAT_M
+
+
+@kernel
 def weigh_repeat(
     i: int,
     look: Look,
@@ -235,8 +258,9 @@ def weigh_repeat(
         mark(c.repeated, r, x, y, axis, all_of.path_m)
     elif r >= 0.0:
         due = REPEAT_NAT * changes_due(i, look, c.repeated, yaw, mounts, reception, echoes, all_of.path_m)
-        c.stuck_nat = max(c.stuck_nat, due)
-        due = min(due, SENSOR_NAT)
+        is_equal = r == c.repeated.range_m and winds(c, tolerance)
+        c.stuck_nat = max(due, c.stuck_nat + (WINDING_NAT if is_equal else 0.0))
+        due = min(c.stuck_nat, SENSOR_NAT)
         if due > c.repeated_nat:
             all_of.repeated_nat += due - c.repeated_nat
             c.repeated_nat = due

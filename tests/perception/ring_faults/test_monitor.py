@@ -206,6 +206,28 @@ def test_a_ring_that_freezes_between_walls_along_the_path_is_found(
     assert max(ways) < 1.0
 
 
+@pytest.mark.parametrize("acoustics", [CLEAN, CLEAN.model_copy(update={"model": "specular"}), MIRRORS])
+@pytest.mark.parametrize("robot", ["p3dx", "amigo"])
+def test_a_ring_that_freezes_while_the_robot_winds_through_a_corridor_is_found(
+    robot: str, acoustics: AcousticsConfig
+) -> None:
+    """Whether its ranges have noise or not: a robot that turns as it drives keeps its distance from nothing."""
+    ring = load_settings("room", robot=robot).ring
+    for seed, half_m in itertools.product(range(3), (0.5, 0.8)):
+        walls = tuple(WallConfig(x1_m=-9.0, y1_m=y, x2_m=29.0, y2_m=y) for y in (-half_m, half_m))
+        x, y, path = 0.0, 0.0, list[tuple[float, float, float]]()
+        for k in range(800):
+            yaw = 0.22 * math.sin(k / 12.0 + seed)
+            x, y = x + 0.5 * SPEED_M * math.cos(yaw), y + 0.5 * SPEED_M * math.sin(yaw)
+            path.append((x, y, yaw))
+        world = WorldConfig(wall=walls, acoustics=acoustics)
+        assert found(ring, firings(ring, world, path, seed=seed)) is None
+        got = found(ring, firings(ring, world, path, frozen, 1.0, seed))
+        assert got is not None
+        assert got[1] == REASONS[REPEATED]
+        assert got[0] < 2.0
+
+
 @pytest.mark.parametrize("robot", ["p3dx", "b21r"])
 def test_a_ring_that_repeats_old_readings_with_a_little_noise_is_found(robot: str) -> None:
     ring = load_settings("room", robot=robot).ring

@@ -17,6 +17,7 @@ from perception.ring_faults.repeats import (
     REPEAT_NAT,
     REPEATS_MAX,
     SENSOR_NAT,
+    WINDING_NAT,
     changes_due,
     is_parallel_wall,
     learn_noise,
@@ -85,7 +86,7 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
 
     def fire(i: int, r: float, x: float) -> None:
         axis = MOUNTS[i, 2]
-        echoes[i].before.range_m = echoes[i].latest.range_m
+        mark(echoes[i].before, echoes[i].latest.range_m, x, 0.0, axis, x)
         mark(echoes[i].latest, r, x, 0.0, axis, x)
         weigh_repeat(i, (r, x, 0.0, axis), 0.0, i != 12, MOUNTS, RECEPTION, echoes, ring)
 
@@ -109,11 +110,11 @@ def test_walls_along_the_path_do_not_explain_readings_without_noise_besides_one_
     for k in range(40):
         x = 0.05 * k
         for i in (*sides, 12):
-            echoes[i].before.range_m = echoes[i].latest.range_m
             r = 0.7 / math.sin(MOUNTS[5, 2] + HALF) if i in sides else 3.0
             if i == 12 and not is_due:
                 r += x
             axis = MOUNTS[i, 2]
+            mark(echoes[i].before, echoes[i].latest.range_m, x - 0.05, 0.0, axis, x - 0.05)
             mark(echoes[i].latest, r, x, 0.0, axis, x)
             echoes[i].agreed_m, echoes[i].agreed_path_m = r, x
             weigh_repeat(i, (r, x, 0.0, axis), 0.0, i != 12, MOUNTS, RECEPTION, echoes, ring)
@@ -121,6 +122,27 @@ def test_walls_along_the_path_do_not_explain_readings_without_noise_besides_one_
     assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * REPEAT_NAT)
     assert repeat_evidence(all_of) == pytest.approx(all_of.repeated_nat + equal, abs=0.1)
     assert (repeat_evidence(all_of) > EVIDENCE_NAT) is is_due
+
+
+def test_a_robot_that_turns_as_it_drives_keeps_its_distance_from_nothing() -> None:
+    echoes, ring = heard((6, 0.5)), records(RingTrace, zeros(RingTrace, 1))
+    c, all_of = echoes[6], ring[0]
+    c.standstill = all_of.standstill = 1
+
+    def evidence(r: float, moved: float, turned: float, tolerance: float = TOLERANCE) -> float:
+        before, axis = c.stuck_nat, math.pi - 0.01 + turned - math.tau
+        mark(c.before, 0.5, 0.0, 0.0, math.pi - 0.01, 0.0)
+        mark(c.latest, r, moved, 0.0, axis, moved)
+        reception = (HALF, tolerance, 5.0)
+        is_ahead = True
+        weigh_repeat(6, (r, moved, 0.0, axis), 0.0, is_ahead, MOUNTS, reception, echoes, ring)
+        return float(c.stuck_nat - before)
+
+    assert evidence(0.5, 0.04, 0.2) == evidence(0.5, 0.04, -0.2) == pytest.approx(WINDING_NAT)
+    assert evidence(0.502, 0.04, 0.2) == 0.0, "a little noise"
+    assert evidence(0.5, 0.01, 0.2) == 0.0, "one that turns on the spot hears the same while its beam is wide enough"
+    assert evidence(0.5, 0.05, 0.01) == 0.0, "one that drives straight on may drive along a wall"
+    assert evidence(0.5, 0.04, 1.0, 0.033) == 0.0, "coarse steps hide a small change"
 
 
 def test_noise_is_learned_at_a_standstill_from_changes_that_noise_explains() -> None:
