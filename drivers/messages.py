@@ -119,7 +119,13 @@ RecordedFlags: TypeAlias = Annotated[Flags, Field(ge=0, le=COUNT_MAX)]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A robot's description of itself; a new `boot_id` means that it has restarted."""
+    """A robot's description of itself; a new `boot_id` means that it has restarted.
+
+    Attributes
+    ----------
+    traits
+        What else it says of itself that outlasts a restart: names and values.
+    """
 
     name: str
     sensors: int
@@ -127,6 +133,7 @@ class Identity:
     deadman_s: float
     odometry_period_s: float
     boot_id: int
+    traits: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

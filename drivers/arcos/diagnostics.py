@@ -26,6 +26,11 @@ MOTORS_STAY_OFF: Final = (
     "release it and check its voltage, then arm again"
 )
 
+_CONSTANT: Final = (
+    "four_motors", "turn_top", "speed_top", "turn_acceleration_top", "acceleration_top", "pwm_max", "sip_cycle_ms",
+    "gripper", "front_sonar", "rear_sonar", "rev_count", "watchdog_ms", "front_bumpers", "rear_bumpers", "charger",
+)  # fmt: skip
+"""What a robot's configuration holds that stands in its flash, or is how it is built."""
 NO_CONFIG: Final = (
     "the robot does not report its configuration, so its limits and watchdog are unknown; likely its firmware is "
     "old: the limits of the robot file apply, and a watchdog of 2 s is assumed"
@@ -95,6 +100,21 @@ def wrong_robot(name: RobotName, config: RobotConfig) -> str | None:
         f"{', '.join(known)}, whose odometry has other factors; choose the robot's own file, or add its subclass to "
         f"arcos.subclasses"
     )
+
+
+def traits(packet: ConfigPacket | None, name: RobotName | None) -> tuple[tuple[str, str], ...]:
+    """Return what a robot says of itself besides its name that no command changes: names and values.
+
+    Parameters
+    ----------
+    packet, name
+        Its configuration, and its answer to SYNC2; None where it sent none.
+    """
+    said = {"class": name and name.class_name, "subclass": name and name.subclass}
+    if packet is not None:
+        said |= {"serial number": packet.serial}
+        said |= {field: getattr(packet, field) for field in _CONSTANT}
+    return tuple((key.replace("_", " "), one_line(str(value))) for key, value in said.items() if value is not None)
 
 
 def wrong_watchdog(name: str, packet: ConfigPacket | None, config: RobotConfig) -> str | None:

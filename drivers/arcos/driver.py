@@ -342,7 +342,9 @@ class ArcosDriver(Session[PoseStamper]):
         self._note_once(diagnostics.watchdog_note(deadman_s))
         period_s = 1e-3 * ((packet and packet.sip_cycle_ms) or 1e3 * SIP_PERIOD_S)
         radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
-        self._identity = Identity(shown, len(self._discs), radius_m, deadman_s, period_s, self._boots)
+        self._identity = Identity(
+            shown, len(self._discs), radius_m, deadman_s, period_s, self._boots, diagnostics.traits(packet, name)
+        )
         self.stamper.set_period(period_s)
         self._limits = limits_of(config.body, packet)
         self._queue += (

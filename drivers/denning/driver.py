@@ -299,7 +299,8 @@ class DenningDriver(Session[PoseStamper]):
         self._ident = ident
         known, self._identity = self._identity, identity_of(ident)
         self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um
-        if known is None and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:
+        is_known = known is not None and known.traits == self._identity.traits
+        if not is_known and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:
             self.stamper.note(coarse)
         restarted = known is not None and (known.boot_id != ident.boot_id or self._jump is Jump.BACK)
         if known is None or known.odometry_period_s != self._identity.odometry_period_s:

@@ -166,6 +166,7 @@ def to_wire(value: float, limit: float) -> int:
 
 def identity_of(ident: Ident) -> Identity:
     """Return the robot's description of itself in SI."""
+    unit_m = 1e-6 * ident.range_unit_um if ident.range_unit_um else TENTH_FT_M
     return Identity(
         name=ident.name,
         sensors=ident.sensors,
@@ -173,6 +174,13 @@ def identity_of(ident: Ident) -> Identity:
         deadman_s=ident.deadman_ms * 1e-3,
         odometry_period_s=ident.odometry_period_ms * 1e-3,
         boot_id=ident.boot_id,
+        traits=(
+            ("deadman", f"{ident.deadman_ms} ms"),
+            ("period of odometry", f"{ident.odometry_period_ms} ms"),
+            ("version of the protocol", str(ident.version)),
+            ("steps of the ranges", f"{unit_m:.4g} m"),
+            ("capabilities", str(ident.capabilities)),
+        ),
     )
 
 

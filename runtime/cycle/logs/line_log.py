@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from drivers.driver import LineState, RobotDriver
-from drivers.messages import LinkCounts
+from drivers.messages import Identity, LinkCounts
 from drivers.token_bucket import LineLimit
 from runtime.cycle.inputs import Request
 from runtime.cycle.line_messages import LineMessages
@@ -13,6 +13,8 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from structlog.typing import FilteringBoundLogger
 
 LINES_PER_S: Final = 1.0 / 60.0
@@ -37,8 +39,8 @@ TOO_MANY: Final = (
     "device sends on the line: restart the robot, and check what else is connected"
 )
 ANOTHER: Final = (
-    "another robot answers on this port: '{}' in place of '{}'; likely it took the port's name: check that it is the "
-    "one of this run before it is armed"
+    "another robot answers on this port: {}; likely it took the port's name: check that it is the one of this run "
+    "before it is armed"
 )
 
 
@@ -60,7 +62,7 @@ class LineLog:
         self._refusals = LineLimit(1.0, LINES_BURST)
         self._is_ready, self._is_flooded = True, False
         self._problem: str | None = None
-        self._robot: str | None = None
+        self._robot: Identity | None = None
         self._counts = LinkCounts()
         self._counted_s: float | None = None
         self._is_noisy = self._is_crowded = False
@@ -76,7 +78,7 @@ class LineLog:
             if not self._is_ready:
                 self._returned(driver, run_s)
             elif self._robot is None and driver.identity is not None:
-                self._robot = driver.identity.name
+                self._robot = driver.identity
         elif inputs.line is not LineState.CLOSED and inputs.line_problem not in (None, self._problem):
             self._problem = inputs.line_problem
             self._say("line down", run_s, reason=inputs.line_problem)
@@ -91,11 +93,11 @@ class LineLog:
 
     def _returned(self, driver: RobotDriver, run_s: float) -> None:
         self._problem = None
-        name = None if driver.identity is None else driver.identity.name
-        if self._robot is not None and name is not None and name != self._robot:
-            self._log.warning(ANOTHER.format(name, self._robot))
-        self._robot = name or self._robot
-        self._say("line back", run_s, robot=name)
+        robot = driver.identity
+        if robot is not None and self._robot is not None and (differs := differences(robot, self._robot)):
+            self._log.warning(ANOTHER.format(differs))
+        self._robot = robot or self._robot
+        self._say("line back", run_s, robot=None if robot is None else robot.name)
 
     def _judge_arming(self, record: CycleRecord) -> None:
         """Log why the robot is not being armed although it was requested."""
@@ -127,6 +129,24 @@ class LineLog:
         if left_out is not None:
             write = self._log.info if event == "line back" else self._log.warning
             write(event, **values, **_more(left_out))
+
+
+def differences(robot: Identity, before: Identity) -> str:
+    """Return what a robot says of itself in another way than the one before; empty if all is the same.
+
+    What only one of them says is no difference: an answer may be lost.
+    """
+    then = dict(_facts(before))
+    return ", ".join(
+        f"{name} {value} in place of {then[name]}" for name, value in _facts(robot) if then.get(name, value) != value
+    )
+
+
+def _facts(robot: Identity) -> Iterator[tuple[str, str]]:
+    yield "name", f"'{robot.name}'"
+    yield "sensors", str(robot.sensors)
+    yield "radius of the ring", f"{robot.ring_radius_m:.3f} m"
+    yield from robot.traits
 
 
 def _more(left_out: int) -> dict[str, int]:

@@ -6,7 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.arcos.diagnostics import deadman_s, no_answer, unanswered, watchdog_note, wrong_robot, wrong_watchdog
+from config.files import one_line
+from drivers.arcos.diagnostics import (
+    deadman_s,
+    no_answer,
+    traits,
+    unanswered,
+    watchdog_note,
+    wrong_robot,
+    wrong_watchdog,
+)
 from drivers.arcos.frames import ConfigPacket, RobotName
 from drivers.arcos.handshake import Stage
 from drivers.heard_bytes import HeardBytes
@@ -24,6 +33,13 @@ def test_a_robot_with_other_factors_is_refused(subclass: str) -> None:
     message = wrong_robot(RobotName("a\x1b[2J", "Pioneer", subclass), P3DX_FILE) or ""
     assert f"is a {subclass}, and the robot file is for p3dx, p2d8, p2d8+" in message
     assert "\x1b" not in message
+
+
+def test_a_robot_says_more_of_itself_than_its_name() -> None:
+    packet = ConfigPacket(serial="17\x1b", rear_sonar=1, speed_max=300)
+    said = dict(traits(packet, RobotName("a", "Pioneer", "p3dx")))
+    assert said == {"class": "Pioneer", "subclass": "p3dx", "serial number": one_line("17\x1b"), "rear sonar": "1"}
+    assert traits(None, None) == ()
 
 
 def test_the_watchdog_is_the_robots_or_that_of_the_firmware_as_delivered() -> None:

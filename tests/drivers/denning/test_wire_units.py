@@ -85,7 +85,11 @@ def test_velocities_are_thousandths_within_the_limit() -> None:
 
 
 def test_an_identity_in_si() -> None:
-    assert identity_of(IDENT) == Identity("denning", 24, 381 * 1e-3, 0.5, 0.02, 0xB001)
+    traits = (
+        ("deadman", "500 ms"), ("period of odometry", "20 ms"), ("version of the protocol", "1"),
+        ("steps of the ranges", "0.03048 m"), ("capabilities", "0"),
+    )  # fmt: skip
+    assert identity_of(IDENT) == Identity("denning", 24, 381 * 1e-3, 0.5, 0.02, 0xB001, traits)
 
 
 def test_flags_that_are_not_known_are_dropped() -> None:

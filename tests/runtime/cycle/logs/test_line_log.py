@@ -8,11 +8,14 @@ from typing import Any, cast
 
 import structlog
 
+from config.load import load_settings
 from drivers.driver import LineState, Received, RobotDriver
+from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Identity, LinkCounts
+from drivers.registry import make_device, make_driver
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.line_messages import ROBOT_LINE
-from runtime.cycle.logs.line_log import LineLog
+from runtime.cycle.logs.line_log import LineLog, differences
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import CycleRecord
 
@@ -78,7 +81,47 @@ def test_another_robot_under_the_old_name_is_named() -> None:
         case.cycle(LineState.DOWN, problem)
     case.cycle()
     assert [each["reason"] for each in case.said("line down")] == ["the robot 'b' is a p3at"], "once"
-    assert any("another robot answers on this port: 'b' in place of 'a'" in each["event"] for each in case.events)
+    assert any("another robot answers on this port: name 'b' in place of 'a'; " in str(each) for each in case.events)
+
+
+def test_another_robot_with_the_same_name_is_named_by_what_else_it_says() -> None:
+    case = Case()
+    case.driver.identity = replace(NAMED, traits=(("steps of the ranges", "0.03048 m"), ("capabilities", "0")))
+    case.cycle()
+    for traits, said in (
+        (
+            (("steps of the ranges", "0.001 m"), ("capabilities", "0")),
+            "steps of the ranges 0.001 m in place of 0.03048 m",
+        ),
+        ((("steps of the ranges", "0.001 m"),), None),
+        ((("steps of the ranges", "0.001 m"), ("serial number", "7")), None),
+    ):
+        case.events.clear()
+        case.driver.identity = replace(NAMED, boot_id=2, traits=traits)
+        case.cycle(LineState.CLOSED)
+        case.cycle()
+        warnings = [each["event"] for each in case.events if "another robot" in each["event"]]
+        assert len(warnings) == (said is not None)
+        assert said is None or f"on this port: {said}; likely" in warnings[0]
+
+
+def identity(driven: str, answers: str) -> Identity:
+    """Return what the driver of a robot file learns of an emulated robot of another one."""
+    driver, robot = make_driver(load_settings("room", robot=driven)), load_settings("room", robot=answers)
+    assert robot.world is not None
+    line = MemoryLine(driver, make_device(robot, robot.world, 1))
+    for cycle in range(1, 40):
+        line.exchange(0.1 * cycle)
+    assert driver.state is LineState.READY
+    assert driver.identity is not None
+    return driver.identity
+
+
+def test_a_denning_and_ears_differ_under_one_name() -> None:
+    denning, ears = identity("denning", "denning"), identity("denning", "ears")
+    assert denning.name == ears.name
+    assert "steps of the ranges 0.001 m in place of 0.03048 m" in differences(ears, denning)
+    assert not differences(replace(denning, boot_id=denning.boot_id + 1), denning), "it was only restarted"
 
 
 def test_a_line_that_is_lost_again_and_again_is_counted() -> None:
