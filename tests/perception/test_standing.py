@@ -30,7 +30,7 @@ def losses(trial: StandTrial) -> list[str]:
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seed", [2000, 2001, 2002])
+@pytest.mark.parametrize("seed", [2000, 2001, pytest.param(2002, marks=pytest.mark.soak)])
 def test_nothing_sure_is_lost_while_the_robot_stands(model: Reflection, seed: int) -> None:
     trial = try_standing(SETTINGS, seed, model, 150.0, settle_s=SETTLED_S)
     assert trial.known, "a drive through a room makes something sure"
@@ -54,8 +54,13 @@ def test_the_last_readings_of_a_drive_take_no_wall_and_no_drum_away(seed: int, m
     assert [one for one, _ in trial.lost if one.model in {"wall", "drum"}] == []
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seed", [2004, 2008])
+@pytest.mark.parametrize(
+    ("seed", "model"),
+    [
+        *zip([2004, 2008], MODELS, strict=True),
+        *(pytest.param(*both, marks=pytest.mark.soak) for both in zip([2008, 2004], MODELS, strict=True)),
+    ],
+)
 def test_further_readings_of_an_unchanged_room_change_nothing(model: Reflection, seed: int) -> None:
     """Without noise they repeat what the robot heard when it stopped, so that the map stays as it is, to the bit."""
     ring = ring_of_room(seed)

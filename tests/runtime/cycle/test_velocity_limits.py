@@ -87,7 +87,7 @@ def least_gap_m(settings: Settings, seed: int, seconds: float, teleoperated: boo
     return least[0], result.state
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0])
 def test_a_mission_arrives_at_its_places_and_enters_no_zone(seed: int) -> None:
     places = random_places(np.random.default_rng(seed))
     settings = with_mission(
@@ -111,7 +111,7 @@ def wandering(seed: int) -> MissionConfig:
     )
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0])
 def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
     places = random_places(np.random.default_rng(100 + seed))
     given = ROOM.model_copy(update={"places": places})
@@ -120,7 +120,7 @@ def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("seed", range(2, 42))
+@pytest.mark.parametrize("seed", range(1, 42))
 def test_nothing_enters_a_zone_in_many_rooms(seed: int) -> None:
     places = random_places(np.random.default_rng(seed))
     errand = mission(to_place("lift"), to_place("charger"))

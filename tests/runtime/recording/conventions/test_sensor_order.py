@@ -55,8 +55,14 @@ def exchanges(count: int) -> dict[str, list[int]]:
     }
 
 
-@pytest.mark.parametrize("robot", ["denning", "p3dx", "amigo"])
-@pytest.mark.parametrize("model", ["cone", "specular"])
+@pytest.mark.parametrize(
+    ("robot", "model"),
+    [
+        ("denning", "specular"), ("p3dx", "cone"), ("amigo", "specular"),
+        *(pytest.param(*both, marks=pytest.mark.soak)
+          for both in [("denning", "cone"), ("p3dx", "specular"), ("amigo", "cone")]),
+    ],
+)  # fmt: skip
 def test_columns_that_are_exchanged_are_found_and_others_are_not(robot: str, model: str) -> None:
     drive = make_drive(13, robot, "room", model, 150.0)
     ranges = np.where(np.isinf(drive.ranges), np.nan, drive.ranges)
