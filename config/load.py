@@ -115,18 +115,24 @@ def load_study(name_or_path: str | os.PathLike[str]) -> StudyConfig:
 def load_any(name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Strict:
     """Return the run, world, model, mission or study of a file, by its top-level keys; a robot's as a run with it.
 
+    A name is that of a shipped or installed run or, where there is none, of a robot, mission, world or model.
+
     Raises
     ------
     ConfigError
         The file cannot be read or is invalid.
     """
-    table = read_document("runs", name_or_path).table
+    by_name: tuple[Kind, ...] = ("runs", "robots", "missions", "worlds", "models")
+    named = next((kind for kind in by_name if name_or_path in list_shipped(kind)), None)
+    if named == "robots":
+        return load_settings(None, overrides, robot=str(name_or_path))
+    table = read_document(named or "runs", name_or_path).table
     kinds: dict[type[Strict], Kind] = {Settings: "runs", ModelConfig: "models", WorldConfig: "worlds",
                                        MissionConfig: "missions", StudyConfig: "studies"}  # fmt: skip
     kind = max(kinds, key=lambda one: len(table.keys() & {*one.model_fields, *(NAMES if one is Settings else ())}))
     if kind is Settings or overrides:
         return load_settings(name_or_path, overrides)
-    return _load(kinds[kind], Path(name_or_path), kind)
+    return _load(kinds[kind], name_or_path if named else Path(name_or_path), kind)
 
 
 def load_settings(

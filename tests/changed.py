@@ -45,14 +45,15 @@ RELATED = {
     "docs/": ("tests/test_docs.py", "tests/drivers/contract/test_example.py"),
     "docs/library": ("tests/test_library_pages.py",),
     "config/models/": ("tests/test_library_pages.py",),
-    "runtime/cycle/": ("tests/runtime/recording/test_schema.py",),
+    "runtime/cycle/": ("tests/runtime/recording/test_schema.py", "tests/test_extending_page.py"),
     "runtime/cycle/step": ("tests/runtime/cycle/test_modes.py",),
     "runtime/console/": ("tests/test_docs.py",),
-    "runtime/console/frames/": ("tests/runtime/console/frames",),
+    "runtime/console/frames/": ("tests/runtime/console/frames", "tests/test_extending_page.py"),
     "runtime/console/page/": ("tests/runtime/console/http/test_static_files.py",),
     "README.md": ("tests/test_docs.py",),
     "CONTRIBUTING.md": ("tests/test_docs.py",),
     "mkdocs.yml": ("tests/test_docs.py",),
+    "docs/extending.md": ("tests/test_extending_page.py",),
     "docs/tutorial.md": ("tests/runtime/cli/test_tutorial.py",),
     "pyproject.toml": ("tests/test_packaging.py",),
 }
@@ -63,6 +64,8 @@ KERNELS = ("perception/", "behaviors/valley/", "drivers/emulator/")
 """After a change of these, tests run without the compiler: compiling the kernels again takes a minute."""
 
 
+TIMEOUT_S = "60"
+"""Of `tests.hil.machine`: a person waits, and several tests may hang because of one change."""
 PRODUCT = ("behaviors", "config", "drivers", "perception", "runtime")
 USERS_MAX = 5
 """Tests of so many modules that import a changed one run as well, the nearest by their path first."""
@@ -161,7 +164,7 @@ def main() -> int:
     files = changed_files()
     tests = find_tests(files)
     marked = "not soak and not realtime"
-    environment = dict(os.environ)
+    environment = {"ECHOLOCATE_TEST_TIMEOUT_S": TIMEOUT_S, **os.environ}
     if any(name.startswith(KERNELS) and name.endswith(".py") for name in files):
         environment["NUMBA_DISABLE_JIT"] = "1"
         marked += " and not compiled"

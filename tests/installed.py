@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import configparser
 import importlib
 import sys
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,6 +26,18 @@ def install(
         _write_entries(folder, entries)
     monkeypatch.syspath_prepend(str(folder))
     importlib.invalidate_caches()
+
+
+def install_editable(folder: Path) -> None:
+    """Do what an editable installation of a package's folder does: its entry points beside its modules."""
+    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+    info = folder / f"{folder.name}-0.1.dist-info"  # which names a package
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    points = configparser.ConfigParser()
+    points.read_dict(project["entry-points"])
+    with (info / "entry_points.txt").open("w") as file:
+        points.write(file)
 
 
 def _write_entries(folder: Path, entries: Mapping[str, Mapping[str, str]]) -> None:

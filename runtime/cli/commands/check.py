@@ -14,7 +14,7 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     Parameters
     ----------
     config
-        Run, robot, world, model or mission file, or the name of a shipped run.
+        Run, robot, world, model or mission file, or the name of one that is shipped or installed.
 
     Raises
     ------

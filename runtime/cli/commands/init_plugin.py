@@ -117,6 +117,7 @@ def make_device(config, world, seed, *, faults, clock_start_us):
 '''
 ROBOT_FILE: Final = """# {name}: measure yours, and change every number. `echolocate settings` lists every key.
 robot.driver = "{name}"
+link.deadman_max_s = 0.5  # that of the lines
 [ring]
 count = 12
 radius_m = 0.12

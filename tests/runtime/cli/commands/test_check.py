@@ -39,6 +39,12 @@ def test_every_shipped_run_is_good_by_name(capsys: pytest.CaptureFixture[str]) -
         assert good == f"{name}: good"
 
 
+@pytest.mark.parametrize("name", ["denning", "drum", "office"])
+def test_a_robot_a_model_and_a_world_are_good_by_name(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["check", name]) == DONE
+    assert capsys.readouterr().out.endswith(f"{name}: good\n")
+
+
 def test_an_unwise_setting_is_named_and_good(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["check", "hallway", "--set", "cycle.rate_hz=5"]) == DONE
     warning, _, good = capsys.readouterr().out.splitlines()

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import configparser
 import os
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,21 +12,9 @@ import pytest
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_any, load_robot
 from runtime.cli.commands.init_plugin import write_plugin
-from tests.installed import install
+from tests.installed import install, install_editable
 
 ROOT = Path(__file__).resolve().parents[4]
-
-
-def installed(folder: Path) -> None:
-    """Do what an editable installation does: the entry points beside the modules."""
-    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
-    info = folder / f"{folder.name}-0.1.dist-info"  # which names a package
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
-    points = configparser.ConfigParser()
-    points.read_dict(project["entry-points"])
-    with (info / "entry_points.txt").open("w") as file:
-        points.write(file)
 
 
 def test_a_robot_is_a_package_that_keeps_the_contract_in_less_than_a_hundred_lines(
@@ -39,7 +25,7 @@ def test_a_robot_is_a_package_that_keeps_the_contract_in_less_than_a_hundred_lin
     files = [file for file in (tmp_path / "skippy").rglob("*") if file.is_file()]
     assert len(files) == 3
     assert sum(len(file.read_text().splitlines()) for file in files) < 100
-    installed(tmp_path / "skippy")
+    install_editable(tmp_path / "skippy")
     options = "-q -p no:cacheprovider --disable-plugin-autoload -p echolocate_pytest --echolocate-family skippy"
     command = [sys.executable, "-m", "pytest", *options.split()]
     environment = {**os.environ, "PYTHONPATH": f"{tmp_path / 'skippy'}:{ROOT}"}
@@ -54,7 +40,7 @@ def test_a_robot_and_a_schema_are_known_by_their_names(tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     for name, kind in (("skippy", "robot"), ("orbit", "schema")):
         assert write_plugin(name, kind) == DONE
-        installed(tmp_path / name)
+        install_editable(tmp_path / name)
         install(monkeypatch, tmp_path / name, {}, {})
     assert load_robot("skippy").robot.driver == "skippy"
     mission = tmp_path / "m.toml"
