@@ -18,7 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypedDict, cast
 
-from config.robot import CalibrationConfig
+from config.robot import CalibrationConfig, DriverConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.capabilities import CAPABILITIES
 from drivers.driver import DriverError
@@ -77,13 +77,17 @@ class DriverFamily(Protocol):
 
 FOREIGN_MIN: Final = 2
 """Fewest frames of another family that name it: a single one may be chance."""
-GIVES_FIRINGS: Final = frozenset({"arcos", "denning", "rflex"})
-"""Drivers whose protocols name what fired; any other may be of a source that repeats last values."""
 
 
 def known_drivers() -> dict[str, EntryPoint]:
     """Return all installed drivers by name; a shipped driver takes precedence over another of its name."""
     return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **SHIPPED}
+
+
+def driver_names() -> tuple[str, ...]:
+    """Return the names of all installed drivers as one chooses from them: the usual one first, then the shipped."""
+    shipped = [DriverConfig().driver, *sorted(SHIPPED.keys() - {DriverConfig().driver})]
+    return (*shipped, *sorted(known_drivers().keys() - SHIPPED.keys()))
 
 
 def capabilities(config: RobotConfig) -> frozenset[str]:
@@ -124,10 +128,11 @@ def make_driver(config: RobotConfig) -> RobotDriver:
     drivers.firing_pattern.FiringError
         The robot or its protocol cannot carry out the firing pattern of `config`.
     """
-    driver = _family(config.robot.driver).make_driver(config)
-    if isinstance(driver, Session) and config.robot.driver in GIVES_FIRINGS:
+    family = _family(config.robot.driver)
+    driver = family.make_driver(config)
+    if isinstance(driver, Session) and _names_frames(family):
         driver.heard.find_robot = partial(other_robot, config.robot.driver)
-    if config.robot.driver not in GIVES_FIRINGS:
+    if not _names_frames(family):  # it may be a source that repeats last values
         pattern, count = firing_pattern(config.ring), len(config.ring.mounts)
         if pattern.set_size < count:
             driver = cast("RobotDriver", FreshDriver(driver, count, pattern.set_size, pattern.cycle_s))
@@ -192,11 +197,16 @@ def other_robot(driver: str, data: bytes) -> str | None:
 
     Such a family has a function `frames_in`, which counts the robot's frames in bytes, and a phrase `ROBOT`.
     """
-    for name in sorted(GIVES_FIRINGS - {driver}):
+    for name in sorted(SHIPPED.keys() - {driver}):
         family: Any = _family(name)
-        if family.frames_in(data) >= FOREIGN_MIN:
+        if _names_frames(family) and family.frames_in(data) >= FOREIGN_MIN:
             return str(family.ROBOT)
     return None
+
+
+def _names_frames(family: DriverFamily) -> bool:
+    """Return whether a family's protocol names its frames, and with them what fired."""
+    return hasattr(family, "frames_in")
 
 
 def _family(name: str) -> DriverFamily:

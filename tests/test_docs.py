@@ -11,8 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from config.files import list_shipped
 from config.reference import markdown
+from config.schema_use import SHIPPED_USES
+from drivers.registry import SHIPPED
 from tests import command_page, page_types, safety_page
+from tests.drivers.contract.families import FAMILIES
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
@@ -111,6 +115,14 @@ def test_the_page_of_settings_is_that_of_the_models() -> None:
 def test_the_page_of_commands_is_that_of_the_program() -> None:
     """Renew it with `python -m tests.command_page`."""
     assert command_page.words(command_page.PAGE.read_text("utf-8")) == command_page.words(command_page.page())
+
+
+def test_what_is_listed_by_hand_is_all_that_is_shipped() -> None:
+    """Robots in the README, schemas on the page of missions, families in the contract of their drivers."""
+    readme, missions = ((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/missions.md"))
+    assert [name for name in list_shipped("robots") if f"`{name}`" not in readme] == []
+    assert [name for name in SHIPPED_USES if f"`{name}`" not in missions] == []
+    assert SHIPPED.keys() - FAMILIES.keys() == set()
 
 
 def test_the_page_on_safety_is_that_of_the_program() -> None:

@@ -624,6 +624,7 @@ interface SessionInfo {
   missions: Array<NamedRow>;
   truth: SurfacesRow | null;
   known_room: SurfacesRow | null;
+  drivers: Array<string>;
   parameters: Array<Parameter>;
   budget_s: number;
   period_s: number;
@@ -894,6 +895,7 @@ interface SessionMessage {
   missions: Array<NamedRow>;
   truth: SurfacesRow | null;
   known_room: SurfacesRow | null;
+  drivers: Array<string>;
   parameters: Array<Parameter>;
   budget_s: number;
   period_s: number;

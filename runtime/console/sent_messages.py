@@ -80,6 +80,8 @@ class SessionInfo(TypedDict):
     missions: list[NamedRow]
     truth: SurfacesRow | None
     known_room: SurfacesRow | None
+    drivers: tuple[str, ...]
+    """Installed ones, for a robot's file."""
     parameters: list[Parameter]
     budget_s: float
     period_s: float

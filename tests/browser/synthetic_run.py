@@ -11,6 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.registry import driver_names
+
 FOOT: Final = 0.3048
 PERIOD_S: Final = 0.05
 START: Final = (-6 * FOOT, 0.0)
@@ -66,6 +68,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
         "truth": {"drums": [[x, y, RADIUS] for x, y in DRUMS], "walls": [], "polygons": []},
         "known_room": {"drums": [], "walls": [[-2.0, -2.0, 4.0, -2.0]], "polygons": []},
         "missions": [{"name": "patrol", "about": "Drives round."}, {"name": "wander", "about": ""}],
+        "drivers": list(driver_names()),
         "parameters": [dict(p) for p in PARAMETERS], "budget_s": 0.005, "period_s": PERIOD_S,
     } | changes  # fmt: skip
 

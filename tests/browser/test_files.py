@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from playwright.async_api import expect
 
+from drivers.registry import driver_names
 from tests.browser.fake_server import TOKEN, FakeServer
 from tests.browser.open_page import Opened, Opener
 
@@ -144,6 +145,8 @@ async def test_a_robot_is_described_with_a_picture_of_its_ring_and_saved(server:
     await expect(page.locator("#robot-picture")).to_have_attribute("aria-label", re.compile("8 sensors"))
     await page.locator("#robot-each").press("Enter")  # the space bar is HALT
     await expect(page.locator("#robot-sensors li")).to_have_count(8)
+    drivers = await page.locator("#new-driver option").all_text_contents()
+    assert drivers[:4] == [*driver_names()][:4]
     before = await beams.nth(0).get_attribute("d")
     await page.get_by_label("direction (degrees) of sensor 0").fill("20")
     assert await beams.nth(0).get_attribute("d") != before, "it is drawn as it is edited"

@@ -16,7 +16,7 @@ from drivers.denning.device import DenningDevice
 from drivers.denning.driver import DenningDriver
 from drivers.driver import DriverError
 from drivers.latched_ranges import FreshDriver
-from drivers.registry import GROUP, known_drivers, make_device, make_driver
+from drivers.registry import GROUP, driver_names, known_drivers, make_device, make_driver
 
 
 def robot_with_driver(name: str) -> RobotConfig:
@@ -57,6 +57,7 @@ def test_an_installed_package_adds_a_driver(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setitem(sys.modules, module.__name__, module)
     install(monkeypatch, "other", module.__name__)
     assert "other" in known_drivers()
+    assert driver_names() == ("denning", "arcos", "rflex", "ros2", "other")
     assert make_driver(robot_with_driver("other")).drive == made.drive
 
 
@@ -72,7 +73,13 @@ def test_a_driver_that_cannot_be_loaded_is_refused_with_its_package_named(monkey
 
 
 def test_an_installed_driver_may_repeat_last_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One whose family counts frames names what fired."""
+    module = types.ModuleType("a_latching_package")
+    module.make_driver = DenningDriver  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
     install(monkeypatch, "mine", "drivers.denning.family")
+    assert isinstance(make_driver(robot_with_driver("mine")), DenningDriver)
+    install(monkeypatch, "mine", module.__name__)
     assert isinstance(make_driver(robot_with_driver("mine")), FreshDriver)
     all_at_once = FiringConfig(sets=(tuple(range(24)),), step_period_s=0.1)
     ring = load_robot("denning").ring.model_copy(update={"firing": all_at_once})

@@ -15,14 +15,13 @@ from config.robot import SENSORS_MAX
 from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
 from drivers.firing_pattern import FiringError
-from drivers.registry import known_drivers
+from drivers.registry import driver_names
 from runtime.cli.commands.init_ring import Described, ask_mounting
 from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.cli.commands.questions import Given, Questions
 from runtime.support.config_lint import lint_settings
 from runtime.support.pattern_check import refuse_undrivable
 
-DRIVERS: Final = ("denning", "arcos", "rflex", "ros2")
 AT_A_TIME: Final = ((8, "octets"), (4, "quadrants"), (3, "thirds"), (2, "opposite_pairs"), (1, "single"))
 SOUND_M_S: Final = 343.0
 CORNERS: Final = 16
@@ -49,7 +48,7 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
 
 def _robot_draft(file: str, ask: Questions) -> RobotDraft:
     """Return the robot as options and answers describe it."""
-    driver = ask.choice("driver", "The robot's protocol", (*DRIVERS, *(known_drivers().keys() - {*DRIVERS})))
+    driver = ask.choice("driver", "The robot's protocol", driver_names())
     name = ask.text("name", "What the robot is called", Path(file).stem)
     most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}.get(driver, SENSORS_MAX)
     body = ask.number("body_radius", "Radius of the body, m", 0.3, 0.01, 10.0)

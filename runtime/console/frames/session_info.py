@@ -11,6 +11,7 @@ from config.mission_step import LABELS
 from config.settings import Settings
 from config.world import StartConfig, WorldConfig
 from drivers.messages import Pose
+from drivers.registry import driver_names
 from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import RIVAL_RADII_M
 from runtime import VERSION
@@ -56,6 +57,7 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
         "missions": [{"name": m.name, "about": m.about} for m in missions(settings)],
         "truth": surfaces(settings.world, settings.world.start) if emulated and settings.world is not None else None,
         "known_room": None if known_room is None else surfaces(known_room, StartConfig()),
+        "drivers": driver_names(),
         "parameters": parameters(settings),
         "budget_s": settings.cycle.perception_budget_s,
         "period_s": 1.0 / settings.cycle.rate_hz,

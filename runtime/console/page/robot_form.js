@@ -39,7 +39,13 @@ export class RobotForm extends Panel {
   /** @param {Panels} parts */
   constructor(parts) {
     super(parts);
-    const form = byId("robot-form");
+    const form = byId("robot-form"),
+      drivers = byId("new-driver");
+    parts.run.on("session", (session) => {
+      const chosen = drivers.value;
+      drivers.replaceChildren(...session.drivers.map((name) => el("option", {}, name)));
+      if (session.drivers.includes(chosen)) drivers.value = chosen;
+    });
     form.addEventListener("input", () => this.draw());
     form.addEventListener("submit", (event) => this.#save(event));
     byId("robot-each").addEventListener("change", () => this.#each());
