@@ -86,6 +86,22 @@ def located(error: ValidationError, *at: str | int) -> Iterable[InitErrorDetails
         yield InitErrorDetails(**details, ctx=found["ctx"]) if "ctx" in found else details
 
 
+def _lacking(model: type[BaseModel], data: object) -> list[InitErrorDetails]:
+    """Return what a robot file without a table of its installed driver lacks; a table of defaults may be left out."""
+    robot = data.get("robot") if isinstance(data, dict) else None
+    name = robot.get("driver") if isinstance(robot, dict) else None
+    if not isinstance(data, dict) or not isinstance(name, str) or name in {*data, *model.model_fields}:
+        return []
+    try:
+        if (table := plugged_table(name)) is not None:
+            table.model_validate({})
+    except ValidationError as error:
+        return list(located(error, name))
+    except PluginError:  # the registry of drivers says it
+        pass
+    return []
+
+
 def with_own_tables(model: type[M], data: object, validate: Callable[[object], M]) -> M:
     """Return a robot file whose further tables are validated by the installed drivers of these names.
 
@@ -104,9 +120,10 @@ def with_own_tables(model: type[M], data: object, validate: Callable[[object], M
         A field or a table is wrong, or no driver has a table of this name.
     """
     own = {key: data[key] for key in data if key not in model.model_fields} if isinstance(data, dict) else {}
-    if not isinstance(data, dict) or not own:
+    lacking = _lacking(model, data)
+    if not isinstance(data, dict) or not (own or lacking):
         return validate(data)
-    problems, tables, config = list[InitErrorDetails](), dict[str, BaseModel](), None
+    problems, tables, config = lacking, dict[str, BaseModel](), None
     try:
         config = validate({key: value for key, value in data.items() if key not in own})
     except ValidationError as error:

@@ -74,7 +74,9 @@ def test_what_a_package_or_a_file_adds_is_written_and_good_in_an_empty_folder(
             assert run_command(words) == DONE, (line, capsys.readouterr().err)
             done.append(words[0])
     assert "check" in done
-    assert ": good" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert ": good" in printed
+    assert ("skippy: [skippy] report_s = 0.05\n" in printed) == (section == "A robot")
 
 
 @pytest.mark.parametrize("section", CHANGES)

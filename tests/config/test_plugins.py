@@ -45,12 +45,13 @@ turn_max_rad_s = 1.0
 @pytest.fixture(autouse=True)
 def _package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     files = {
-        "plug_family.py": FAMILY, "plug_broken.py": "import plug_missing\n", "plug_data/__init__.py": "",
+        "plug_family.py": FAMILY, "plug_wants.py": FAMILY.replace("default=1.0, ", ""),
+        "plug_broken.py": "import plug_missing\n", "plug_data/__init__.py": "",
         "plug_data/models/tub.toml": CRATE, "plug_data/robots/skippy.toml": ROBOT + "[skippy]\ntrim = 1.1\n",
         "plug_data/models/drum.toml": CRATE,
     }  # fmt: skip
     install(monkeypatch, tmp_path / "site", files, {
-        DRIVERS: {"skippy": "plug_family", "broken": "plug_broken"},
+        DRIVERS: {"skippy": "plug_family", "wants": "plug_wants", "broken": "plug_broken"},
         "echolocate.schemas": {"none": "plug_family"},
         "echolocate.models": {"mine": "plug_data.models"}, "echolocate.robots": {"mine": "plug_data.robots"},
     })  # fmt: skip
@@ -91,6 +92,16 @@ def test_what_is_wrong_in_it_is_named_with_its_place(tmp_path: Path, text: str, 
         with pytest.raises((ConfigError, PluginError)) as caught:
             load(path)
         assert said in str(caught.value)
+
+
+def test_a_table_that_a_driver_needs_is_missed_where_there_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(ROBOT.replace('"skippy"', '"wants"'))
+    with pytest.raises(ConfigError, match=r"wants.trim: missing"):
+        load_robot(path)
+    path.write_text(path.read_text() + "[wants]\ntrim = 1.0\n")
+    assert load_robot(path).model_dump()["wants"] == {"trim": 1.0}
+    assert load_robot("skippy").robot.driver == "skippy"
 
 
 def test_the_reference_lists_it() -> None:

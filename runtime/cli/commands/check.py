@@ -25,6 +25,7 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     """
     from config.load import load_any
     from config.places import check_places
+    from config.plugins import plugged_table
     from config.robot import NO_BODY
     from config.settings import Settings
     from drivers.capabilities import after_kill
@@ -40,6 +41,10 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
         check_places(settings.mission, settings.places)
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
+        if (own := plugged_table(settings.robot.driver)) is not None:
+            values = settings.own_table(settings.robot.driver, own).model_dump(mode="json")
+            shown = ", ".join(f"{key} = {value}" for key, value in values.items())
+            sys.stdout.write(f"{config}: [{settings.robot.driver}] {shown}\n")
         if settings.body != NO_BODY:
             sys.stdout.write(f"{config}: {after_kill(settings.body, deadman_s(settings))}\n")
     sys.stdout.write(f"{config}: good\n")

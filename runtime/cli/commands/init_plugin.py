@@ -148,6 +148,7 @@ class Schema(Use):
 
     can_arrive: ClassVar[bool] = True  # False: a step with it needs `until`
     name: Literal["{name}"]
+    """Of the schema."""
     way_m: float = Field(default=1.0, gt=0.0, le=100.0)
     """That way, m."""
 
