@@ -19,6 +19,8 @@ async def test_the_commands_over_a_websocket(tmp_path: Path) -> None:
         answer = await page.ask(type="check_settings", file=number, toml="[ring\n" + held["text"])
         assert answer["data"]["problems"][0]["line"] == 1
         text = "# mine\n" + held["text"]
+        answer = await page.ask(type="change_settings", file=number, toml=text, path="ring.count", value=3)
+        assert "no field of this file's form" in answer["error"]
         assert (await page.ask(type="save_settings", file=number, toml=text, digest=held["digest"]))["ok"]
         assert run.robot.read_text() == text
         enter(case, Mode.DRIVE)

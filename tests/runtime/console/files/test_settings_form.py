@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from config.files import documents_read, noting_files_read
 from config.load import load_settings
 from config.plugins import DRIVERS, SCHEMAS
 from runtime.console.commands.command_error import CommandError
+from runtime.console.files.settings_files import SettingsFiles
 from runtime.console.files.settings_form import form_of, with_setting
 from runtime.console.sent_messages import SettingsTable
 from tests.installed import install
-from tests.runtime.console.files.test_settings_files import Run
+from tests.runtime.console.files.test_settings_files import ROBOT, Run
 
 PLUG = '''
 from typing import ClassVar, Literal
@@ -60,8 +62,11 @@ schemas = [{name = "noise"}, {name = "orbit", way_m = 0.5}]
 
 @pytest.fixture(autouse=True)
 def _package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    entries = {DRIVERS: {"skippy": "plug_form"}, SCHEMAS: {"orbit": "plug_form:Orbit"}}
-    install(monkeypatch, tmp_path / "site", {"plug_form.py": PLUG}, entries)
+    entries = {DRIVERS: {"skippy": "plug_form"}, SCHEMAS: {"orbit": "plug_form:Orbit"},
+               "echolocate.robots": {"skippy": "plug_robots"}}  # fmt: skip
+    robot = ROBOT.read_text().replace('driver = "denning"', 'driver = "skippy"')
+    files = {"plug_form.py": PLUG, "plug_robots/__init__.py": "", "plug_robots/skippy.toml": robot}
+    install(monkeypatch, tmp_path / "site", files, entries)
 
 
 def values(form: list[SettingsTable]) -> dict[str, object]:
@@ -108,6 +113,20 @@ async def test_a_field_is_changed_checked_by_the_plug_ins_own_model_and_saved(tm
     saved = await run.files.save(number, good, held["digest"])
     assert saved["text"] == run.robot.read_text() == f"{text.rstrip()}\n\n[skippy]\ntrim = 1.5\n"
     assert load_settings(run.config).model_extra
+
+
+async def test_a_packages_own_robot_file_is_read_and_not_changed(tmp_path: Path) -> None:
+    run = Run(tmp_path)
+    run.config.write_text('robot = "skippy"\nworld = "hallway"\n')
+    with noting_files_read():
+        run.load()
+        files = SettingsFiles(documents_read(), run.load, lambda: None)
+    number = next(n for n, row in enumerate(files.listed()) if row["name"] == "robots/skippy.toml")
+    assert files.listed()[number]["shipped"]
+    held = await files.read(number)
+    assert values(held["form"])["skippy.trim"] == 1.0
+    with pytest.raises(CommandError, match="comes with the program"):
+        await files.save(number, held["text"], held["digest"])
 
 
 @pytest.mark.parametrize("path", ["skippy.masks", "ring.count", "skippy.name", "step.0.name"])
