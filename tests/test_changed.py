@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.changed import DRAWN, EVERY, QUICK, RELATED, ROOT, find_tests
+from tests.changed import BOUNDS, DRAWN, EVERY, QUICK, RELATED, ROOT, bounds_changed, find_tests
 from tests.mutation.quick_check import CHANGES, Change
 
 
@@ -41,9 +41,17 @@ def test_a_change_maps_to_tests_by_path(root: Path, changed: list[str], tests: l
     assert find_tests(changed, root) == tests
 
 
+def test_bounds_of_a_state_are_known_by_their_declaration(root: Path) -> None:
+    (root / "perception").mkdir()
+    (root / "perception" / "records.py").write_text("from perception.bounds import Count\n")
+    (root / "perception" / "other.py").write_text("")
+    assert bounds_changed(["a/b.py", "perception/records.py"], root)
+    assert not bounds_changed(["perception/other.py", "perception/removed.py", "perception/bounds.toml"], root)
+
+
 def test_the_quick_tests_exist() -> None:
     related = (name for names in RELATED.values() for name in names)
-    assert [name for name in (*QUICK, *EVERY, *related, DRAWN) if not (ROOT / name).exists()] == []
+    assert [name for name in (*QUICK, *EVERY, *related, DRAWN, BOUNDS) if not (ROOT / name).exists()] == []
 
 
 def test_a_change_of_what_lists_hold_runs_the_tests_of_the_lists() -> None:
