@@ -60,7 +60,7 @@ class RunningPreparation:
     log : structlog logger
         Gets the progress now and then.
     on_ready : callable
-        Called once recognition is ready, before the cycle with which it begins.
+        Called once recognition is ready, between two cycles: it takes milliseconds.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class RunningPreparation:
         """Prepare what the first cycle needs and connect; go on to prepare recognition beside that and the cycles."""
         if self._preparation is not None:
             await self._preparation.ring(settings)
-            self._task = asyncio.create_task(self._preparation(settings), name="preparation")
+            self._task = asyncio.create_task(self._prepare(self._preparation, settings), name="preparation")
         try:
             await connect()
         except BaseException:  # nothing else would end it
@@ -102,7 +102,6 @@ class RunningPreparation:
             is_over, self._preparation = self._preparation.is_over, None
             try:
                 self._task.result()
-                self._on_ready()
             finally:
                 is_over.set()
             return None
@@ -111,6 +110,10 @@ class RunningPreparation:
             self._logged_run_s = run_s
             self._log.info(progress)
         return progress
+
+    async def _prepare(self, preparation: Preparation, settings: Settings) -> None:
+        await preparation(settings)
+        self._on_ready()
 
     async def close(self) -> None:
         """End it."""

@@ -236,9 +236,9 @@ class RobotProcess:
         )
 
     def _on_prepared(self) -> None:
-        """Recognition begins with this cycle: what it took is no part of the run's own footprint."""
-        self._memory.settle()
-        if self._footprint is not None:
+        """Recognition begins with the next cycle: what it took is no part of the run's own footprint."""
+        if self._footprint is not None:  # else the first cycle is still to come, and begins it
+            self._memory.settle()
             self._footprint.begin()
 
     async def _run_cycles(self, seconds: float | None) -> None:

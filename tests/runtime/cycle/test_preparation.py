@@ -20,7 +20,7 @@ from drivers.emulator.faults import Mute
 from runtime.cycle.drive_requests import NO_MAP, DriveRequest
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import fresh_state
+from runtime.cycle.preparation import RunningPreparation, fresh_state
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, Refused, State, step
 from runtime.timing.cycle_stats import CycleStats
@@ -123,6 +123,22 @@ def test_the_robot_drives_before_recognition_is_ready_and_goes_on_with_it(monkey
     assert preparation.is_over.is_set(), "what else is to be loaded has waited for it"
     assert (run.summary["mode"], run.summary["preparing"]) == ("DRIVE", None)
     assert run.summary["process"]["compilations"] == 0
+
+
+async def test_what_begins_with_recognition_is_measured_between_two_cycles() -> None:
+    seen: list[bool] = []
+
+    async def connect() -> None:
+        """Do nothing."""
+
+    running = RunningPreparation(Preparation(0.0), structlog.get_logger(), lambda: seen.append(running.is_running))
+    await running.start(SETTINGS, connect)
+    while not seen:
+        assert running.progress(0.0) is not None
+        await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert running.progress(0.0) is None, "the cycle with which recognition begins"
+    assert seen == [True], "before that cycle, and once"
 
 
 @pytest.mark.usefixtures("warm_kernels")
