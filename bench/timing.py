@@ -38,6 +38,7 @@ START_CONTROL: Final = "start_s, control"
 VIRTUAL: Final = "one second of virtual time, CPU ms"
 VIRTUAL_S: Final = 20.0
 WAKING: Final = "lag"
+CYCLE: Final = "cycle"
 CONTROL: Final = ", control"
 TIMEOUT_S: Final = 90.0
 QUANTILES: Final = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999}
@@ -92,17 +93,18 @@ def measure_timing(plan: TimingPlan, sets: Sequence[str], report: Callable[[str]
     """
     summaries: list[dict[str, Any]] = []
     samples: dict[str, list[float]] = {
-        name: [] for name in (WAKING + CONTROL, ECHO_TO_DRIVE, ECHO_TO_DRIVE + CONTROL)
+        name: [] for name in (WAKING + CONTROL, CYCLE + CONTROL, ECHO_TO_DRIVE, ECHO_TO_DRIVE + CONTROL)
     }
     unanswered, imports_s = 0, []
     with tempfile.TemporaryDirectory(prefix="echolocate-bench-") as name, busy_processes(plan.busy):
         folder = Path(name)
         for turn in range(1, plan.rounds + 1):
             report(f"timing: ours, {plan.seconds:g} s, turn {turn} of {plan.rounds}, {plan.busy} busy processes")
-            summary, late_us = _ours(folder, plan.seconds, sets)
+            summary, woken_us = _ours(folder, plan.seconds, sets)
             summaries.append(summary)
             imports_s.append(_import_s())
-            samples[WAKING + CONTROL] += late_us
+            samples[WAKING + CONTROL] += [late for late, _ in woken_us]
+            samples[CYCLE + CONTROL] += [worked for _, worked in woken_us]
             answers, missing = answers_us(folder / "latency.csv")
             samples[ECHO_TO_DRIVE] += answers
             unanswered += missing
@@ -112,7 +114,7 @@ def measure_timing(plan: TimingPlan, sets: Sequence[str], report: Callable[[str]
     rows = worst_rows(summaries)
     rows |= {name: quantiles_of(taken) for name, taken in samples.items() if taken}
     figures = worst_figures(summaries) | {
-        WINDOW_USED: round(rows["cycle"]["p99"] / (1e6 * window_s(sets)), 4),
+        WINDOW_USED: round(rows[CYCLE]["p99"] / (1e6 * window_s(sets)), 4),
         START_CONTROL: round(max(imports_s), 2),
         VIRTUAL: virtual_ms(sets, plan.rounds),
         "echoes unanswered": float(unanswered),
@@ -192,20 +194,21 @@ def worst_figures(summaries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     return figures
 
 
-def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, Any], list[float]]:
-    """Run the command with a sleeping control; return the summary, and how late the control woke, µs."""
-    summary, late = folder / "run.json", folder / "late.txt"
+def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, Any], list[tuple[float, float]]]:
+    """Run the command with a control; return the summary, and how late the control woke and what it took then, µs."""
+    summary, woken = folder / "run.json", folder / "woken.csv"
     options = [option for text in sets for option in ("--set", text)]
     with emulating(folder, options) as port:
         run = start(
             folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
             "--json", str(summary), "--force", *DRIVE_ON, *options,
         )  # fmt: skip
-        control = start(folder, "wake", "bench.control", "wake", f"{PERIOD_S}", f"{seconds}", str(late))
+        control = start(folder, "wake", "bench.control", "wake", f"{PERIOD_S}", f"{seconds}", str(woken))
         for process, name in ((run, "run"), (control, "wake")):
             finish(folder, process, name, seconds + TIMEOUT_S)
     found: dict[str, Any] = orjson.loads(summary.read_bytes())
-    return found, [float(line) for line in late.read_text().split()]
+    with woken.open(encoding="ascii", newline="") as file:
+        return found, [(float(late), float(worked)) for late, worked in csv.reader(file)]
 
 
 def virtual_ms(sets: Sequence[str], rounds: int) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 import orjson
 import pytest
 
+from bench.control import wake
 from bench.timing import (
     CONTROL,
     ECHO_TO_DRIVE,
@@ -79,6 +80,13 @@ def test_figures_are_the_worst_of_all_runs() -> None:
 def timed(p99: float, control: float) -> Timing:
     rows = {ECHO_TO_DRIVE: quantiles_of([p99]), ECHO_TO_DRIVE + CONTROL: quantiles_of([control])}
     return Timing(PLAN, rows, {"start_s": 2.0, "cpu_share": 0.07})
+
+
+def test_a_control_writes_how_late_it_woke_and_how_long_it_worked(tmp_path: Path) -> None:
+    wake(0.001, 0.01, tmp_path / "woken.csv")
+    rows = [line.split(",") for line in (tmp_path / "woken.csv").read_text("ascii").splitlines()]
+    assert len(rows) == 10
+    assert all(float(late) >= 0.0 and float(worked) > 0.0 for late, worked in rows)
 
 
 def test_echo_to_drive_limit_is_three_milliseconds_beyond_the_control() -> None:
