@@ -2,7 +2,7 @@
 
 ``wake`` sleeps to a grid of deadlines without an event loop, and does the same work after each; ``answer`` sends a
 DRIVE for each ECHO, from a blocking read to a blocking write. Their times are those of the machine under its present
-load: whoever shares its caches and cores makes the same work several times longer now and then.
+load: a neighbour that shares its caches and cores makes the same work several times longer now and then.
 """
 
 from __future__ import annotations
