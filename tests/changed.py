@@ -47,6 +47,8 @@ RELATED = {
     "drivers/registry": ("tests/test_docs.py",),
     "runtime/cli/": ("tests/runtime/cli/test_app.py", "tests/test_docs.py"),
     "docs/": ("tests/test_docs.py", "tests/drivers/contract/test_example.py"),
+    "docs/figures.md": ("tests/bench/test_figures.py",),
+    "bench/figures": ("tests/bench/test_figures.py",),
     "docs/library": ("tests/test_library_pages.py",),
     "config/models/": ("tests/test_library_pages.py",),
     "runtime/cycle/": ("tests/runtime/recording/test_schema.py", "tests/test_extending_page.py"),
@@ -57,8 +59,6 @@ RELATED = {
     "README.md": ("tests/test_docs.py",),
     "CONTRIBUTING.md": ("tests/test_docs.py",),
     "mkdocs.yml": ("tests/test_docs.py",),
-    "docs/extending.md": ("tests/test_extending_page.py",),
-    "docs/tutorial.md": ("tests/runtime/cli/test_tutorial.py",),
     "pyproject.toml": ("tests/test_packaging.py",),
 }
 """Tests that hold a list, a page or a rule for all files whose path begins so, by that beginning."""
@@ -110,6 +110,7 @@ def find_tests(files: Iterable[str], root: Path = ROOT) -> list[str]:
         if name.startswith(PAGE) and path.suffix == ".js":
             found |= touching(path, root)
         if path.suffix != ".py":
+            found |= naming(path, root)
             continue
         found |= {*EVERY}
         if path.parts[0] != "tests":
@@ -160,6 +161,14 @@ def bounds_changed(files: Iterable[str], root: Path = ROOT) -> bool:
     """Return whether a changed file declares bounds of what perception remembers."""
     sources = (root / name for name in files if name.startswith("perception/") and name.endswith(".py"))
     return any(one.exists() and "bounds" in one.read_text("utf-8") for one in sources)
+
+
+def naming(file: Path, root: Path) -> set[str]:
+    """Return the test files that name a document or another file that is no module, if they are few."""
+    said = re.compile(rf"""["'/]{re.escape(file.name)}["']""")
+    tests = (test for test in (root / "tests").rglob("test_*.py") if "browser" not in test.parts)
+    found = {test.relative_to(root).as_posix() for test in tests if said.search(test.read_text("utf-8"))}
+    return found if len(found) <= USERS_MAX else set()
 
 
 def importing(helper: Path, root: Path) -> set[str]:

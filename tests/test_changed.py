@@ -68,6 +68,8 @@ def test_a_change_of_what_lists_hold_runs_the_tests_of_the_lists() -> None:
         ("runtime/cycle/inputs.py", "tests/runtime/recording/test_schema.py"),
         ("behaviors/wander.py", "tests/behaviors/test_schema_registry.py"),
         ("docs/tutorial.md", "tests/runtime/cli/test_tutorial.py"),
+        ("docs/build-a-ring.md", "tests/drivers/firmware/test_bundle.py"),
+        ("docs/extending.md", "tests/test_extending_page.py"),
     ],
 )
 def test_a_change_runs_what_it_breaks_elsewhere(changed: str, test: str) -> None:
