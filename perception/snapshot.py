@@ -28,9 +28,7 @@ OURS: Final = "perception."
 
 def snapshot_of(owner: object) -> Snapshot:
     """Return copies of every array and number in the memory of an object and its parts."""
-    taken: Snapshot = {}
-    _take(owner, "", taken)
-    return taken
+    return {name: _copied(array) for name, array in _arrays(owner)}
 
 
 def bounds_of(owner: object) -> dict[str, Bound]:
@@ -58,7 +56,7 @@ def put_back(owner: object, snapshot: Snapshot) -> None:
         The snapshot is of something else: names, shapes or fields differ. Or numbers that are each in their bounds
         contradict each other, as a part's method `contradiction` says; the object is of no use then.
     """
-    mine = snapshot_of(owner)
+    mine = dict(_arrays(owner))
     if mine.keys() != snapshot.keys():
         strange = sorted(mine.keys() ^ snapshot.keys())
         raise ValueError(f"the snapshot is of another method or version: {', '.join(strange[:3])}")
@@ -115,28 +113,42 @@ def _fields(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]
             yield from _fields(f"{name}.{field}", array[field])
 
 
-def _take(owner: object, path: str, taken: Snapshot) -> None:
+def _arrays(owner: object, path: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the dotted names and the arrays themselves; a number is an array of its own."""
     for name, value in _parts(owner):
         if isinstance(value, np.ndarray):
-            taken[path + name] = _copied(value)
+            yield path + name, value
         elif isinstance(value, bool | int | float):
-            taken[path + name] = np.array(value)
+            yield path + name, np.array(value)
         else:
-            _take(value, f"{path}{name}.", taken)
+            yield from _arrays(value, f"{path}{name}.")
 
 
 def _copied(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a copy with zeros for scratch, byte by byte: numpy copies records field by field, six times as long."""
+    """Return a copy with zeros for scratch."""
+    if array.dtype.fields is None:
+        return array.copy()
+    copied = np.zeros(array.shape, array.dtype)
+    _overwrite(copied, array)
+    return copied
+
+
+def _overwrite(array: NDArray[Any], source: NDArray[Any]) -> None:
+    """Copy all but scratch, records byte by byte: numpy copies them field by field, which takes six times as long."""
     fields = array.dtype.fields
     if fields is None:
-        return array.copy()
-    copied = np.empty(array.shape, array.dtype)
-    data = _bytes_of(copied)
-    data[...] = _bytes_of(array if array.flags.c_contiguous else array.copy())
+        array[...] = source
+        return
+    if not (array.flags.c_contiguous and source.flags.c_contiguous):
+        for name in fields.keys() - {SCRATCH_FIELD}:
+            array[name] = source[name]
+        return
+    ours, theirs = _bytes_of(array), _bytes_of(source)
+    begin = end = array.dtype.itemsize
     if SCRATCH_FIELD in fields:
-        begin, size = fields[SCRATCH_FIELD][1], array.dtype[SCRATCH_FIELD].itemsize
-        data[:, begin : begin + size] = 0
-    return copied
+        begin = fields[SCRATCH_FIELD][1]
+        end = begin + array.dtype[SCRATCH_FIELD].itemsize
+    ours[:, :begin], ours[:, end:] = theirs[:, :begin], theirs[:, end:]
 
 
 def _bytes_of(records: NDArray[Any]) -> NDArray[np.uint8]:
@@ -149,18 +161,11 @@ def _put(owner: object, path: str, snapshot: Snapshot) -> None:
         if name == GROWING:
             setattr(owner, name, snapshot[path + name].copy())
         elif isinstance(value, np.ndarray):
-            scratch = value[SCRATCH_FIELD].copy() if _has_scratch(value) else None
-            value[...] = snapshot[path + name]
-            if scratch is not None:
-                value[SCRATCH_FIELD] = scratch
+            _overwrite(value, snapshot[path + name])
         elif isinstance(value, bool | int | float):
             setattr(owner, name, type(value)(snapshot[path + name].item()))
         else:
             _put(value, f"{path}{name}.", snapshot)
-
-
-def _has_scratch(array: NDArray[Any]) -> bool:
-    return SCRATCH_FIELD in (array.dtype.names or ())
 
 
 def fixed_shape(name: str, shape: Sequence[int]) -> tuple[int, ...]:

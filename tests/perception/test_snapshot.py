@@ -56,21 +56,39 @@ def test_scratch_inside_an_array_is_zero_in_a_snapshot_and_left_alone_by_it() ->
     assert owner.array.item() == (1.0, 6.0)
 
 
+def kept_of(records: NDArray[Any]) -> list[bytes]:
+    """Return the values of what a snapshot keeps, without the gaps between them."""
+    return [records["a"].tobytes(), records["b"]["y"].tobytes(), records["b"]["z"].tobytes()]
+
+
 @pytest.mark.parametrize("shape", [(), (0,), (1,), (3, 2)])
-def test_records_are_copied_whole(shape: tuple[int, ...]) -> None:
+def test_records_are_copied_whole_there_and_back(shape: tuple[int, ...]) -> None:
     dtype = np.dtype(
         [("a", "i1"), ("scratch", [("x", float, 3)]), ("b", [("y", "i8", (2, 2)), ("z", "?")])], align=True
     )
     owner, rng = Owner(), np.random.default_rng(0)
-    owner.array = np.frombuffer(rng.bytes(math.prod(shape) * dtype.itemsize), dtype).reshape(shape).copy()
-    for array in (owner.array, owner.array.T):  # one of which is not contiguous
-        owner.array = array
-        taken = snapshot_of(owner)["array"]
-        assert taken.dtype == dtype
-        assert not np.shares_memory(taken, array)
-        assert not taken["scratch"]["x"].any()
-        for name in ("a", "b"):
-            assert taken[name].tobytes() == array[name].tobytes()
+    records = np.frombuffer(rng.bytes(math.prod(shape) * dtype.itemsize), dtype).reshape(shape).copy()
+    for array in (records, records.T):  # one of which is not contiguous
+        owner.array, before, scratch = array, kept_of(array), array["scratch"]["x"].tobytes()
+        snapshot = snapshot_of(owner)
+        assert snapshot["array"].dtype == dtype
+        assert not np.shares_memory(snapshot["array"], array)
+        assert not snapshot["array"]["scratch"]["x"].any()
+        assert kept_of(snapshot["array"]) == before
+        array["a"], array["b"] = 0, np.zeros((), dtype["b"])
+        put_back(owner, snapshot)
+        assert owner.array is array
+        assert kept_of(array) == before
+        assert array["scratch"]["x"].tobytes() == scratch
+
+
+def test_records_with_other_places_in_memory_are_another_version() -> None:
+    owner, fields = Owner(), [("a", float), ("b", float)]
+    owner.array = np.zeros(2, fields)
+    snapshot = snapshot_of(owner)
+    dtype = np.dtype({"names": ["a", "b"], "formats": [float, float], "offsets": [8, 0]})
+    with pytest.raises(ValueError, match="array has other fields"):
+        put_back(owner, snapshot | {"array": np.zeros(2, dtype)})
 
 
 def test_a_snapshot_of_something_else_is_refused() -> None:
