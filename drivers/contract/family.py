@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from typing import Any, Final
 
+from config.files import list_shipped
 from config.load import load_robot
 from config.robot import RingConfig, RobotConfig
 from config.world import WallConfig, WorldConfig
@@ -144,10 +145,19 @@ def family_of(robot: RobotConfig | str, **known: Any) -> Family:
 
 
 def find_family(name: str) -> Family:
-    """Return the family that a call names: a robot, by its name or its file, or `module:FAMILY`."""
-    if ":" not in name:
+    """Return the family that a call names: a robot, by its name or its file, or `module:FAMILY`.
+
+    A module without that name which a robot is called after is this robot's: what its file says describes it whole.
+    """
+    module, _, attribute = name.partition(":")
+    if not attribute:
         return family_of(name)
-    found = EntryPoint("family", name, "").load()
+    try:
+        found = EntryPoint("family", name, "").load()
+    except AttributeError:
+        if module not in list_shipped("robots"):
+            raise
+        return family_of(module)
     if not isinstance(found, Family):
         raise TypeError(f"{name} is {type(found).__name__}, expected a drivers.contract.family.Family")
     return found

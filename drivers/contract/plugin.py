@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
+from config.errors import UserError
+from drivers.driver import DriverError
+
 if TYPE_CHECKING:
     from drivers.contract.family import Family
 
@@ -36,10 +39,22 @@ class _Measurements:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Collect the contract, and nothing else."""
+    """Collect the contract, and nothing else.
+
+    Raises
+    ------
+    pytest.UsageError
+        The option names no robot that can be loaded.
+    """
     for marker in MARKERS:
         config.addinivalue_line("markers", marker)
     pytest.register_assert_rewrite("drivers.contract.cable")
+    from drivers.contract.family import find_family
+
+    try:
+        find_family(config.getoption(OPTION))
+    except (UserError, DriverError, ImportError, AttributeError, TypeError) as error:
+        raise pytest.UsageError(f"--echolocate-family {config.getoption(OPTION)}: {error}") from None
     config.args = [str(Path(__file__).with_name(f"{part}.py")) for part in PARTS]
     config.option.reportchars += "s"
     config.pluginmanager.register(_Measurements())

@@ -26,3 +26,5 @@ def test_it_is_found_by_a_robots_name_or_in_a_module() -> None:
     assert find_family("tests.drivers.contract.families:CHIRP") is CHIRP
     with pytest.raises(TypeError, match="expected a"):
         find_family("tests.drivers.contract.families:CHIRP_RING")
+    with pytest.raises(AttributeError):
+        find_family("tests.drivers.contract.families:NONE")

@@ -48,3 +48,9 @@ def test_a_project_with_packages_of_our_names_is_tested_as_without_us(tmp_path: 
     done = run(tmp_path, "--echolocate-family", "denning")
     assert done.returncode == 4, done.stdout + done.stderr
     assert "drivers/__init__.py hides echolocate's own package 'drivers'" in done.stderr
+
+
+def test_a_robot_that_there_is_not_is_said_once(tmp_path: Path) -> None:
+    done = run(tmp_path, "--echolocate-family", "nonesuch")
+    assert done.returncode == 4, done.stdout + done.stderr
+    assert '--echolocate-family nonesuch: robot "nonesuch": no such robot' in done.stderr

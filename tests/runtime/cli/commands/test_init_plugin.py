@@ -26,7 +26,9 @@ def test_a_robot_is_a_package_that_keeps_the_contract_in_less_than_a_hundred_lin
     assert len(files) == 3
     assert sum(len(file.read_text().splitlines()) for file in files) < 100
     install_editable(tmp_path / "skippy")
-    options = "-q -p no:cacheprovider --disable-plugin-autoload -p echolocate_pytest --echolocate-family skippy"
+    options = (
+        "-q -p no:cacheprovider --disable-plugin-autoload -p echolocate_pytest --echolocate-family skippy:FAMILY"
+    )
     command = [sys.executable, "-m", "pytest", *options.split()]
     environment = {**os.environ, "PYTHONPATH": f"{tmp_path / 'skippy'}:{ROOT}"}
     empty = tmp_path / "empty"
