@@ -279,9 +279,16 @@ def corner(
                 faces[side] = fit_line(w[mine], n, centre, c, opt - 0.02, gate, 9.0, var0, rel2, 3)
         edge = corner()
     best = np.zeros(len(w))
-    for n, c in faces:
+    errors = [np.abs(line_error(w, centre, n, c)) for n, c in faces]
+    for side, (n, c) in enumerate(faces):
         v = evidence(noise, w[:, 4], line_error(w, centre, n, c))
-        best = np.maximum(best, np.where(w[:, 2:4] @ n >= opt, v, 0.0))
+        is_heard = w[:, 2:4] @ n >= opt
+        if edge is not None:  # a face ends there
+            feet = (w[:, :2] - edge) @ np.array([-n[1], n[0]])
+            own = is_heard & (errors[side] <= errors[1 - side])
+            way = 1.0 if np.where(feet[own] > 0.0, 1, -1).sum() > 0 else -1.0
+            is_heard &= way * feet >= 0.0
+        best = np.maximum(best, np.where(is_heard, v, 0.0))
     if edge is not None:
         there = look(w, edge)
         v = evidence(noise, w[:, 4], w[:, 4] - there.d)
