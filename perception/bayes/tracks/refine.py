@@ -335,7 +335,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         return
     if s[0].rays > 0:
         compare_rays(s, p, track, n)
-    careful = is_careful(s, p)
+    careful = is_careful(s, tracks, p)
     add_residuals(s, tracks, p, t, n, careful)
     is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
     if track.kind < p[0].model_count and is_due:

@@ -194,6 +194,26 @@ def is_on_straight_span(wall: Wall, along: float) -> bool:
 
 
 @kernel
+def cuts_circle(room: WallMap, x: float, y: float, radius: float) -> bool:
+    """Return whether a wall that is straight beyond doubt passes through a circle, at least this near to its centre.
+
+    Parameters
+    ----------
+    room : WallMap
+        The walls.
+    x, y, radius : float
+        The centre, and how near, m.
+    """
+    for k in range(MAX_WALLS):
+        wall = room.walls[k]
+        if wall.weight > 0.0:
+            distance, along = distance_and_foot(wall, x, y)
+            if abs(distance) < radius and is_on_straight_span(wall, along):
+                return True
+    return False
+
+
+@kernel
 def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float) -> tuple[int, int, float]:
     """Return the wall that explains an echo best, where from, and the error as a share of the greatest explained.
 

@@ -10,6 +10,7 @@ import pytest
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.parameters import CONFIRMED_SIDES, TRUSTED_M
 from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
+from perception.bayes.memory.wall_records import Wall
 from perception.bayes.tracks import model_check
 from tests import naive_bayes, naive_naming, naive_walls
 from tests.naive_walls import Array
@@ -56,9 +57,17 @@ def room_evidence(w: Array, walls: list[tuple[float, float]], corner: Array, edg
     return best
 
 
+def is_in_wall(wall: Wall, normal: float, distance: float, centre: Array, rho: float) -> bool:
+    """Return whether a wall's only span passes a circle within 0.7 of its radius, if it is straight beyond doubt."""
+    n, span = np.array([math.cos(normal), math.sin(normal)]), wall.spans[0]
+    along = float(centre @ (-n[1], n[0]))
+    is_straight = wall.span_count > 0 and span.chi2 > 60.0 and span.weight > 20.0
+    return bool(is_straight and abs(distance - centre @ n) < 0.7 * rho and span.low <= along <= span.high)
+
+
 @examples(40, 400)
 def test_room_and_sides_are_those_of_the_hits(examples: int) -> None:
-    rng, wide, explained = np.random.default_rng(60), 0, 0
+    rng, wide, explained, cut = np.random.default_rng(60), 0, 0, 0
     for _ in range(examples):
         memory, room = new_room()
         memory.state["noise_level"] = level = int(rng.integers(4, 20))
@@ -83,12 +92,15 @@ def test_room_and_sides_are_those_of_the_hits(examples: int) -> None:
         want = naive_naming.model_check(
             naive_bayes.evidence(noises()[level], w[:, 4], e), by_room, np.arctan2(seen_u[:, 1], seen_u[:, 0])
         )  # fmt: skip
-        assert track.room_lead == pytest.approx(want[0], rel=1e-6, abs=1e-6)
+        is_cut = any(is_in_wall(room.walls[k], *walls[k], centre, rho) for k in range(2))
+        cut += is_cut
+        assert track.room_lead == pytest.approx(max(want[0], 0.0) if is_cut else want[0], rel=1e-6, abs=1e-6)
         assert track.sides == want[1]
         wide += want[1] >= CONFIRMED_SIDES
         explained += int((by_room > 0.0).sum())
     assert 0.1 * examples < wide < examples
     assert explained > 0.5 * examples
+    assert 0.1 * examples < cut < 0.9 * examples
 
 
 def hear(memory: Memory, ranges: list[float], moved_m: float = 0.0) -> None:
@@ -115,12 +127,12 @@ def test_everything_echoes_where_hardly_a_beam_is_silent() -> None:
 def test_a_withdrawn_name_makes_careful_until_a_model_is_confirmed() -> None:
     memory = new_memory()
     hear(memory, [1.0, 2.0 * FAR], TRUSTED_M + 1.0)
-    assert not model_check.is_careful(memory.s, P)
+    assert not model_check.is_careful(memory.s, memory.tracks, P)
     track = memory.tracks[0]
     track.status, track.radius = FREE, 0.3
     model_check.count_names(memory.s, memory.tracks, P, 0, 5.0, 5.0)
     assert memory.s[0].names_withdrawn == 1
-    assert model_check.is_careful(memory.s, P)
+    assert model_check.is_careful(memory.s, memory.tracks, P)
     other = memory.tracks[1]
     other.status, other.is_named, other.x, other.y = ESTABLISHED, 1, 5.0, 5.1
     model_check.count_names(memory.s, memory.tracks, P, 0, 5.0, 5.0)
@@ -135,4 +147,35 @@ def test_a_withdrawn_name_makes_careful_until_a_model_is_confirmed() -> None:
     other.leads[1] = -4.0
     model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
     assert (other.is_confirmed, memory.s[0].names_withdrawn, memory.s[0].unconfirmed_m) == (1, 0, 0.0)
-    assert not model_check.is_careful(memory.s, P)
+    assert not model_check.is_careful(memory.s, memory.tracks, P)
+
+
+def test_where_most_bodies_are_something_else_the_prior_is_against_a_model() -> None:
+    memory, model, rival = new_memory(), 0, S.model_count
+    for t, kind in enumerate((model, rival, rival)):
+        track = memory.tracks[t]
+        track.status, track.kind, track.probability = ESTABLISHED, kind, 0.99
+    memory.tracks[0].is_named, memory.tracks[2].probability = 1, 0.9
+    hear(memory, [1.0, 2.0 * FAR])
+    assert not model_check.is_careful(memory.s, memory.tracks, P), "the second rival is not sure"
+    memory.tracks[2].probability = 0.96
+    assert model_check.is_careful(memory.s, memory.tracks, P)
+    memory.tracks[2].status = FREE
+    assert not model_check.is_careful(memory.s, memory.tracks, P)
+
+
+def test_no_model_stands_in_a_wall() -> None:
+    """A wall that is straight beyond doubt passes a body at a third of its radius."""
+    memory, room = new_room()
+    wall = room.walls[0]
+    place_wall(wall, np.array([2.0, 0.0]), 0.0)
+    wall.span_count, span = 1, wall.spans[0]
+    span.low, span.high, span.weight = -1.0, 1.0, 30.0
+    track = memory.tracks[0]
+    track.kind, track.radius, track.x, track.y = 0, 0.3, 1.9, 0.0
+    enter_readings(memory, np.array([[0.5, y, 1.0, 0.0, 1.1] for y in (-0.2, 0.0, 0.2)]))
+    predict_own(memory, 3, np.array([1.9, 0.0]), 0.3)
+    for chi2, is_cut in ((50.0, False), (70.0, True)):
+        span.chi2 = chi2
+        model_check.check_model(memory.s, P, track, 3)
+        assert (track.room_lead >= 0.0) == is_cut
