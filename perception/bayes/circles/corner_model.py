@@ -237,7 +237,7 @@ def foot_from_edge(q: Reading, corner: CornerFit, side: int) -> float:
 def way_of_face(
     readings: Records[Reading], facing: Ints, cx: float, cy: float, corner: CornerFit, side: int, cos_may: float
 ) -> float:
-    """Return on which side of the edge a face lies along its line, 1 or −1: where most of its own echoes have their feet.
+    """Return on which side of the edge a face lies along its line, 1 or −1: where most of its echoes have their feet.
 
     Parameters
     ----------
