@@ -28,6 +28,7 @@ from bench.trials.wall_trials import (
 )
 from config.settings import Settings
 from config.units import FOOT_M
+from config.world import DrumConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
 from drivers.firing_pattern import firing_pattern
@@ -42,6 +43,13 @@ EXPLAINED_M: Final = 0.1
 NEAR_M: Final = 0.15
 """Reported length is false if no surface is this near."""
 PIECE_M: Final = 0.05
+SIDES: Final = 36
+SIDES_MIN: Final = 8
+SIDE_ECHOES: Final = 3
+"""A drum was driven round if so many of its sides of 10° answered, each so often: 80°. With fewer, and with its true
+echoes alone, it leads a body of unknown outline by 4 to 7 nat, as circles through legs and doorways do."""
+ON_DRUM_M: Final = 0.02
+"""An echo's place is so near to the outline of the drum from which it came."""
 SAID: Final = 0.5
 """Least probability of a drum that is said."""
 ROUND: Final = ("drum", "semicircle")
@@ -58,6 +66,8 @@ class ImperfectTrial:
         How many stand there, and how many were found and said in vain.
     drum_errors_m : tuple of float
         Of those found.
+    drums_round, drums_round_found : int
+        How many were driven round, and how many of these were found.
     walls_answered_m, walls_found_m : float
         Length of the walls that answered, and of those parts that were reported.
     walls_m, walls_false_m : float
@@ -74,6 +84,8 @@ class ImperfectTrial:
     drums_found: int
     drums_false: int
     drum_errors_m: tuple[float, ...]
+    drums_round: int
+    drums_round_found: int
     walls_answered_m: float
     walls_found_m: float
     walls_m: float
@@ -105,6 +117,8 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
     drums = [d for d in room.world.drum if d.radius_m == DRUM_RADIUS_M]
     said = [(it.x, it.y) for it in seen if it.model in ROUND and it.score >= SAID]
     rows, false = match_drums(room.world.model_copy(update={"drum": tuple(drums)}), said)
+    is_found = [row["error"] is not None for row in rows]
+    is_round = [sides(heard.points, drum) >= SIDES_MIN for drum in drums]
     walls, corners = reported_walls(seen), reported_corners(seen)
     whole = compare(heard.walls, heard.answered, walls, compare_corners(heard.corners, heard.echoes, corners))
     lines, away = reported_lines(perception), away_from(heard.points, walls, corners)
@@ -115,9 +129,11 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
     with_lines = np.minimum(away, distances(heard.points, lines))
     return ImperfectTrial(
         drums=len(drums),
-        drums_found=sum(row["error"] is not None for row in rows),
+        drums_found=sum(is_found),
         drums_false=false,
         drum_errors_m=tuple(row["error"] for row in rows if row["error"] is not None),
+        drums_round=sum(is_round),
+        drums_round_found=sum(a and b for a, b in zip(is_round, is_found, strict=True)),
         walls_answered_m=whole.answered_m,
         walls_found_m=whole.found_m,
         walls_m=sum(it.length_m for it in walls),
@@ -130,6 +146,22 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
         explained=int((away < EXPLAINED_M).sum()),
         explained_with_lines=int((with_lines < EXPLAINED_M).sum()),
     )
+
+
+def sides(points: Floats, drum: DrumConfig) -> int:
+    """Return how many sides of a drum answered often enough to count.
+
+    Parameters
+    ----------
+    points : (n, 2) float
+        Where echoes came from, m.
+    drum : DrumConfig
+        The drum.
+    """
+    dx, dy = (points - (drum.x_m, drum.y_m)).T
+    is_on = np.abs(np.hypot(dx, dy) - drum.radius_m) < ON_DRUM_M
+    side = np.floor(np.arctan2(dy[is_on], dx[is_on]) / (2.0 * math.pi) * SIDES).astype(int) % SIDES
+    return int((np.bincount(side, minlength=SIDES) >= SIDE_ECHOES).sum())
 
 
 def distances(points: Floats, pieces: Sequence[Segment]) -> Floats:
@@ -187,6 +219,8 @@ def figures(trials: Sequence[ImperfectTrial]) -> dict[str, float]:
         "rooms": len(trials),
         "drums": total("drums"),
         "found": total("drums_found"),
+        "driven round": total("drums_round"),
+        "of these found": total("drums_round_found"),
         "false": total("drums_false"),
         "error, ft": float(np.mean(errors_ft)) if errors_ft else math.nan,
         "worst, ft": max(errors_ft, default=math.nan),
