@@ -213,7 +213,7 @@ def place_readings(
     turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
     new = []
     for i, (mount, r) in enumerate(zip(mounts, ranges, strict=True)):
-        if not r > span[0] + half_box:
+        if not r >= 0:
             continue
         q = np.array([
             *(np.array(pose[:2]) + turn @ mount[:2]), *(turn @ [math.cos(mount[2]), math.sin(mount[2])]),
@@ -235,7 +235,8 @@ def place_readings(
             stands[i] = (1, 0) if old is None else (9, 0)
         if stands[i][0] in (1, 9):
             last[i] = q
-        new.append((*q, float(i)))
+        if r > span[0] + half_box:
+            new.append((*q, float(i)))
     return new
 
 

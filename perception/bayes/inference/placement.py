@@ -83,7 +83,7 @@ def place_readings(
     m = 0
     for i in range(ranges.shape[0]):
         r = ranges[i]
-        if not r > least:  # also true for NaN
+        if not r >= 0.0:  # also true for NaN
             continue
         if r >= p[0].range_max_m:
             r = 2.0 * FAR
@@ -112,6 +112,8 @@ def place_readings(
         q.listener_x = q.listener_y = 0.0
         if sensor.looks == 1 or sensor.looks == COUNTED:  # Later ones from there may be strays.
             copy_reading(q, last)
+        if r <= least:  # after the above, or the next range from here would be the first look
+            continue
         scratch.fired_sensors[m] = i
         scratch.explained_by[m] = UNEXPLAINED
         m += 1

@@ -60,6 +60,9 @@ def test_readings_are_placed_and_remembered(examples: int) -> None:
 def test_the_least_range_of_the_ring_is_no_reading() -> None:
     memory = new_memory()
     ranges = np.full(SENSORS, S.range_min_m)
-    assert placement.place_readings(memory.s, P, MOUNTS, 0.0, 0.0, 0.0, ranges) == 0
+    for _ in range(2):
+        assert placement.place_readings(memory.s, P, MOUNTS, 0.0, 0.0, 0.0, ranges) == 0
     ranges[1] += S.half_resolution_m + 0.001
+    assert placement.place_readings(memory.s, P, MOUNTS, 0.0, 0.0, 0.0, ranges) == 0, "the third look from here"
+    memory = new_memory()
     assert placement.place_readings(memory.s, P, MOUNTS, 0.0, 0.0, 0.0, ranges) == 1
