@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -36,8 +37,14 @@ PLACED: Final = 800
 """Echoes that these are compared with."""
 PARTS: Final = 12
 """Parts of the time in which an exchange is judged."""
+GAIN_NAT: Final = math.log(300.0 * 100.0)
+"""What the moved columns' echoes must gain before their own sum counts, nat: some 300 pairs of columns are tried, and
+one log in a hundred has exchanged ones. In halls of mirrors columns in their order gained up to 6 nat, and evenly."""
+ORDERS: Final = 3
+"""How many of the orders that are tried are judged, besides the last one."""
 ROUNDS: Final = 3
-"""How often columns are tried: each time against the echoes as the last order places them."""
+"""How often columns are tried: against the echoes as the last order places them, in the second round those that it
+leaves where they are."""
 
 
 def mirrored_columns(ring: RingConfig) -> NDArray[np.int64]:
@@ -189,28 +196,38 @@ def find_exchange(
     is_first = np.random.default_rng(0).random(table.ranges.shape) < 0.5
     first, second = (table._replace(ranges=np.where(kept, table.ranges, np.nan)) for kept in (is_first, ~is_first))
     own = np.arange(table.ranges.shape[1])
-    orders = [own]
-    for _ in range(ROUNDS):
-        fits = _fits(first, robot, way, (range_m, range_m * length_per_range), orders[-1])
-        tried = _exchanged(fits, orders[-1])
+    orders, units = [own], (range_m, range_m * length_per_range)
+    for number in range(ROUNDS):
+        among = _alike(orders[-1]) if number % 2 else None
+        tried = _exchanged(_fits(first, robot, way, units, orders[-1], among), orders[-1])
         if not tried:
             break
         orders += tried
     if len(orders) == 1:
         return None
-    kept = echo_scores(second, robot, list(others), range_m, length_per_range).values()
+    kept = echo_scores(second, robot, list(dict.fromkeys([way, *others])), range_m, length_per_range)
     exchanges = []
-    for order in (orders[1], orders[-1]):
+    for order in orders[1 : 1 + ORDERS] + orders[-1:]:
         ordered = second._replace(ranges=second.ranges[:, np.argsort(order)])
         scores = echo_scores(ordered, robot, [way], range_m, length_per_range)[way]
-        exchanges.append(Exchange(way, order, min(sureness(scores, other) for other in kept)))
+        surely = {one: sureness(scores, kept[one]) for one in kept}
+        moved = _gains(_fits(second, robot, way, units, order, _alike(order)), order)
+        is_few = 2 * np.count_nonzero(order != own) <= len(own)  # of all columns' echoes, few differ
+        if is_few and surely[way] > 0.0 and float(moved.sum()) > GAIN_NAT:
+            surely[way] = max(surely[way], sureness(moved, np.zeros(PARTS)))
+        exchanges.append(Exchange(way, order, min(surely.values())))
     return max(exchanges, key=lambda one: one.surely)
 
 
 def _fits(
-    table: Table, robot: RobotConfig, way: Angles, units: tuple[float, float], order: NDArray[np.int64]
+    table: Table,
+    robot: RobotConfig,
+    way: Angles,
+    units: tuple[float, float],
+    order: NDArray[np.int64],
+    among: NDArray[np.bool_] | None = None,
 ) -> list[Floats]:
-    """Return for each column how well the other columns' echoes explain each of its own, (sensors, echoes).
+    """Return for each column how well other columns' echoes explain each of its own, (sensors, echoes).
 
     Parameters
     ----------
@@ -220,11 +237,14 @@ def _fits(
         Of ranges and of positions, m.
     order
         The sensor of each column, for the others' echoes.
+    among
+        The columns that count as others; all if not given.
     """
     mounts, (range_m, length_m) = np.array(robot.ring.mounts), units
     rng = np.random.default_rng(0)
     rows, columns = np.nonzero(np.isfinite(table.ranges))
-    some = rng.permutation(len(rows))[:PLACED]
+    some = np.arange(len(rows)) if among is None else np.flatnonzero(among[columns])
+    some = rng.permutation(some)[:PLACED]
     reach = range_m * table.ranges[rows[some], columns[some]]
     x, y = echo_places(table.pose[rows[some]], way, mounts[order[columns[some]]], reach, length_m)
     fits = []
@@ -240,17 +260,36 @@ def _fits(
     return fits
 
 
+def _alike(order: NDArray[np.int64]) -> NDArray[np.bool_] | None:
+    """Return the columns that an order leaves to their sensors: their echoes speak for no order; None if none."""
+    alike: NDArray[np.bool_] = order == np.arange(len(order))
+    return alike if alike.any() else None
+
+
+def _gains(fits: list[Floats], order: NDArray[np.int64]) -> Floats:
+    """Return by how much moved columns' echoes are explained better than in the file's order, in parts of the time.
+
+    Only these columns' echoes differ, so all others would only blur the sum.
+    """
+    gains = [fits[column][sensor] - fits[column][column] for column, sensor in enumerate(order) if sensor != column]
+    return np.array([sum(float(part.sum()) for part in parts) for parts in _parts(gains)])
+
+
+def _parts(gains: Iterable[Floats]) -> Iterator[tuple[Floats, ...]]:
+    """Yield the gains of several columns in each part of the time."""
+    return zip(*(np.array_split(each, PARTS) for each in gains), strict=True)
+
+
 def _exchanged(fits: list[Floats], order: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return the orders after one exchange of two columns that both gain by it, after two, …; greatest gain first."""
+    """Return the orders after one exchange of two columns that gain by it, after two, …; greatest gain first."""
     orders = [order]
     while True:
         order, best, gain = orders[-1], None, 0.0
         for i, j in itertools.combinations(range(len(order)), 2):
             gains = (fits[i][order[j]] - fits[i][order[i]], fits[j][order[i]] - fits[j][order[j]])
             total = sum(float(each.sum()) for each in gains)
-            if total > gain and all(len(each) >= PARTS and each.mean() > 0.0 for each in gains):
-                parts = zip(*(np.array_split(each, PARTS) for each in gains), strict=True)
-                sums = np.array([sum(float(part.sum()) for part in both) for both in parts])
+            if total > gain and all(len(each) >= PARTS for each in gains):
+                sums = np.array([sum(float(part.sum()) for part in both) for both in _parts(gains)])
                 if sureness(sums, np.zeros(PARTS)) > TRIED:
                     best, gain = [i, j], total
         if best is None:
