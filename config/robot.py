@@ -27,6 +27,9 @@ SOUND_SPEED_M_S = 343.0
 SENSORS_MAX = 255
 """Largest number of sensors in a ring, and of sets in a firing pattern; bounds the memory for a faulty file."""
 
+ECHO_LAG_MAX_S: Final = 0.35
+"""Most by which ranges may lag behind odometry, or odometry behind ranges, s."""
+
 PASSAGE_M: Final = 0.085
 """Room on either side of its rim with which a robot passes a gap at its cautious velocity.
 
@@ -180,6 +183,9 @@ class RingConfig(Strict):
     """Greatest range that a sensor reports, m."""
     firing: Annotated[FiringConfig, BeforeValidator(_preset_as_table)] = FiringConfig(preset="octets")
     """The firing pattern: a preset's name, or a table."""
+    echo_lag_s: float = Field(default=0.0, ge=-ECHO_LAG_MAX_S, le=ECHO_LAG_MAX_S)
+    """Time by which the ranges lag behind odometry, s, as `echolocate calibrate` finds it; below 0, odometry lags. It
+    is estimated as the robot drives; this is what the estimate begins with."""
 
     @model_validator(mode="after")
     def _whole_ring(self) -> RingConfig:

@@ -53,6 +53,7 @@ from perception.vacant_areas import VacantArea, VacantAreas
 
 if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
+    from perception.localization.submaps.echo_lag import EchoLag
     from perception.mapping.grid.evidence_grid import EvidenceGrid
 
 __all__ = ["DetectedObject", "Perception"]
@@ -90,11 +91,11 @@ class Perception:
         self._ring = ring
         self.known_room: KnownRoom | None = None
         self.room: WorldConfig | None = None
-        """The room of the settings, where there is one, and what finds the robot in it."""
         self.grid: EvidenceGrid | None = None
-        """The evidence grid in the odometry's frame, where the settings have one."""
+        """In the odometry's frame, where the settings have one."""
         self.surfaces = NoSurfaces()
         """The map of surfaces in the frame of `method`."""
+        self.echo_lag: EchoLag | None = None
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
         self._half_angle, self._models = math.radians(ring.beam_half_angle_deg), tuple(models)
@@ -117,22 +118,18 @@ class Perception:
         """Begin to recognise these models, with an empty map, as at a start; or stop, and have no map."""
         self._models = tuple(models)
         parts = begin_recognition(self._ring, models, config) if on else NO_RECOGNITION
-        self.method, self._other, self.map_frame, self.known_room, self.grid, self.surfaces = parts
+        self.method, self._other, self.map_frame, self.known_room, self.grid, self.surfaces, self.echo_lag = parts
         self.room = config.localization.known_room if on else None
 
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return any(one.can_refine for one in self._refined()) or self.canyon_map.is_due or self._can_localize
+        return any(one.can_refine for one in self._refined()) or self.canyon_map.is_due
 
     @property
     def converged(self) -> bool:
         """Whether nothing is left to improve, now or with the next firing."""
-        return all(one.converged for one in self._refined()) and not self.canyon_map.is_due and not self._can_localize
-
-    @property
-    def _can_localize(self) -> bool:
-        return (self.known_room or self.map_frame).can_refine
+        return all(one.converged for one in self._refined()) and not self.canyon_map.is_due
 
     @property
     def counts(self) -> MapCounts:
@@ -152,6 +149,8 @@ class Perception:
         trusted, possible = self.sensor_monitor.filter(firing)
         self.sensor_monitor.mask_stuck(self.ring_monitor.observe(possible))
         self._echoes.update(possible)
+        if self.echo_lag is not None:
+            trusted = self.echo_lag.follow(trusted)
         if self.known_room is not None:
             self.known_room.observe(trusted)
         placed = self._correct(trusted)
@@ -187,9 +186,6 @@ class Perception:
         if self.canyon_map.is_due:
             radii_m = {one.name: one.arc_radius_m for one in self._models if one.arc_radius_m is not None}
             self.canyon_map.refine(self._in_odometry(self.vacant.outside(self.method.labelled_objects())), radii_m)
-            return 1
-        if self._can_localize:
-            (self.known_room or self.map_frame).refine()
             return 1
         return next((one.refine() for one in self._refined()[1:] if one.can_refine), 0)
 
@@ -337,7 +333,8 @@ class Perception:
 
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
-        for part in (*self._methods(), self.map_frame, self.known_room, self.sensor_monitor, self.ring_monitor):
+        monitors = (self.sensor_monitor, self.ring_monitor)
+        for part in (*self._methods(), self.map_frame, self.known_room, self.echo_lag, *monitors):
             if part is not None:
                 part.reset()
         for memory in (self.grid, self.surfaces, self.vacant, self.canyon_map, self._echoes):
@@ -369,8 +366,10 @@ class Perception:
         """Return the methods that enter firings."""
         return (self.method,) if self.map_frame.is_applied else self._methods()
 
-    def _refined(self) -> tuple[Method | NoSurfaces, ...]:
-        return (*self._fed(), self.surfaces)
+    def _refined(self) -> tuple[Method | NoSurfaces | OdometryFrame | KnownRoom | EchoLag, ...]:
+        """Return what takes quanta, in that order; `canyon_map` follows the first."""
+        parts = (self.method, self.known_room or self.map_frame, *self._fed()[1:], self.surfaces)
+        return parts if self.echo_lag is None else (*parts, self.echo_lag)
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""
@@ -395,6 +394,7 @@ class Perception:
             The snapshot was made with other settings.
         """
         put_back(self, snapshot)
-        for part in (*self._methods(), self.vacant, self.grid, self.surfaces, self.map_frame, self.known_room):
+        places = (self.map_frame, self.known_room, self.echo_lag)
+        for part in (*self._methods(), self.vacant, self.grid, self.surfaces, *places):
             if part is not None:
                 part.drop_caches()

@@ -20,6 +20,7 @@ from perception.no_method import NoMethod
 
 if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
+    from perception.localization.submaps.echo_lag import EchoLag
     from perception.mapping.grid.evidence_grid import EvidenceGrid
     from perception.method import Method
 
@@ -34,14 +35,16 @@ class Recognition(NamedTuple):
     known_room: KnownRoom | None
     grid: EvidenceGrid | None
     surfaces: NoSurfaces
+    echo_lag: EchoLag | None
 
 
-NO_RECOGNITION: Final = Recognition(NoMethod(), None, OdometryFrame(), None, None, NoSurfaces())
+NO_RECOGNITION: Final = Recognition(NoMethod(), None, OdometryFrame(), None, None, NoSurfaces(), None)
 
 
 def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Recognition:
     """Return the parts that the settings name, with an empty map."""
     from perception.localization.map_frame import MapFrame
+    from perception.localization.submaps.echo_lag import EchoLag
     from perception.mapping.grid.evidence_grid import EvidenceGrid
     from perception.method import make_method
 
@@ -53,6 +56,7 @@ def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: P
         find_in_room(config.localization.known_room, ring),
         None if config.grid.method == "off" else EvidenceGrid(ring, config.grid),
         _map_surfaces(ring, models, config.surfaces) if config.maps_surfaces else NoSurfaces(),
+        EchoLag(ring),
     )
 
 

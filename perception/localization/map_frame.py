@@ -82,9 +82,10 @@ class MapFrame(OdometryFrame):
         """Whether the pose by maps waits for quanta."""
         return not self.drift.is_applied and self.submaps.can_refine
 
-    def refine(self) -> None:
-        """Do one quantum."""
+    def refine(self) -> int:
+        """Do one quantum, and return 1."""
         self.submaps.refine()
+        return 1
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""

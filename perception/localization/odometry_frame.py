@@ -36,8 +36,14 @@ class OdometryFrame:
         """Whether a pose waits for quanta."""
         return False
 
-    def refine(self) -> None:
-        """Do one quantum."""
+    @property
+    def converged(self) -> bool:
+        """Whether nothing is left to improve."""
+        return not self.can_refine
+
+    def refine(self) -> int:
+        """Do one quantum, and return 1, or 0 where there is nothing to improve."""
+        return 0
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""

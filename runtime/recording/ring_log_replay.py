@@ -35,6 +35,7 @@ class FiringReplayer:
     def __init__(self, settings: Settings, firings: Iterable[Firing]) -> None:
         self.perception = Perception(settings.ring, settings.models, settings.perception)
         self.perception.canyon_map.is_wanted = True
+        self.perception.echo_lag = None  # found as the log was opened
         self._firings = firings
         self._cycle_stats = CycleStats(late_after_s=float("inf"))
 

@@ -64,12 +64,14 @@ LOCALIZATION: Final = "localization"
 KNOWN_ROOM: Final = "known_room"
 VALLEY: Final = "valley"
 SURFACES: Final = "surfaces"
+ECHO_LAG: Final = "echo_lag"
 GRIDS: Final = ("directed", "moravec_elfes", "elfes")
-PARTS: Final = (EMULATOR, RING, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, SURFACES, *GRIDS)
+PARTS: Final = (EMULATOR, RING, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, VALLEY, SURFACES, ECHO_LAG, *GRIDS)
 """What is compiled separately: what keeps the ring's echoes and finds false ones, without which no robot drives; a
 method by its name, what the Bayesian method needs beyond it for polygons, the emulator, the correction of drift,
-finding the robot in a known room, the choice of a valley, the map of surfaces, and each kind of evidence grid. A file
-with the name of a part in the folder of `use_kernel_cache` says that it is compiled."""
+finding the robot in a known room, the choice of a valley, the map of surfaces, the lag of ranges behind odometry, and
+each kind of evidence grid. A file with the name of a part in the folder of `use_kernel_cache` says that it is
+compiled."""
 
 COMPILED_SUFFIX: Final = ".compiled"
 """Ending of empty files in the folder of `use_kernel_cache`, one for each kernel that was compiled; progress is
@@ -159,7 +161,7 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     grid = () if settings.perception.grid.method == "off" else (settings.perception.grid.method,)
     surfaces = (SURFACES,) if settings.perception.maps_surfaces else ()
     method = settings.perception.method
-    return (EMULATOR, RING, method, *polygons, *localization, *known_room, VALLEY, *surfaces, *grid)
+    return (EMULATOR, RING, method, *polygons, *localization, *known_room, VALLEY, *surfaces, *grid, ECHO_LAG)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:

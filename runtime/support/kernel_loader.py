@@ -21,6 +21,7 @@ from runtime.support.child_process import kill_child, start_child
 from runtime.support.kernel_cache import (
     BAYES,
     COMPILED_SUFFIX,
+    ECHO_LAG,
     EMULATOR,
     KNOWN_ROOM,
     LOCALIZATION,
@@ -54,6 +55,7 @@ KERNEL_COUNTS: Final = MappingProxyType(
         LOCALIZATION: 14,
         KNOWN_ROOM: 26,
         VALLEY: 2,
+        ECHO_LAG: 5,
         "directed": 13,
         "moravec_elfes": 6,
         "elfes": 6,

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import math
 import os
 import subprocess
 import sys
@@ -23,6 +22,7 @@ from runtime.support.child_process import INTERPRETER, child_environment
 from runtime.support.kernel_cache import (
     BAYES,
     COMPILED_SUFFIX,
+    ECHO_LAG,
     EMULATOR,
     GRIDS,
     KNOWN_ROOM,
@@ -37,6 +37,7 @@ from runtime.support.kernel_cache import (
     uncompiled_parts,
     use_kernel_cache,
 )
+from runtime.support.localization_warmup import correct_drift, find_echo_lag, find_in_room
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
@@ -196,44 +197,6 @@ def _emulator(settings: Settings) -> None:
         make_device(settings, world, seed=0).advance(0.5)
 
 
-def _localization(settings: Settings) -> None:
-    """Drive past objects that become landmarks and vanish; enter every kind of range, and match maps of the way."""
-    import numpy as np
-
-    from drivers.messages import Firing, Pose
-    from perception.localization.drift.drift_correction import DriftCorrection, SeenObject
-    from perception.localization.submaps.submap_graph import SubmapGraph
-
-    drift, graph = DriftCorrection(settings.ring), SubmapGraph(settings.ring)
-    objects = [SeenObject(k, 2.0 * math.cos(k), 2.0 * math.sin(k), 0.3) for k in range(1, 5)]
-    for k in range(2 * FIRINGS):
-        ranges = np.full(len(settings.ring.mounts), 1.3 if k % 2 else math.inf)
-        firing = Firing(0.1 * k, Pose(0.15 * k, 0.0, 0.1 * k), 0.0, ranges)
-        drift.learn(objects[k // 12 :])
-        drift.observe(firing)
-        graph.observe(firing)
-        while graph.can_refine:
-            graph.refine()
-
-
-def _known_room(settings: Settings) -> None:
-    """Drive through a small room until a search of it is over."""
-    import numpy as np
-
-    from drivers.messages import Firing, Pose
-    from perception.localization.known_room.known_room import SEARCH_M, KnownRoom
-    from perception.localization.room.room import make_room
-
-    walls = np.array([[-1.0, -1.0, 2.0, -1.0], [2.0, -1.0, 2.0, 1.0], [2.0, 1.0, -1.0, 1.0]])
-    known_room = KnownRoom(make_room(walls, np.array([[1.0, 0.5, 0.2]])), settings.ring)
-    for k in range(FIRINGS):
-        ranges = np.full(len(settings.ring.mounts), 0.7 if k % 2 else math.inf)
-        known_room.observe(Firing(0.1 * k, Pose(2.0 * SEARCH_M[0] * k / FIRINGS, 0.0, 0.0), 0.0, ranges))
-        while known_room.can_refine:
-            known_room.refine()
-    known_room.localized()
-
-
 def _valley(settings: Settings) -> None:
     """Choose among the valleys before an echo."""
     import numpy as np
@@ -249,8 +212,8 @@ def _valley(settings: Settings) -> None:
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
     EMULATOR: _emulator, RING: _ring, BAYES: _circles, POLYGONS: _polygons, PAPER: partial(_polygons, method=PAPER),
-    LOCALIZATION: _localization, KNOWN_ROOM: _known_room, VALLEY: _valley, SURFACES: _surfaces,
-    **{method: partial(_grid, method=method) for method in GRIDS},
+    LOCALIZATION: correct_drift, KNOWN_ROOM: find_in_room, VALLEY: _valley, SURFACES: _surfaces,
+    ECHO_LAG: find_echo_lag,    **{method: partial(_grid, method=method) for method in GRIDS},
 })  # fmt: skip
 """Runs each part once."""
 

@@ -210,8 +210,13 @@ class KnownRoom:
         """Whether keyframes are to be entered or a search has work left."""
         return self._stage != IDLE or self._tracked.is_behind(self._keyframes)
 
-    def refine(self) -> None:
-        """Do one quantum: of what the tracked hypotheses have not entered, then of a search."""
+    @property
+    def converged(self) -> bool:
+        """Whether nothing is left to improve."""
+        return not self.can_refine
+
+    def refine(self) -> int:
+        """Do one quantum: of what the tracked hypotheses have not entered, then of a search; return 1."""
         if self._tracked.is_behind(self._keyframes):
             if self._enter(self._tracked):
                 self._judge()
@@ -238,6 +243,7 @@ class KnownRoom:
                 self._candidates.clear()
                 self._stage = IDLE
                 self._judge()
+        return 1
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing, as far as known."""

@@ -9,7 +9,10 @@ is good. It is coarser than `perception.mapping.surfaces`: it is compared with o
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final
+
+import numpy as np
 
 from perception.kernel import Floats, kernel
 
@@ -31,6 +34,26 @@ PRIOR_LOOKS: Final = 0.5
 """A cell that was not looked at answers with 3 %, as the sum of half a reading."""
 THICKNESS: Final = 3.0
 """A surface is about three cells thick once it is blurred, which divide each echo among them."""
+CHUNK: Final = 64
+"""Readings whose passes are entered in one quantum."""
+
+
+def make_grid(readings: Floats, half: float) -> Iterator[Floats]:
+    """Make the map of hits and passes of readings (n, 4), as of `enter_passes`; yield it after each quantum.
+
+    Yields
+    ------
+    (2, SUBMAP_CELLS, SUBMAP_CELLS) float
+        The same array, complete at last.
+    """
+    count = len(readings)
+    grid, shared = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS)), np.empty((SUBMAP_CELLS, SUBMAP_CELLS))
+    for begin in range(0, count, CHUNK):
+        enter_passes(readings, begin, min(begin + CHUNK, count), half, grid[1])
+        yield grid
+    for _ in range(SHARING_ROUNDS):
+        share_echoes(readings, count, half, grid[1], grid[0], shared)
+        yield grid
 
 
 @kernel

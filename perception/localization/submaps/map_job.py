@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
 from perception.localization.submaps.local_grid import (
-    SHARING_ROUNDS,
     SUBMAP_CELLS,
     add_map,
     answers_of,
-    enter_passes,
-    share_echoes,
+    make_grid,
 )
 from perception.localization.submaps.map_match import Match, best_match
 from perception.localization.submaps.pose_graph import (
@@ -56,8 +54,6 @@ ITERATIONS: Final = 24
 """Gauss-Newton steps after a map, and iterations of one quantum."""
 SOLVED: Final = 1e-6
 STEP_MIN: Final = 1e-4
-CHUNK: Final = 64
-"""Readings whose passes are entered in one quantum."""
 
 
 class Maps(NamedTuple):
@@ -87,7 +83,9 @@ class Outcome(NamedTuple):
 def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
     """Compare the last map with those before; yield None after each quantum, and the outcome last."""
     number = len(maps.submaps) - 1
-    for grid in _make_grid(maps.submaps[number], half_angle):
+    count = int(maps.submaps[number]["count"])
+    readings = np.ascontiguousarray(maps.submaps[number]["readings"][:count])
+    for grid in make_grid(readings, half_angle):
         maps.grids[number] = grid
         yield None
     nodes, links, usual = maps.nodes, maps.links, maps.usual.copy()
@@ -95,8 +93,6 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
     here = pose_of(nodes[number])
     distances = np.hypot(nodes["x"][:number] - here[0], nodes["y"][:number] - here[1])
     found: list[NDArray[Any]] = []
-    count = int(maps.submaps[number]["count"])
-    readings = np.ascontiguousarray(maps.submaps[number]["readings"][:count])
     for run in _runs(np.flatnonzero(distances < OVERLAP_M).tolist()) if count else ():
         nearest = min(run, key=lambda k: distances[k])
         joined = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS))
@@ -139,22 +135,11 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
     yield from _solve(Maps(maps.submaps, nodes, links, maps.scales, usual, maps.grids), is_new=len(found) > 0)
 
 
-def _make_grid(submap: NDArray[Any], half_angle: float) -> Iterator[Floats]:
-    """Make the map of hits and passes; yield it after each quantum."""
-    count, readings = int(submap["count"]), np.ascontiguousarray(submap["readings"])
-    grid, shared = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS)), np.empty((SUBMAP_CELLS, SUBMAP_CELLS))
-    for begin in range(0, count, CHUNK):
-        enter_passes(readings, begin, min(begin + CHUNK, count), half_angle, grid[1])
-        yield grid
-    for _ in range(SHARING_ROUNDS):
-        share_echoes(readings, count, half_angle, grid[1], grid[0], shared)
-        yield grid
-
-
 def _grid_of(maps: Maps, number: int, half_angle: float) -> Floats:
     """Return hits and passes of a map before; made again at once if the process has started since then."""
     if number not in maps.grids:
-        *_, maps.grids[number] = _make_grid(maps.submaps[number], half_angle)
+        submap = maps.submaps[number]
+        *_, maps.grids[number] = make_grid(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
     return maps.grids[number]
 
 

@@ -24,6 +24,10 @@ from perception.localization.localized_pose import LocalizedPose, Moment, Status
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
+    READING_M,
+    READING_RAD,
+    SUBMAP_M,
+    SUBMAP_RAD,
     SUBMAP_READINGS_MAX,
     Rows,
     Submap,
@@ -38,12 +42,6 @@ from perception.localization.submaps.submap_records import (
 from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
-SUBMAP_M: Final = 3.0
-SUBMAP_RAD: Final = 2.0
-"""A map ends after this way or these turns: scales of 3 % deform it by one cell."""
-READING_M: Final = 0.1
-READING_RAD: Final = math.radians(6.0)
-"""Readings of one sensor from nearer poses have the same error."""
 WALK_RAD: Final = 0.02
 WALK_M: Final = 0.03
 """Random walk of odometry's heading, rad/√m, and of its place, m/√m, beside the scales."""

@@ -14,6 +14,12 @@ from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import Link, Node, spread_from
 from perception.records import Record, records, zeros
 
+SUBMAP_M: Final = 3.0
+SUBMAP_RAD: Final = 2.0
+"""A map ends after this way or these turns: scales of 3 % deform it by one cell."""
+READING_M: Final = 0.1
+READING_RAD: Final = math.radians(6.0)
+"""Readings of one sensor from nearer poses have the same error."""
 SUBMAP_READINGS_MAX: Final = 512
 """Of one map, which ends with them."""
 

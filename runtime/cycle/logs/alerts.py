@@ -13,6 +13,7 @@ from runtime.cycle.step import State
 
 if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
+    from perception.localization.submaps.echo_lag import EchoLag
 
 LINES_PER_S: Final = 1.0
 LINES_BURST: Final = 60.0
@@ -30,6 +31,7 @@ class Alerts:
         self._place: tuple[Status, int, int] = ("localizing", 0, 0)
         """Of the known room: status, places refuted, rivals."""
         self._ring_problems: set[str] = set()
+        self._has_told_lag = False
         self.recovered: list[str] = []
         """Of the last update: what is well again, and needs nobody."""
 
@@ -64,7 +66,7 @@ class Alerts:
     def _new_facts(self, received: Received, perception: Perception) -> tuple[list[str], list[str]]:
         """Return what asks for attention, and what is well again."""
         lost, recovered = self._new_place(perception.known_room)
-        lines = [*received.notes, *self._new_waiting(perception), *lost]
+        lines = [*received.notes, *self._new_waiting(perception), *lost, *self._new_lag(perception.echo_lag)]
         if perception.sensor_monitor.changes == self._changes:
             return lines, recovered
         self._changes = perception.sensor_monitor.changes
@@ -73,6 +75,18 @@ class Alerts:
         recovered += [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
         self._reported = now
         return lines, recovered
+
+    def _new_lag(self, lag: EchoLag | None) -> list[str]:
+        """Return what is new of the lag of ranges behind odometry."""
+        if lag is None or self._has_told_lag or not (found := lag.found()).is_refuted:
+            return []
+        self._has_told_lag = True
+        which = "the ranges lag behind odometry" if found.lag_s > 0.0 else "odometry lags behind the ranges"
+        return [
+            f"{which} by {abs(found.lag_s):.2f} s (± {found.sigma_s:.2f}), as the echoes show: recognition takes "
+            f"it into account from now on; with echo_lag_s = {found.lag_s:.2f} in the robot file's [ring] it does so "
+            "from the start"
+        ]
 
     def _new_place(self, room: KnownRoom | None) -> tuple[list[str], list[str]]:
         """Return what is new of the robot's place in a known room, as of `_new_facts`."""

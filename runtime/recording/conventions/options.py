@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
+from config.robot import ECHO_LAG_MAX_S
 
 Heading: TypeAlias = Literal[
     "auto",
@@ -60,6 +61,8 @@ class RingLogOptions:
     not_fired
         Ring logs: what stands for a sensor that did not fire in this row: empty (an empty cell alone), nan, inf, or
         exactly a number as 0 or -1.
+    echo_lag
+        Ring logs: time by which the ranges lag behind their rows' poses, s; below 0, the poses lag.
     """
 
     latched: Literal["auto", "yes", "no"] = "auto"
@@ -71,9 +74,15 @@ class RingLogOptions:
     range_unit: LengthUnit = "auto"
     silence: str = "auto"
     not_fired: str = "auto"
+    echo_lag: str = "auto"
+
+    @property
+    def echo_lag_s(self) -> float | None:
+        """The time by which ranges lag behind poses, s; None where the data decide."""
+        return None if self.echo_lag == "auto" else float(self.echo_lag)
 
     def check(self) -> None:
-        """Raise an error if `silence` or `not_fired` is neither a word nor a number.
+        """Raise an error if `silence`, `not_fired` or `echo_lag` is neither a word nor a number.
 
         Raises
         ------
@@ -83,9 +92,14 @@ class RingLogOptions:
         for name, value, words in (
             ("silence", self.silence, ("auto", "inf", "nan", "max")),
             ("not-fired", self.not_fired, ("auto", "empty", "nan", "inf")),
+            ("echo-lag", self.echo_lag, ("auto",)),
         ):
             if value not in words and not _is_number(value):
                 raise UserError(f"--{name} {value}: give {', '.join(words)} or a number, as 0 or -1", WRONG_CALL)
+        if abs(self.echo_lag_s or 0.0) > ECHO_LAG_MAX_S:
+            raise UserError(
+                f"--echo-lag {self.echo_lag}: give seconds from -{ECHO_LAG_MAX_S} to {ECHO_LAG_MAX_S}", WRONG_CALL
+            )
 
     def refuse_for(self, recording: str) -> None:
         """Raise an error if an option is given for a recording, whose conventions are known.

@@ -14,6 +14,7 @@ from config.robot import RingConfig, RobotConfig
 from drivers.latched_ranges import RepeatFilter
 from drivers.messages import Firing, Pose, wrap_angle
 from runtime.recording.conventions.decision import Conventions, decide
+from runtime.recording.conventions.echo_lag import at_heard_poses, found_lag
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError, read_ring_log
@@ -21,6 +22,8 @@ from runtime.recording.servo_columns import ServoColumns
 
 FIRST: Final = 20_000
 """Rows on which the decision rests: a quarter of an hour at the rate of most rings, 20 MB."""
+LAG_ROWS: Final = 4000
+"""Rows from which the lag of ranges behind poses is found: enough for the lag of most logs to ± 0.02 s."""
 FIRST_OF_PIPE: Final = 400
 """Rows of a pipe, whose reader waits for the first firing: less than half a minute of most rings."""
 
@@ -95,7 +98,7 @@ def converted_firings(
     firings: Iterator[Firing] = (one if found.is_plain else found.converted(one) for one in every)
     if found.cycle_s is not None:
         firings = _changes(firings, robot.ring, found.cycle_s)
-    yield from _checked(firings, path)
+    yield from _checked(_at_heard_poses(firings, path, robot.ring, options, warn, rows=min(first, LAG_ROWS)), path)
 
 
 def _decided(seen: list[Firing], path: Path, robot: RobotConfig, options: RingLogOptions) -> Conventions:
@@ -159,6 +162,30 @@ def _changes(firings: Iterable[Firing], ring: RingConfig, cycle_s: float) -> Ite
             fresh = replace(fresh, pose=pose, ring_yaw=ring_yaw)
         last = firing
         yield fresh
+
+
+def _at_heard_poses(
+    firings: Iterator[Firing],
+    path: Path,
+    ring: RingConfig,
+    options: RingLogOptions,
+    warn: Callable[[str], None],
+    *,
+    rows: int,
+) -> Iterator[Firing]:
+    """Yield firings at the poses from which they were heard: by the option, the robot file, or the first rows."""
+    lag_s, begin = options.echo_lag_s, list[Firing]()
+    if lag_s is None:
+        begin = list(itertools.islice(firings, rows))
+        lag_s, found = ring.echo_lag_s, found_lag(begin, ring)
+        if found is not None:
+            lag_s = found.lag_s
+            which = "the ranges lag behind the poses" if lag_s > 0.0 else "the poses lag behind the ranges"
+            warn(
+                f"{path}: {which} by {abs(lag_s):.2f} s (± {found.sigma_s:.2f}), which is taken into account. "
+                f"To settle it: --echo-lag {lag_s:.2f}, or echo_lag_s = {lag_s:.2f} in the robot's [ring]"
+            )
+    yield from at_heard_poses(itertools.chain(begin, firings), lag_s)
 
 
 def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:

@@ -166,7 +166,13 @@ def test_an_existing_setting_is_respected(home: Path, monkeypatch: pytest.Monkey
 
 def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     hallway = load_settings("hallway")
-    assert kernels.needed_parts(hallway) == (kernels.EMULATOR, kernels.RING, kernels.BAYES, kernels.VALLEY)
+    assert kernels.needed_parts(hallway) == (
+        kernels.EMULATOR,
+        kernels.RING,
+        kernels.BAYES,
+        kernels.VALLEY,
+        kernels.ECHO_LAG,
+    )
     boxes = load_settings("hallway", models=["semicircle", "box"])
     assert kernels.needed_parts(boxes) == (
         kernels.EMULATOR,
@@ -174,9 +180,16 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.POLYGONS,
         kernels.VALLEY,
+        kernels.ECHO_LAG,
     )
     paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
-    assert kernels.needed_parts(paper) == (kernels.EMULATOR, kernels.RING, kernels.PAPER, kernels.VALLEY)
+    assert kernels.needed_parts(paper) == (
+        kernels.EMULATOR,
+        kernels.RING,
+        kernels.PAPER,
+        kernels.VALLEY,
+        kernels.ECHO_LAG,
+    )
     corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
     assert kernels.needed_parts(corrected) == (
         kernels.EMULATOR,
@@ -184,6 +197,7 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.LOCALIZATION,
         kernels.VALLEY,
+        kernels.ECHO_LAG,
     )
     mapped = with_known_room(load_settings("hallway"), "irregular")
     assert kernels.needed_parts(mapped) == (
@@ -192,6 +206,7 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.KNOWN_ROOM,
         kernels.VALLEY,
+        kernels.ECHO_LAG,
     )
     with_grid = load_settings("hallway", ["perception.grid.method=directed"])
     assert kernels.needed_parts(with_grid) == (
@@ -200,6 +215,7 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.VALLEY,
         "directed",
+        kernels.ECHO_LAG,
     )
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 

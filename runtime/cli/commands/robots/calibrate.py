@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -19,6 +20,7 @@ from runtime.cli.source_options import File, LogOptions
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 
 if TYPE_CHECKING:
+    from config.robot import RingConfig
     from config.settings import Settings
     from drivers.messages import Firing
     from perception.calibration.calibrate import Calibration
@@ -66,6 +68,7 @@ def calibrate(
         The file cannot be read or written, or the drive does not show what is needed.
     """
     from perception.calibration.calibrate import calibrate as find_calibration
+    from runtime.recording.conventions.echo_lag import at_heard_poses
 
     for option, value in (*(("--drum", radius) for radius in drum), ("--way", way)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -78,6 +81,8 @@ def calibrate(
     if settings.ring.turning:
         which = f"{robot or file}: only some of its sensors turn with the wheels"
         raise UserError(f"{which}; calibrate each of its rings by a robot file of its own", WRONG_CALL)
+    lag, what = _echo_lag(firings, settings.ring, options)
+    firings = list(at_heard_poses(firings, lag))
     found = find_calibration(firings, settings.ring, drum, way, synchro=settings.body.synchro)
     if found is None:
         raise UserError(
@@ -93,10 +98,11 @@ def calibrate(
             FAILED,
         )
     with writing("--out", out):
-        Path(out).write_text(robot_text(settings, found, Path(file).name), encoding="utf-8")
+        Path(out).write_text(robot_text(settings, found, Path(file).name, lag), encoding="utf-8")
     output = plain_console()
     output.print(sensors_table(settings, found))
     output.print(scales_line(found))
+    output.print(what)
     for what, sigmas in (("places", found.place_sigmas_m), ("directions", found.angle_sigmas_rad)):
         nominal = [str(i) for i, sigma in enumerate(sigmas.tolist()) if not math.isfinite(sigma)]
         if nominal:
@@ -106,6 +112,21 @@ def calibrate(
         output.print("without a measured way, lengths are known less well: measure it and give --way")
     output.print(f"{out}: robot file written; use it with: echolocate run --robot {out} --port DEVICE")
     return DONE
+
+
+def _echo_lag(firings: Sequence[Firing], ring: RingConfig, options: RingLogOptions) -> tuple[float, str]:
+    """Return by how much ranges lag behind odometry, s, and how that is known."""
+    from perception.localization.submaps.echo_lag import lag_of
+
+    if options.echo_lag_s is not None:
+        return options.echo_lag_s, f"ranges lag behind odometry by {options.echo_lag_s:+.3f} s, as --echo-lag says"
+    found = lag_of(firings, ring)
+    if not math.isfinite(found.sigma_s):
+        return ring.echo_lag_s, "by how much ranges lag behind odometry is not shown by this drive"
+    shown = f"{found.lag_s:+.3f} s (± {found.sigma_s:.3f})"
+    if found.is_refuted:
+        return found.lag_s, f"ranges lag behind odometry by {shown}"
+    return ring.echo_lag_s, f"ranges lag behind odometry by {shown}: the {ring.echo_lag_s:g} s of before stay"
 
 
 def sensors_table(settings: Settings, found: Calibration) -> Table:
@@ -167,7 +188,7 @@ def _shown(sigma: float, digits: int) -> str:
     return f"{sigma:.{digits}f}" if math.isfinite(sigma) else "–"
 
 
-def robot_text(settings: Settings, found: Calibration, source: str) -> str:
+def robot_text(settings: Settings, found: Calibration, source: str, echo_lag_s: float = 0.0) -> str:
     """Return the robot file of a calibrated robot.
 
     Parameters
@@ -178,6 +199,8 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
         The calibration.
     source : str
         Name of the drive's file.
+    echo_lag_s : float
+        By how much ranges lag behind odometry.
     """
     import tomli_w
 
@@ -188,6 +211,8 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
     ring = tables.pop("ring")
     for name in ("count", "radius_m", "sensors"):
         ring.pop(name, None)
+    if echo_lag_s != 0.0:
+        ring["echo_lag_s"] = round(echo_lag_s, 3)
     ring["beam_half_angle_deg"] = round(math.degrees(found.half_angle_rad), 2)
     firing = ring.pop("firing", None)
     before = settings.calibration
@@ -228,7 +253,7 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
 def read_firings(
     file: str, robot: str | None, check: Callable[[], None], options: RingLogOptions = AUTO
 ) -> tuple[Settings, list[Firing]]:
-    """Return the settings and the firings of a recording or ring log; `check` is called between the two.
+    """Return the settings and the firings of a recording or ring log at the poses that the robot gave.
 
     Parameters
     ----------
@@ -237,7 +262,7 @@ def read_firings(
     robot : str, optional
         Of a ring log: robot file, or the name of a shipped one.
     check : callable
-        Raises an error if outputs cannot be written.
+        Called before the firings are read; raises an error if outputs cannot be written.
     options : RingLogOptions
         Conventions of a ring log. What is found in the data is printed.
 
@@ -257,7 +282,9 @@ def read_firings(
         check()
         console = plain_console(stderr=True)
         return settings, list(
-            open_ring_log(path, settings, options, lambda text: console.print(f"echolocate: {text}"))
+            open_ring_log(
+                path, settings, replace(options, echo_lag="0"), lambda text: console.print(f"echolocate: {text}")
+            )
         )
     options.refuse_for(file)
     if robot is not None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from perception.localization.submaps import map_job
-from perception.localization.submaps.local_grid import SUBMAP_CELLS
+from perception.localization.submaps.local_grid import SUBMAP_CELLS, make_grid
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import Link
 from perception.localization.submaps.submap_records import Submap, node_at, odometry_link, pose_of
@@ -45,7 +45,7 @@ def test_a_map_is_matched_with_the_one_before() -> None:
 @pytest.mark.compiled
 def test_caches_change_nothing() -> None:
     cold, warm = two_maps(), two_maps()
-    *_, warm.grids[0] = map_job._make_grid(warm.submaps[0], BEAM)
+    *_, warm.grids[0] = make_grid(np.array(room_readings()), BEAM)
     *mine, one = match_map(cold, BEAM)
     *its, other = match_map(warm, BEAM)
     assert len(mine) == len(its)

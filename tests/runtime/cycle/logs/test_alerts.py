@@ -9,6 +9,7 @@ from typing import Any
 from drivers.driver import Received
 from drivers.messages import Pose
 from perception.detected_object import MapCounts
+from perception.localization.submaps.echo_lag import FoundLag
 from perception.sensor_faults.report import SensorReport
 from runtime.cycle.logs.alerts import LINES_BURST, LINES_PER_S, Alerts
 
@@ -23,6 +24,7 @@ class StubPerception:
         self.reports: list[SensorReport] = []
         self.counts = MapCounts(0, 0, 0)
         self.known_room: SimpleNamespace | None = None
+        self.echo_lag: SimpleNamespace | None = None
 
     def report(self, *reports: SensorReport) -> None:
         self.reports = list(reports)
@@ -127,3 +129,15 @@ def test_what_is_new_of_the_place_in_a_known_room_is_reported_once() -> None:
         assert len(lines) == (said is not None)
         assert not lines or lines[0].startswith(said or "")
         assert alerts.update(NOTHING, seen, 1.0) == []
+
+
+def test_a_lag_of_the_ranges_is_told_once_with_what_to_set() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    found = FoundLag(0.02, 0.05, 0.1)
+    perception.echo_lag = SimpleNamespace(found=lambda: found)
+    assert alerts.update(NOTHING, state(perception), 0.0) == []
+    found = FoundLag(0.163, 0.02, 9.0)
+    (line,) = alerts.update(NOTHING, state(perception), 1.0)
+    assert line.startswith("the ranges lag behind odometry by 0.16 s (± 0.02)")
+    assert "echo_lag_s = 0.16" in line
+    assert alerts.update(NOTHING, state(perception), 2.0) == []
