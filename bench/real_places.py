@@ -18,8 +18,12 @@ from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing, Floats, Pose
 from perception.localization.localized_pose import LocalizedPose
+from perception.localization.submaps.echo_lag import lag_of
+from runtime.recording.conventions.echo_lag import at_heard_poses
 from runtime.recording.ring_log_replay import replay_localized
 
+WAY_M: Final = 3.0
+"""Way over which the error of a relative place is measured."""
 WRONG_M: Final = 0.5
 WRONG_SIGMAS: Final = 3.5
 """A place that is off by more than both is wrong."""
@@ -38,7 +42,9 @@ def measure(folders: Iterable[Path], tell: Callable[[str], None]) -> dict[str, R
                 Firing(float(t), Pose(x, y, theta), theta, row)
                 for t, (x, y, theta), row in zip(ring[:, 0], poses.tolist(), ranges, strict=True)
             ]
-            rows[name] = _score(settings, firings, poses, truth)
+            lag = lag_of(firings, settings.ring)
+            heard = list(at_heard_poses(firings, lag.lag_s if lag.is_refuted else 0.0))
+            rows[name] = {"lag s": lag.lag_s, "± s": lag.sigma_s, **_score(settings, heard, poses, truth)}
     return rows
 
 
@@ -52,15 +58,30 @@ def _score(settings: Settings, firings: list[Firing], odometry: Floats, truth: F
     turn = Pose(*odometry[0].tolist()).compose(Pose(*truth[0].tolist()).inverse())
     from_start = np.array([(at.x, at.y) for at in (turn.compose(Pose(*row)) for row in truth.tolist())])
     off = np.hypot(*(said - from_start).T)
-    at_end = errors_when_aligned(np.array([(here.pose.x, here.pose.y) for here in end]), truth[:, :2])
+    ended = np.array([(here.pose.x, here.pose.y, here.pose.theta) for here in end])
+    at_end = errors_when_aligned(ended[:, :2], truth[:, :2])
     return {
         "odometry": _rms(errors_when_aligned(odometry[:, :2], truth[:, :2])),
         "now": _rms(errors_when_aligned(said, truth[:, :2])),
         "end": _rms(at_end),
         "worst": float(at_end.max()),
+        "odometry over 3 m": _over_way(odometry, truth),
+        "over 3 m": _over_way(ended, truth),
         "wrong": float((is_tracking & (off > np.maximum(WRONG_M, WRONG_SIGMAS * sigma))).mean()),
         "not tracking": float((~is_tracking).mean()),
     }
+
+
+def _over_way(poses: Floats, truth: Floats) -> float:
+    """Return the error of where the robot is `WAY_M` later, in its own frame, m."""
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
+    first = np.flatnonzero(way < way[-1] - WAY_M)
+    later = np.searchsorted(way, way[first] + WAY_M)
+    moved = []
+    for at in (poses, truth):
+        (dx, dy), c, s = (at[later, :2] - at[first, :2]).T, np.cos(at[first, 2]), np.sin(at[first, 2])
+        moved.append(np.column_stack([c * dx + s * dy, c * dy - s * dx]))
+    return _rms(np.hypot(*(moved[0] - moved[1]).T)) if len(first) else 0.0
 
 
 def _rms(errors: Floats) -> float:

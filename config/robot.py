@@ -184,8 +184,8 @@ class RingConfig(Strict):
     firing: Annotated[FiringConfig, BeforeValidator(_preset_as_table)] = FiringConfig(preset="octets")
     """The firing pattern: a preset's name, or a table."""
     echo_lag_s: float = Field(default=0.0, ge=-ECHO_LAG_MAX_S, le=ECHO_LAG_MAX_S)
-    """Time by which the ranges lag behind odometry, s, as `echolocate calibrate` finds it; below 0, odometry lags. It
-    is estimated as the robot drives; this is what the estimate begins with."""
+    """Time by which the ranges lag behind odometry, s, as `echolocate calibrate` finds it; below 0, odometry lags. A
+    run that knows of one, or corrects drift, estimates it as the robot drives, beginning with this."""
 
     @model_validator(mode="after")
     def _whole_ring(self) -> RingConfig:

@@ -37,8 +37,8 @@ LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
     "most such silences are named at once, and some are not before a contact.",
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
-    "become so where the ring hears four echoes or fewer from then on (in 2 of 20 drives, both through a corridor, "
-    "the end was touched): they change as the robot's motion says. "
+    "become so where the ring hears few echoes from then on (in 2 of 20 drives, both through a corridor, with five "
+    "and ten of them, the end was touched): they change as the robot's motion says. "
     "A map of the room contradicts them; without one, only a bumper stops the robot.",
     "A part of the ring that freezes or falls silent while the rest still hears: a sensor that does not change is "
     "named after a metre or two on which its neighbours change, and what stood ahead may be touched before.",

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from config.robot import ECHO_LAG_MAX_S, RingConfig
+from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, FINITE, PLACE, bounds, up_to
 from perception.kernel import Floats
@@ -46,10 +46,9 @@ without a lag gain up to 0.5."""
 LAG_READINGS_MIN: Final = 20
 """Readings of a window that say anything of the lag."""
 TRAIL_MAX: Final = 1024
-RECENT_MAX: Final = 128
-"""Poses of a window, and of the last `HISTORY_S`."""
-HISTORY_S: Final = ECHO_LAG_MAX_S + float(LAGS[-1])
-"""No lag that is compared needs older poses."""
+"""Poses of a window, the last ones before it among them."""
+RECENT_MAX: Final = 256
+"""Last poses that are kept: the newer half spans all lags that are compared at up to 180 firings a second."""
 QUANTA_MAX: Final = len(LAGS) * (SUBMAP_READINGS_MAX // CHUNK + SHARING_ROUNDS + 2)
 """Quanta of one comparison."""
 RATE_S: Final = 0.1
@@ -147,10 +146,9 @@ class EchoLag:
         if count > 0:
             last = recent[count - 1]
             here[3:] = last[3] + wrap_angle(here[3] - last[3]), last[4] + wrap_angle(here[4] - last[4])
-            first = int(np.searchsorted(recent[:count, 0], here[0] - HISTORY_S))
-            first = max(0, first - 1, count + 1 - RECENT_MAX)
-            recent[: count - first] = recent[first:count].copy()
-            count -= first
+        if count == RECENT_MAX:
+            count //= 2
+            recent[:count] = recent[count:]
         recent[count] = here
         self._recent_count = count + 1
         return here

@@ -171,7 +171,6 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.RING,
         kernels.BAYES,
         kernels.VALLEY,
-        kernels.ECHO_LAG,
     )
     boxes = load_settings("hallway", models=["semicircle", "box"])
     assert kernels.needed_parts(boxes) == (
@@ -180,7 +179,6 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.POLYGONS,
         kernels.VALLEY,
-        kernels.ECHO_LAG,
     )
     paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
     assert kernels.needed_parts(paper) == (
@@ -188,7 +186,6 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.RING,
         kernels.PAPER,
         kernels.VALLEY,
-        kernels.ECHO_LAG,
     )
     corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
     assert kernels.needed_parts(corrected) == (
@@ -206,7 +203,6 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.KNOWN_ROOM,
         kernels.VALLEY,
-        kernels.ECHO_LAG,
     )
     with_grid = load_settings("hallway", ["perception.grid.method=directed"])
     assert kernels.needed_parts(with_grid) == (
@@ -215,7 +211,6 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
         kernels.BAYES,
         kernels.VALLEY,
         "directed",
-        kernels.ECHO_LAG,
     )
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
