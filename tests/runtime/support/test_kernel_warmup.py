@@ -144,7 +144,8 @@ def test_each_part_is_compiled_once_and_then_warmed_up(tmp_path: Path, monkeypat
     folder = kernels.use_kernel_cache()
     (folder / kernels.BAYES).unlink()
     assert kernels.uncompiled_parts(folder, kernels.PARTS) == [
-        kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM, kernels.SURFACES, *kernels.GRIDS,
+        kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM, kernels.SURFACES,
+        kernels.ECHO_LAG, *kernels.GRIDS,
     ]  # fmt: skip
     happened.clear()
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
