@@ -49,6 +49,10 @@ async def run(folder: Path, opener: Opener) -> AsyncIterator[Run]:
         url = await asyncio.to_thread(start_url, command)
         try:
             yield Run(command, url, Truth(trace), recording)
+        except Exception as error:
+            if command.process.poll() is not None:
+                raise AssertionError(f"the run has ended before its page: {command.err}") from error
+            raise
         finally:
             await opener.leave()  # before the server goes: no page reports that
 
