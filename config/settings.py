@@ -16,7 +16,7 @@ from config.mission import MissionConfig
 from config.mission_step import LABELS, Frame
 from config.model import ModelConfig
 from config.places import PlacesConfig
-from config.robot import RobotConfig
+from config.robot import RingConfig, RobotConfig
 from config.strict import Strict, TomlList
 from config.world import WorldConfig
 
@@ -140,6 +140,10 @@ class LocalizationConfig(Strict):
     def has_map(self) -> bool:
         """Whether there is a map frame besides odometry's."""
         return self.correct_drift or self.known_room is not None
+
+    def finds_echo_lag(self, ring: RingConfig) -> bool:
+        """Whether the lag of ranges behind odometry is estimated: where drift is corrected, or the ring has one."""
+        return self.correct_drift or ring.echo_lag_s != 0.0
 
     @model_validator(mode="after")
     def _one_map_frame(self) -> LocalizationConfig:

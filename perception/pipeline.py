@@ -129,7 +129,7 @@ class Perception:
     @property
     def converged(self) -> bool:
         """Whether nothing is left to improve, now or with the next firing."""
-        return all(one.converged for one in self._refined()) and not self.canyon_map.is_due
+        return not self.can_refine and self.surfaces.converged and all(one.converged for one in self._fed())
 
     @property
     def counts(self) -> MapCounts:

@@ -36,7 +36,6 @@ class Recognition(NamedTuple):
     grid: EvidenceGrid | None
     surfaces: NoSurfaces
     echo_lag: EchoLag | None
-    """Where drift is corrected, or the robot file knows of a lag."""
 
 
 NO_RECOGNITION: Final = Recognition(NoMethod(), None, OdometryFrame(), None, None, NoSurfaces(), None)
@@ -57,7 +56,7 @@ def begin_recognition(ring: RingConfig, models: Sequence[ModelConfig], config: P
         find_in_room(config.localization.known_room, ring),
         None if config.grid.method == "off" else EvidenceGrid(ring, config.grid),
         _map_surfaces(ring, models, config.surfaces) if config.maps_surfaces else NoSurfaces(),
-        EchoLag(ring) if corrects or ring.echo_lag_s != 0.0 else None,
+        EchoLag(ring) if config.localization.finds_echo_lag(ring) else None,
     )
 
 

@@ -36,11 +36,6 @@ class OdometryFrame:
         """Whether a pose waits for quanta."""
         return False
 
-    @property
-    def converged(self) -> bool:
-        """Whether nothing is left to improve."""
-        return not self.can_refine
-
     def refine(self) -> int:
         """Do one quantum, and return 1, or 0 where there is nothing to improve."""
         return 0

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
 from config.settings import Settings
-from config.toml_edit import Scalar
+from config.toml_edit import TomlValue
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
@@ -164,7 +164,7 @@ class SettingsFileControl(Protocol):
     async def check(self, number: int, text: str, /) -> SettingsCheck:
         """Return problems and warnings of a text in place of a file, and its difference from the file."""
 
-    async def changed(self, number: int, text: str, path: str, value: Scalar, /) -> str:
+    async def changed(self, number: int, text: str, path: str, value: TomlValue, /) -> str:
         """Return a text in place of a file with another value of a field of its form."""
 
     async def save(self, number: int, text: str, digest: str, /) -> SettingsText:

@@ -156,10 +156,10 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     """Return the parts that a run needs. Polygons take half of the time to compile, and many runs have none."""
     has_polygons = any(model.arc_radius_m is None for model in settings.models)
     polygons = (POLYGONS,) if has_polygons and settings.perception.method == BAYES else ()
-    corrects = settings.perception.localization.correct_drift
-    localization = (LOCALIZATION,) if corrects else ()
-    echo_lag = (ECHO_LAG,) if corrects or settings.ring.echo_lag_s != 0.0 else ()
-    known_room = () if settings.perception.localization.known_room is None else (KNOWN_ROOM,)
+    place = settings.perception.localization
+    localization = (LOCALIZATION,) if place.correct_drift else ()
+    echo_lag = (ECHO_LAG,) if place.finds_echo_lag(settings.ring) else ()
+    known_room = () if place.known_room is None else (KNOWN_ROOM,)
     grid = () if settings.perception.grid.method == "off" else (settings.perception.grid.method,)
     surfaces = (SURFACES,) if settings.perception.maps_surfaces else ()
     method = settings.perception.method

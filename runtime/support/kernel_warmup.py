@@ -37,7 +37,7 @@ from runtime.support.kernel_cache import (
     uncompiled_parts,
     use_kernel_cache,
 )
-from runtime.support.localization_warmup import correct_drift, find_echo_lag, find_in_room
+from runtime.support.localization_warmup import WARM_UP_FIRINGS, correct_drift, find_echo_lag, find_in_room
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
@@ -51,8 +51,6 @@ if TYPE_CHECKING:
     from perception.bayes.memory.state import Memory
     from perception.pipeline import Perception
 
-FIRINGS: Final = 24
-"""Firings past a wall that between them run every kernel."""
 GARBAGE_MAX: Final = 100_000
 """Objects from one garbage collection to the next while compiling: with Python's own 700, a tenth of the time goes
 into collections that find little."""
@@ -68,7 +66,9 @@ def _perception(settings: Settings, method: str, models: Sequence[ModelConfig]) 
     return Perception(settings.ring, models, config)
 
 
-def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS, *, refines: bool = True) -> None:
+def _drive(
+    settings: Settings, perception: Perception, firings: int = WARM_UP_FIRINGS, *, refines: bool = True
+) -> None:
     """Drive past a wall."""
     import numpy as np
 
@@ -94,7 +94,7 @@ def _ring(settings: Settings) -> None:
 
     perception = Perception(settings.ring, settings.models, settings.perception, recognises=False)
     _drive(settings, perception, refines=False)
-    perception.steady_obstacles(0.1 * FIRINGS, 1.0)
+    perception.steady_obstacles(0.1 * WARM_UP_FIRINGS, 1.0)
     perception.unheard.take_ahead(Pose(0.0, 0.0, 0.0), 1.0, 1.0)
     perception.unheard.points()
 
@@ -149,7 +149,7 @@ def _edit(settings: Settings, perception: Perception, models: Sequence[ModelConf
 def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
     perception = _perception(settings, method, models)
     _drive(settings, perception)
-    _edit(settings, perception, models, FIRINGS)
+    _edit(settings, perception, models, WARM_UP_FIRINGS)
 
 
 def observe_only(settings: Settings) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import tomllib
 
 import pytest
+import tomlkit
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.toml_edit import Place, Scalar, TomlEditError, with_value
+from config.toml_edit import Place, TomlEditError, TomlValue, with_value
 
 ROBOT = """# mine
 robot.driver = "skippy"  # of a package
@@ -35,18 +36,25 @@ name = "orbit"
     ("text", "place", "value", "old", "new"),
     [
         (ROBOT, ("skippy", "trim"), 1.25, "trim = 1.1 #", "trim = 1.25 #"),
-        (ROBOT, ("skippy", "name"), 'a "b"', "[skippy]\n", '[skippy]\nname = "a \\"b\\""\n'),
+        (ROBOT, ("skippy", "name"), 'a "b"', "measured\n", 'measured\nname = "a \\"b\\""\n'),
         (ROBOT, ("skippy", "trim"), None, "trim = 1.1 # measured\n", ""),
         (ROBOT, ("other", "on"), True, "trim = 3\n", "trim = 3\n\n[other]\non = true\n"),
         (ROBOT, ("robot", "driver"), "x", '"skippy"', '"x"'),
         (MISSION, ("step", 0, "schemas", 0, "way_m"), 2.0, "way_m = 0.5", "way_m = 2.0"),
-        (MISSION, ("step", 0, "schemas", 1, "way_m"), 2.0, '{ name = "orbit" }', '{ name = "orbit", way_m = 2.0 }'),
-        (MISSION, ("step", 1, "schemas", 0, "way_m"), 2.0, "schemas]]\n", "schemas]]\nway_m = 2.0\n"),
-        (MISSION, ("step", 0, "schemas", 0, "way_m"), None, ", way_m = 0.5", ""),
+        (MISSION, ("step", 0, "schemas", 1, "way_m"), 2.0, '{ name = "orbit" }', '{ name = "orbit", way_m = 2.0}'),
+        (
+            MISSION,
+            ("step", 1, "schemas", 0, "way_m"),
+            2.0,
+            'schemas]]\nname = "orbit"\n',
+            'schemas]]\nname = "orbit"\nway_m = 2.0\n',
+        ),
+        (MISSION, ("step", 0, "schemas", 0, "way_m"), None, ", way_m = 0.5", " "),
+        ('a = """\nx = 1\n"""\n', ("a",), 1, '"""\nx = 1\n"""', "1"),
         ("", ("skippy", "trim"), 1.0, "", "[skippy]\ntrim = 1.0\n"),
     ],
 )
-def test_only_the_value_changes(text: str, place: Place, value: Scalar, old: str, new: str) -> None:
+def test_only_the_value_changes(text: str, place: Place, value: TomlValue, old: str, new: str) -> None:
     assert with_value(text, place, value) == text.replace(old, new, 1)
 
 
@@ -56,7 +64,6 @@ def test_only_the_value_changes(text: str, place: Place, value: Scalar, old: str
         ("a = [", ("a",), "not TOML"),
         (MISSION, ("step", 7, "name"), "no such table"),
         (MISSION, ("name", "way"), "no such table"),
-        ('a = """\nx = 1\n"""\n', ("a",), "in the text"),
     ],
 )
 def test_what_is_not_understood_is_refused(text: str, place: Place, said: str) -> None:
@@ -64,11 +71,17 @@ def test_what_is_not_understood_is_refused(text: str, place: Place, said: str) -
         with_value(text, place, 1)
 
 
+def test_a_text_that_would_say_something_else_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tomlkit, "dumps", lambda _document: "trim = 2\n")
+    with pytest.raises(TomlEditError, match="in the text"):
+        with_value(ROBOT, ("skippy", "trim"), 2)
+
+
 @given(
     st.sampled_from([("skippy", "trim"), ("ring", "count"), ("body", "trim"), ("skippy", "new"), ("robot", "name")]),
     st.booleans() | st.integers(-(2**60), 2**60) | st.floats(-1e9, 1e9) | st.text(max_size=9),
 )
-def test_the_text_says_what_is_wanted_and_nothing_else(place: tuple[str, str], value: Scalar) -> None:
+def test_the_text_says_what_is_wanted_and_nothing_else(place: tuple[str, str], value: TomlValue) -> None:
     wanted = tomllib.loads(ROBOT)
     wanted[place[0]][place[1]] = value
     changed = with_value(ROBOT, place, value)

@@ -309,7 +309,7 @@ def score_corner(
     if not found:
         return IMPOSSIBLE_NAT
     total = 0.0
-    ends = has_edge and corner.faces[0].rays == 0
+    ends = has_edge and corner.faces[0].rays == 0  # a ray misses an edge
     first = way_of_face(readings, facing, cx, cy, corner, 0, cos_may) if ends else 1.0
     second = way_of_face(readings, facing, cx, cy, corner, 1, cos_may) if ends else 1.0
     for i in range(count):
@@ -322,7 +322,7 @@ def score_corner(
                 continue
             if face.normal_x * q.axis_x + face.normal_y * q.axis_y >= cos_may:
                 v = max(v, log_likelihood(p, level, face_error(q, cx, cy, face)))
-        if has_edge and corner.faces[0].rays == 0:  # a ray misses an edge
+        if ends:
             ex = corner.edge_x - q.x
             ey = corner.edge_y - q.y
             d = math.sqrt(ex * ex + ey * ey)

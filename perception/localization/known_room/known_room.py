@@ -210,11 +210,6 @@ class KnownRoom:
         """Whether keyframes are to be entered or a search has work left."""
         return self._stage != IDLE or self._tracked.is_behind(self._keyframes)
 
-    @property
-    def converged(self) -> bool:
-        """Whether nothing is left to improve."""
-        return not self.can_refine
-
     def refine(self) -> int:
         """Do one quantum: of what the tracked hypotheses have not entered, then of a search; return 1."""
         if self._tracked.is_behind(self._keyframes):

@@ -25,13 +25,12 @@ from perception.kernel import Floats
 from perception.localization.submaps.local_grid import CHUNK, SHARING_ROUNDS, SUBMAP_CELLS, answers_of, make_grid
 from perception.localization.submaps.map_match import BEAM_CELLS, MATCH_TEMPER, fit_of
 from perception.localization.submaps.submap_records import (
-    READING_M,
-    READING_RAD,
     SUBMAP_M,
     SUBMAP_RAD,
     SUBMAP_READINGS_MAX,
     between,
     compose,
+    fresh_sensors,
 )
 from perception.sensor_mounts import mounts_array, mounts_at
 
@@ -70,6 +69,10 @@ class FoundLag(NamedTuple):
         """Whether the ring's own lag is too unlikely to be used."""
         return self.gain > LAG_REFUTED
 
+    def __str__(self) -> str:
+        which = "the ranges lag behind odometry" if self.lag_s > 0.0 else "odometry lags behind the ranges"
+        return f"{which} by {abs(self.lag_s):.2f} s (± {self.sigma_s:.2f})"
+
 
 class EchoLag:
     """Enters firings at the poses from which they were heard.
@@ -81,15 +84,15 @@ class EchoLag:
 
     Attributes
     ----------
-    lag_s : float
-        By how much ranges lag behind odometry, as used now.
+    lag_s, given_s : float
+        By how much ranges lag behind odometry: as used now, and as the ring's settings say.
     """
 
     SCRATCH: Final = ("_job",)
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
-        _given_s=CONSTANT,
+        given_s=CONSTANT,
         lag_s=PLACE,
         _readings=PLACE._replace(infinite=True),
         _latest=PLACE._replace(infinite=True),
@@ -105,7 +108,7 @@ class EchoLag:
 
     def __init__(self, ring: RingConfig) -> None:
         self._mounts, self._turning = mounts_array(ring.mounts), ring.turning
-        self._half_angle, self._given_s = math.radians(ring.beam_half_angle_deg), ring.echo_lag_s
+        self._half_angle, self.given_s = math.radians(ring.beam_half_angle_deg), ring.echo_lag_s
         self._log_likelihoods = np.zeros(len(LAGS))
         """Of all windows so far, by lag."""
         self.lag_s, self.is_known = ring.echo_lag_s, False
@@ -177,10 +180,7 @@ class EchoLag:
         self._trail_count = count + 1 - stands
         if self._has_ended():
             return
-        apart = here[1:4] - self._latest
-        fresh = ~np.isnan(firing.ranges_m) & (
-            (np.abs(apart[:, 2]) >= READING_RAD) | (np.hypot(apart[:, 0], apart[:, 1]) >= READING_M)
-        )
+        fresh = fresh_sensors(firing.ranges_m, here[1:4], self._latest)
         if fresh.any():
             rows = self._readings[self._count : self._count + int(fresh.sum())]
             rows[:, 0], rows[:, 1:4] = here[0], mounts_at(firing, self._mounts, self._turning)[fresh]
@@ -197,18 +197,13 @@ class EchoLag:
         return is_full or way >= SUBMAP_M or turns >= SUBMAP_RAD
 
     @property
-    def converged(self) -> bool:
-        """Whether nothing is left to improve."""
-        return not self.can_refine
-
-    @property
     def can_refine(self) -> bool:
         """Whether a window waits to be compared, with the poses after it that any lag may need."""
         if self.is_known or self._count == 0:
             return False
         is_full = self._trail_count == TRAIL_MAX
         after_s = float(self._trail[self._trail_count - 1, 0] - self._readings[self._count - 1, 0])
-        return is_full or (self._has_ended() and after_s >= LAGS[-1] - self._given_s)
+        return is_full or (self._has_ended() and after_s >= LAGS[-1] - self.given_s)
 
     def refine(self) -> int:
         """Do one quantum, and return 1."""
@@ -222,7 +217,7 @@ class EchoLag:
             self._log_likelihoods += found
             lag = self.found()
             self.is_known = lag.sigma_s <= LAG_SIGMA_S
-            self.lag_s = lag.lag_s if lag.is_refuted else self._given_s
+            self.lag_s = lag.lag_s if lag.is_refuted else self.given_s
             self._begin_window()
         return 1
 
@@ -240,15 +235,15 @@ class EchoLag:
         """Compute the log likelihood of the window by lag; yield None after each quantum, and it last."""
         rows, log_likelihoods, fit = self._readings[: self._count], np.zeros(len(LAGS)), np.empty(2)
         answers, goes_on = np.empty((2, SUBMAP_CELLS, SUBMAP_CELLS)), np.empty(BEAM_CELLS)
+        beam = np.array([self._half_angle, 0.0])
         for k, lag in enumerate(LAGS if len(rows) >= LAG_READINGS_MIN else ()):
-            readings = _heard_at(self._trail[: self._trail_count], rows, self._given_s + float(lag))
+            readings = _heard_at(self._trail[: self._trail_count], rows, self.given_s + float(lag))
             grid = np.empty(0)
             for made in make_grid(readings, self._half_angle):
                 grid = made
                 yield None
             answers_of(grid[0], grid[1], answers[0], answers[1])
             yield None
-            beam = np.array([self._half_angle, 0.0])
             fit_of(readings, len(readings), 1, _SENSORS_FRAME, beam, answers, goes_on, fit)
             log_likelihoods[k] = MATCH_TEMPER * fit[0]
             yield None
@@ -260,14 +255,14 @@ class EchoLag:
         best = int(np.argmax(known))
         gain = float(known[best] - known[len(LAGS) // 2])
         if not 0 < best < len(LAGS) - 1:
-            return FoundLag(self._given_s, math.inf, 0.0)
+            return FoundLag(self.given_s, math.inf, 0.0)
         slope, curvature = (
             0.5 * (known[best + 1] - known[best - 1]),
             known[best + 1] + known[best - 1] - 2.0 * known[best],
         )
         if not curvature < 0.0:
-            return FoundLag(self._given_s, math.inf, 0.0)
-        lag = self._given_s + LAGS[best] - LAG_STEP_S * slope / curvature
+            return FoundLag(self.given_s, math.inf, 0.0)
+        lag = self.given_s + LAGS[best] - LAG_STEP_S * slope / curvature
         return FoundLag(float(lag), LAG_STEP_S / math.sqrt(-curvature), gain)
 
 

@@ -33,6 +33,7 @@ from perception.localization.submaps.submap_records import (
     Submap,
     between,
     compose,
+    fresh_sensors,
     node_at,
     odometry_link,
     pose_of,
@@ -142,10 +143,7 @@ class SubmapGraph:
         if self._trail_count == 0 or (_is_apart(here - last) and self._trail_count < SUBMAP_READINGS_MAX):
             self._trail[self._trail_count] = here
             self._trail_count += 1
-        apart = here[:3] - self._latest
-        fresh = ~np.isnan(ranges) & (
-            (np.abs(apart[:, 2]) >= READING_RAD) | (np.hypot(apart[:, 0], apart[:, 1]) >= READING_M)
-        )
+        fresh = fresh_sensors(ranges, here[:3], self._latest)
         if fresh.any():
             mounts = mounts_at(firing, self._mounts, self._turning)[fresh]
             c, s = math.cos(here[2]), math.sin(here[2])

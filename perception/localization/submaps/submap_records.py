@@ -57,6 +57,23 @@ class Rows:
         self.archived_rows = np.concatenate([self.archived_rows, row])
 
 
+def fresh_sensors(ranges: Floats, here: Floats, latest: Floats) -> NDArray[np.bool_]:
+    """Return which sensors have a reading from a pose apart from that of their last one.
+
+    Parameters
+    ----------
+    ranges : (n,) float
+        Of a firing, m; NaN where a sensor did not fire.
+    here : (3,) float
+        The ring's pose, x, y (m) and direction (rad), not wrapped.
+    latest : (n, 3) float
+        The ring's pose at each sensor's last reading; infinite before the first.
+    """
+    apart = here - latest
+    turned = np.abs(apart[:, 2]) >= READING_RAD
+    return ~np.isnan(ranges) & (turned | (np.hypot(apart[:, 0], apart[:, 1]) >= READING_M))
+
+
 def between(of: Floats, to: Floats) -> Floats:
     """Return poses in the frame of one, x, y (m) and direction (rad), which is not wrapped; shape (…, 3)."""
     c, s = math.cos(of[2]), math.sin(of[2])

@@ -14,7 +14,7 @@ from config.errors import UserError
 from config.files import ConfigError, DocumentRead, in_place_of, read_file, read_shipped
 from config.load import parse_text, with_room
 from config.settings import Settings
-from config.toml_edit import Scalar
+from config.toml_edit import TomlValue
 from config.toml_lines import located
 from config.world import WorldConfig
 from runtime.analysis.export.world_file import text_with_places, with_places, world_text
@@ -71,7 +71,7 @@ class SettingsFiles:
         """Return what the run's settings would be like with this text in place of a file; raises as `read`."""
         return await asyncio.to_thread(self._check, self._document(number), text)
 
-    async def changed(self, number: int, text: str, path: str, value: Scalar) -> str:
+    async def changed(self, number: int, text: str, path: str, value: TomlValue) -> str:
         """Return a text in place of a file with another value of a field of its form.
 
         Raises

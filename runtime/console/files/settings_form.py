@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from config.files import Kind
 from config.layers import Location
 from config.plugins import DRIVERS, PluginError, plugged, plugged_table, plugged_use
-from config.toml_edit import Scalar, TomlEditError, with_value
+from config.toml_edit import TomlEditError, TomlValue, with_value
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.parameters import fields_of
 from runtime.console.sent_messages import SettingsTable
@@ -37,7 +37,7 @@ def form_of(kind: Kind, text: str) -> list[SettingsTable]:
         return []
 
 
-def with_setting(kind: Kind, text: str, path: str, value: Scalar) -> str:
+def with_setting(kind: Kind, text: str, path: str, value: TomlValue) -> str:
     """Return a text with another value of a field of its form; what that means, the check says.
 
     Parameters

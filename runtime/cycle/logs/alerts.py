@@ -78,14 +78,12 @@ class Alerts:
 
     def _new_lag(self, lag: EchoLag | None) -> list[str]:
         """Return what is new of the lag of ranges behind odometry."""
-        if lag is None or self._has_told_lag or not (found := lag.found()).is_refuted:
+        if lag is None or self._has_told_lag or lag.lag_s == lag.given_s:
             return []
-        self._has_told_lag = True
-        which = "the ranges lag behind odometry" if found.lag_s > 0.0 else "odometry lags behind the ranges"
+        self._has_told_lag, found = True, lag.found()
         return [
-            f"{which} by {abs(found.lag_s):.2f} s (± {found.sigma_s:.2f}), as the echoes show: recognition takes "
-            f"it into account from now on; with echo_lag_s = {found.lag_s:.2f} in the robot file's [ring] it does so "
-            "from the start"
+            f"{found}, as the echoes show: recognition takes it into account from now on; with "
+            f"echo_lag_s = {lag.lag_s:.2f} in the robot file's [ring] it does so from the start"
         ]
 
     def _new_place(self, room: KnownRoom | None) -> tuple[list[str], list[str]]:

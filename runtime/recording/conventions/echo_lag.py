@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
-from perception.localization.submaps.echo_lag import FoundLag, lag_of
-
-
-def found_lag(firings: Sequence[Firing], ring: RingConfig) -> FoundLag | None:
-    """Return by how much ranges lag behind poses; None where what the robot file says is not refuted."""
-    found = lag_of(firings, ring)
-    return found if found.is_refuted else None
 
 
 def at_heard_poses(firings: Iterable[Firing], lag_s: float) -> Iterator[Firing]:
@@ -51,7 +43,13 @@ def _moved(firing: Firing, known: deque[Firing], lag_s: float) -> Firing:
     after = next((one for one in known if one.robot_s > at_s), known[-1])
     span_s = after.robot_s - before.robot_s
     share = min(max((at_s - before.robot_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 0.0
-    a, b = before.pose, after.pose
-    pose = Pose(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y), a.theta + share * wrap_angle(b.theta - a.theta))
-    yaw = before.ring_yaw + share * wrap_angle(after.ring_yaw - before.ring_yaw)
+    pose, yaw = pose_between(before, after, share)
     return replace(firing, pose=pose, ring_yaw=yaw)
+
+
+def pose_between(before: Firing, after: Firing, share: float) -> tuple[Pose, float]:
+    """Return pose and ring's direction on the straight way from one firing to another, after this share of it."""
+    a, b = before.pose, after.pose
+    theta = a.theta + share * wrap_angle(b.theta - a.theta)
+    yaw = before.ring_yaw + share * wrap_angle(after.ring_yaw - before.ring_yaw)
+    return Pose(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y), theta), yaw

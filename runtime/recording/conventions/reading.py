@@ -12,9 +12,10 @@ import numpy as np
 
 from config.robot import RingConfig, RobotConfig
 from drivers.latched_ranges import RepeatFilter
-from drivers.messages import Firing, Pose, wrap_angle
+from drivers.messages import Firing
+from perception.localization.submaps.echo_lag import lag_of
 from runtime.recording.conventions.decision import Conventions, decide
-from runtime.recording.conventions.echo_lag import at_heard_poses, found_lag
+from runtime.recording.conventions.echo_lag import at_heard_poses, pose_between
 from runtime.recording.conventions.options import AUTO, RingLogOptions
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError, read_ring_log
@@ -152,13 +153,7 @@ def _changes(firings: Iterable[Firing], ring: RingConfig, cycle_s: float) -> Ite
         if last is not None:
             dt = firing.robot_s - last.robot_s
             back = 0.5 * max(0.0, min(dt, cycle_s) - step_s) / dt if dt > 0.0 else 0.0
-            here, was = firing.pose, last.pose
-            pose = Pose(
-                here.x + back * (was.x - here.x),
-                here.y + back * (was.y - here.y),
-                here.theta + back * wrap_angle(was.theta - here.theta),
-            )
-            ring_yaw = firing.ring_yaw + back * wrap_angle(last.ring_yaw - firing.ring_yaw)
+            pose, ring_yaw = pose_between(firing, last, back)
             fresh = replace(fresh, pose=pose, ring_yaw=ring_yaw)
         last = firing
         yield fresh
@@ -177,13 +172,12 @@ def _at_heard_poses(
     lag_s, begin = options.echo_lag_s, list[Firing]()
     if lag_s is None:
         begin = list(itertools.islice(firings, rows))
-        lag_s, found = ring.echo_lag_s, found_lag(begin, ring)
-        if found is not None:
-            lag_s = found.lag_s
-            which = "the ranges lag behind the poses" if lag_s > 0.0 else "the poses lag behind the ranges"
+        found = lag_of(begin, ring)
+        lag_s = found.lag_s if found.is_refuted else ring.echo_lag_s
+        if found.is_refuted:
             warn(
-                f"{path}: {which} by {abs(lag_s):.2f} s (± {found.sigma_s:.2f}), which is taken into account. "
-                f"To settle it: --echo-lag {lag_s:.2f}, or echo_lag_s = {lag_s:.2f} in the robot's [ring]"
+                f"{path}: {found}, which is taken into account. To settle it: --echo-lag {lag_s:.2f}, or "
+                f"echo_lag_s = {lag_s:.2f} in the robot's [ring]"
             )
     yield from at_heard_poses(itertools.chain(begin, firings), lag_s)
 

@@ -123,10 +123,9 @@ def _echo_lag(firings: Sequence[Firing], ring: RingConfig, options: RingLogOptio
     found = lag_of(firings, ring)
     if not math.isfinite(found.sigma_s):
         return ring.echo_lag_s, "by how much ranges lag behind odometry is not shown by this drive"
-    shown = f"{found.lag_s:+.3f} s (± {found.sigma_s:.3f})"
     if found.is_refuted:
-        return found.lag_s, f"ranges lag behind odometry by {shown}"
-    return ring.echo_lag_s, f"ranges lag behind odometry by {shown}: the {ring.echo_lag_s:g} s of before stay"
+        return found.lag_s, str(found)
+    return ring.echo_lag_s, f"{found}: too little to change the {ring.echo_lag_s:g} s of before"
 
 
 def sensors_table(settings: Settings, found: Calibration) -> Table:
@@ -209,7 +208,7 @@ def robot_text(settings: Settings, found: Calibration, source: str, echo_lag_s: 
     parts = {name: getattr(settings, name) for name in RobotConfig.model_fields}
     tables = RobotConfig(**parts).model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     ring = tables.pop("ring")
-    for name in ("count", "radius_m", "sensors"):
+    for name in ("count", "radius_m", "sensors", "echo_lag_s"):
         ring.pop(name, None)
     if echo_lag_s != 0.0:
         ring["echo_lag_s"] = round(echo_lag_s, 3)

@@ -13,6 +13,7 @@ from perception.localization.submaps.submap_records import (
     Rows,
     between,
     compose,
+    fresh_sensors,
     match_link,
     node_at,
     odometry_link,
@@ -67,3 +68,10 @@ def test_a_pose_survives_as_a_record() -> None:
     rows.append(node_at(pose))
     assert rows.archived_rows["y"].tolist() == [2.0]
     assert rows.archived_rows.dtype == Node.DTYPE
+
+
+def test_a_reading_is_fresh_once_its_sensor_is_elsewhere() -> None:
+    latest = np.array([[math.inf] * 3, [0.0, 0.0, 0.0], [0.95, 0.0, 0.0], [1.0, 0.0, -0.2], [math.inf] * 3])
+    ranges = np.array([1.0, 1.0, math.inf, 1.0, math.nan])
+    fresh = fresh_sensors(ranges, np.array([1.0, 0.0, 0.0]), latest)
+    assert fresh.tolist() == [True, True, False, True, False]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import tomlkit
 
 from config.files import documents_read, noting_files_read
 from config.load import load_settings
@@ -135,7 +136,9 @@ def test_what_is_no_field_of_the_form_is_refused(path: str) -> None:
         with_setting("robots", 'robot.driver = "skippy"', path, 1.0)
 
 
-def test_a_text_that_only_a_person_can_change_is_refused() -> None:
+def test_a_text_that_only_a_person_can_change_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     text = 'robot.driver = "skippy"\nskippy = { side = """left""" }'
+    assert with_setting("robots", text, "skippy.side", "right") == text.replace('"""left"""', '"right"')
+    monkeypatch.setattr(tomlkit, "dumps", lambda _document: text)
     with pytest.raises(CommandError, match="change it in the text"):
         with_setting("robots", text, "skippy.side", "right")

@@ -133,10 +133,10 @@ def test_what_is_new_of_the_place_in_a_known_room_is_reported_once() -> None:
 
 def test_a_lag_of_the_ranges_is_told_once_with_what_to_set() -> None:
     alerts, perception = Alerts(), StubPerception()
-    found = FoundLag(0.02, 0.05, 0.1)
-    perception.echo_lag = SimpleNamespace(found=lambda: found)
+    lag = SimpleNamespace(lag_s=0.0, given_s=0.0, found=lambda: FoundLag(0.163, 0.02, 9.0))
+    perception.echo_lag = lag
     assert alerts.update(NOTHING, state(perception), 0.0) == []
-    found = FoundLag(0.163, 0.02, 9.0)
+    lag.lag_s = 0.163
     (line,) = alerts.update(NOTHING, state(perception), 1.0)
     assert line.startswith("the ranges lag behind odometry by 0.16 s (± 0.02)")
     assert "echo_lag_s = 0.16" in line

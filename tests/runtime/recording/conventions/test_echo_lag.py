@@ -50,7 +50,7 @@ def test_a_lag_is_found_said_and_taken_into_account() -> None:
     raw = [abs(a.pose.theta - b.pose.theta) for a, b in zip(firings, exact, strict=True)]
     assert np.mean(off) < 0.2 * np.mean(raw)
     (text,) = said
-    assert "the ranges lag behind the poses by 0.2" in text
+    assert "the ranges lag behind odometry by 0.2" in text
     assert "--echo-lag 0.2" in text
 
 
