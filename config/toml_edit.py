@@ -6,8 +6,6 @@ import tomllib
 from collections.abc import MutableMapping, Sequence
 from typing import Any, TypeAlias
 
-import tomlkit
-
 TomlValue: TypeAlias = bool | int | float | str | None
 Place: TypeAlias = tuple[str | int, ...]
 
@@ -33,6 +31,8 @@ def with_value(text: str, place: Sequence[str | int], value: TomlValue) -> str:
     TomlEditError
         The text is not TOML, the place is within none of its tables, or what tomlkit makes of it says something else.
     """
+    import tomlkit  # here, as a start should not wait for it
+
     name = ".".join(map(str, place))
     try:
         wanted = tomllib.loads(text)
