@@ -10,7 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import InitErrorDetails
+from pydantic_core import InitErrorDetails, to_json
 
 from config.errors import WRONG_CALL, UserError
 
@@ -79,6 +79,19 @@ def plugged_use(name: str) -> type[BaseModel] | None:
     )
 
 
+def validated(model: type[M], value: object) -> M:
+    """Return a package's own table as its model, whose fields may have any type that TOML can write.
+
+    A strict model takes a list for a tuple, and a text for a path or an enumeration, only from JSON.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        The table is wrong.
+    """
+    return model.model_validate_json(to_json(value)) if isinstance(value, dict) else model.model_validate(value)
+
+
 def located(error: ValidationError, *at: str | int) -> Iterable[InitErrorDetails]:
     """Yield the problems of a table that was validated by itself, each at its place in the table that holds it."""
     for found in error.errors(include_url=False):
@@ -94,7 +107,7 @@ def _lacking(model: type[BaseModel], data: object) -> list[InitErrorDetails]:
         return []
     try:
         if (table := plugged_table(name)) is not None:
-            table.model_validate({})
+            validated(table, {})
     except ValidationError as error:
         return list(located(error, name))
     except PluginError:  # the registry of drivers says it
@@ -134,7 +147,7 @@ def with_own_tables(model: type[M], data: object, validate: Callable[[object], M
             problems.append(InitErrorDetails(type="extra_forbidden", loc=(key,), input=value))
             continue
         try:
-            tables[key] = table.model_validate(value)
+            tables[key] = validated(table, value)
         except ValidationError as error:
             problems += located(error, key)
     if problems or config is None:

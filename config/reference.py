@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 import annotated_types
-import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -20,6 +19,7 @@ from config.robot import RobotConfig
 from config.settings import Settings
 from config.strict import description
 from config.study import StudyConfig
+from config.toml_edit import inline
 from config.world import WorldConfig
 
 FILES: Final = (
@@ -86,9 +86,11 @@ def _plugged_tables(file: str) -> dict[str, type[BaseModel]]:
 def table_help(file: str, table: str) -> str:
     """Return what a table is for: the first paragraph of its model's documentation."""
     model: type[BaseModel] = next(model for name, model, _ in FILES if name == file)
-    if (own := _plugged_tables(file).get(table)) is not None:
-        return " ".join((own.__doc__ or "").split("\n\n")[0].split())
-    for name in table.removesuffix("[]").split(".") if table else ():
+    way = table
+    for own_table, own in _plugged_tables(file).items():
+        if f"{table}.".startswith(f"{own_table}."):
+            model, way = own, table[len(own_table) + 1 :]
+    for name in way.removesuffix("[]").split(".") if way else ():
         key, _, kind = name.removesuffix("]").partition("[")
         options = list(_models(model.model_fields[key].annotation))
         model = next((option for option in options if kind == _kind(option)), options[0])
@@ -113,7 +115,7 @@ def _settings(file: str, model: type[BaseModel], table: str, leave_out: set[str]
     for name, field in fields.items():
         inners = list(_models(field.annotation))
         for inner in inners:
-            is_list = get_origin(_without_none(field.annotation)[0]) in (tuple, Annotated)
+            is_list = get_origin(_without_none(field.annotation)[0]) in (tuple, list, Annotated)
             kind = _kind(inner) if len(inners) > 1 else ""
             inner_table = f"{table}.{name}".lstrip(".") + (f"[{kind}]" if is_list else "")
             yield from _settings(file, inner, inner_table, leave_out)
@@ -135,7 +137,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:  # noqa: ANN401 - an 
     for option in _without_none(annotation):
         if isinstance(option, type) and issubclass(option, BaseModel):
             yield option
-        elif get_origin(option) is Annotated or get_origin(option) is tuple:
+        elif get_origin(option) in (Annotated, tuple, list):
             yield from _models(get_args(option)[0])
 
 
@@ -154,6 +156,10 @@ def type_of(annotation: Any) -> str:  # noqa: ANN401 - an annotation can be anyt
         if ... in get_args(only):
             return f"list of {type_of(inner[0])}"
         return f"list of {len(inner)} × {type_of(inner[0])}"
+    if get_origin(only) is list:
+        return f"list of {type_of(get_args(only)[0])}"
+    if get_origin(only) is dict:
+        return f"table of {type_of(get_args(only)[1])}"
     return next((words for plain, words in PLAIN if only is plain), getattr(only, "__name__", str(only)))
 
 
@@ -182,11 +188,7 @@ def default_of(field: FieldInfo) -> str:
     if field.is_required():
         return ""
     value = field.get_default(call_default_factory=True)
-    if value is None:
-        return "not set"
-    if isinstance(value, tuple):
-        return str(list(value))
-    return tomli_w.dumps({"x": value}).removeprefix("x = ").strip()
+    return "not set" if value is None else inline(value)
 
 
 def markdown() -> str:

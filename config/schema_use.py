@@ -24,7 +24,7 @@ from config.mission_step import (
     Use,
     WanderUse,
 )
-from config.plugins import located, plugged_use
+from config.plugins import located, plugged_use, validated
 
 
 def _with_plugged(value: object, shipped: ValidatorFunctionWrapHandler) -> object:
@@ -34,7 +34,7 @@ def _with_plugged(value: object, shipped: ValidatorFunctionWrapHandler) -> objec
     if use is None:
         return value if isinstance(value, Use) else shipped(value)
     try:
-        return use.model_validate(value)
+        return validated(use, value)
     except ValidationError as error:
         raise ValidationError.from_exception_data(use.__name__, list(located(error, str(name)))) from None
 

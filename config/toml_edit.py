@@ -3,15 +3,37 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from typing import Any, TypeAlias
 
-TomlValue: TypeAlias = bool | int | float | str | None
+from pydantic_core import to_jsonable_python
+
+TomlValue: TypeAlias = bool | int | float | str | list[Any] | dict[str, Any] | None
 Place: TypeAlias = tuple[str | int, ...]
 
 
 class TomlEditError(ValueError):
     """A text in which a value cannot be changed."""
+
+
+def inline(value: object) -> str:
+    """Return a value as in TOML, on one line: lists in brackets, tables and models in braces."""
+    match value:
+        case Mapping():
+            pairs = (f"{_scalar({str(key): 0}).removesuffix(' = 0')} = {inline(one)}" for key, one in value.items())
+            return "{" + ", ".join(pairs) + "}"
+        case list() | tuple():
+            return "[" + ", ".join(map(inline, value)) + "]"
+        case bool() | int() | float() | str():
+            return _scalar({"x": value}).removeprefix("x = ")
+        case _:  # a model, a path, an enumeration
+            return inline(to_jsonable_python(value, exclude_none=True))
+
+
+def _scalar(pair: Mapping[str, object]) -> str:
+    import tomli_w  # here, as a start should not wait for it
+
+    return tomli_w.dumps(pair).strip()
 
 
 def with_value(text: str, place: Sequence[str | int], value: TomlValue) -> str:

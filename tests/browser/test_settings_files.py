@@ -107,13 +107,15 @@ async def test_a_table_of_an_installed_package_is_a_form_that_changes_the_text(
 ) -> None:
     trim = {"path": "skippy.trim", "label": "trim", "value": 1.0, "low": 0.0, "high": 2.0, "kind": "float",
             "choices": None, "optional": False, "help": "Counts."}  # fmt: skip
-    form = [{"title": "skippy", "help": "Of <b>skippy</b>.", "fields": [trim]}]
+    masks = {**trim, "path": "skippy.masks", "label": "masks", "value": "[1, 2]", "low": None, "high": None,
+             "kind": "toml", "help": "Fire."}  # fmt: skip
+    form = [{"title": "skippy", "help": "Of <b>skippy</b>.", "fields": [trim, masks]}]
     server.data |= {
         "list_settings": [{"kind": "robot", "name": "my.toml", "shipped": False},
                           {"kind": "robot", "name": "robots/skippy.toml", "shipped": True}],
         "read_settings": {"text": TEXT, "digest": "a" * 64, "form": form},
         "check_settings": {"problems": [], "warnings": [], "difference": "+x",
-                           "form": [{**form[0], "fields": [{**trim, "value": 1.25}]}]},
+                           "form": [{**form[0], "fields": [{**trim, "value": 1.25}, masks]}]},
         "change_settings": TEXT + "[skippy]\ntrim = 1.25\n",
     }  # fmt: skip
     opened = await opener.open(server.url)
@@ -123,10 +125,10 @@ async def test_a_table_of_an_installed_package_is_a_form_that_changes_the_text(
     field = page.get_by_label("trim", exact=True)
     await expect(field).to_have_value("1")
     await expect(page.locator("#settings-form .hint")).to_have_text("Of <b>skippy</b>.")
-    await expect(page.locator("#settings-form .help")).to_have_text("Counts. 0 to 2.")
+    await expect(page.locator("#settings-form .help").first).to_have_text("Counts. 0 to 2.")
     await field.fill("one")
     await field.press("Enter")
-    await expect(page.locator("#settings-form .error")).to_have_text("a number is wanted")
+    await expect(page.locator("#settings-form .error").first).to_have_text("a number is wanted")
     await field.fill("1.25")
     await field.press("Enter")
     sent = await server.wait("change_settings")
@@ -135,6 +137,9 @@ async def test_a_table_of_an_installed_package_is_a_form_that_changes_the_text(
     await opened.run_for(500)
     await expect(page.locator("#settings-save")).to_be_enabled()
     await expect(page.locator("#settings-form .field.changed")).to_have_count(1)
+    await page.get_by_label("masks", exact=True).fill("")
+    await page.get_by_label("masks", exact=True).press("Enter")
+    assert (await server.wait("change_settings", 2))["value"] is None
     await page.select_option("#settings-file", "1")
     await page.locator("#dialog-buttons button").last.click()
     await expect(field).to_be_disabled()

@@ -23,6 +23,19 @@ class Config(Strict):
     trim: float = Field(default=1.0, gt=0.0, le=2.0)
     """Counts of the left wheel over those of the right one."""
 '''
+LISTS = (
+    FAMILY
+    + """
+    masks: tuple[int, ...] = ()
+    log: Path | None = None
+    side: Side = Side.LEFT
+    gains: list[Gain] = []
+    limits: dict[str, float] = {}
+"""
+)
+LISTS = LISTS.replace("from pydantic", "from enum import Enum\nfrom pathlib import Path\nfrom pydantic").replace(
+    "class Config", "class Side(Enum):\n    LEFT = 'l'\n\nclass Gain(Strict):\n    ratio: int = 1\n\nclass Config"
+)
 CRATE = 'name = "tub"\nclosed = true\nvertices_m = [[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]\n'
 ROBOT = """
 [robot]
@@ -45,13 +58,13 @@ turn_max_rad_s = 1.0
 @pytest.fixture(autouse=True)
 def _package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     files = {
-        "plug_family.py": FAMILY, "plug_wants.py": FAMILY.replace("default=1.0, ", ""),
+        "plug_family.py": FAMILY, "plug_lists.py": LISTS, "plug_wants.py": FAMILY.replace("default=1.0, ", ""),
         "plug_broken.py": "import plug_missing\n", "plug_data/__init__.py": "",
         "plug_data/models/tub.toml": CRATE, "plug_data/robots/skippy.toml": ROBOT + "[skippy]\ntrim = 1.1\n",
         "plug_data/models/drum.toml": CRATE,
     }  # fmt: skip
     install(monkeypatch, tmp_path / "site", files, {
-        DRIVERS: {"skippy": "plug_family", "wants": "plug_wants", "broken": "plug_broken"},
+        DRIVERS: {"skippy": "plug_family", "wants": "plug_wants", "lists": "plug_lists", "broken": "plug_broken"},
         "echolocate.schemas": {"none": "plug_family"},
         "echolocate.models": {"mine": "plug_data.models"}, "echolocate.robots": {"mine": "plug_data.robots"},
     })  # fmt: skip
@@ -74,6 +87,19 @@ def test_a_drivers_own_table_is_validated_by_its_own_model_and_goes_with_the_set
     plain = tmp_path / "plain.toml"
     plain.write_text(ROBOT)
     assert "skippy" not in load_robot(plain).model_dump()
+
+
+def test_a_table_may_have_any_type_that_toml_can_write(tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    text = '[lists]\nmasks = [1, 2]\nlog = "a.txt"\nside = "l"\ngains = [{ratio = 3}]\nlimits = {v = 2}\n'
+    path.write_text(ROBOT.replace('"skippy"', '"lists"') + text)
+    robot = load_robot(path)
+    held = {"trim": 1.0, "masks": [1, 2], "log": "a.txt", "side": "l", "gains": [{"ratio": 3}], "limits": {"v": 2.0}}
+    assert robot.model_dump(mode="json")["lists"] == held
+    assert type(robot).model_validate(robot.model_dump(mode="json")) == type(robot).model_validate(robot.model_dump())
+    path.write_text(path.read_text().replace("masks = [1, 2]", "masks = [1, 2.5]"))
+    with pytest.raises(ConfigError, match=r"lists.masks.1 = 2.5: must be an integer"):
+        load_robot(path)
 
 
 @pytest.mark.parametrize(
@@ -107,6 +133,10 @@ def test_a_table_that_a_driver_needs_is_missed_where_there_is_none(tmp_path: Pat
 def test_the_reference_lists_it() -> None:
     (found,) = (one for one in settings_of("robot") if one.table == "skippy")
     assert (found.key, found.default, found.bounds) == ("trim", "1.0", "> 0, ≤ 2")
+    lists = {one.key: (one.type, one.default) for one in settings_of("robot") if one.table == "lists"}
+    assert lists["masks"] == ("list of integer", "[]")
+    assert lists["limits"] == ("table of number", "{}")
+    assert [one.key for one in settings_of("robot") if one.table == "lists.gains[]"] == ["ratio"]
     assert 'Of the driver "skippy"' in markdown().replace("broken", "")
 
 

@@ -9,7 +9,7 @@ import tomlkit
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.toml_edit import Place, TomlEditError, TomlValue, with_value
+from config.toml_edit import Place, TomlEditError, TomlValue, inline, with_value
 
 ROBOT = """# mine
 robot.driver = "skippy"  # of a package
@@ -88,3 +88,14 @@ def test_the_text_says_what_is_wanted_and_nothing_else(place: tuple[str, str], v
     assert tomllib.loads(changed) == wanted
     assert "# measured" in changed
     assert "# of a package" in changed
+
+
+PLAIN = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text()
+NESTED = st.recursive(PLAIN, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner))
+
+
+@given(NESTED)
+def test_a_value_on_one_line_says_the_same(value: object) -> None:
+    text = inline(value)
+    assert "\n" not in text
+    assert tomllib.loads(f"x = {text}") == {"x": value}

@@ -28,6 +28,7 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     from config.plugins import plugged_table
     from config.robot import NO_BODY
     from config.settings import Settings
+    from config.toml_edit import inline
     from drivers.capabilities import after_kill
     from drivers.registry import deadman_s
     from runtime.support.blind_sides import refuse_blind_ways
@@ -42,8 +43,8 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
         if (own := plugged_table(settings.robot.driver)) is not None:
-            values = settings.own_table(settings.robot.driver, own).model_dump(mode="json")
-            shown = ", ".join(f"{key} = {value}" for key, value in values.items())
+            values = settings.own_table(settings.robot.driver, own).model_dump(mode="json", exclude_none=True)
+            shown = ", ".join(f"{key} = {inline(value)}" for key, value in values.items())
             sys.stdout.write(f"{config}: [{settings.robot.driver}] {shown}\n")
         if settings.body != NO_BODY:
             sys.stdout.write(f"{config}: {after_kill(settings.body, deadman_s(settings))}\n")

@@ -19,9 +19,12 @@ from config.layers import Location
 from config.reload import Difference
 from config.settings import Settings
 from config.strict import description
+from config.toml_edit import inline
 
 KINDS: Final = ((bool, "bool"), (int, "int"), (float, "float"), (str, "text"))
 """Plain types and their names on the wire; bool precedes int, of which it is a subclass."""
+TOML: Final = "toml"
+"""The name of all others, whose value is a text in TOML."""
 UNITS: Final = MappingProxyType(
     {"_m_s": "m/s", "_rad_s": "rad/s", "_per_s": "1/s", "_deg": "°", "_rad": "rad", "_hz": "Hz", "_m": "m", "_s": "s"}
 )
@@ -59,7 +62,7 @@ def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
 
 
 def fields_of(model: type[BaseModel], values: Mapping[str, Any], at: Location) -> Iterator[Parameter]:
-    """Yield every key of a table in a file that has a single plain value, whether the file gives it or not.
+    """Yield every key of a table in a file, whether the file gives it or not; lists and the like as text in TOML.
 
     Parameters
     ----------
@@ -75,10 +78,35 @@ def fields_of(model: type[BaseModel], values: Mapping[str, Any], at: Location) -
         value = values.get(name, None if field.is_required() else field.get_default(call_default_factory=True))
         if isinstance(inner, type) and issubclass(inner, BaseModel):
             yield from fields_of(inner, value if isinstance(value, Mapping) else {}, location)
-        elif (found := _parameter(location, field, value)) is not None and found["choices"] != [value]:
-            found["value"] = value if isinstance(value, bool | int | float | str | None) else str(value)
-            found["help"] = " ".join((description(model, name) or model.__doc__ or "").split())
-            yield found
+            continue
+        found = _parameter(location, field, value)
+        if found is not None and found["choices"] == [value]:
+            continue
+        text = " ".join((description(model, name) or model.__doc__ or "").split())
+        if found is None:
+            yield _in_toml(location, field, value, text)
+            continue
+        found["value"] = value if isinstance(value, bool | int | float | str | None) else str(value)
+        found["help"] = text
+        yield found
+
+
+def _in_toml(location: Location, field: FieldInfo, value: Any, text: str) -> Parameter:  # noqa: ANN401 - any setting
+    """Return a field that has no single plain value as a text in TOML."""
+    from config.reference import bounds_of, type_of  # here, as a start should not wait for it
+
+    kind = ", ".join(part for part in (type_of(field.annotation), bounds_of(field)) if part)
+    return {
+        "path": ".".join(map(str, location)),
+        "label": _label(str(location[-1])),
+        "value": None if value is None else inline(value),
+        "low": None,
+        "high": None,
+        "kind": TOML,
+        "choices": None,
+        "optional": False,
+        "help": f"{text} As in TOML, {kind}; empty: the default.".strip(),
+    }
 
 
 def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | None:  # noqa: ANN401 - any setting

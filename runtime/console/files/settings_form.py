@@ -13,7 +13,7 @@ from config.layers import Location
 from config.plugins import DRIVERS, PluginError, plugged, plugged_table, plugged_use
 from config.toml_edit import TomlEditError, TomlValue, with_value
 from runtime.console.commands.command_error import CommandError
-from runtime.console.commands.parameters import fields_of
+from runtime.console.commands.parameters import TOML, fields_of
 from runtime.console.sent_messages import SettingsTable
 
 
@@ -47,20 +47,35 @@ def with_setting(kind: Kind, text: str, path: str, value: TomlValue) -> str:
     path
         Of the field.
     value
-        None removes the key, so that its default counts.
+        None removes the key, so that its default counts. A list and the like is a text in TOML.
 
     Raises
     ------
     CommandError
-        There is no such field, or the text is written so that only a person can change it.
+        There is no such field, its text is not TOML, or the file's is written so that only a person can change it.
     """
-    if all(path != field["path"] for table in form_of(kind, text) for field in table["fields"]):
+    fields = {field["path"]: field for table in form_of(kind, text) for field in table["fields"]}
+    if path not in fields:
         raise CommandError(f"{path}: no field of this file's form; change the text")
+    if fields[path]["kind"] == TOML and value is not None:
+        value = _read(path, str(value))
     place = [int(part) if part.isdecimal() else part for part in path.split(".")]
     try:
         return with_value(text, place, value)
     except TomlEditError as error:
         raise CommandError(str(error)) from None
+
+
+def _read(path: str, text: str) -> TomlValue:
+    """Return the value that a text in TOML says."""
+    try:
+        said = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError as error:
+        raise CommandError(f"{path}: not a value in TOML ({error}); write it as [1, 2] or [{{name = 1}}]") from None
+    if len(said) > 1:
+        raise CommandError(f"{path}: more than one value; write it as [1, 2] or [{{name = 1}}]")
+    value: TomlValue = said["value"]
+    return value
 
 
 def _tables(kind: Kind, document: dict[str, Any]) -> Iterator[tuple[Location, type[BaseModel], dict[str, Any]]]:

@@ -76,7 +76,7 @@ export function valueIn(field) {
   } = field;
   if (isBox(input)) return input.checked;
   const text = input.value.trim();
-  if (text === "" && optional) return null;
+  if (text === "" && (optional || kind === "toml")) return null;
   if (kind !== "float" && kind !== "int") return text;
   const value = text === "" ? Number.NaN : (numberIn(text) ?? 0);
   if (Number.isFinite(value) && (kind === "float" || Number.isInteger(value))) return value;

@@ -40,7 +40,10 @@ class Config(Strict):
     side: Literal["left", "right"] = "left"
     """Which one."""
     wheels: Wheels = Wheels()
-    masks: tuple[int, ...] = ()
+    masks: tuple[int, ...] = Field(default=(1, 2), max_length=4)
+    """Which fire."""
+    limits: dict[str, float] = {}
+    gains: list[Wheels] = [Wheels()]
 
 class Orbit(Use):
     """Round and round."""
@@ -77,11 +80,15 @@ def values(form: list[SettingsTable]) -> dict[str, object]:
 def test_a_robot_has_the_table_of_its_driver_with_what_the_file_does_not_say() -> None:
     (table,) = form_of("robots", 'robot.driver = "skippy"\n[skippy]\ntrim = 1.1\n')
     assert (table["title"], table["help"]) == ("skippy", 'Of the driver "skippy".')
-    assert values([table]) == {"skippy.trim": 1.1, "skippy.side": "left", "skippy.wheels.ratio": 2}
-    trim, side, _ = table["fields"]
+    assert values([table]) == {
+        "skippy.trim": 1.1, "skippy.side": "left", "skippy.wheels.ratio": 2, "skippy.masks": "[1, 2]",
+        "skippy.limits": "{}", "skippy.gains": "[{ratio = 2}]",
+    }  # fmt: skip
+    trim, side, _, masks, _, _ = table["fields"]
     assert (trim["kind"], trim["low"], trim["high"]) == ("float", 0.0, 2.0)
     assert trim["help"] == "Counts of the left wheel over those of the right one."
     assert side["choices"] == ["left", "right"]
+    assert masks["help"] == "Which fire. As in TOML, list of integer, at most 4 long; empty: the default."
 
 
 def test_files_without_such_a_table_have_no_form() -> None:
@@ -95,6 +102,29 @@ def test_a_mission_has_each_use_of_a_schema() -> None:
     assert (table["title"], values([table])) == ("step 1, orbit", {"step.0.schemas.1.way_m": 0.5})
     changed = with_setting("missions", MISSION, "step.0.schemas.1.way_m", 0.7)
     assert changed == MISSION.replace("0.5}", "0.7}")
+
+
+@pytest.mark.parametrize(
+    ("said", "path", "value"),
+    [
+        ("masks = [7]", "skippy.masks", "[3, 4]"),
+        ("[[skippy.gains]]\nratio = 3\n[[skippy.gains]]\nratio = 4", "skippy.gains", "[{ratio = 5}]"),
+        ("limits.left = 1.0  # m/s", "skippy.limits", "{right = 2.0}"),
+    ],
+)
+def test_a_list_is_changed_as_a_text_in_toml(said: str, path: str, value: str) -> None:
+    text = f'[robot]\ndriver = "skippy"\n[skippy]\ntrim = 1.5\n{said}\n'
+    changed = with_setting("robots", text, path, value)
+    assert values(form_of("robots", changed))[path] == value
+    assert values(form_of("robots", changed))["skippy.trim"] == 1.5
+    default = with_setting("robots", changed, path, None)
+    assert values(form_of("robots", default))[path] != value
+
+
+@pytest.mark.parametrize("value", ["[1, ", "1\nname = 2", "", "one"])
+def test_what_is_no_value_in_toml_is_refused(value: str) -> None:
+    with pytest.raises(CommandError, match=r"skippy\.masks: "):
+        with_setting("robots", 'robot.driver = "skippy"', "skippy.masks", value)
 
 
 async def test_a_field_is_changed_checked_by_the_plug_ins_own_model_and_saved(tmp_path: Path) -> None:
@@ -130,7 +160,7 @@ async def test_a_packages_own_robot_file_is_read_and_not_changed(tmp_path: Path)
         await files.save(number, held["text"], held["digest"])
 
 
-@pytest.mark.parametrize("path", ["skippy.masks", "ring.count", "skippy.name", "step.0.name"])
+@pytest.mark.parametrize("path", ["skippy.mask", "ring.count", "skippy.name", "step.0.name"])
 def test_what_is_no_field_of_the_form_is_refused(path: str) -> None:
     with pytest.raises(CommandError, match="no field of this file"):
         with_setting("robots", 'robot.driver = "skippy"', path, 1.0)
