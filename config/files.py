@@ -22,7 +22,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from config.errors import WRONG_CALL, UserError
 from config.layers import Source
-from config.plugins import FILES, plugged
+from config.plugins import plugged_folders
 
 Kind: TypeAlias = Literal["robots", "worlds", "models", "runs", "missions", "studies"]
 """Kind of a file, and the folder of the shipped files of that kind."""
@@ -96,8 +96,7 @@ def read_shipped(read: DocumentRead) -> bytes:
 
 def _shipped_files(kind: Kind) -> dict[str, Traversable]:
     """Return the files of a kind by their names; a shipped one takes precedence."""
-    added = [files(entry.value) for entry in plugged(FILES.format(kind)).values()]
-    found = (entry for folder in (*added, files("config") / kind) for entry in folder.iterdir())
+    found = (entry for folder in (*plugged_folders(kind)[0], files("config") / kind) for entry in folder.iterdir())
     return {entry.name.removesuffix(".toml"): entry for entry in found if entry.name.endswith(".toml")}
 
 
@@ -339,7 +338,7 @@ def _file_hint(name: str, base: Path) -> str:
 
 
 def _known(kind: Kind) -> str:
-    return f"known {kind}: {', '.join(list_shipped(kind))}"
+    return f"known {kind}: {', '.join(list_shipped(kind))}{plugged_folders(kind)[1]}"
 
 
 def _placed(message: str, text: str) -> str:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from importlib.metadata import EntryPoint, entry_points
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -43,13 +45,32 @@ def load_plugin(entry: EntryPoint) -> object:
     PluginError
         It cannot be imported.
     """
+    found, why = None, None
     try:
-        return entry.load()
+        module = EntryPoint(entry.name, entry.module, entry.group).load()
+        if hasattr(module, "__path__") and getattr(module, "__file__", None) is None:
+            why = f"the folder {next(iter(module.__path__))} hides it: start Python in another folder"
+        else:
+            found = entry.load()
     except (ImportError, AttributeError) as error:
+        why = str(error)
+    if why is not None:
         raise PluginError(
-            f'the plug-in "{entry.name}" cannot be loaded from {entry.value} ({error}); reinstall or update the '
+            f'the plug-in "{entry.name}" cannot be loaded from {entry.value} ({why}); reinstall or update the '
             f"package that provides it"
-        ) from error
+        )
+    return found
+
+
+def plugged_folders(kind: str) -> tuple[list[Traversable], str]:
+    """Return the folders of files that packages add to a kind, and a sentence on those that are missing."""
+    folders, lacking = [], ""
+    for name, entry in plugged(FILES.format(kind)).items():
+        try:
+            folders.append(files(entry.value))
+        except ImportError:
+            lacking += f'; the plug-in "{name}" has no package {entry.value}: reinstall it'
+    return folders, lacking
 
 
 def plugged_table(name: str) -> type[BaseModel] | None:

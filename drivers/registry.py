@@ -18,6 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypedDict, cast
 
+from config.plugins import PluginError, load_plugin
 from config.robot import CalibrationConfig, DriverConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.capabilities import CAPABILITIES
@@ -217,12 +218,9 @@ def _family(name: str) -> DriverFamily:
             f"the name, or install the package that provides the driver"
         )
     try:
-        return cast("DriverFamily", entry.load())
-    except (ImportError, AttributeError) as error:
-        raise DriverError(
-            f'robot.driver = "{name}": cannot be loaded from {entry.value} ({error}); reinstall or update the '
-            f"package that provides it"
-        ) from error
+        return cast("DriverFamily", load_plugin(entry))
+    except PluginError as error:
+        raise DriverError(f'robot.driver = "{name}": {error}') from error
 
 
 def _with_errors(world: WorldConfig, errors: CalibrationConfig) -> WorldConfig:

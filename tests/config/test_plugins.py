@@ -61,12 +61,14 @@ def _package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         "plug_family.py": FAMILY, "plug_lists.py": LISTS, "plug_wants.py": FAMILY.replace("default=1.0, ", ""),
         "plug_broken.py": "import plug_missing\n", "plug_data/__init__.py": "",
         "plug_data/models/tub.toml": CRATE, "plug_data/robots/skippy.toml": ROBOT + "[skippy]\ntrim = 1.1\n",
-        "plug_data/models/drum.toml": CRATE,
+        "plug_data/models/drum.toml": CRATE, "plug_hidden/plug_hidden/__init__.py": FAMILY,
     }  # fmt: skip
     install(monkeypatch, tmp_path / "site", files, {
-        DRIVERS: {"skippy": "plug_family", "wants": "plug_wants", "lists": "plug_lists", "broken": "plug_broken"},
+        DRIVERS: {"skippy": "plug_family", "wants": "plug_wants", "lists": "plug_lists", "broken": "plug_broken",
+                  "hidden": "plug_hidden"},
         "echolocate.schemas": {"none": "plug_family"},
-        "echolocate.models": {"mine": "plug_data.models"}, "echolocate.robots": {"mine": "plug_data.robots"},
+        "echolocate.models": {"mine": "plug_data.models", "gone": "plug_gone.models"},
+        "echolocate.robots": {"mine": "plug_data.robots"},
     })  # fmt: skip
 
 
@@ -75,6 +77,8 @@ def test_files_are_known_by_name_and_a_shipped_one_comes_first() -> None:
     assert load_model("tub").name == "tub"
     assert load_model("drum").name == "drum"
     assert "skippy" in list_shipped("robots")
+    with pytest.raises(ConfigError, match=r'the plug-in "gone" has no package plug_gone\.models: reinstall it'):
+        load_model("tubb")
 
 
 def test_a_drivers_own_table_is_validated_by_its_own_model_and_goes_with_the_settings(tmp_path: Path) -> None:
@@ -109,6 +113,7 @@ def test_a_table_may_have_any_type_that_toml_can_write(tmp_path: Path) -> None:
         ("[skippy]\ntrimm = 1.0\n", "skippy.trimm: unknown key; did you mean trim?"),
         ("[skipy]\ntrim = 1.0\n", "skipy: unknown key"),
         ("[broken]\ntrim = 1.0\n", 'the plug-in "broken" cannot be loaded'),
+        ("[hidden]\ntrim = 1.0\n", "plug_hidden hides it: start Python in another folder"),
     ],
 )
 def test_what_is_wrong_in_it_is_named_with_its_place(tmp_path: Path, text: str, said: str) -> None:

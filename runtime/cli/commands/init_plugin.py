@@ -19,7 +19,6 @@ NAME: Final = re.compile(r"[a-z][a-z0-9_]{1,39}")
 PROJECT: Final = """[build-system]
 requires = ["setuptools>=77"]
 build-backend = "setuptools.build_meta"
-
 [project]
 name = "echolocate-plugin-{name}"
 version = "0.1"
@@ -35,6 +34,7 @@ ROBOT_PROJECT: Final = (
 {name} = "{name}.robots"
 
 [tool.setuptools]
+package-dir = {{ "" = "." }}  # installed with -e, it is found also beside this folder
 packages = ["{name}"]
 package-data = {{ {name} = ["robots/*.toml"] }}
 """
@@ -46,6 +46,7 @@ SCHEMA_PROJECT: Final = (
 {name} = "{name}:Schema"
 
 [tool.setuptools]
+package-dir = {{ "" = "." }}  # installed with -e, it is found also beside this folder
 py-modules = ["{name}"]
 """
 )
