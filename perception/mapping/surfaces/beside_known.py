@@ -135,8 +135,9 @@ def wall_prior(rows: NDArray[Any], near: NDArray[np.int64]) -> float:
     length = lengths(rows)
     known_m = float(length @ (near > AWAY).mean(axis=1)) + UNKNOWN_M
     known_share = known_m / (float(length.sum()) + UNKNOWN_M)
-    # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls.
-    is_long = (length >= STRAIGHT_M) & (near == AWAY).all(axis=1)
+    # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls,
+    # those that the method knows as walls, too.
+    is_long = (length >= STRAIGHT_M) & ((near >= AWAY) & (near < ON_BODY)).all(axis=1)
     straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
     return KNOWN_NAT * (straight_share * (1.0 - known_share) / (1.0 - KNOWN_SHARE) - 1.0)
 
