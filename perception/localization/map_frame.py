@@ -68,6 +68,11 @@ class MapFrame(OdometryFrame):
         """Whether odometry is refuted, so that poses are corrected."""
         return self.drift.is_applied
 
+    @property
+    def corrects_path(self) -> bool:
+        """Whether earlier poses are corrected later, too: by maps of the way."""
+        return self.submaps.is_applied and not self.drift.is_applied
+
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Make landmarks of the round ones of these models."""
         self._radii = {model.name: model.arc_radius_m for model in models if model.arc_radius_m is not None}

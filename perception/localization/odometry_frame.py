@@ -25,6 +25,11 @@ class OdometryFrame:
         """Whether poses are corrected."""
         return False
 
+    @property
+    def corrects_path(self) -> bool:
+        """Whether earlier poses are corrected later, too."""
+        return False
+
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Make landmarks of the round ones of these models."""
 

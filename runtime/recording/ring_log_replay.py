@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 from config.settings import LocalizationConfig, Settings
 from drivers.messages import Firing, Pose
@@ -85,6 +86,8 @@ def replay_localized(
 ) -> ReplaySummary:
     """Run perception over firings, correct drift by what it recognises, and return what it perceived.
 
+    Where maps of the way have corrected the path, everything is recognised anew from the poses as known at the end.
+
     Parameters
     ----------
     settings : Settings
@@ -96,25 +99,34 @@ def replay_localized(
     on_path : callable, optional
         Called at the end for each firing with its time and the robot's pose as known at the end.
     """
-    config = settings.perception.model_copy(update={"localization": LocalizationConfig(correct_drift=True)})
-    replayer = FiringReplayer(settings.model_copy(update={"perception": config}), firings)
+    replayer = FiringReplayer(_localizing(settings, LocalizationConfig(correct_drift=True)), firings)
     perception = replayer.perception
-    frame, moments = perception.map_frame, []
+    frame, taken = perception.map_frame, []
     for firing in replayer:
         while frame.can_refine:  # a log has time for all that can be known
             frame.refine()
         here = perception.localized()
         if here is not None:
             on_pose(firing.robot_s, here)
-            moments.append((firing.robot_s, here, frame.moment()))
+            taken.append((firing, here, frame.moment()))
+    path = [(firing, frame.as_known_now(then, moment)) for firing, then, moment in taken]
     if on_path is not None:
-        for time_s, then, moment in moments:
-            on_path(time_s, frame.as_known_now(then, moment))
-    summary = replayer.summary(perception.odometry_from_map().inverse(), perception.mapped_objects())
+        for firing, at in path:
+            on_path(firing.robot_s, at)
+    if frame.corrects_path:
+        placed = (replace(firing, pose=at.pose, ring_yaw=at.ring_yaw) for firing, at in path)
+        summary = replay_firings(_localizing(settings, LocalizationConfig()), placed)
+    else:
+        summary = replayer.summary(perception.odometry_from_map().inverse(), perception.mapped_objects())
     summary["frame"], here = "map", perception.localized()
     if here is not None:
         summary["pose"] = pose_row(here)
     return summary
+
+
+def _localizing(settings: Settings, localization: LocalizationConfig) -> Settings:
+    perception = settings.perception.model_copy(update={"localization": localization})
+    return settings.model_copy(update={"perception": perception})
 
 
 def replay_in_known_room(

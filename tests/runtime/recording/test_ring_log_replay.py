@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,16 @@ from bench.trials.known_room_trials import furnished_drive
 from config.load import load_settings
 from config.units import FOOT_M
 from perception.localization.localized_pose import LocalizedPose
+from runtime.recording.replay_summary import ReplaySummary
 from runtime.recording.ring_log import read_ring_log
-from runtime.recording.ring_log_replay import FiringReplayer, replay_firings, replay_in_known_room
+from runtime.recording.ring_log_replay import (
+    FiringReplayer,
+    replay_firings,
+    replay_in_known_room,
+    replay_localized,
+)
+from tests.perception.localization.rooms import RING
+from tests.perception.localization.submaps.test_submap_graph import ROOM, driven
 
 PAPER = load_settings("hallway", ["perception.method=paper"])
 START_FT = -6.0
@@ -66,3 +75,24 @@ def test_a_replay_in_a_known_room_gives_objects_and_pose_in_its_frame() -> None:
     assert (summary["pose"]["status"], summary["frame"]) == ("tracking", "map")
     x, y, _ = drive.truth[-1].tolist()
     assert (summary["pose"]["x"], summary["pose"]["y"]) == pytest.approx((x, y), abs=0.05)
+
+
+def share_in_place(summary: ReplaySummary) -> float:
+    """Return the share of the reported length of walls that lies within 0.1 m of the room's."""
+    corners = np.array((*ROOM, ROOM[0]))
+    begins, sides = corners[:-1], np.diff(corners, axis=0)
+    ends = [((wall["x1"], wall["y1"]), (wall["x2"], wall["y2"])) for wall in summary["walls"]]
+    places = np.concatenate([np.linspace(a, b, int(math.dist(a, b) / 0.05) + 2) for a, b in ends])[:, None, :]
+    along = (((places - begins) * sides).sum(axis=2) / (sides**2).sum(axis=1)).clip(0.0, 1.0)
+    away = np.hypot(*np.moveaxis(begins + along[..., None] * sides - places, 2, 0)).min(axis=1)
+    return float((away < 0.1).mean())
+
+
+@pytest.mark.compiled
+def test_walls_are_recognised_from_the_path_as_known_at_the_end() -> None:
+    settings = load_settings(None).model_copy(update={"ring": RING})
+    firings, _ = driven(0.04, 0.02)
+    corrected = replay_localized(settings, firings, lambda *_: None)
+    assert corrected["frame"] == "map"
+    shares = share_in_place(corrected), share_in_place(replay_firings(settings, firings))
+    assert shares[0] > 0.9 > 0.6 > shares[1], shares
