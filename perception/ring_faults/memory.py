@@ -57,8 +57,10 @@ class EchoTrace(Record):
     """Evidence that it repeats an old reading, nat: of changes that were due, …"""
     equal_nat: Annotated[float, POSITIVE]
     """… and of readings that need not have changed, but had no reason to be equal to the bit."""
+    own: SensorPlace
+    """Where it made the reading first that it repeats, whatever the others do, …"""
     stuck_nat: Annotated[float, POSITIVE]
-    """Evidence that it alone does so, as far as changes were due, nat."""
+    """… and the evidence that it alone is stuck, as far as changes were due, nat."""
     heard: SensorPlace
     """The last echo."""
     agreed: Count

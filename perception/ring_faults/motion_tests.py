@@ -213,6 +213,8 @@ def weigh_change(
         c.is_anchored = 1
         mark(c.anchor, r, x, y, axis, all_of.path_m)
         return
+    if r == c.anchor.range_m and c.standstill == all_of.standstill:  # frozen looks as if it were turned
+        return
     dx, dy = x - c.anchor.x, y - c.anchor.y
     moved = math.hypot(dx, dy)
     if moved < 2.0 * max(STEP_MIN_M, 3.0 * tolerance):
@@ -346,8 +348,11 @@ def check_motion(
         for i in range(len(echoes)):
             echoes[i].is_compared = 0
         return found
+    other_nat = 0.0
+    for quarter in range(QUARTERS):  # the sensors ahead on a turned ring hear the walls beside the path
+        other_nat = max(other_nat, all_of.turned_nat[quarter])
     for i in range(len(echoes)):
-        if echoes[i].stuck_nat >= EVIDENCE_NAT:
+        if echoes[i].stuck_nat >= EVIDENCE_NAT + other_nat:
             echoes[i].stuck_nat = 0.0
             return STUCK_SENSOR + i
     return NOTHING

@@ -114,7 +114,7 @@ def changes_due(
     """Return how many times sensor `i` should have changed the reading that it repeats since it was at a place.
 
     A surface whose normal lies in the beam comes nearer by at least d·cos(ψ + β) when the sensor moves by d at an
-    angle ψ to its axis, β being half the beam; after a turn by two beams it hears what another sensor heard before.
+    angle ψ to its axis, β being half the beam. After a turn by a beam's width nothing is in the beam that was in it.
 
     Parameters
     ----------
@@ -146,13 +146,6 @@ def changes_due(
         if is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, lean, echoes, path_m):
             return 0.0
         return float(due)
-    nearest, off = -1, half_angle
-    for k in range(len(echoes)):
-        away = abs(wrapped(mounts[k, 2] - mounts[i, 2] - turned))
-        if k != i and echoes[k].is_known and away < off:
-            nearest, off = k, away
-    if nearest < 0 or abs(echoes[nearest].latest.range_m - r) <= tolerance + 0.1 * r:
-        return 0.0
     return math.floor(abs(turned) / (2.0 * half_angle))
 
 
@@ -215,6 +208,85 @@ def winds(c: EchoTrace, tolerance: float) -> bool:
 
 
 @kernel
+def may_be_wall(
+    i: int,
+    r: float,
+    way: tuple[float, float],
+    yaw: float,
+    mounts: Floats,
+    reception: Reception,
+    echoes: Records[EchoTrace],
+    path_m: float,
+) -> bool:
+    """Return whether a rough wall along the path may answer sensor `i`.
+
+    It may where no sensor looks nearer to the wall's normal, or one that does hears the wall.
+
+    Parameters
+    ----------
+    i, r, way, yaw, mounts, reception, echoes, path_m
+        As for `is_parallel_wall`.
+    """
+    half_angle, tolerance, reach = reception
+    path = math.atan2(way[1], way[0])
+    forward, left = math.sin(yaw - path), math.cos(yaw - path)
+    for turn in range(2):
+        side = 1.0 - 2.0 * turn
+        own = side * wrapped(yaw + mounts[i, 2] - path)
+        nearest = min(max(0.5 * math.pi, own - half_angle), own + half_angle)
+        if math.sin(nearest) < 1e-3:
+            continue
+        wall = side * (mounts[i, 0] * forward + mounts[i, 1] * left) + r * math.sin(nearest)
+        is_outermost = True
+        for k in range(len(echoes)):
+            bearing = side * wrapped(yaw + mounts[k, 2] - path)
+            best = min(max(0.5 * math.pi, bearing - half_angle), bearing + half_angle)
+            if k == i or math.sin(best) <= math.sin(nearest):
+                continue
+            is_outermost = False
+            heard, is_fresh = echoes[k].agreed_m, path_m - echoes[k].agreed_path_m <= reach
+            here = side * (mounts[k, 0] * forward + mounts[k, 1] * left)
+            off = abs(wall - here - heard * math.sin(best)) / math.sin(best)
+            if heard > 0.0 and is_fresh and off <= tolerance + NOISE_SHARE * heard:
+                return True
+        if is_outermost:
+            return True
+    return False
+
+
+@kernel
+def weigh_own_repeat(
+    i: int,
+    look: Look,
+    yaw: float,
+    mounts: Floats,
+    reception: Reception,
+    echoes: Records[EchoTrace],
+    path_m: float,
+) -> None:
+    """Test whether a sensor repeats its own reading, whatever the others hear.
+
+    Parameters
+    ----------
+    i, look, yaw, mounts, reception, echoes, path_m
+        As for `changes_due`.
+    """
+    c = echoes[i]
+    r, x, y, axis = look
+    if not c.is_known or r < 0.0 or not repeats(r, c.own.range_m):
+        mark(c.own, r, x, y, axis, path_m)
+        c.stuck_nat = 0.0
+        return
+    way = (x - c.own.x, y - c.own.y)
+    is_turned = abs(axis - c.own.axis) > 2.0 * reception[0]
+    if not is_turned and may_be_wall(i, r, way, yaw, mounts, reception, echoes, path_m):
+        mark(c.own, c.own.range_m, x, y, axis, path_m)
+    due = REPEAT_NAT * changes_due(i, look, c.own, yaw, mounts, reception, echoes, path_m)
+    is_equal = r == c.own.range_m and winds(c, reception[1])
+    c.stuck_nat = max(due, c.stuck_nat + (WINDING_NAT if is_equal else 0.0))
+
+
+@kernel
 def weigh_repeat(
     i: int,
     look: Look,
@@ -243,6 +315,7 @@ def weigh_repeat(
     c, all_of = echoes[i], ring[0]
     r, x, y, axis = look
     tolerance = reception[1]
+    weigh_own_repeat(i, look, yaw, mounts, reception, echoes, all_of.path_m)
     is_repeating = c.standstill == all_of.standstill
     if not c.is_known or not repeats(r, c.repeated.range_m if is_repeating else c.before.range_m):
         if c.is_known and is_ahead:
@@ -251,16 +324,16 @@ def weigh_repeat(
         elif c.is_known and is_repeating:
             all_of.repeated_nat = max(0.0, all_of.repeated_nat - c.repeated_nat)
             all_of.equal_nat = max(0.0, all_of.equal_nat - c.equal_nat)
-        c.standstill, c.repeated_nat, c.equal_nat, c.stuck_nat = 0, 0.0, 0.0, 0.0
+        c.standstill, c.repeated_nat, c.equal_nat = 0, 0.0, 0.0
         c.is_known = 1
     elif not is_repeating:
-        c.standstill, c.repeated_nat, c.equal_nat, c.stuck_nat = all_of.standstill, 0.0, 0.0, 0.0
+        c.standstill, c.repeated_nat, c.equal_nat = all_of.standstill, 0.0, 0.0
         mark(c.repeated, r, x, y, axis, all_of.path_m)
     elif r >= 0.0:
         due = REPEAT_NAT * changes_due(i, look, c.repeated, yaw, mounts, reception, echoes, all_of.path_m)
         is_equal = r == c.repeated.range_m and winds(c, tolerance)
-        c.stuck_nat = max(due, c.stuck_nat + (WINDING_NAT if is_equal else 0.0))
-        due = min(c.stuck_nat, SENSOR_NAT)
+        c.stuck_nat = max(c.stuck_nat, due)  # nothing else ahead has changed either
+        due = min(max(due, c.repeated_nat + (WINDING_NAT if is_equal else 0.0)), SENSOR_NAT)
         if due > c.repeated_nat:
             all_of.repeated_nat += due - c.repeated_nat
             c.repeated_nat = due

@@ -139,10 +139,11 @@ def test_the_only_sensor_that_hears_is_named_where_it_does_not_change() -> None:
 
 @pytest.mark.parametrize("quarter", [1, 2, 3])
 def test_a_ring_that_is_turned_is_named(quarter: int) -> None:
-    ring, found = Ring(), set[int]()
-    while ring.x < 2.0 and not found:
-        found |= {ring.fire(honest(ring.x, quarter))} - {NOTHING}
-    assert found == {TURNED + quarter - 1}
+    """Without noise, what looks along the path beside it repeats its reading: such a sensor may be named before."""
+    ring, found = Ring(), NOTHING
+    while ring.x < 2.0 and found in (NOTHING, STUCK_SENSOR):
+        found = ring.fire(honest(ring.x, quarter))
+    assert found == TURNED + quarter - 1
 
 
 def test_what_is_not_finite_and_what_did_not_fire_says_nothing() -> None:
@@ -154,3 +155,17 @@ def test_what_is_not_finite_and_what_did_not_fire_says_nothing() -> None:
     ring.x = 0.5
     assert ring.fire(np.full(COUNT, math.nan)) == NOTHING
     assert ring.missed_nat == 0.0
+
+
+@pytest.mark.parametrize("is_wall", [False, True])
+def test_a_sensor_that_repeats_alone_is_named_unless_one_beside_it_hears_a_wall_along_the_path(is_wall: bool) -> None:
+    ring, found, wall = Ring(), set[int](), 2.0 * math.sin(MOUNTS[1, 2] + HALF)
+    for _ in range(30):
+        ranges = honest(ring.x)
+        ranges[1] = 2.0
+        for k in range(3, 10):
+            nearest = min(max(0.5 * math.pi, MOUNTS[k, 2] - HALF), MOUNTS[k, 2] + HALF)
+            ranges[k] = wall / math.sin(nearest) if is_wall else math.inf
+        found.add(ring.fire(ranges))
+    assert (STUCK_SENSOR + 1 in found) is not is_wall
+    assert found <= {NOTHING, STUCK_SENSOR + 1}
