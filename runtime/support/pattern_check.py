@@ -121,7 +121,7 @@ def _gap_note(settings: Settings, course_rad: float) -> str:
     gaps = [
         f"{begin + beam_deg + shift:.0f}° to {end - beam_deg + shift:.0f}°"
         for begin, end in ends
-        if end - begin > 2.0 * beam_deg and begin + beam_deg < path_deg and end - beam_deg > -path_deg
+        if end - begin > 2.0 * beam_deg + 1e-6 and begin + beam_deg < path_deg and end - beam_deg > -path_deg
     ]
     return (
         f"ring: no beam covers {' and '.join(gaps)} (counter-clockwise from the ring's front), and the path needs "

@@ -114,3 +114,10 @@ def test_the_longest_gap_of_each_sensor() -> None:
     gaps = longest_gaps_s(firing_pattern(ring), 24)
     np.testing.assert_allclose(gaps[:3], [0.3, 0.5, 0.4])
     assert np.isinf(gaps[3:]).all()
+
+
+def test_beams_that_just_touch_are_no_gap_of_a_ring_that_has_one() -> None:
+    sensors = "[{x_m=0.1, y_m=0.0, angle_deg=0.0}, {x_m=0.1, y_m=0.02, angle_deg=30.0}]"
+    note = gap_note(load_settings("hallway", [f"ring.sensors={sensors}"], robot="hobby3"))
+    assert note is not None
+    assert "no beam covers -180° to -15° (" in note
