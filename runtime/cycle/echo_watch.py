@@ -14,9 +14,11 @@ from typing import Final
 from config.bounded import Coordinate
 from drivers.messages import Firing, Odometry, Pose
 
-WAY_MAX_M: Final = 1.0
-"""Way without an echo since the start after which the robot stops, m. Few rooms let a robot drive so far away from
-everything, and a robot of .3 m/s is stopped within 4 s."""
+WAY_MIN_M: Final = 1.0
+"""Way without an echo since the start after which a robot stops whose ring reaches far, m: within 4 s at .3 m/s."""
+OPEN_M: Final = 4.0
+"""Way and reach together at which a ring that hears nothing stops the robot, m: from the middle of a room 8 m wide it
+has come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +42,14 @@ class EchoWatch:
             return self
         pose = odometry.pose
         way = 0.0 if self.at is None else math.dist((pose.x, pose.y), (self.at.x, self.at.y))
-        return replace(self, way_m=min(self.way_m + way, WAY_MAX_M), at=pose)
+        return replace(self, way_m=min(self.way_m + way, OPEN_M), at=pose)
 
-    def stopped(self, problem: str | None = None) -> tuple[EchoWatch, str | None]:
-        """Return the watch, and why the robot must stop; then it is over. Another problem comes first."""
-        if problem is not None or self.is_over or self.way_m < WAY_MAX_M:
+    def stopped(self, reach_m: float, problem: str | None = None) -> tuple[EchoWatch, str | None]:
+        """Return the watch, and why a robot whose ring reaches so far must stop; then it is over.
+
+        Another problem comes first.
+        """
+        if problem is not None or self.is_over or self.way_m < max(WAY_MIN_M, OPEN_M - reach_m):
             return self, problem
         return EchoWatch(is_over=True), (
             f"no sensor has heard an echo since the start, over {self.way_m:.1f} m: if anything stands within range, "

@@ -315,7 +315,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
-    state.echo_watch, problem = state.echo_watch.stopped(state.ring_problem)
+    state.echo_watch, problem = state.echo_watch.stopped(settings.ring.range_max_m, state.ring_problem)
     if problem is not None:
         return Stop(problem)
     age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s

@@ -12,7 +12,7 @@ from config.load import load_settings
 from config.world import WorldConfig
 from drivers.emulator.faults import SilentRing
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
-from runtime.cycle.echo_watch import WAY_MAX_M, EchoWatch
+from runtime.cycle.echo_watch import WAY_MIN_M, EchoWatch
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from tests.runtime.emulated_run import Run
@@ -31,16 +31,33 @@ def heard(*ranges_m: float) -> tuple[Firing, ...]:
 def test_silence_counts_while_the_robot_drives_and_is_named_once() -> None:
     watch = EchoWatch()
     for k in range(11):
-        watch, reason = watch.observe(at(0.1 * k), heard(math.inf, math.nan)).stopped()
+        watch, reason = watch.observe(at(0.1 * k), heard(math.inf, math.nan)).stopped(4.0)
         assert (reason is None) is (k < 10)
     assert reason is not None
     assert "no sensor has heard an echo since the start, over 1.0 m" in reason
-    assert watch.observe(at(9.0), heard(math.inf)).stopped()[1] is None, "armed again it drives on"
+    assert watch.observe(at(9.0), heard(math.inf)).stopped(4.0)[1] is None, "armed again it drives on"
+
+
+def test_a_ring_that_reaches_less_may_drive_farther() -> None:
+    watch = EchoWatch()
+    for k in range(26):
+        watch, reason = watch.observe(at(0.1 * k), heard(math.inf)).stopped(1.5)
+        assert (reason is None) is (k < 25)
+
+
+@pytest.mark.compiled
+def test_an_honest_ring_of_little_reach_drives_on_in_the_middle_of_a_room() -> None:
+    settings = load_settings("room", robot="servo1")
+    assert settings.world is not None
+    run = Run(settings, settings.world, 1, preparing="left out")
+    run.until_true(lambda: run.state.echo_watch.is_over, 30.0)
+    assert run.mode is Mode.DRIVE
+    assert run.state.echo_watch.way_m == 0.0, "it has heard an echo"
 
 
 def test_an_echo_ends_the_watch_and_cycles_without_firings_do_not_count() -> None:
     watch = EchoWatch().observe(at(0.0), heard(math.inf, 2.0))
-    assert watch.observe(at(5.0), heard(math.inf)).stopped()[1] is None
+    assert watch.observe(at(5.0), heard(math.inf)).stopped(4.0)[1] is None
     assert EchoWatch().observe(at(0.0), ()).observe(at(9.0), ()).way_m == 0.0
     assert EchoWatch().observe(None, heard(math.inf)).way_m == 0.0
 
@@ -76,4 +93,4 @@ def test_in_the_open_a_robot_that_is_armed_again_drives_on() -> None:
     run.until_true(drives, 5.0, Request.ARM)
     run.until(run.run_s + 10.0)
     assert drives()
-    assert run.truths[-1].pose.x > before + 2.0 * WAY_MAX_M
+    assert run.truths[-1].pose.x > before + 2.0 * WAY_MIN_M
