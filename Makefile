@@ -52,7 +52,8 @@ kernels: $(VENV)/test.stamp
 tests: compiled interpreted
 	@$(MAKE) --no-print-directory coverage
 
-# All tests but those that `boundscheck` runs. Many wait for the clock, so there are twice as many at a time as processors.
+# All tests but those of `boundscheck`, and of `interpreted` alone (tests/inner_kernels.py). Many wait for the clock, so
+# there are twice as many at a time as processors.
 compiled: $(VENV)/test.stamp $(VENV)/browser.stamp
 	@rm -f $(LINES)/compiled-*
 	LINE_COVERAGE=$(LINES) $(PYTEST) --forks $$((2 * $(PROCESSORS))) -m "not soak and not boundscheck"

@@ -6,6 +6,7 @@ marked `realtime` are skipped there. Tests marked `soak` run only on request.
 
 `make tests` runs everything compiled, and the tests of kernels (marker `kernels`) as plain Python, because coverage
 (see tests/line_coverage.py) cannot see into compiled code; those marked `compiled` would be too slow there.
+Tests that would compile kernels for themselves run as plain Python alone (see tests/inner_kernels.py).
 
 The result of a run must depend on the sources alone: hypothesis generates the same examples in every run (`make soak`
 generates new ones), and the settings of the user's terminal are removed.
@@ -152,8 +153,13 @@ def _waits(item: pytest.Item) -> bool:
     return item.get_closest_marker("realtime") is not None or item.path.is_relative_to(BROWSER_TESTS)
 
 
-def _load_kernels() -> None:
+def _load_kernels(session: pytest.Session) -> None:
+    from tests.inner_kernels import runs_interpreted_alone  # imports numba, which reads its settings
+
     compile_all()
+    left = {item: None for item in session.items if runs_interpreted_alone(item)}
+    session.items[:] = [item for item in session.items if item not in left]
+    session.config.hook.pytest_deselected(items=[*left])
     FREEZE()
 
 

@@ -57,14 +57,14 @@ class ForkedTests:
     waits : callable
         Returns whether a test mostly waits.
     prepare : callable
-        Loads in the parent what every child needs.
+        Loads in the parent what every child needs, and may leave tests out.
     finish : callable
         Is called with its number in each child, after its last test.
     """
 
     def __init__(
         self, processes: int, waits: Callable[[pytest.Item], bool],
-        prepare: Callable[[], None], finish: Callable[[int], None],
+        prepare: Callable[[pytest.Session], None], finish: Callable[[int], None],
     ) -> None:  # fmt: skip
         self._processes = processes
         self._waits = waits
@@ -76,7 +76,7 @@ class ForkedTests:
         """Run all tests; every one is reported, or the session fails."""
         if session.testsfailed or session.config.option.collectonly:
             return None  # pytest's own loop runs nothing, and says why
-        self._prepare()
+        self._prepare(session)
         _temp_paths(session).getbasetemp()  # made once, before there are several who would
         files = files_of(session.items)
         waiting = {n for n, file in enumerate(files) if any(self._waits(session.items[index]) for index in file)}

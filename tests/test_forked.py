@@ -18,7 +18,7 @@ from tests.forked import ForkedTests
 
 def pytest_configure(config):
     config.pluginmanager.register(
-        ForkedTests(2, lambda item: "_b" in item.path.name, lambda: print("prepared"),
+        ForkedTests(2, lambda item: "_b" in item.path.name, lambda session: print("prepared"),
                     lambda n: print(f"process {n} is over")))
 """
 PASSING = """

@@ -19,6 +19,7 @@ from rich.console import Console
 from behaviors.valley import polar_histogram
 from config.load import load_settings
 from config.settings import Settings
+from perception.bayes import bayes_method
 from perception.bayes.tracks import polygon_tracks, refine
 from perception.bayes.walls import points as wall_points
 from perception.localization.drift import drift_correction, landmark_tracker
@@ -33,11 +34,13 @@ ROOT = Path(__file__).parents[3]
 def test_the_second_process_compiles_the_refinement_of_its_part(monkeypatch: pytest.MonkeyPatch) -> None:
     """A call on an empty memory compiles and does nothing."""
     asked = []
+    real = dict(vars(bayes_method))  # were it first imported now, it would keep the stubs
     for module, name in ((refine, "quantum"), (polygon_tracks, "polygon_quantum")):
         monkeypatch.setattr(module, name, lambda _s, _tracks, _p, _share, name=name: asked.append(name))
     kernel_warmup.compile_refinement(kernels.BAYES)
     kernel_warmup.compile_refinement(kernels.POLYGONS)
     assert asked == ["quantum", "polygon_quantum"]
+    assert vars(bayes_method) == real
 
 
 def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
