@@ -1,19 +1,21 @@
-"""Furnished, imperfect rooms by each model of their acoustics, and the paper's hall by rays on two robots."""
+"""Furnished, imperfect rooms by each model of their acoustics, rooms of walls alone, the paper's hall by rays."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
-from bench.trials.imperfect_rooms import imperfect_room
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
+from bench.trials.imperfect_rooms import JITTER, imperfect_room
 from bench.trials.imperfect_trials import figures, try_room
 from config.load import load_settings
 from config.settings import Settings
 from config.units import FOOT_M
 from config.world import AcousticsConfig, DrumConfig, PolygonConfig, WorldConfig
+from perception.localization.room.expected_ranges import Reflection
 from runtime.simulation.open_loop import HallOutcome, run_hall
 from runtime.simulation.scenes import Hall, halls
 
@@ -61,6 +63,27 @@ def measure(
             report(f"imperfect rooms: {model}, room {seed}")
             trials.append(try_room(settings, imperfect_room(seed, model, drums), seed, step_m))
         rows[model] = figures(trials)
+    return rows
+
+
+def measure_jitter(
+    settings: Settings, seeds: Iterable[int], step_m: float, report: Callable[[str], None]
+) -> dict[str, dict[str, float]]:  # fmt: skip
+    """Return the figures of the rooms of `bench.walls` where poses jump as real ones do, by model of reflection.
+
+    Parameters
+    ----------
+    settings, seeds, step_m, report
+        As for `measure`.
+    """
+    rows, seeds = {}, tuple(seeds)
+    for reflection in get_args(Reflection):
+        acoustics = ACOUSTICS.model_copy(update={"model": reflection, **JITTER})
+        trials = []
+        for seed in seeds:
+            report(f"pose jitter: {reflection}, room {seed}")
+            trials.append(try_room(settings, furnished_room(seed, acoustics), seed, step_m, is_empty=True))
+        rows[f"{reflection}, jitter"] = figures(trials)
     return rows
 
 

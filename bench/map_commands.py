@@ -258,6 +258,7 @@ def imperfect_rooms(
     step: float = 0.2,
     models: tuple[str, ...] = tuple(MODELS),
     hall_seeds: int = 0,
+    jitter: bool = False,
 ) -> int:
     """Measure what is found in furnished, imperfect rooms by rays, cones, mirrors, a mixture of them and pose jitter.
 
@@ -278,9 +279,12 @@ def imperfect_rooms(
     hall_seeds
         In place of rooms, drive down the paper's hall of six drums with this many seeds, by rays and cone, with the
         Denning and a Pioneer.
+    jitter
+        In place of rooms with furniture, drive through those of `bench walls`, by cones and mirrors, with poses that
+        jump by 3 cm and .3° from one firing to the next.
     """
     use_kernel_cache()
-    from bench.imperfect_rooms import measure, measure_halls
+    from bench.imperfect_rooms import measure, measure_halls, measure_jitter
 
     if hall_seeds > 0:
         return try_in_rooms(
@@ -288,6 +292,11 @@ def imperfect_rooms(
             lambda rows: rows_table("the paper's hall, by rays in the beam", rows), json, BY_BAYES,
         )  # fmt: skip
     seeds = range(first, first + max(1, rooms))
+    if jitter:
+        return try_in_rooms(
+            lambda settings, tell: measure_jitter(settings, seeds, step * FOOT_M, tell),
+            lambda rows: rows_table(f"rooms of walls and drums, pose jitter, {step:g} ft", rows), json, BY_BAYES,
+        )  # fmt: skip
     return try_in_rooms(
         lambda settings, tell: measure(settings, seeds, models, step * FOOT_M, drums, tell),
         lambda rows: rows_table(f"furnished, imperfect rooms, {step:g} ft", rows), json, BY_BAYES,

@@ -99,7 +99,9 @@ class ImperfectTrial:
     explained_with_lines: int
 
 
-def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) -> ImperfectTrial:
+def try_room(
+    settings: Settings, room: FurnishedRoom, seed: int, step_m: float, *, is_empty: bool = False
+) -> ImperfectTrial:  # fmt: skip
     """Drive through a room and return how the report compares with the truth.
 
     Parameters
@@ -108,9 +110,11 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
         Ring, models and perception.
     room, seed, step_m
         As for `wall_trials.listen`.
+    is_empty : bool
+        Whether the room has no furniture, so that its own drive leads through it.
     """
     sets = len(firing_pattern(settings.ring).masks)
-    poses = drive_through(room, seed, step_m / sets, DRIVE_M)
+    poses = None if is_empty else drive_through(room, seed, step_m / sets, DRIVE_M)
     heard, scene = listen(settings.ring, room, seed, step_m, poses), compile_scene(room.world)
     perception = recognise(settings, heard)
     seen = perception.labelled_objects()

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
-from bench.imperfect_rooms import RASTER_M, rastered
+from bench.imperfect_rooms import RASTER_M, measure_jitter, rastered
 from config.load import load_settings
+from config.units import FOOT_M
 from config.world import AcousticsConfig
 from runtime.simulation.open_loop import run_hall
 from runtime.simulation.scenes import Hall, halls
@@ -33,3 +34,11 @@ def test_one_ray_a_disc_on_a_raster_of_20_mm_finds_the_six_drums() -> None:
     errors_m = [row["error"] for row in outcome.drums if row["error"] is not None]
     assert (len(errors_m), outcome.false) == (6, 0)
     assert max(errors_m) < 0.02
+
+
+@pytest.mark.compiled
+def test_with_pose_jitter_walls_and_the_drum_are_found_and_an_edge_of_a_doorway_is_no_drum() -> None:
+    settings = load_settings("hallway", ["perception.method=bayes"])
+    for name, row in measure_jitter(settings, [3008], 0.2 * FOOT_M, lambda _: None).items():
+        assert (row["drums"], row["found"], row["false"]) == (1, 1, 0), name
+        assert row["walls found"] > 0.9, name

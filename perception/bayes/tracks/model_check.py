@@ -28,7 +28,7 @@ from perception.bayes.memory.parameters import (
 )
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, CircleTrack, CircleTracks, StateRecord
-from perception.bayes.memory.wall_records import CORNERS_MAX, MAX_WALLS, WallMap
+from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, MAX_WALLS, RoomCorner, WallMap
 from perception.bayes.tracks.naming import best_other_lead
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
@@ -40,6 +40,7 @@ from perception.bayes.walls.contact import (
     is_on_span,
     wall_normal,
 )
+from perception.bayes.walls.corners import KEPT
 from perception.kernel import kernel
 
 
@@ -88,8 +89,22 @@ def is_careful(s: StateRecord, tracks: CircleTracks, p: SettingsRecord) -> bool:
 
 
 @kernel
+def point_evidence(point: RoomCorner, q: Reading, p: SettingsRecord, level: int) -> float:
+    """Return the log likelihood ratio (nat) of a range under a corner or an edge; −inf where it lies off the beam."""
+    dx = point.x - q.x
+    dy = point.y - q.y
+    d = math.sqrt(dx * dx + dy * dy)
+    if dx * q.axis_x + dy * q.axis_y < p[0].cos_may_answer * d:
+        return -math.inf
+    e = circle_error(q, dx, dy, d, 0.0)
+    if is_crossed(q) and point.is_edge == 0:  # twice the way to the middle between both
+        e = q.range_m - math.hypot(dx - 0.5 * q.listener_x, dy - 0.5 * q.listener_y)
+    return float(log_likelihood(p, level, e))
+
+
+@kernel
 def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edges: bool) -> float:
-    """Return the greatest log likelihood ratio (nat) of a range under the mapped walls and corners.
+    """Return the greatest log likelihood ratio (nat) of a range under the mapped walls, corners and edges.
 
     Parameters
     ----------
@@ -114,16 +129,11 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
             if kind != NOWHERE and (kind != BEAM_EDGE or edges) and is_on_span(wall, along, ROOM_MARGIN_M):
                 best = max(best, log_likelihood(p, level, q.range_m - expected))
     for c in range(CORNERS_MAX):
-        corner = room.corners[c]
-        if corner.is_used == 1:
-            dx = corner.x - q.x
-            dy = corner.y - q.y
-            d = math.sqrt(dx * dx + dy * dy)
-            if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d:
-                e = circle_error(q, dx, dy, d, 0.0)
-                if is_crossed(q) and corner.is_edge == 0:  # twice the way to the middle between both
-                    e = q.range_m - math.hypot(dx - 0.5 * q.listener_x, dy - 0.5 * q.listener_y)
-                best = max(best, log_likelihood(p, level, e))
+        if room.corners[c].is_used == 1:
+            best = max(best, point_evidence(room.corners[c], q, p, level))
+    for c in range(EDGES_MAX):
+        if room.edges[c].is_used == KEPT:
+            best = max(best, point_evidence(room.edges[c], q, p, level))
     return best
 
 
@@ -147,8 +157,10 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     lead = 0.0
     for j in range(n):
         q = scratch.readings[j]
-        e = scratch.own.error[j]
-        if abs(e) > p[0].gate_m or scratch.own.ahead[j] < p[0].cos_half_angle * scratch.own.distance[j]:
+        d, ahead, e = scratch.own.distance[j], scratch.own.ahead[j], scratch.own.error[j]
+        if e > p[0].gate_m and ahead >= p[0].cos_must_answer * d and not is_crossed(q):
+            lead -= p[0].missed_echo_nat  # where the model had to answer and did not
+        if abs(e) > p[0].gate_m or ahead < p[0].cos_half_angle * d:
             continue
         level = level_of(p, s[0].noise_level, q.range_m)
         v = log_likelihood(p, level, e)

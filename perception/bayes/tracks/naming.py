@@ -14,13 +14,13 @@ from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.memory.parameters import (
     ALONE_LEAD_NAT,
+    IN_WALL_NAT,
     NAME_KEPT_PROBABILITY,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
     NAMED_OVER_UNKNOWN_ALONE,
     NAMED_SIGMA_MAX_M,
     NO_WALL_LEAD_NAT,
-    ROOM_LEAD_NAT,
 )
 from perception.bayes.memory.polygon_parameters import (
     POLYGON_DISPERSION_MIN,
@@ -75,7 +75,7 @@ def is_name_doubtful(track: CircleTrack, p: SettingsRecord, sure: float, careful
     careful : bool
         Whether the prior is as much against a model as it is for it elsewhere.
     """
-    if track.room_lead > ROOM_LEAD_NAT:
+    if track.room_lead > IN_WALL_NAT:
         return True
     return bool(careful and best_other_lead(track, p) > -p[0].model_prior_nat - math.log(sure / (1.0 - sure)))
 
@@ -123,7 +123,7 @@ def update_name(
         track.status != ESTABLISHED
         or track.kind >= p[0].model_count
         or track.probability < min(least, NAME_KEPT_PROBABILITY)
-        or is_name_doubtful(track, p, sure, careful)
+        or is_name_doubtful(track, p, NAME_KEPT_PROBABILITY if track.is_named == 1 else sure, careful)
     ):
         track.is_named = 0
         return

@@ -36,8 +36,8 @@ LEAST = math.log(0.03)
 """Log ratio of an outlier, nat."""
 
 
-def room_evidence(w: Array, walls: list[tuple[float, float]], corner: Array, edges: bool, level: int) -> Array:
-    """Return the best log ratio of each reading under walls (normal, distance) with one span, and a corner."""
+def room_evidence(w: Array, walls: list[tuple[float, float]], points: Array, edges: bool, level: int) -> Array:
+    """Return the best log ratio of each reading under walls (normal, distance) with one span, and points."""
     noise, best = noises()[level], np.full(len(w), LEAST)
     for j, q in enumerate(w):
         axis, found = math.atan2(q[3], q[2]), []
@@ -49,9 +49,10 @@ def room_evidence(w: Array, walls: list[tuple[float, float]], corner: Array, edg
             reach, along = naive_walls.answer(q[:2], axis, S.half_angle_rad, normal, distance)
             if SPAN[0] - 0.2 <= along <= SPAN[1] + 0.2:
                 found.append(reach)
-        seen = naive_bayes.look(w[j : j + 1], corner)
-        if seen.cos[0] >= COSINES[0]:
-            found.append(float(seen.d[0]))
+        for point in points:
+            seen = naive_bayes.look(w[j : j + 1], point)
+            if seen.cos[0] >= COSINES[0]:
+                found.append(float(seen.d[0]))
         for reach in found:
             best[j] = max(best[j], naive_bayes.evidence(noise, q[None, 4], q[None, 4] - reach)[0])
     return best
@@ -75,8 +76,9 @@ def test_room_and_sides_are_those_of_the_hits(examples: int) -> None:
         for k, (normal, distance) in enumerate(walls):
             place_wall(room.walls[k], np.zeros(2), normal, distance)
             fill(memory, room.walls[k], *SPAN)
-        corner = rng.uniform(-1.0, 1.0, 2)
-        room.corners[0].is_used, (room.corners[0].x, room.corners[0].y) = 1, pair(corner)
+        points = rng.uniform(-1.0, 1.0, (2, 2))
+        for point, at in zip((room.corners[0], room.edges[3]), points, strict=True):
+            point.is_used, (point.x, point.y) = 1, pair(at)
         edges = bool(rng.random() < 0.5)
         room.edge_echoes = 9.0 * edges
         random_track(rng, memory, 0, ESTABLISHED)
@@ -87,10 +89,11 @@ def test_room_and_sides_are_those_of_the_hits(examples: int) -> None:
         model_check.check_model(memory.s, P, track, len(w))
         seen = naive_bayes.look(w, centre)
         e = w[:, 4] - (seen.d - rho)
+        misses = int(((e > S.gate_m) & (seen.cos >= COSINES[2])).sum())
         w, e, seen_u = (a[(np.abs(e) <= S.gate_m) & (seen.cos >= COSINES[1])] for a in (w, e, seen.u))
-        by_room = room_evidence(w, walls, corner, edges, level)
+        by_room = room_evidence(w, walls, points, edges, level)
         want = naive_naming.model_check(
-            naive_bayes.evidence(noises()[level], w[:, 4], e), by_room, np.arctan2(seen_u[:, 1], seen_u[:, 0])
+            naive_bayes.evidence(noises()[level], w[:, 4], e), by_room, np.arctan2(seen_u[:, 1], seen_u[:, 0]), misses
         )  # fmt: skip
         is_cut = any(is_in_wall(room.walls[k], *walls[k], centre, rho) for k in range(2))
         cut += is_cut

@@ -45,14 +45,18 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         leads[:, -2] = rng.choice([0.0, -3.9, -4.1, -30.0], TRACKS)
         circles["dispersion"] = rng.uniform(0.004, 0.03, TRACKS)
         circles["is_named"] = rng.integers(0, 2, TRACKS)
-        circles["room_lead"] = rng.choice([-90.0, -5.1, -4.9], TRACKS)
-        circles["outline_lead"] = rng.choice([0.0, -2.0, -5.3, -5.6, -20.0], TRACKS)
+        circles["room_lead"] = rng.choice([-90.0, -8.1, -7.9], TRACKS)
+        circles["outline_lead"] = rng.choice([0.0, -2.0, -2.9, -3.1, -5.3, -5.6, -20.0], TRACKS)
         circles["reservoir"] = rng.choice([20, 79, 80, 200], TRACKS)
         circles["refinements"] = rng.integers(0, 12, TRACKS)
         careful, is_standing = (bool(rng.random() < 0.3) for _ in range(2))
         doubtful = [
             naive_naming.is_doubtful(
-                careful, it["room_lead"], it["outline_lead"], np.delete(leads[t], it["kind"]).tolist(), 0.92
+                careful,
+                it["room_lead"],
+                it["outline_lead"],
+                np.delete(leads[t], it["kind"]).tolist(),
+                0.5 if it["is_named"] else 0.92,
             )
             for t, it in enumerate(circles)
         ]
