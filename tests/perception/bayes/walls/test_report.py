@@ -26,15 +26,19 @@ def two_walls(first: tuple[float, float], second: tuple[float, float]) -> tuple[
     return memory, room
 
 
-def test_the_first_wall_needs_more_evidence_than_the_others() -> None:
+def test_each_wall_needs_evidence_and_the_first_one_weight_as_well() -> None:
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
     fill(memory, room.walls[0], -1.0, 1.0)
     place_wall(room.walls[1], np.zeros(2), math.pi, 2.0)
     fill(memory, room.walls[1], -1.0, 1.0)
-    for first, second, reported in ((39.0, 30.0, 0), (41.0, 30.0, 2), (41.0, 13.0, 1)):
+    for first, second, reported in ((39.0, 39.0, 0), (41.0, 41.0, 2), (41.0, 39.0, 1)):
         for wall, chi2 in zip(room.walls, (first, second), strict=False):
             wall.chi2 = wall.spans[0].chi2 = chi2
+        assert len(wall_segments(memory)) == reported
+    room.walls[0].spans[0].chi2 = room.walls[1].spans[0].chi2 = 41.0
+    for first, second, reported in ((13.0, 11.0, 2), (11.0, 11.0, 0)):
+        room.walls[0].spans[0].weight, room.walls[1].spans[0].weight = first, second
         assert len(wall_segments(memory)) == reported
 
 
