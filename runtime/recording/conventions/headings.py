@@ -33,6 +33,8 @@ as often as forward has none."""
 TURNS: Final = 72
 """Angles at which directions may follow theta that are looked at: each is off by less than their spread."""
 ECHOES: Final = 1500
+ROWS: Final = 128
+"""Echoes that are compared with those before them at a time: few enough for the processor's cache."""
 BLOCKS: Final = 20
 KERNEL_M: Final = 0.15
 """Width of an echo's density, m: what a beam leaves open at a metre or two."""
@@ -200,12 +202,38 @@ def echo_scores(
     scores = {}
     for one in choices:
         px, py = echo_places(table.pose[rows], one, mounts, reach, mounts_per_unit * length_per_range)
-        squared = (px[:, None] - px) ** 2 + (py[:, None] - py) ** 2
-        near = np.tril((1.0 + squared / kernel_m**2) ** -1.5, -1)
-        density = near.sum(axis=1)[1:] / np.arange(1, len(px))
+        near = np.empty(len(px))
+        for begin in range(0, len(px), ROWS):  # those before it and, of its own, the earlier ones
+            end = begin + ROWS
+            part = nearness(px[begin:end], py[begin:end], px[:end], py[:end], kernel_m)
+            part[:, begin:] = np.tril(part[:, begin:], -1)
+            near[begin:end] = part.sum(axis=1)
+        density = near[1:] / np.arange(1, len(px))
         tail = np.log(density + 1e-3)[len(px) // 10 :]
         scores[one] = np.array([block.mean() for block in np.array_split(tail, BLOCKS)])
     return scores
+
+
+def nearness(px: Floats, py: Floats, x: Floats, y: Floats, kernel_m: float) -> Floats:
+    """Return how near each place is to each other one, (1 + d²/w²)^-3/2, (places, others); 1 where they are one.
+
+    Parameters
+    ----------
+    px, py : (places,) float
+        m.
+    x, y : (others,) float
+        m.
+    kernel_m : float
+        Width w of an echo's density.
+    """
+    spread, across = np.subtract.outer(px, x), np.subtract.outer(py, y)
+    spread *= spread
+    across *= across
+    spread += across
+    spread *= kernel_m**-2
+    spread += 1.0
+    spread *= np.sqrt(spread, out=across)
+    return np.reciprocal(spread, out=spread)
 
 
 def echo_places(poses: Floats, one: Angles, mounts: Floats, reach: Floats, scale: float) -> tuple[Floats, Floats]:

@@ -19,6 +19,7 @@ from runtime.recording.conventions.headings import (
     echo_places,
     echo_scores,
     mirror_image,
+    nearness,
     sureness,
 )
 from runtime.recording.conventions.table import HEADINGS, Table
@@ -253,9 +254,8 @@ def _fits(
         own = np.sort(rng.permutation(own)[:EACH])
         reach = range_m * table.ranges[own, column]
         px, py = echo_places(table.pose[own], way, mounts[:, None], reach, length_m)
-        squared = (px[..., None] - x[others]) ** 2 + (py[..., None] - y[others]) ** 2
-        spread = 1.0 + squared / KERNEL_M**2
-        density = (1.0 / (spread * np.sqrt(spread))).sum(axis=-1) / max(1, int(others.sum()))
+        near = [nearness(*places, x[others], y[others], KERNEL_M).sum(axis=1) for places in zip(px, py, strict=True)]
+        density = np.array(near) / max(1, int(others.sum()))
         fits.append(np.log(density + 1e-3))
     return fits
 

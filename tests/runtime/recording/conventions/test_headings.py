@@ -7,7 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from runtime.recording.conventions.headings import SURE, Angles, echo_scores, motion_scores, sureness
+from runtime.recording.conventions.headings import (
+    BLOCKS,
+    KERNEL_M,
+    ROWS,
+    SURE,
+    Angles,
+    echo_places,
+    echo_scores,
+    motion_scores,
+    nearness,
+    sureness,
+)
 from runtime.recording.conventions.options import AUTO
 from runtime.recording.conventions.table import ANGLES, HEADINGS, Table
 from tests.runtime.recording.conventions.tables import Drive, make_drive
@@ -68,3 +79,29 @@ def test_echoes_agree_in_the_true_convention_only(drive: Drive) -> None:
     assert all(sureness(scores[choices[0]], scores[other]) > SURE for other in choices[1:])
     assert sureness(scores[choices[0]], scores[choices[0]]) == 0.0
     assert np.isfinite(scores[choices[0]]).all()
+
+
+def test_places_are_as_near_as_the_density_of_an_echo_says() -> None:
+    near = nearness(
+        np.array([0.0, 3.0]), np.array([0.0, 4.0]), np.array([0.0, 3.0, 3.0]), np.array([0.0, 4.0, 0.0]), 2.0
+    )
+    expected = [[(1.0 + (d / 2.0) ** 2) ** -1.5 for d in row] for row in ([0.0, 5.0, 3.0], [5.0, 0.0, 4.0])]
+    assert near == pytest.approx(np.array(expected), rel=1e-14)
+
+
+def test_each_echo_is_scored_by_those_before_it(drive: Drive) -> None:
+    """By plain Python, echo after echo."""
+    count = 2 * ROWS + 30
+    ranges = np.where(np.isinf(drive.ranges), np.nan, drive.ranges)
+    rows, sensors = (found[:count] for found in np.nonzero(np.isfinite(ranges)))
+    few = np.full_like(ranges, np.nan)
+    few[rows, sensors] = ranges[rows, sensors]
+    mounts = np.array(drive.settings.ring.mounts)[sensors]
+    x, y = echo_places(drive.pose[rows], Angles(), mounts, ranges[rows, sensors], 1.0)
+    logs = []
+    for k in range(1, count):
+        spread = [1.0 + ((x[k] - x[i]) ** 2 + (y[k] - y[i]) ** 2) / KERNEL_M**2 for i in range(k)]
+        logs.append(math.log(sum(each**-1.5 for each in spread) / k + 1e-3))
+    expected = [float(np.mean(block)) for block in np.array_split(logs[count // 10 :], BLOCKS)]
+    found = echo_scores(Table(drive.t, drive.pose, few), drive.settings, [Angles()], 1.0, 1.0)
+    assert found[Angles()] == pytest.approx(expected, abs=1e-12)
