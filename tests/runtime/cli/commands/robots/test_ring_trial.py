@@ -191,9 +191,11 @@ def test_a_dead_sensor_of_the_real_firmware_is_found(plugged: list[str], capsys:
     assert run_command(["ring-test", *plugged, "--rounds", "2"]) == FAILED
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("robot 'ring' on ")
-    assert "NO ANSWER" in lines[4]
-    assert not any("NO ANSWER" in line for line in (*lines[1:4], *lines[5:13]))
-    assert len(lines) == 13, "and no wheel has turned"
+    # A busy machine may distort an echo, and that is said, too.
+    silent = [line.startswith("sensor  3 ") for line in lines if "NO ANSWER" in line]
+    assert silent == [True], lines
+    assert {int(line.split()[1]) for line in lines if line.startswith("sensor ")} == {*range(12)}
+    assert not any(line.startswith("motors ") for line in lines), "no wheel has turned"
 
 
 @pytest.mark.soak
