@@ -8,8 +8,9 @@ the ring stands on it. Echoes of the same surface in other directions contradict
 robot that stands has left, and is not kept.
 
 While no sensor hears anything, the ring itself may have failed: several echoes that are lost in such a silence are
-kept, even if the robot stood or turned on the spot. A sensor that has moved and repeats its reading to the bit may
-not have heard it, so it does not end such a silence: some sensors of a frozen ring repeat an echo, others silence.
+kept, even if the robot stood or turned on the spot. A sensor that has moved, if only as the ring turns, and repeats
+its reading to the bit may not have heard it, so it does not end such a silence: some sensors of a frozen ring repeat
+an echo, others silence.
 """
 
 from __future__ import annotations
@@ -51,6 +52,8 @@ class UnheardEcho(Record):
     ring_x: Place
     """Place of the ring when the sensor looked last, m, …"""
     ring_y: Place
+    yaw: Place
+    """… its direction, rad, …"""
     range_m: Place
     """… and what it heard then, m; below zero for nothing."""
     state: Annotated[int, index_of(4)]
@@ -136,7 +139,7 @@ def contradict_echoes(
     silences : (2,) int
         Looks since the ring last heard anything, and since it heard anything new. Updated.
     """
-    x, y, _ = pose
+    x, y, yaw = pose
     kept = 0
     hears = False
     is_new = False
@@ -144,12 +147,13 @@ def contradict_echoes(
         one = echoes[i]
         if not math.isnan(ranges[i]):
             r = ranges[i] if ranges[i] < reach else -1.0
-            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) > COME_NEARER_M
+            turned = math.hypot(mounts[i, 0], mounts[i, 1]) * abs(yaw - one.yaw)
+            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) + turned > COME_NEARER_M
             silences[SILENT] += 1
             silences[UNCHANGED] += 1
             hears |= r >= 0.0
             is_new = is_new or (r >= 0.0 and (r != one.range_m or not has_moved))
-            one.ring_x, one.ring_y, one.range_m = x, y, r
+            one.ring_x, one.ring_y, one.yaw, one.range_m = x, y, yaw, r
         kept += one.state != NOT_KEPT
     if hears:
         silences[SILENT] = 0

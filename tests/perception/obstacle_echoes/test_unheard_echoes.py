@@ -128,6 +128,19 @@ def test_an_echo_that_repeats_to_the_bit_on_the_way_does_not_end_the_silence_of_
     assert not ring.unheard.is_ring_silent
 
 
+@pytest.mark.parametrize("turn_rad", [0.0, 0.05])
+def test_a_sensor_on_a_ring_that_turns_has_moved_too(turn_rad: float) -> None:
+    ring = FreshEchoes(AROUND, BEAM, (), REACH_M)
+    for k in range(14):
+        ranges = np.full(12, math.inf)
+        ranges[8] = 3.0
+        if k < 8:
+            ranges[:6] = 2.0
+        pose = Pose(0.03 * min(k, 9), 0.0, turn_rad * max(0, k - 9))  # it drives, then turns on the spot
+        ring.update(Firing(0.1 * k, pose, pose.theta, ranges))
+    assert ring.unheard.is_ring_silent is (turn_rad > 0.0)
+
+
 @pytest.mark.parametrize(("sensors", "is_kept"), [(2, False), (3, True)])
 def test_a_ring_that_loses_several_echoes_at_once_keeps_them_although_it_only_turns(
     sensors: int, is_kept: bool
