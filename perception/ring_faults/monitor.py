@@ -12,10 +12,12 @@ can only be compared with how it moves. An honest ring among objects that stand 
 - *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°.
 - *Changed.* All readings change at once from one round of the firing pattern to the next, by a change that the
   sensors have in common (`perception.ring_faults.changes`).
+- *Exchanged.* What a sensor hears is what others heard where another one looks, or behind it
+  (`perception.ring_faults.wiring`).
 
-The first four are sequential tests, with one threshold for all, `perception.ring_faults.motion_tests.EVIDENCE_NAT`.
-The same threshold names a single sensor that repeats its reading while all others are silent: a frozen ring may have
-heard a single echo.
+All but the changes at once are sequential tests, with one threshold for all,
+`perception.ring_faults.motion_tests.EVIDENCE_NAT`. The same threshold names a single sensor that repeats its reading
+while no wall along the path may answer it: a frozen ring may have heard a single echo.
 A lie that agrees with the motion, as ranges that are all too long by the same amount do, can be found only as it
 begins.
 """
@@ -30,12 +32,13 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Firing
-from perception.bounds import CONSTANT, COUNT, PLACE, POSITIVE, bounds, index_of
+from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, index_of
 from perception.records import records, zeros
 from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
 from perception.ring_faults.memory import EchoTrace, RingTrace
 from perception.ring_faults.motion_tests import (
     CHANGED,
+    EVIDENCE_NAT,
     NOTHING,
     REPEATED,
     SCATTERED,
@@ -45,6 +48,7 @@ from perception.ring_faults.motion_tests import (
     check_motion,
 )
 from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
+from perception.ring_faults.wiring import LOOK_FIELDS, LOOKS, SENSORS_MAX, Wiring, weigh_wiring
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
 from perception.sensor_mounts import mounts_array, ring_pose, turn_mounts
 
@@ -74,6 +78,24 @@ REASONS: Final = MappingProxyType(
     }
 )
 """What happened, the likely cause, the next action."""
+WIRED: Final = CHANGED + EXCHANGED + 1
+"""From here on, a finding is WIRED + i·n + j for sensors i and j of n that are exchanged; i = j looks backwards."""
+WIRING_NAT: Final = EVIDENCE_NAT + math.log(0.5 * SENSORS_MAX**2)
+"""Evidence that suffices for one of so many pairs, nat."""
+
+
+def wiring_reason(i: int, j: int) -> str:
+    """Return why sensors `i` and `j` cannot be wired as the robot file says, or sensor `i` if they are the same."""
+    if i == j:
+        return (
+            f"sensor {i} hears what the others hear on the opposite side: it looks backwards against the robot file; "
+            f"turn it, or correct its angle_deg by 180 (`echolocate ring-test --hand` shows each), then re-arm"
+        )
+    return (
+        f"sensors {i} and {j} each hear what the others hear where the other one looks: they are exchanged against "
+        f"the robot file; exchange their cables, or their order in the file (`echolocate ring-test --hand` shows "
+        f"each), then re-arm"
+    )
 
 
 class RingMonitor:
@@ -85,7 +107,7 @@ class RingMonitor:
         The sensors.
     """
 
-    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned", "_expected", "_past_looks")
+    SCRATCH: Final = ("_echo_records", "_ring_records", "_turned", "_expected", "_past_looks", "_wiring", "_near")
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
@@ -99,7 +121,10 @@ class RingMonitor:
         _replayed_nat=POSITIVE,
         _echoes=EchoTrace.BOUNDS,
         _ring=RingTrace.BOUNDS,
-        _found=index_of(CHANGED + EXCHANGED + 1),
+        _turned_looks=PLACE,
+        _turned_counts=COUNT,
+        _exchanged_nat=FINITE,
+        _found=index_of(WIRED + SENSORS_MAX**2),
     )
 
     def __init__(self, ring: RingConfig) -> None:
@@ -119,6 +144,12 @@ class RingMonitor:
         self._looks = np.zeros(len(ring.mounts), np.int64)
         self._replayed_nat = np.zeros(PAST_LOOKS)
         self._past_looks = PastLooks(self._past, self._looks, self._replayed_nat)
+        is_tested = len(ring.mounts) <= SENSORS_MAX and not ring.turning
+        wired = len(ring.mounts) if is_tested else 1  # the first sensor alone, with no other to compare it with
+        self._turned_looks, self._turned_counts = np.zeros((wired, LOOKS, LOOK_FIELDS)), np.zeros(wired, np.int64)
+        self._exchanged_nat = np.zeros((wired, wired))
+        self._wiring = Wiring(self._turned_looks, self._turned_counts, self._exchanged_nat)
+        self._near = np.zeros((wired * LOOKS, 3))
         self._found = NOTHING
 
     def observe(self, firing: Firing) -> int | None:
@@ -127,16 +158,20 @@ class RingMonitor:
         if self._turns:
             mounts = self._turned
             turn_mounts(self._mounts, self._turning, float(firing.pose.theta - firing.ring_yaw), mounts)
+        pose, reception = ring_pose(firing), (self._half_angle, self._tolerance, self._reach_m)
         found = check_motion(
             firing.ranges_m,
-            ring_pose(firing),
+            pose,
             mounts,
-            (self._half_angle, self._tolerance, self._reach_m),
+            reception,
             self._echo_records,
             self._ring_records,
             self._expected,
             self._past_looks,
         )
+        wired = weigh_wiring(firing.ranges_m, pose, mounts, reception, self._wiring, self._near, WIRING_NAT)
+        if wired >= 0:
+            self._found = WIRED + int(wired)
         if found >= STUCK_SENSOR:
             return int(found) - STUCK_SENSOR
         if found != NOTHING:
@@ -146,6 +181,8 @@ class RingMonitor:
     def take_problem(self) -> str | None:
         """Return why the readings since the last call cannot be true, once; None if they can."""
         found, self._found = self._found, NOTHING
+        if found >= WIRED:
+            return wiring_reason(*divmod(found - WIRED, len(self._exchanged_nat)))
         return None if found == NOTHING else REASONS[found]
 
     def set_reach(self, reach_m: float) -> None:
@@ -158,4 +195,6 @@ class RingMonitor:
         self._ring[...] = np.zeros((), self._ring.dtype)
         self._looks[:] = 0
         self._replayed_nat[:] = 0.0
+        self._turned_counts[:] = 0
+        self._exchanged_nat[:] = 0.0
         self._found = NOTHING

@@ -1,0 +1,171 @@
+"""The test of whether two sensors are exchanged, or one looks backwards: the others heard what it hears elsewhere.
+
+While the robot turns, a sensor looks where others looked from the same place a moment ago. What it hears is compared
+with what they heard in the direction that the robot file gives it, and in the one that it would have in the place of
+another sensor, or turned by half a circle. Only looks for which both are known count, so silence and round rooms say
+nothing. As for the tests of `perception.ring_faults.motion_tests`, logarithms of likelihood ratios are summed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from perception.kernel import Floats, Ints, kernel
+from perception.ring_faults.memory import NO_ECHO_M, Reception
+from perception.sensor_faults.wall import NOISE_SHARE
+from perception.sensor_mounts import RingPose
+
+SENSORS_MAX: Final = 16
+"""Greatest ring that is tested: the work grows with the third power of its sensors, and larger rings are not wired by
+hand."""
+LOOKS: Final = 32
+"""Looks of each sensor that are kept, a quarter of the beam apart or more: a turn by 240° of beams of 30°."""
+LATER: Final = 8
+"""A look is judged after so many later ones: others have looked there before it, or since."""
+LOOK_FIELDS: Final = 4
+"""The ring's direction (rad) and place x, y (m), and the reading, m; below zero without an echo."""
+PLACE_M: Final = 0.15
+"""Looks from places that are no farther apart are compared, m."""
+AXIS_SHARE: Final = 0.35
+"""Looks whose axes differ by no more than this share of half the beam are compared."""
+SAME_M: Final = 0.08
+"""Echoes from such places that differ by no more are of the same object, m."""
+AGREES: Final = 0.45
+SILENT: Final = 0.3
+"""Of an honest sensor's looks where another heard an echo, the share that hears the same, and the share that hears
+none; where the other heard none, …"""
+SILENT_TOO: Final = 0.75
+"""… the share that does not either."""
+
+
+class Wiring(NamedTuple):
+    """What is remembered of how the sensors are wired."""
+
+    looks: Floats
+    """(n, LOOKS, LOOK_FIELDS): the last looks of each sensor, the oldest overwritten first."""
+    counts: Ints
+    """(n,): looks of each sensor so far."""
+    exchanged_nat: Floats
+    """(n, n): evidence that sensors i < j are exchanged, and for i = j that the sensor looks backwards, nat."""
+
+
+@kernel
+def density(r: float, heard: float, reach: float) -> float:
+    """Return the density of a reading where another sensor heard an echo, 1/m; of a silence the probability.
+
+    Parameters
+    ----------
+    r, heard : float
+        The reading, and the other's, m; below zero without an echo.
+    reach : float
+        Range up to which the ring listens, m.
+    """
+    if heard < 0.0:
+        return SILENT_TOO if r < 0.0 else (1.0 - SILENT_TOO) / reach
+    if r < 0.0:
+        return SILENT
+    same = SAME_M + NOISE_SHARE * heard
+    return (1.0 - AGREES - SILENT) / reach + (AGREES / (2.0 * same) if abs(r - heard) <= same else 0.0)
+
+
+@kernel
+def heard_there(i: int, j: int, axis: float, off: float, count: int, near: Floats) -> float:
+    """Return how far from the middle a sensor other than `i` and `j` heard something, m; NaN if none looked there.
+
+    Below zero without an echo.
+
+    Parameters
+    ----------
+    i, j : int
+        The sensors that are left out.
+    axis : float
+        The direction, rad, from 0 to 2π as those of `near`.
+    off : float
+        Angle by which the other's axis may differ, rad.
+    count : int
+        Number of looks in `near`.
+    near : (…, 3) float
+        Sensor, axis (rad) and distance of each look from about this place.
+    """
+    heard, nearest = math.nan, off
+    for n in range(count):
+        away = abs(near[n, 1] - axis)
+        away = min(away, math.tau - away)
+        if away <= nearest and near[n, 0] not in (i, j):
+            heard, nearest = near[n, 2], away
+    return heard
+
+
+@kernel
+def beyond(r: float, offset: float) -> float:
+    """Return how far from the middle an echo is, m, of a sensor so far along its axis; below zero for silence."""
+    return r + offset if r >= 0.0 else NO_ECHO_M
+
+
+@kernel
+def weigh_wiring(
+    ranges: Floats, pose: RingPose, mounts: Floats, reception: Reception, wiring: Wiring, near: Floats, most: float
+) -> int:
+    """Weigh the readings of a firing; return i·n + j for sensors i and j that are exchanged, i = j for one backwards.
+
+    Returns −1 where nothing is found. A sensor's next look counts when it has turned by a quarter of the beam.
+
+    Parameters
+    ----------
+    ranges, pose, mounts, reception
+        As for `motion_tests.check_motion`.
+    wiring : Wiring
+        What is remembered. Updated.
+    near : (n·LOOKS, 3) float
+        Overwritten.
+    most : float
+        Evidence that suffices, nat.
+    """
+    x, y, yaw = pose
+    half_angle, tolerance, reach = reception
+    looks, counts, exchanged_nat = wiring
+    n, size, found = looks.shape[0], looks.shape[1], -1
+    for i in range(n):
+        if math.isnan(ranges[i]) or not math.isfinite(x + y + yaw):
+            continue
+        last = looks[i, (counts[i] - 1) % size]
+        if counts[i] > 0 and abs(yaw - last[0]) < 0.5 * half_angle:
+            continue
+        new = looks[i, counts[i] % size]
+        new[0], new[1], new[2] = yaw, x, y
+        new[3] = ranges[i] if ranges[i] < reach - tolerance else NO_ECHO_M
+        counts[i] += 1
+        if counts[i] <= LATER:
+            continue
+        judged = looks[i, (counts[i] - 1 - LATER) % size]
+        towards, r = judged[0], judged[3]
+        count = 0
+        for k in range(n):
+            offset = mounts[k, 0] * math.cos(mounts[k, 2]) + mounts[k, 1] * math.sin(mounts[k, 2])
+            for m in range(min(counts[k], size)):
+                look = looks[k, m]
+                if k != i and math.hypot(look[1] - judged[1], look[2] - judged[2]) <= PLACE_M:
+                    near[count, 0], near[count, 1] = k, (look[0] + mounts[k, 2]) % math.tau
+                    near[count, 2] = beyond(look[3], offset)
+                    count += 1
+        off = AXIS_SHARE * half_angle
+        own = mounts[i, 0] * math.cos(mounts[i, 2]) + mounts[i, 1] * math.sin(mounts[i, 2])
+        for j in range(n):
+            mounted = heard_there(i, j, (towards + mounts[i, 2]) % math.tau, off, count, near)
+            other, axis = -own, towards + mounts[i, 2] + math.pi
+            if i != j:
+                other = mounts[j, 0] * math.cos(mounts[j, 2]) + mounts[j, 1] * math.sin(mounts[j, 2])
+                axis = towards + mounts[j, 2]
+            there = heard_there(i, j, axis % math.tau, off, count, near)
+            if math.isnan(mounted + there):
+                continue
+            honest = density(beyond(r, own), mounted, reach)
+            nats = math.log(density(beyond(r, other), there, reach) / honest)
+            first, second = min(i, j), max(i, j)
+            exchanged_nat[first, second] = max(-most, exchanged_nat[first, second] + nats)
+            if exchanged_nat[first, second] >= most:
+                found = first * n + second
+    if found >= 0:
+        exchanged_nat[:] = 0.0
+    return found
