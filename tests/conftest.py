@@ -159,6 +159,7 @@ def _load_kernels(session: pytest.Session) -> None:
     compile_all()
     left = {item: None for item in session.items if runs_interpreted_alone(item)}
     session.items[:] = [item for item in session.items if item not in left]
+    session.testscollected = len(session.items)  # of which the progress is a share
     session.config.hook.pytest_deselected(items=[*left])
     FREEZE()
 
