@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from perception.detected_object import DetectedObject, wall_between
 from perception.kernel import Floats
 from perception.mapping.no_surfaces import SurfaceReport
-from perception.mapping.surfaces.parameters import AGREES_M, KNOWN_NAT, KNOWN_SHARE, PIECE_MIN_M, UNKNOWN_M
+from perception.mapping.surfaces.parameters import (
+    AGREES_M,
+    KNOWN_NAT,
+    KNOWN_SHARE,
+    PIECE_KEPT_M,
+    PIECE_MIN_M,
+    UNKNOWN_M,
+)
 from perception.mapping.surfaces.surface_list import ENDS, find_near, places_on
 from perception.polyline import Polyline
 
@@ -111,7 +118,7 @@ def beside_known(rows: NDArray[Any], near: NDArray[np.int64], prior: float) -> S
         _wall(wall, begin, end)
         for wall, length_m, runs in zip(numbers, length[is_wall].tolist(), map(_runs, free[is_wall]), strict=True)
         for begin, end in runs
-        if (end - begin) * length_m >= PIECE_MIN_M
+        if (end - begin) * length_m >= PIECE_KEPT_M
     ]
     rest = ~is_wall & free.any(axis=1)
     return SurfaceReport(tuple(found), tuple(_polylines(rows[rest])), prior > 0.0)
@@ -133,6 +140,7 @@ def wall_prior(rows: NDArray[Any], near: NDArray[np.int64]) -> float:
         As for `beside_known`.
     """
     length = lengths(rows)
+    length[length < PIECE_MIN_M] = 0.0  # shorter ones are left of the ends of others
     known_m = float(length @ (near > AWAY).mean(axis=1)) + UNKNOWN_M
     known_share = known_m / (float(length.sum()) + UNKNOWN_M)
     # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls,
@@ -158,7 +166,7 @@ def refuted(
     radius_m : mapping
         Radii of the round models, m.
     """
-    pieces = rows[rows["number"] < 0]
+    pieces = rows[lengths(rows) >= PIECE_MIN_M]  # a shorter one lies at a round outline as well
     places = places_on(pieces, PLACES).reshape(-1, PLACES, 2)
     gone = set()
     for one in known:

@@ -14,7 +14,7 @@ from perception.mapping.surfaces.parameters import (
     NODE_CELLS,
     NODE_M,
     NODE_STRENGTH,
-    PIECE_MIN_M,
+    PIECE_KEPT_M,
 )
 from perception.mapping.surfaces.pieces import offset_of
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap, SurfaceCell
@@ -56,7 +56,7 @@ def is_left(room: LocalMap, cell: SurfaceCell) -> bool:
     if cell.owner < 0:
         return bool(cell.owner == FREE)
     piece = room.pieces[cell.owner]
-    if piece.high - piece.low < PIECE_MIN_M:
+    if piece.high - piece.low < PIECE_KEPT_M:
         return True
     along = (offset_of(cell.i) - piece.x) * piece.ux + (offset_of(cell.j) - piece.y) * piece.uy
     return bool(along < piece.low - CELL_M or along > piece.high + CELL_M)

@@ -28,7 +28,7 @@ from perception.kernel import Floats
 from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
 from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
 from perception.mapping.surfaces.local_map import LocalMapSearch
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_MIN_M
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_KEPT_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
 from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
@@ -114,7 +114,7 @@ class SurfaceMap(NoSurfaces):
     def _found(self) -> NDArray[Any]:
         """Return the surfaces of the search that has just ended, as records of `Surface`."""
         pieces = self._search.pieces()
-        pieces = pieces[pieces["high"] - pieces["low"] >= PIECE_MIN_M]
+        pieces = pieces[pieces["high"] - pieces["low"] >= PIECE_KEPT_M]
         x, y = self._search.centre
         rows = zeros(Surface, len(pieces))
         for end, along in (("1", pieces["low"]), ("2", pieces["high"])):

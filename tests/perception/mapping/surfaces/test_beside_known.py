@@ -140,6 +140,15 @@ def test_what_seems_round_among_straight_pieces_needs_evidence(
     assert refuted(rows, (drum,), {"barrel": 0.2}) == frozenset()
 
 
+def test_a_short_piece_is_a_wall_among_walls_but_says_nothing_against_a_round_object() -> None:
+    short = pieces((3.0, 3.0, 3.2, 3.0), evidence=-8.0)
+    walls = report(np.concatenate([room(), short])).walls
+    assert len(walls) == 5
+    drum = DetectedObject("drum", 3.1, 3.3, 0.0, 0.01, 9, 1.0, 1.0 - 1e-8, number=4)
+    assert 4 not in refuted(np.concatenate([room(), pieces((3.0, 3.0, 3.2, 3.0))]), (drum,), {"drum": 0.3})
+    assert 4 in refuted(np.concatenate([room(), pieces((2.9, 3.0, 3.3, 3.0))]), (drum,), {"drum": 0.3})
+
+
 def test_a_polyline_keeps_its_points_in_order() -> None:
     parts = pieces((0.0, 0.0, 0.1, 0.1), (0.1, 0.1, 0.2, 0.1), (0.5, 0.5, 0.55, 0.5))
     parts["number"], parts["echoes"] = [4, 4, 5], 2.0
