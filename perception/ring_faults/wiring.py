@@ -36,7 +36,8 @@ SILENT: Final = 0.3
 """Of an honest sensor's looks where another heard an echo, the share that hears the same, and the share that hears
 none; where the other heard none, …"""
 SILENT_TOO: Final = 0.75
-"""… the share that does not either."""
+"""… the share that does not either. In eight drives of a minute, of four robots, they were .83 and .11 of 1,459 looks
+and .91 of 1,958; they are taken for less, as looks in succession are alike."""
 
 
 class Wiring(NamedTuple):
