@@ -131,7 +131,7 @@ def weigh_wiring(
         if math.isnan(ranges[i]) or not math.isfinite(x + y + yaw):
             continue
         last = looks[i, (counts[i] - 1) % size]
-        if counts[i] > 0 and abs(yaw - last[0]) < 0.5 * half_angle:
+        if counts[i] > 0 and (abs(yaw - last[0]) < 0.5 * half_angle or ranges[i] == last[3]):  # stuck ones agree
             continue
         new = looks[i, counts[i] % size]
         new[0], new[1], new[2] = yaw, x, y
