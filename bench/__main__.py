@@ -36,6 +36,7 @@ from bench.measure import Plan, measure
 from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
+    building_places,
     chatter,
     correction,
     drift_bound,
@@ -276,6 +277,7 @@ for command in (
     corner_bound,
     false_drums,
     false_walls,
+    building_places,
     real_places,
     real_rooms,
     false_canyons,

@@ -312,7 +312,7 @@ def real_places(drives: tuple[Path, ...], *, json: str = "real_places.json") -> 
     Parameters
     ----------
     drives
-        Folders with ring.csv, robot.toml and truth.csv.
+        Folders with ring.csv, robot.toml, truth.csv and bearings.csv.
     json
         File to write.
     """
@@ -324,3 +324,25 @@ def real_places(drives: tuple[Path, ...], *, json: str = "real_places.json") -> 
     with console.status("bench") as status:
         rows = measure(drives, status.update)
     return report(json, rows, rows_table("real drives: errors of the place, m, and shares", rows))
+
+
+def building_places(logs: tuple[Path, ...], *, json: str = "building_places.json", starts: int = 2) -> int:
+    """Measure the place without a map in the worlds of lasers' walls, driven along the laser's way and back.
+
+    Parameters
+    ----------
+    logs
+        CARMEN logs with corrected poses, plain or compressed.
+    json
+        File to write.
+    starts
+        Drives in each log and by each model of reflection.
+    """
+    use_kernel_cache()
+    from bench.building_places import measure
+
+    console, settings = Console(stderr=True), load_settings("hallway").of_log()
+    prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
+    with console.status("bench") as status:
+        rows = measure(logs, starts, status.update)
+    return report(json, rows, rows_table("real buildings: errors of the place, m, and shares", rows))

@@ -72,14 +72,27 @@ def read_drive(folder: Path) -> RealDrive:
     ring, truth, bearings = read_tables(folder, "ring.csv", "truth.csv", "bearings.csv")
     (points,) = read_tables(folder.parent, f"{folder.name.rsplit('-', 1)[0]}-points.csv")
     times, ranges = ring[:, 0], ring[:, POSE_COLUMNS:]
-    rows, columns = np.nonzero(np.isfinite(ranges) & np.isfinite(bearings))
-    angles, heard = truth[rows, 2] + bearings[rows, columns], ranges[rows, columns]
-    echoes = truth[rows, :2] + heard[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    echoes = echo_places(truth, ranges, bearings)
     firings = tuple(
         Firing(float(t), Pose(x, y, theta), theta, row)
         for t, (x, y, theta), row in zip(times, truth.tolist(), ranges, strict=True)
     )
     return RealDrive(settings, firings, echoes, points)
+
+
+def echo_places(poses: Floats, ranges: Floats, bearings: Floats) -> Floats:
+    """Return where echoes came from, shape (n, 2), m.
+
+    Parameters
+    ----------
+    poses : (k, 3) float
+        x, y (m) and direction (rad) of the ring at each firing.
+    ranges, bearings : (k, sensors) float
+        What was heard, m, and where that was in the robot's frame, rad; not finite for silence and strays.
+    """
+    rows, columns = np.nonzero(np.isfinite(ranges) & np.isfinite(bearings))
+    angles, heard = poses[rows, 2] + bearings[rows, columns], ranges[rows, columns]
+    return np.asarray(poses[rows, :2] + heard[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 def rounded(firings: Iterable[Firing], steps: tuple[float, float, float]) -> list[Firing]:

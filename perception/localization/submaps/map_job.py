@@ -20,6 +20,7 @@ from perception.localization.submaps.local_grid import (
 from perception.localization.submaps.map_match import Match, best_match
 from perception.localization.submaps.pose_graph import (
     GRAPH_SCALE_SIGMA,
+    OF_ODOMETRY,
     SCALES,
     Link,
     Node,
@@ -52,6 +53,8 @@ EXPECTED_LEAST: Final = (0.01, 0.01, 0.001)
 GRAPH_STEPS_MAX: Final = 6
 ITERATIONS: Final = 24
 """Gauss-Newton steps after a map, and iterations of one quantum."""
+LOST_STEPS: Final = 5
+"""Steps in which the way that matches have lost is found, odometry exact."""
 SOLVED: Final = 1e-6
 STEP_MIN: Final = 1e-4
 
@@ -166,9 +169,7 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
     links, nodes, scales = records(Link, maps.links), records(Node, maps.nodes), maps.scales.copy()
     count, size = len(maps.links), SCALES + 3 * len(maps.nodes)
     jacobians, residuals, vectors = np.empty((count, 3, 6 + SCALES)), np.empty((count, 3)), np.empty((6, size))
-    exact = zeros(Node, len(maps.nodes))
-    exact["x"], exact["y"], exact["theta"] = maps.submaps["pose"].T
-    at_odometry = linearise(links, count, records(Node, exact), np.zeros(SCALES), jacobians, residuals)
+    at_odometry = _cost_at_odometry(maps, jacobians, residuals)
     for _ in range(GRAPH_STEPS_MAX if is_new else 0):
         linearise(links, count, nodes, scales, jacobians, residuals)
         begin_step(links, count, scales, jacobians, residuals, vectors)
@@ -192,3 +193,20 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
     off = residuals[of_odometry]
     cost += 0.5 * float(np.einsum("ij,ijk,ik->", off, maps.links["information"][of_odometry], off))
     yield Outcome(maps.nodes, maps.links, scales, maps.usual, at_odometry - cost)
+
+
+def _cost_at_odometry(maps: Maps, jacobians: Floats, residuals: Floats) -> float:
+    """Return the cost of the matches where odometry is exact, and they have lost as much way as suits them best."""
+    exact, scales, links = zeros(Node, len(maps.nodes)), np.zeros(SCALES), maps.links
+    exact["x"], exact["y"], exact["theta"] = maps.submaps["pose"].T
+    by_scale = links["by_scale"][:, OF_ODOMETRY:]
+    prior = np.eye(SCALES - OF_ODOMETRY) / GRAPH_SCALE_SIGMA**2
+    cost = math.inf
+    for _ in range(LOST_STEPS):
+        cost = linearise(records(Link, links), len(links), records(Node, exact), scales, jacobians, residuals)
+        lost = scales[OF_ODOMETRY:]
+        cost += 0.5 * float(lost @ prior @ lost)
+        force = np.einsum("n,nki,nij->nkj", links["weight"], by_scale, links["information"])
+        slope = np.einsum("nkj,nj->k", force, residuals) - prior @ lost
+        lost += np.linalg.solve(np.einsum("nkj,nlj->kl", force, by_scale) + prior, slope)
+    return cost

@@ -16,9 +16,11 @@ from perception.bounds import COUNT, FINITE, Finite, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records
 
-SCALES: Final = 3
-"""Unknowns beside the poses: shares by which way and turns are longer than by odometry, and by which a match of a map
-and the one before has lost way, because what comes into view ahead fits less well."""
+SCALES: Final = 4
+"""Unknowns beside the poses: shares by which way and turns are longer than by odometry, and by which a match with the
+map before, and one with another, has lost way, because what comes into view fits less well."""
+OF_ODOMETRY: Final = 2
+"""The first so many of them are odometry's."""
 GRAPH_SCALE_SIGMA: Final = 0.03
 """Standard deviation of each before any match."""
 CAUCHY: Final = 2.0
@@ -131,6 +133,7 @@ def multiply(links: Records[Link], count: int, jacobians: Floats, given: Floats,
             moved0 += j[0, k] * given[of + k] + j[0, 3 + k] * given[to + k]
             moved1 += j[1, k] * given[of + k] + j[1, 3 + k] * given[to + k]
             moved2 += j[2, k] * given[of + k] + j[2, 3 + k] * given[to + k]
+        for k in range(SCALES):
             moved0 += j[0, 6 + k] * given[k]
             moved1 += j[1, 6 + k] * given[k]
             moved2 += j[2, 6 + k] * given[k]
@@ -140,6 +143,7 @@ def multiply(links: Records[Link], count: int, jacobians: Floats, given: Floats,
             for k in range(3):
                 result[of + k] += j[i, k] * force
                 result[to + k] += j[i, 3 + k] * force
+            for k in range(SCALES):
                 result[k] += j[i, 6 + k] * force
     for k in range(3):
         result[SCALES + k] = 0.0

@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from drivers.messages import wrap_angle
 from perception.bounds import PLACE, Finite, bounds, up_to
 from perception.kernel import Floats
-from perception.localization.submaps.pose_graph import Link, Node, spread_from
+from perception.localization.submaps.pose_graph import OF_ODOMETRY, Link, Node, spread_from
 from perception.records import Record, records, zeros
 
+LOST_WAY: Final = (0.02, 0.01)
+"""Share of its way that a match with the map before, and one with another, usually loses. Four real drives, two
+buildings and 14 generated rooms with exact poses: -0.03 to 0.07, mean 0.02; and -0.02 to 0.02, mean 0.01."""
 SUBMAP_M: Final = 3.0
 SUBMAP_RAD: Final = 2.0
 """A map ends after this way or these turns: scales of 3 % deform it by one cell."""
@@ -108,9 +111,9 @@ def match_link(of: int, to: int, pose: Floats, information: Floats, *, is_next: 
     """Return a match of two maps, of which one may have been driven right after the other."""
     row = zeros(Link, 1)
     row["of"], row["to"], row["is_match"], row["weight"] = of, to, 1, 1.0
-    row["pose"], row["information"] = (pose[0], pose[1], wrap_angle(pose[2])), information
-    if is_next:
-        row["by_scale"][0, 2] = pose[0], pose[1], 0.0
+    way = pose[:2] * (1.0 + LOST_WAY[not is_next])
+    row["pose"], row["information"] = (*way, wrap_angle(pose[2])), information
+    row["by_scale"][0, OF_ODOMETRY + (not is_next)] = *way, 0.0
     return row
 
 

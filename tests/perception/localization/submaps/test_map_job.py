@@ -8,11 +8,20 @@ import pytest
 from perception.localization.submaps import map_job
 from perception.localization.submaps.local_grid import SUBMAP_CELLS, make_grid
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
-from perception.localization.submaps.pose_graph import Link
-from perception.localization.submaps.submap_records import Submap, node_at, odometry_link, pose_of
+from perception.localization.submaps.pose_graph import SCALES, Link
+from perception.localization.submaps.submap_records import (
+    Submap,
+    between,
+    match_link,
+    node_at,
+    odometry_link,
+    pose_of,
+)
 from perception.records import zeros
 from tests.perception.localization.submaps.test_local_grid import BEAM
 from tests.perception.localization.submaps.test_map_match import room_readings
+
+INFORMATION = np.diag([400.0, 400.0, 900.0])
 
 
 def two_maps(error: tuple[float, float, float] = (0.1, -0.05, 0.03)) -> Maps:
@@ -25,7 +34,7 @@ def two_maps(error: tuple[float, float, float] = (0.1, -0.05, 0.03)) -> Maps:
     submaps[1]["pose"] = moved + error
     nodes = np.concatenate([node_at(submaps[k]["pose"]) for k in range(2)])
     links = odometry_link(0, moved + error, np.diag([50.0, 50.0, 200.0]))
-    return Maps(submaps, nodes, links, np.zeros(3), np.array([-70.0, 100.0]), {})
+    return Maps(submaps, nodes, links, np.zeros(SCALES), np.array([-70.0, 100.0]), {})
 
 
 @pytest.mark.compiled
@@ -57,7 +66,7 @@ def test_caches_change_nothing() -> None:
 
 def test_the_first_map_has_nothing_to_be_compared_with() -> None:
     maps = two_maps()
-    alone = Maps(zeros(Submap, 1), maps.nodes[:1], zeros(Link, 0), np.zeros(3), np.array([-70.0, 100.0]), {})
+    alone = Maps(zeros(Submap, 1), maps.nodes[:1], zeros(Link, 0), np.zeros(SCALES), np.array([-70.0, 100.0]), {})
     *_, outcome = match_map(alone, BEAM)
     assert isinstance(outcome, Outcome)
     assert outcome.gain == 0.0
@@ -66,3 +75,23 @@ def test_the_first_map_has_nothing_to_be_compared_with() -> None:
 def test_runs_are_consecutive_and_short() -> None:
     assert map_job._runs([0, 1, 2, 5, 6, 9]) == [[0, 1, 2], [5, 6], [9]]
     assert [len(run) for run in map_job._runs(list(range(20)))] == [8, 8, 4]
+
+
+def test_way_that_all_matches_lose_refutes_no_odometry() -> None:
+    """Matches of maps of round bodies come out short, since only the side that was seen is in the map."""
+    submaps = zeros(Submap, 9)
+    submaps["pose"] = [(0.6 * k, 0.3 * k * k / 9.0, 0.2 * k) for k in range(9)]
+    moved = [(k, k + 3, between(submaps["pose"][k], submaps["pose"][k + 3])) for k in range(6)]
+    nodes = np.concatenate([node_at(pose) for pose in submaps["pose"]])
+
+    def cost(factor: float, turn: float) -> float:
+        links = [
+            match_link(of, to, pose * (factor, factor, 1.0) + (0.0, 0.0, turn), INFORMATION, is_next=False)
+            for of, to, pose in moved
+        ]
+        maps = Maps(submaps, nodes, np.concatenate(links), np.zeros(SCALES), np.array([-70.0, 100.0]), {})
+        return map_job._cost_at_odometry(maps, np.empty((6, 3, 6 + SCALES)), np.empty((6, 3)))
+
+    assert cost(0.99, 0.0) < 0.1
+    assert cost(0.9, 0.0) < 6.0
+    assert cost(0.99, 0.2) > 20.0

@@ -10,6 +10,7 @@ import pytest
 from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import Node
 from perception.localization.submaps.submap_records import (
+    LOST_WAY,
     Rows,
     between,
     compose,
@@ -55,10 +56,13 @@ def test_derivatives_by_scales_are_those_of_the_motion() -> None:
 
 
 @pytest.mark.parametrize("is_next", [True, False])
-def test_a_match_of_the_next_map_may_lose_way(is_next: bool) -> None:
+def test_a_match_may_lose_way(is_next: bool) -> None:
     row = match_link(1, 4, np.array([1.0, 0.5, 7.0]), np.eye(3), is_next=is_next)[0]
     assert row["pose"][2] == pytest.approx(7.0 - 2.0 * math.pi)
-    assert row["by_scale"][2].tolist() == ([1.0, 0.5, 0.0] if is_next else [0.0, 0.0, 0.0])
+    way = np.array([1.0, 0.5, 0.0]) * (1.0 + LOST_WAY[not is_next])
+    assert row["pose"][:2].tolist() == way[:2].tolist()
+    assert row["by_scale"][2 if is_next else 3].tolist() == way.tolist()
+    assert not row["by_scale"][3 if is_next else 2].any()
 
 
 def test_a_pose_survives_as_a_record() -> None:
