@@ -53,8 +53,8 @@ class MapFrame(OdometryFrame):
     drift : DriftCorrection
         The landmark filter.
     submaps : SubmapGraph
-        Where no landmark refutes odometry: the pose by maps of a few metres of way. What is recognised stays in
-        odometry's frame then.
+        The pose by maps of a few metres of way; of both, the first that refutes odometry corrects it. What is
+        recognised stays in odometry's frame then.
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
@@ -71,7 +71,7 @@ class MapFrame(OdometryFrame):
     @property
     def corrects_path(self) -> bool:
         """Whether earlier poses are corrected later, too: by maps of the way."""
-        return self.submaps.is_applied and not self.drift.is_applied
+        return self.submaps.is_applied
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Make landmarks of the round ones of these models."""
@@ -110,6 +110,9 @@ class MapFrame(OdometryFrame):
         shift : callable
             Called with number and displacement (m) of the objects that are to move, because their landmarks moved.
         """
+        if self.submaps.is_applied:  # what seems round among walls may be a corner
+            self.submaps.observe(firing)
+            return firing
         self._near = {seen.number for seen in objects if seen.number is not None}
         self.drift.learn(
             SeenObject(seen.number, seen.x, seen.y, self._radii[seen.model])
@@ -128,12 +131,12 @@ class MapFrame(OdometryFrame):
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing: by landmarks where there are some, or by maps of the way."""
+        if self.submaps.is_applied:
+            return self.submaps.localized()
         here = self.drift.localized()
-        is_placed = here.status == "lost" or (here.status == "tracking" and not self.submaps.is_applied)
-        if self.drift.is_applied or is_placed:
+        if self.drift.is_applied or here.status != "localizing":
             return here
-        found = self.submaps.localized()
-        return found if self.submaps.is_applied else found._replace(pose=here.pose, ring_yaw=here.ring_yaw)
+        return self.submaps.localized()._replace(pose=here.pose, ring_yaw=here.ring_yaw)
 
     def moment(self) -> Moment | None:
         """Return the moment of the last firing, for `as_known_now`; None where landmarks correct the pose."""

@@ -114,6 +114,18 @@ def test_objects_move_with_their_landmarks() -> None:
     assert after.x == pytest.approx(seen.x + 0.05, abs=0.01)
 
 
+def test_once_maps_of_the_way_correct_the_pose_no_landmark_takes_over() -> None:
+    frame, silent = MapFrame(SETTINGS.ring, SETTINGS.models), np.full(len(SETTINGS.ring.mounts), np.nan)
+    frame.submaps.is_applied = True
+    drum = DetectedObject("drum", 1.0, 0.0, 0.0, 0.02, 90, 1.0, number=3, covariance=(1e-4, 0.0, 1e-4))
+    firing = Firing(0.0, Pose(1.0, 2.0, 0.5), 0.5, silent)
+    assert frame.follow(firing, (drum,), lambda *_: None) is firing
+    assert frame.drift.places() == {}
+    assert frame.corrects_path
+    assert not frame.is_applied
+    assert frame.localized().pose == Pose(1.0, 2.0, 0.5)
+
+
 def test_without_recognition_the_pose_is_odometrys() -> None:
     perception, entered = drive(1, 3)
     assert perception.objects() == perception.mapped_objects() == ()
