@@ -95,4 +95,4 @@ def test_walls_are_recognised_from_the_path_as_known_at_the_end() -> None:
     corrected = replay_localized(settings, firings, lambda *_: None)
     assert corrected["frame"] == "map"
     shares = share_in_place(corrected), share_in_place(replay_firings(settings, firings))
-    assert shares[0] > 0.9 > 0.6 > shares[1], shares
+    assert shares[0] > 0.8 > 0.5 > shares[1], shares
