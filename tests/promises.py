@@ -47,10 +47,14 @@ LIMITS: Sequence[str] = (
     "Echoes of an earlier drive that fit the present one, until they come again: replays in a corridor along its "
     "walls, or of a drive like this one. They change as the motion says, and what returns to an earlier place are a "
     "few sensors ahead and behind. When they come again they are equal to the bit.",
-    "A ring that is mounted turned by a small angle, or two sensors exchanged, until the objects that result are "
-    "seen to be wrong: measure it with `echolocate calibrate`. So is one of eight sensors or fewer that is turned, "
-    "and one that turns by a quarter or a half among few surfaces, as in a corridor: 3 of 40 drives of five robots "
-    "then touched something.",
+    "A ring that is mounted turned by a small angle, until the objects that result are seen to be wrong: measure "
+    "it with `echolocate calibrate`. Two sensors exchanged, or one that looks backwards, in a ring of up to "
+    "sixteen, until the robot has turned by about 60°, or by half a turn on one spot: 4 to 20 s in drives through"
+    " rooms. In a ring of more sensors they are not named at all. One of eight sensors or fewer that is turned "
+    "otherwise, and a ring that is turned by a quarter or a half among few surfaces, as in a corridor: 3 of 40 "
+    "drives of five robots then touched something.",
+    "A frozen ring that hears next to nothing: an AmigoBot in a corridor whose one echo lay behind it was named "
+    "after a second, and touched the end at .13 m/s 19 s later, in 1 of some 54 drives.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
     "then, and nothing is touched. Where nothing echoes, silence is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
