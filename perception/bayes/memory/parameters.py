@@ -43,10 +43,11 @@ DROP_OUT_NAT: Final = 2.0
 
 # --- Noise of the ranges -------------------------------------------------------------------------------------------
 
-NOISE_ABSOLUTE_M: Final = tuple(v * FOOT_M for v in (0.003, 0.012, 0.03, 0.05, 0.1))
+NOISE_ABSOLUTE_M: Final = tuple(v * FOOT_M for v in (0.003, 0.012, 0.03, 0.05, 0.09))
 NOISE_RELATIVE: Final = (0.0, 0.005, 0.01, 0.02)
 """Absolute and relative noises of the hypotheses: σ² = absolute² + (relative · range)². The greatest is that of poses
-that jump by 3 cm from firing to firing: with .08 ft in its place two corners and a doorway of 40 rooms were drums."""
+that jump by 3 cm from firing to firing: with .08 ft in its place two corners and a doorway of 40 rooms were drums;
+with .1 ft an open shell between mirrors is found turned."""
 START_NOISE: Final = 9
 """Index of the noise assumed at the start: σ = 0.03 ft, 0.5 %."""
 START_NOISE_NAT: Final = 6.0

@@ -56,7 +56,8 @@ def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDA
     readings = newest_readings(track[BINS][0])
     row["is_reported"], row["kept"] = is_reported, len(readings)
     kept = row["readings"][0, : len(readings)]
-    kept[:, 0], kept[:, 1] = readings["x"] - track["x"], readings["y"] - track["y"]
+    with np.errstate(over="ignore"):  # a state from a damaged file may lie anywhere
+        kept[:, 0], kept[:, 1] = readings["x"] - track["x"], readings["y"] - track["y"]
     kept[:, 2], kept[:, 3] = np.arctan2(readings["axis_y"], readings["axis_x"]), readings["range_m"]
     return row
 
