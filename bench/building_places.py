@@ -13,13 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from bench.laser_rooms import RING, WALL_M, LaserLog, read_carmen, wall_map
-from bench.navigation import SCANS_MAX
+from bench.laser_rooms import RING, LaserLog, read_carmen, walls_around, world_walls
 from bench.real_places import followed, place_errors
 from bench.real_rooms import Row
 from bench.trials.known_room_trials import drifting_odometry
 from config.load import load_settings
-from config.world import AcousticsConfig, WallConfig, WorldConfig
+from config.world import AcousticsConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Floats, Pose, wrap_angle
@@ -41,7 +40,7 @@ def measure(logs: Iterable[Path], starts: int, tell: Callable[[str], None]) -> d
     settings = load_settings(None).model_copy(update={"ring": RING})
     for file in logs:
         log = read_carmen(file)
-        walls = wall_map(log, range(0, len(log.poses), max(1, len(log.poses) // SCANS_MAX)), WALL_M).walls
+        walls = world_walls(log)
         for k in range(starts):
             truth = way_out_and_back(log, k * len(log.poses) // (2 * starts))
             for acoustics in (AcousticsConfig(model="cone"), AcousticsConfig(model="specular")):
@@ -89,10 +88,8 @@ def drive(walls: Floats, truth: Floats, acoustics: AcousticsConfig, seed: int) -
     seed : int
         Of odometry's errors and of the acoustics.
     """
-    ends, low, high = walls.reshape(-1, 2, 2), truth[:, :2].min(axis=0), truth[:, :2].max(axis=0)
-    near = (ends.max(axis=1) >= low - AROUND_M).all(axis=1) & (ends.min(axis=1) <= high + AROUND_M).all(axis=1)
-    heard = [WallConfig(x1_m=a, y1_m=b, x2_m=c, y2_m=d) for a, b, c, d in walls[near].tolist()]
-    scene = compile_scene(WorldConfig(wall=tuple(heard), acoustics=acoustics))
+    low, high = truth[:, :2].min(axis=0) - AROUND_M, truth[:, :2].max(axis=0) + AROUND_M
+    scene = compile_scene(WorldConfig(wall=walls_around(walls, low, high), acoustics=acoustics))
     sonar = Sonar(RING, scene, acoustics, np.random.default_rng(np.random.SeedSequence([seed, 42])))
     reported = drifting_odometry(truth, np.random.default_rng(np.random.SeedSequence([seed, 43])))
     return [

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from bench.trials.known_room_trials import KnownDrive, drifting_odometry
 from config.errors import WRONG_CALL, UserError
 from config.robot import FiringConfig, RingConfig, SensorConfig
+from config.world import WallConfig
 from drivers.messages import Firing, Floats
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.room import Room, make_room
@@ -58,6 +59,8 @@ SAME_RAD: Final = math.radians(6.0)
 OPENING_M: Final = 0.4
 """A greater gap between hits of one line is an opening."""
 PIECE_M: Final = 0.2
+SCANS_MAX: Final = 400
+"""Scans of a recording that the walls of a world are made of, evenly spaced."""
 WALL_M: Final = 0.4
 """Shorter walls are left out of a known room's map, and of a world to drive in: they are clutter."""
 
@@ -169,6 +172,18 @@ def _mirrors(log: LaserLog, k: int) -> NDArray[np.bool_]:
             ray = hits[i] / ranges_m[i]
             answers[i] = abs(float(normal @ ray)) >= math.cos(MIRROR_RAD)
     return answers
+
+
+def world_walls(log: LaserLog) -> Floats:
+    """Return the walls of a world to drive in, from so many scans at most as `SCANS_MAX`, shape (n, 4), m."""
+    return wall_map(log, range(0, len(log.poses), max(1, len(log.poses) // SCANS_MAX)), WALL_M).walls
+
+
+def walls_around(walls: Floats, low: Floats, high: Floats) -> tuple[WallConfig, ...]:
+    """Return those of some walls, shape (n, 4), that reach into a box from one corner to the other, m."""
+    ends = walls.reshape(-1, 2, 2)
+    near = (ends.max(axis=1) >= low).all(axis=1) & (ends.min(axis=1) <= high).all(axis=1)
+    return tuple(WallConfig(x1_m=a, y1_m=b, x2_m=c, y2_m=d) for a, b, c, d in walls[near].tolist())
 
 
 def wall_map(log: LaserLog, scans: Sequence[int], least_m: float = PIECE_M) -> Room:

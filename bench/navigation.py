@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from bench.laser_rooms import WALL_M, LaserLog, read_carmen, wall_map
+from bench.laser_rooms import LaserLog, read_carmen, walls_around, world_walls
 from bench.peers.nav2_recovery import Nav2Recovery
 from bench.peers.playerproject_vfh import PlayerprojectVfh
 from bench.peers.vff import Vff
@@ -35,12 +35,10 @@ from bench.trials.navigation_trials import (
 from bench.trials.shortest_way import free_space
 from config.load import load_settings
 from config.settings import Settings
-from config.world import WallConfig, WorldConfig
+from config.world import WorldConfig
 from drivers.messages import Floats, Pose
 from runtime.cycle import goal_drive
 
-SCANS_MAX: Final = 400
-"""Scans of a recording that its map is made of, evenly spaced."""
 AROUND_M: Final = 9.0
 """Walls up to this far from start and goal are in the world: the ring hears less far."""
 STRAIGHT_M: Final = (4.0, 9.0)
@@ -85,7 +83,7 @@ def laser_trials(path: Path, count: int, settings: Settings, seed: int = 0) -> l
         Of the choice.
     """
     log = read_carmen(path)
-    walls = wall_map(log, range(0, len(log.poses), max(1, len(log.poses) // SCANS_MAX)), WALL_M).walls
+    walls = world_walls(log)
     rng = np.random.default_rng(np.random.SeedSequence([seed, 57]))
     found: list[Trial] = []
     for _ in range(400 * count):
@@ -103,15 +101,7 @@ def _between(log: LaserLog, walls: Floats, i: int, j: int, heading: float, setti
     if not STRAIGHT_M[0] <= math.dist(start, goal) <= STRAIGHT_M[1]:
         return None
     low, high = np.minimum(start, goal) - AROUND_M, np.maximum(start, goal) + AROUND_M
-    ends = walls.reshape(-1, 2, 2)
-    near = (ends.max(axis=1) >= low).all(axis=1) & (ends.min(axis=1) <= high).all(axis=1)
-    world = WorldConfig(
-        wall=tuple(
-            WallConfig(x1_m=float(a), y1_m=float(b), x2_m=float(c), y2_m=float(d)) for a, b, c, d in walls[near]
-        ),
-        acoustics=ACOUSTICS,
-        odometry=ODOMETRY,
-    )
+    world = WorldConfig(wall=walls_around(walls, low, high), acoustics=ACOUSTICS, odometry=ODOMETRY)
     space = free_space(world, closed_room_m(settings))
     trial = make_trial(
         world, space, Pose(float(start[0]), float(start[1]), heading), (float(goal[0]), float(goal[1]))

@@ -166,15 +166,14 @@ class Perception:
         """Return a firing at the pose at which `method` enters it: by odometry, until that is refuted."""
         if self._other is None:
             return firing
-        was_corrected, corrected = self.map_frame.is_applied, self._fed()[-1]
-        placed = self.map_frame.follow(firing, self.vacant.outside(corrected.near_objects()), corrected.shift_object)
-        if not self.map_frame.is_applied:
-            self._other.observe(placed)
-            return firing
-        if not was_corrected:
+        fed = self._fed()
+        placed = self.map_frame.follow(firing, self.vacant.outside(fed[-1].near_objects()), fed[-1].shift_object)
+        if len(fed) > 1 and self.map_frame.is_applied:
             self.method, self._other = self._other, self.method
             self.surfaces.clear()  # it was in odometry's frame
-        return placed
+        elif len(fed) > 1:
+            self._other.observe(placed)
+        return placed if self.map_frame.is_applied else firing
 
     def refine(self) -> int:
         """Do one quantum of refinement and return its iterations, zero if nothing is left to improve.
@@ -364,7 +363,7 @@ class Perception:
 
     def _fed(self) -> tuple[Method, ...]:
         """Return the methods that enter firings."""
-        return (self.method,) if self.map_frame.is_applied else self._methods()
+        return (self.method,) if self.map_frame.is_settled else self._methods()
 
     def _refined(self) -> tuple[Method | NoSurfaces | OdometryFrame | KnownRoom | EchoLag, ...]:
         """Return what takes quanta, in that order; `canyon_map` follows the first."""

@@ -144,7 +144,7 @@ class MapFrame(OdometryFrame):
 
     def as_known_now(self, then: LocalizedPose, moment: Moment | None) -> LocalizedPose:
         """Return where the robot was at a moment, as known now; by landmarks that is what was known then."""
-        if moment is None or self.drift.is_applied or not self.submaps.is_applied:
+        if moment is None or not self.submaps.is_applied:
             return then
         x, y, yaw = self.submaps.placed(moment).tolist()
         return then._replace(pose=Pose(x, y, yaw + moment.turned), ring_yaw=yaw)

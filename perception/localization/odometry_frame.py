@@ -26,6 +26,11 @@ class OdometryFrame:
         return False
 
     @property
+    def is_settled(self) -> bool:
+        """Whether it is known in which frame firings are entered from now on."""
+        return self.is_applied or self.corrects_path
+
+    @property
     def corrects_path(self) -> bool:
         """Whether earlier poses are corrected later, too."""
         return False

@@ -99,6 +99,12 @@ def heard_there(i: int, j: int, axis: float, off: float, count: int, near: Float
 
 
 @kernel
+def along_axis(mounts: Floats, k: int) -> float:
+    """Return how far sensor `k` lies from the middle along its axis, m."""
+    return float(mounts[k, 0] * math.cos(mounts[k, 2]) + mounts[k, 1] * math.sin(mounts[k, 2]))
+
+
+@kernel
 def beyond(r: float, offset: float) -> float:
     """Return how far from the middle an echo is, m, of a sensor so far along its axis; below zero for silence."""
     return r + offset if r >= 0.0 else NO_ECHO_M
@@ -143,7 +149,7 @@ def weigh_wiring(
         towards, r = judged[0], judged[3]
         count = 0
         for k in range(n):
-            offset = mounts[k, 0] * math.cos(mounts[k, 2]) + mounts[k, 1] * math.sin(mounts[k, 2])
+            offset = along_axis(mounts, k)
             for m in range(min(counts[k], size)):
                 look = looks[k, m]
                 if k != i and math.hypot(look[1] - judged[1], look[2] - judged[2]) <= PLACE_M:
@@ -151,13 +157,12 @@ def weigh_wiring(
                     near[count, 2] = beyond(look[3], offset)
                     count += 1
         off = AXIS_SHARE * half_angle
-        own = mounts[i, 0] * math.cos(mounts[i, 2]) + mounts[i, 1] * math.sin(mounts[i, 2])
+        own = along_axis(mounts, i)
         for j in range(n):
             mounted = heard_there(i, j, (towards + mounts[i, 2]) % math.tau, off, count, near)
             other, axis = -own, towards + mounts[i, 2] + math.pi
             if i != j:
-                other = mounts[j, 0] * math.cos(mounts[j, 2]) + mounts[j, 1] * math.sin(mounts[j, 2])
-                axis = towards + mounts[j, 2]
+                other, axis = along_axis(mounts, j), towards + mounts[j, 2]
             there = heard_there(i, j, axis % math.tau, off, count, near)
             if math.isnan(mounted + there):
                 continue
