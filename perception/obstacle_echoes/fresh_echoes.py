@@ -326,7 +326,7 @@ class FreshEchoes:
         if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
             since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
             heard = self._heard if self._blind_walls is None else self._in_beams(pose, mounts)
-            keep_sudden(self._points, self._times, heard, since, pose[0], pose[1], self.unheard.records)
+            keep_sudden(self._points, self._times, heard, self._steady, since, pose[0], pose[1], self.unheard.records)
         if self._blind_walls is not None:
             if self.unheard.is_ring_silent:
                 self._blind_walls.look_again(pose[0], pose[1], self.unheard.has_been_silent)

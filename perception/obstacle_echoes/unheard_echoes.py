@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Pose
-from perception.bounds import COUNT, Place, bounds, index_of
+from perception.bounds import COUNT, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose
@@ -63,6 +63,8 @@ class UnheardEcho(Record):
     y: Place
     lost_m: Place
     """How far the ring was from it when it was lost, m."""
+    is_steady: Flag
+    """Whether another look agreed with it: else it may have been random."""
 
 
 @kernel
@@ -84,6 +86,7 @@ def lose_echo(c: UnheardEcho, px: float, py: float, is_steady: bool, x: float, y
     state = ALONE if is_steady and now < math.hypot(px - c.ring_x, py - c.ring_y) - COME_NEARER_M else LEFT
     if c.state < KEPT or (state == ALONE and now < math.hypot(c.x - x, c.y - y)):
         c.state, c.x, c.y, c.lost_m = state, px, py, now
+        c.is_steady = 1 if is_steady else 0
 
 
 @kernel
@@ -186,6 +189,7 @@ def keep_sudden(
     points: Floats,
     times: Floats,
     heard: NDArray[np.bool_],
+    steady: NDArray[np.bool_],
     since: float,
     x: float,
     y: float,
@@ -199,6 +203,8 @@ def keep_sudden(
         As in `fresh_echoes.record_echoes`.
     heard : (n, looks) bool
         Whether it is an echo that no look has removed.
+    steady : (n, looks) bool
+        Whether another look agreed with it.
     since : float
         Older looks do not count, s; with +inf only what was lost does.
     x, y : float
@@ -218,6 +224,7 @@ def keep_sudden(
                     away = math.hypot(px - x, py - y)
                     if turn == 1 and (one.state < KEPT or away < math.hypot(one.x - x, one.y - y)):
                         one.state, one.x, one.y, one.lost_m = ALONE, px, py, away
+                        one.is_steady = 1 if steady[i, k] else 0
             if turn == 1 and one.state == LEFT:
                 one.state = ALONE
             sudden += is_young or one.state == LEFT or one.state == ALONE
@@ -234,7 +241,7 @@ class UnheardEchoes:
         x, y (m), direction (rad) of each sensor in the ring's frame.
     """
 
-    SCRATCH: Final = ("records", "_places")
+    SCRATCH: Final = ("records", "_places", "_are_steady")
     """Not part of a snapshot: views of an array that is."""
     BOUNDS: Final = bounds(_echoes=UnheardEcho.BOUNDS, silences=COUNT)
 
@@ -242,6 +249,7 @@ class UnheardEchoes:
         self._echoes = zeros(UnheardEcho, len(mounts))
         self.records = records(UnheardEcho, self._echoes)
         self._places = self._echoes[["state", "x", "y"]]
+        self._are_steady = self._echoes["is_steady"]
         self.silences = np.zeros(2, np.int64)
 
     def falls_silent(self, which: int) -> bool:
@@ -272,9 +280,10 @@ class UnheardEchoes:
         return np.array(kept, float).reshape(-1, 2)
 
     def take_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
-        """Return how far ahead the nearest one of a silent ring stands, m; all are then forgotten: the robot stops.
+        """Return how far ahead the nearest steady one of a silent ring stands, m; all are then forgotten: it stops.
 
-        None if there is none in the robot's way so near, or if the ring has not been silent for `SILENT_ROUNDS`.
+        None if there is none in the robot's way so near, or if the ring has not been silent for `SILENT_ROUNDS`. Few
+        sensors among mirrors are often silent for so long, and hear random echoes now and then.
 
         Parameters
         ----------
@@ -285,7 +294,7 @@ class UnheardEchoes:
         """
         if not (self.has_been_silent and self.is_ring_silent):
             return None
-        dx, dy = (self.points(ALONE) - (pose.x, pose.y)).T
+        dx, dy = (self.points(ALONE)[self._are_steady[self._echoes["state"] == ALONE] == 1] - (pose.x, pose.y)).T
         c, s = math.cos(pose.theta), math.sin(pose.theta)
         ahead, across = c * dx + s * dy, c * dy - s * dx
         near = ahead[(ahead > 0.0) & (ahead < near_m) & (np.abs(across) < half_width_m)]

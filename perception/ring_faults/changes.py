@@ -33,6 +33,8 @@ WINDOW_MIN_M: Final = 1e-3
 """A window of ranges is at least as wide, m."""
 SAME_RAD: Final = 1e-6
 """Directions that differ by less are the same, rad."""
+TURNING_SHARE: Final = 0.25
+"""A sensor that has turned by more than this share of half its beam looks elsewhere: mirrors leave the beam."""
 TURNS: Final = 8
 """Turns by a part of the circle that are tried; one by half as much looks as if the robot had turned."""
 
@@ -47,6 +49,8 @@ class Expected(Record):
     low: Place
     """Between what ranges an echo is expected, m; below zero where silence is, …"""
     high: Place
+    missed: Annotated[float, Bound(0.0, 1.0)]
+    """The share of an honest sensor's readings that are not as expected, …"""
     honest_nat: Annotated[float, FINITE]
     """… and the logarithm of the density of what it reads."""
 
@@ -148,7 +152,7 @@ def compare(
     half_angle: float,
     tolerance: float,
     reach: float,
-    missed: float,
+    missed: tuple[float, float],
     mounts: Floats,
     echoes: Records[EchoTrace],
     expected: Records[Expected],
@@ -173,7 +177,9 @@ def compare(
             one.source = -1
             continue
         one.low, one.high = expect(one.source, i, 0.0, half_angle, tolerance, mounts, echoes)
-        one.honest_nat = math.log(density(r, one.low, one.high, reach, missed))
+        turned = abs(wrapped(echoes[i].latest.axis - then.axis))
+        one.missed = missed[1 if turned > TURNING_SHARE * half_angle else 0]
+        one.honest_nat = math.log(density(r, one.low, one.high, reach, one.missed))
         is_known = one.high >= 0.0 and one.low <= reach
         one.is_off = 1 if is_known and r >= 0.0 and not one.low <= r <= one.high else 0
         misses += one.is_off or (is_known and r < 0.0)
@@ -187,7 +193,6 @@ def weigh_exchange(
     half_angle: float,
     tolerance: float,
     reach: float,
-    missed: float,
     mounts: Floats,
     echoes: Records[EchoTrace],
     expected: Records[Expected],
@@ -198,7 +203,7 @@ def weigh_exchange(
     ----------
     turn : float
         The angle, rad.
-    half_angle, tolerance, reach, missed, mounts, echoes, expected
+    half_angle, tolerance, reach, mounts, echoes, expected
         As for `weigh_changes`.
     """
     evidence = 0.0
@@ -208,31 +213,31 @@ def weigh_exchange(
         other = source(i, turn, half_angle, echoes)
         if other >= 0:
             low, high = expect(other, i, turn, half_angle, tolerance, mounts, echoes)
-            likely = density(echoes[i].latest.range_m, low, high, reach, missed)
+            likely = density(echoes[i].latest.range_m, low, high, reach, expected[i].missed)
             evidence += math.log(likely) - expected[i].honest_nat
     return evidence
 
 
 @kernel
-def weigh_length(
-    k: int, reach: float, missed: float, echoes: Records[EchoTrace], expected: Records[Expected]
-) -> float:
+def weigh_length(k: int, reach: float, echoes: Records[EchoTrace], expected: Records[Expected]) -> float:
     """Return the evidence that all ranges are longer or shorter by as much as that of sensor `k`, nat.
 
     Parameters
     ----------
     k : int
         The sensor, of which an echo was expected elsewhere.
-    reach, missed, echoes, expected
+    reach, echoes, expected
         As for `weigh_changes`.
     """
     longer = echoes[k].latest.range_m - 0.5 * (expected[k].low + expected[k].high)
-    evidence = math.log((1.0 - missed) / (2.0 * reach)) - expected[k].honest_nat  # any length is as likely
+    evidence = (
+        math.log((1.0 - expected[k].missed) / (2.0 * reach)) - expected[k].honest_nat
+    )  # any length is as likely
     for i in range(len(echoes)):
         one = expected[i]
         if i != k and one.source >= 0 and one.high >= 0.0:
             low, high = max(0.0, one.low + longer), max(0.0, one.high + longer) + WINDOW_MIN_M
-            evidence += math.log(density(echoes[i].latest.range_m, low, high, reach, missed)) - one.honest_nat
+            evidence += math.log(density(echoes[i].latest.range_m, low, high, reach, one.missed)) - one.honest_nat
     return evidence
 
 
@@ -242,7 +247,7 @@ def weigh_changes(
     half_angle: float,
     tolerance: float,
     reach: float,
-    missed: float,
+    missed: tuple[float, float],
     echoes: Records[EchoTrace],
     expected: Records[Expected],
 ) -> tuple[int, float]:
@@ -252,8 +257,9 @@ def weigh_changes(
     ----------
     mounts, half_angle, tolerance, reach
         As for `motion_tests.check_motion`.
-    missed : float
-        Share of an honest ring's readings that are not as expected.
+    missed : (float, float)
+        Share of an honest ring's readings that are not as expected, where a sensor looks on in the same direction and
+        where it has turned.
     echoes : (n,) records
         What is remembered of each sensor.
     expected : (n,) records
@@ -270,12 +276,12 @@ def weigh_changes(
         return found, most
     for k in range(len(echoes)):
         if expected[k].source >= 0 and expected[k].is_off:
-            nats = weigh_length(k, reach, missed, echoes, expected)
+            nats = weigh_length(k, reach, echoes, expected)
             if nats > most:
                 found, most = LENGTHENED, nats
     for part in range(1, TURNS):
         turn = math.tau * part / TURNS
-        nats = weigh_exchange(turn, half_angle, tolerance, reach, missed, mounts, echoes, expected)
+        nats = weigh_exchange(turn, half_angle, tolerance, reach, mounts, echoes, expected)
         if nats > most:
             found, most = EXCHANGED, nats
     return found, most / max(1.0, len(echoes) * half_angle / math.pi)

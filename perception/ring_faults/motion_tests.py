@@ -13,7 +13,14 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_faults.changes import EXCHANGED, NO_CHANGE, NOISE_M, Expected, weigh_changes
+from perception.ring_faults.changes import (
+    EXCHANGED,
+    NO_CHANGE,
+    NOISE_M,
+    TURNING_SHARE,
+    Expected,
+    weigh_changes,
+)
 from perception.ring_faults.memory import (
     HALVES,
     LOOK_KINDS,
@@ -59,8 +66,6 @@ MISSED: Final = 0.9
 HONEST_MISS_MIN: Final = 0.04
 HONEST_MISS_MAX: Final = 0.6
 """An honest ring misses no less and no more of its known echoes than this: all surfaces end, and some are heard."""
-TURNING_SHARE: Final = 0.25
-"""A sensor that has turned by more than this share of half its beam looks elsewhere: mirrors leave the beam."""
 STEADY, TURNING, AGAIN, DOUBTED = range(LOOK_KINDS)
 """Kinds of looks: at an echo that agreed with the one before, from the same direction or another; the second look at
 one that was missed; and at one that agreed with nothing. After that, silence is as honest: it was a stray."""
@@ -338,7 +343,7 @@ def check_motion(
             weigh_change(i, look, yaw, mounts, reception, echoes, all_of)
     found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)
     if found == NOTHING:
-        missed = honest_share(all_of, STEADY)
+        missed = (honest_share(all_of, STEADY), honest_share(all_of, TURNING))
         change, nats = weigh_changes(mounts, half_angle, tolerance, reach, missed, echoes, expected)
         if change != NO_CHANGE and nats >= CHANGE_NAT:
             found = CHANGED + change

@@ -160,6 +160,21 @@ def test_a_ring_that_loses_several_echoes_at_once_keeps_them_although_it_only_tu
     assert not ring.unheard.is_ring_silent
 
 
+def test_random_echoes_of_a_ring_that_hears_little_else_stop_no_robot() -> None:
+    """Among mirrors, three strays in succession were taken for what stood ahead before the ring failed."""
+    pose = Pose(0.0, 0.0, 0.0)
+    for is_steady in (False, True):
+        ring = FreshEchoes(AROUND, BEAM, (), REACH_M)
+        for k in range(40):
+            ranges = np.full(12, math.nan)
+            ranges[k % 4 :: 4] = math.inf
+            if 4 * (not is_steady) <= k % 8 < 8 and 8 <= k < 16:
+                ranges[k % 4] = 0.6 + 0.4 * (k % 4)
+            ring.update(Firing(0.05 * k, pose, 0.0, ranges))
+        assert ring.unheard.is_ring_silent, "it drives slowly all the same"
+        assert (ring.unheard.take_ahead(pose, 3.0, 0.5) is not None) is is_steady
+
+
 def test_it_is_gone_where_the_robot_could_have_heard_it_again_or_stands_on_it() -> None:
     ring = lost()
     assert look(ring, 1.65 - 0.5 * AWAY_M, math.inf, 5.7) == 1

@@ -43,9 +43,9 @@ def looks(before: Floats, latest: Floats, moved_m: float = 0.1, turned_rad: floa
     return echoes
 
 
-def weighed(echoes: Records[EchoTrace], missed: float = MISSED) -> tuple[int, float]:
+def weighed(echoes: Records[EchoTrace], missed: float = MISSED, turning: float = MISSED) -> tuple[int, float]:
     expected = records(Expected, zeros(Expected, COUNT))
-    return weigh_changes(MOUNTS, HALF, TOLERANCE, REACH, missed, echoes, expected)
+    return weigh_changes(MOUNTS, HALF, TOLERANCE, REACH, (missed, turning), echoes, expected)
 
 
 def moved(ranges: Floats, moved_m: float = 0.1) -> Floats:
@@ -110,6 +110,14 @@ def test_a_ring_that_often_misses_what_it_heard_gives_less_evidence() -> None:
     longer = looks(ROOM, moved(ROOM) + 0.4572)
     nats = [weighed(longer, missed)[1] for missed in (0.05, 0.2, 0.5)]
     assert nats == sorted(nats, reverse=True)
+
+
+def test_a_robot_that_turns_fast_among_mirrors_hears_other_surfaces_at_once() -> None:
+    """Turned by most of its beam, an AmigoBot heard as much elsewhere as the shares of misses of a turn expect."""
+    turned = looks(ROOM, np.roll(ROOM, -4), 0.0, 0.8 * HALF)
+    assert weighed(turned, turning=0.4)[1] < 0.7 * weighed(turned)[1]
+    steady = looks(ROOM, np.roll(ROOM, -4), 0.0, 0.1 * HALF)
+    assert weighed(steady, turning=0.4) == weighed(steady)
 
 
 def test_what_was_heard_too_long_ago_or_not_twice_says_nothing() -> None:

@@ -68,7 +68,8 @@ def test_before_what_a_silent_ring_heard_a_robot_stops_unless_it_is_about_to_loo
     def stops(request: DriveRequest, *, has_unknown: bool) -> bool:
         unheard = UnheardEchoes(np.zeros((3, 3)))
         for echo in unheard.records:
-            echo.state, echo.x, echo.y = ALONE, settings.body.radius_m + 0.3, 0.0
+            echo.state, echo.is_steady = ALONE, 1
+            echo.x, echo.y = settings.body.radius_m + 0.3, 0.0
         unheard.silences[:] = 100
         pose = Pose(0.0, 0.0, 0.0)
         return lost_ahead(unheard, pose, has_unknown, request, settings) is not None
