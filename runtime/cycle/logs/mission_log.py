@@ -21,8 +21,8 @@ STEPS_MAX: Final = 1000
 class MissionStepRow(TypedDict):
     """A step of a mission that was begun, or the mission's state in it."""
 
-    run_s: float
-    """When, by the run's clock."""
+    after_s: float
+    """When, s since the run's first cycle, without its pauses."""
     step: str
     status: str
     """running, held, done or failed."""
@@ -58,10 +58,13 @@ class MissionLog:
         self.row: MissionRow | None = None
         self._log = log
         self._last: tuple[str, int, str] | None = None
+        self._begin_run_s: float | None = None
         self._limit = LineLimit(LINES_PER_S, LINES_BURST)
 
     def observe(self, request: DriveRequest, run_s: float) -> None:
-        """Note the mission's step and status where they changed."""
+        """Note the mission's step and status where they changed; `run_s` is the run's clock, in every cycle."""
+        if self._begin_run_s is None:
+            self._begin_run_s = run_s
         if not isinstance(request, Mission):
             return
         name, progress = request.plan.name, request.progress
@@ -70,7 +73,8 @@ class MissionLog:
             return
         self._last = now
         step, status, reason = request.step.name, progress.status, progress.reason
-        row: MissionStepRow = {"run_s": run_s, "step": step, "status": status, "reason": reason}
+        after_s = round(run_s - self._begin_run_s, 3)
+        row: MissionStepRow = {"after_s": after_s, "step": step, "status": status, "reason": reason}
         before = [] if self.row is None or self.row["name"] != name else self.row["steps"]
         steps = [*before[1 - STEPS_MAX :], row]
         self.row = {"name": name, "step": step, "status": status, "reason": reason, "steps": steps}

@@ -29,17 +29,17 @@ def test_every_step_and_the_end_are_noted_once_and_no_more_than_are_read() -> No
         raise structlog.DropEvent
 
     log = MissionLog(structlog.wrap_logger(None, processors=[keep]))
-    log.observe(Legs(), 0.0)
+    log.observe(Legs(), 7000.0)
     noted = log.row
     assert noted is None
     mission = Mission(PLAN)
-    for run_s, target, why in ((1.0, "next", "reached"), (2.0, "out", "reached"), (3.0, "failed", "time")):
-        log.observe(mission, run_s)
-        log.observe(mission, run_s + 0.5)
+    for after_s, target, why in ((1.0, "next", "reached"), (2.0, "out", "reached"), (3.0, "failed", "time")):
+        log.observe(mission, 7000.0 + after_s)
+        log.observe(mission, 7000.5 + after_s)
         mission = goes_to(mission, target, why)
-    log.observe(mission, 4.0)
+    log.observe(mission, 7004.0)
     assert log.row is not None
-    assert [(row["run_s"], row["step"], row["status"]) for row in log.row["steps"]] == [
+    assert [(row["after_s"], row["step"], row["status"]) for row in log.row["steps"]] == [
         (1.0, "out", "running"), (2.0, "back", "running"), (3.0, "out", "running"), (4.0, "out", "failed"),
     ]  # fmt: skip
     assert (log.row["name"], log.row["status"]) == ("there", "failed")
@@ -47,7 +47,7 @@ def test_every_step_and_the_end_are_noted_once_and_no_more_than_are_read() -> No
     assert [line["step"] for line in lines] == ["out", "back", "out", "out"]
     mission = Mission(PLAN)
     for k in range(3 * STEPS_MAX):
-        log.observe(mission, 5.0)
+        log.observe(mission, 7005.0)
         mission = goes_to(mission, "back" if k % 2 else "out", "reached")
     assert len(log.row["steps"]) == STEPS_MAX
     assert len(lines) <= LINES_BURST + 5.0 * LINES_PER_S + 1
