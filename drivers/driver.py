@@ -155,6 +155,8 @@ class RobotDriver(Protocol):
     def outgoing(self, *, writable: bool) -> bytes:
         """Return the bytes to send now, and consider them sent.
 
+        A run asks in each cycle, and again 10 ms after it got some.
+
         Parameters
         ----------
         writable

@@ -32,9 +32,10 @@ from drivers.arcos.wire_units import (
     limits_of,
     polling_of,
 )
+from drivers.base_model import stop_s
 from drivers.driver import DriverError, LineState
 from drivers.line_budget import refuse_slow_line
-from drivers.messages import Identity, LinkCounts
+from drivers.messages import Identity, LinkCounts, Twist
 from drivers.session import Session
 
 _PULSE_S: Final = 0.5
@@ -49,8 +50,8 @@ _REFUSED_S: Final = 2.0
 """Time until a robot that was refused is asked again, s: another one may have been plugged in."""
 _SONAR_S: Final = 0.5
 """Time from one attempt to switch the sonar on to the next, s."""
-_MOVING_MAX_S: Final = 2.5
-"""Longest time that a halted base may take to stand, s: from 2 m/s at 0.8 m/s²."""
+_MOVING_MORE_S: Final = 1.0
+"""Time that a halted base may move beyond that in which it brakes as its file says, s: it hears and reports late."""
 
 
 class ArcosDriver(Session[PoseStamper]):
@@ -80,6 +81,8 @@ class ArcosDriver(Session[PoseStamper]):
         refuse_slow_line(config.link, SIP_BYTES / SIP_PERIOD_S, *traffic_of(self._polling, self._discs))
         self._handshake = Handshake(config.link, has_speed="://" not in (config.link.port or ""))
         self._limits = limits_of(config.body, None)
+        fastest = Twist(config.body.speed_max_m_s, config.body.turn_max_rad_s)
+        self._moving_max_s = stop_s(fastest, config.body) + _MOVING_MORE_S
         self._decoder = Decoder(decode_packet)
         self._boots = 0
         self._sent_s = self._data_s = self._packet_s = self._sip_s = 0.0
@@ -96,7 +99,7 @@ class ArcosDriver(Session[PoseStamper]):
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
         moving_s = self._halting.moving_s(self._run_s)
-        if self._state is LineState.READY and moving_s > _MOVING_MAX_S:
+        if self._state is LineState.READY and moving_s > self._moving_max_s:
             return diagnostics.not_stopping(moving_s)
         return super().problem
 

@@ -47,6 +47,8 @@ _INPUT_REQUEST_S: Final = 2.0
 """Time from one request for the bumpers' reports to the next, s: a lost one would go unnoticed."""
 _CALLING_S: Final = 1.0
 """Time for which the robot is called before the line counts as down, s."""
+_OTHERS_S: Final = 0.2
+"""Longest time for which nothing but velocities is sent, s: a status is asked for twice as often."""
 _SILENT_ECHO_S: Final = 0.5
 """Time without a range after which the sonars are started again, s, besides two steps of their pattern."""
 _DRIVEN_S: Final = 0.5
@@ -88,10 +90,11 @@ class RflexDriver(Session[Measurements]):
         self._boots = 0
         self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
         self._sample_s = self._echo_s = self._answer_s = self._driven_s = self._input_s = 0.0
+        self._others_s = 0.0
         self._bad_at_sample = 0
         self._brake, self._stall = Brake(config), StallMonitor(config)
         self._queue: deque[Frame] = deque()
-        self._second_axis: Frame | None = None
+        self._axes, self._axes_left, self._axis_turn = drive_commands(Twist(0.0, 0.0), config), 0, 0
         self._is_ending = self._is_moving = False
         self._pressed: dict[int, int] = {}
         self._volts = math.inf
@@ -155,7 +158,7 @@ class RflexDriver(Session[Measurements]):
 
     def halt(self) -> None:
         """Stop the base at once, repeat that until it stands, then set its brake."""
-        self._drive = self._second_axis = None
+        self._drive, self._axes_left = None, 0
         self._is_moving = False
         self._stall.stop()
         self._brake.halt()
@@ -213,19 +216,23 @@ class RflexDriver(Session[Measurements]):
         return data
 
     def _next_command(self) -> Frame | None:
-        """Return the next command that is due: a velocity first, its second axis next, then all that can wait."""
+        """Return the next command that is due: a velocity's axes in turn, and in time all that can wait."""
         drive, self._drive = self._drive, None
         if drive is not None and self._state is LineState.READY and self._brake.may_drive:
-            frame, self._second_axis = drive_commands(drive, self._config)
+            self._axes, self._axes_left = drive_commands(drive, self._config), 2
             self._stall.command(drive, self._run_s)
             self._driven_s, self._is_moving = self._run_s, drive != Twist(0.0, 0.0)
-            return frame
-        if self._second_axis is not None:
-            frame, self._second_axis = self._second_axis, None
-            return frame
-        if self._queue:
-            return self._queue.popleft()
-        return self._brake.due(self._run_s)
+        if self._axes_left and self._run_s - self._others_s < _OTHERS_S:
+            return self._axis()
+        self._others_s = self._run_s
+        frame = self._queue.popleft() if self._queue else self._brake.due(self._run_s)
+        return self._axis() if frame is None and self._axes_left else frame
+
+    def _axis(self) -> Frame:
+        """Return the command of the axis whose turn it is, of the newest velocity."""
+        frame = self._axes[self._axis_turn]
+        self._axis_turn, self._axes_left = 1 - self._axis_turn, self._axes_left - 1
+        return frame
 
     def _begin(self, state: LineState, problem: str | None) -> None:
         """Give up what there was and call the robot: stop the base, whether it hears that or not."""
@@ -248,7 +255,7 @@ class RflexDriver(Session[Measurements]):
     def _abandon(self) -> None:
         """Drop all commands but a halt, and all that does not outlast an interruption."""
         self._queue.clear()
-        self._drive = self._second_axis = None
+        self._drive, self._axes_left = None, 0
         self._is_moving = False
         self._brake.forget()
         self._stall.stop()

@@ -6,6 +6,7 @@ from typing import Final
 
 LINE_OPENED: Final = "line opened"
 LINK_RECEIVE: Final = "link receive"
+LINE_SEND: Final = "line send"
 LINE_LOST: Final = "line lost"
 COLLECTION: Final = "garbage collection"
 CONSOLE_RECEIVE: Final = "console receive"
@@ -15,6 +16,7 @@ VIEW: Final = "view"
 CALLBACKS: Final = (
     LINE_OPENED,
     LINK_RECEIVE,
+    LINE_SEND,
     LINE_LOST,
     COLLECTION,
     CONSOLE_RECEIVE,

@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.errors import UserError
@@ -21,12 +22,13 @@ from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
 from perception.edits import Edit, Evidence
-from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINK_RECEIVE
+from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINE_SEND, LINK_RECEIVE
 from runtime.cycle.connection import Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Inputs, OperatorInput, Request, always_valid, command_gap_max_s, gather_inputs
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
+from runtime.cycle.line_sender import LineSender
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.logs.alerts import Alerts
 from runtime.cycle.logs.line_log import LineLog
@@ -131,7 +133,9 @@ class RobotProcess:
         self._link = Link(settings.link, *handlers, timed(LINE_LOST, self._on_closed), **line_options(settings))
         self._budget = ReceiveBudget(settings.link)
         self._clock.on_change(self._link.release)
-        line = (self._link, self._driver, self._send, self._clock)
+        send_timed = partial(timed, LINE_SEND)
+        self._sender = LineSender(self._link, self._driver, self._clock, observers.on_bytes, send_timed)
+        line = (self._link, self._driver, self._sender.send, self._clock)
         self._connection = Connection(*line, settings.body, line_messages)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
         self._mode_log = ModeLog(log, self._notifier)
@@ -343,31 +347,25 @@ class RobotProcess:
 
     def _carry_out(self, command: Command, stale_run_s: float) -> None:
         """Send the command, but no velocity after `stale_run_s`: the next cycle stops the drive for such a gap."""
+        self._sender.stale_run_s = stale_run_s
         if not isinstance(command, Twist):
             apply_command(self._driver, command)
-            self._send()
+            self._sender.send()
         elif self._clock() <= stale_run_s:
             apply_command(self._driver, command)
-            self._send()
+            self._sender.send()
             if self._clock() > stale_run_s:
                 # This process was suspended meanwhile: the base may move again that its deadman had stopped.
                 self._halt()
 
-    def _send(self) -> None:
-        """Send the bytes that the driver has to send."""
-        link, on_bytes = self._link, self._observers.on_bytes
-        link.set_baud(self._driver.line_baud)
-        if link.is_open and (data := self._driver.outgoing(writable=link.writable)) and link.send(data) and on_bytes:
-            on_bytes("out", *self._clock.both(), data)
-
     def _halt(self) -> None:
         """Send HALT now, whatever else is in progress; on a lost line, as soon as it is open again."""
         self._driver.halt()
-        self._send()
+        self._sender.send()
 
     def _on_opened(self) -> None:
         self._driver.line_opened(self._clock())
-        self._send()
+        self._sender.send()
 
     def _on_data(self, data: bytes) -> None:
         (run_s, host_s), waiting = self._clock.both(), self._driver.firings_waiting

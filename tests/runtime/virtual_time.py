@@ -88,7 +88,7 @@ class MemoryLink:
         return self.is_open
 
     def send(self, data: bytes) -> bool:
-        self.live()
+        self._arrived += self.live()
         self._robot.receive(data)
         return True
 

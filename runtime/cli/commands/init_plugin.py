@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -199,8 +200,10 @@ def write_plugin(name: str, kind: str) -> int:
             f"{name!r}: give a name of small letters, digits and _, which begins with a letter", WRONG_CALL
         )
     taken = {*known_drivers(), *list_shipped("robots")} if kind == "robot" else {*SHIPPED_USES, *plugged(SCHEMAS)}
-    if name in taken or name in {"config", "drivers", "perception", "behaviors", "runtime", "echolocate"}:
+    if name in taken:
         raise UserError(f"{name}: is taken; choose another name than {', '.join(sorted(taken))}", WRONG_CALL)
+    if find_spec(name) is not None:
+        raise UserError(f"{name}: a module of this name is here already; choose another name", WRONG_CALL)
     folder = Path(name)
     try:
         folder.mkdir()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 
+import pytest
+
 from config.load import load_robot
 from drivers.contract.family import PLAIN
 from drivers.driver import LineState
@@ -13,7 +15,9 @@ from drivers.registry import make_driver
 from drivers.rflex import diagnostics
 from drivers.rflex.codec import (
     BRAKE_SET,
+    STATUS_REQUEST,
     Decoder,
+    Frame,
     Input,
     encode,
     frame_of,
@@ -41,6 +45,22 @@ def test_commands_have_gaps_and_are_sent_one_at_a_time() -> None:
     cable.run(1.0)
     assert len(times) > 10
     assert min(b - a for a, b in itertools.pairwise(times)) >= 0.0099
+
+
+def test_a_driver_that_is_asked_once_a_cycle_sends_both_axes_and_asks_for_the_status() -> None:
+    cable = RFLEX.driving()
+    driver, decoder, sent = cable.driver, Decoder(), list[Frame]()
+    for cycle in range(40):
+        now_s = cable.now_s + 0.05 * (cycle + 1)
+        driver.receive(cable.robot.advance(now_s), now_s)
+        driver.tick(now_s)
+        driver.drive(Twist(0.1, 0.08))
+        data = driver.outgoing(writable=True)
+        cable.robot.receive(data)
+        sent += decoder.feed(data)
+    assert driver.state is LineState.READY
+    assert (cable.robot.truth.twist.v, cable.robot.truth.twist.w) == pytest.approx((0.1, 0.08), abs=0.002)
+    assert sent.count(STATUS_REQUEST) >= 6
 
 
 def test_sonars_that_stop_are_started_again() -> None:

@@ -80,7 +80,7 @@ def test_a_line_that_is_lost_before_the_handshake(monkeypatch: pytest.MonkeyPatc
     assert refusal(monkeypatch, silent, disturb=MemoryLink.pull) == "pulled out"
 
 
-@pytest.mark.parametrize(("robot_file", "farewell"), [("denning", ""), ("p3dx", "fafb06023b0100033b")])
+@pytest.mark.parametrize(("robot_file", "farewell"), [("denning", ""), ("p3dx", "fafb06023b0100033b"), ("b21r", "")])
 def test_the_base_has_stopped_and_its_session_has_ended_before_the_line_is_closed(
     monkeypatch: pytest.MonkeyPatch, robot_file: str, farewell: str
 ) -> None:

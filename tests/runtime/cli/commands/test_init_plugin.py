@@ -52,7 +52,10 @@ def test_a_robot_and_a_schema_are_known_by_their_names(tmp_path: Path, monkeypat
         write_plugin("orbit", "schema")
 
 
-@pytest.mark.parametrize(("name", "said"), [("Skippy", "small letters"), ("denning", "is taken"), ("here", "exists")])
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("Skippy", "small letters"), ("denning", "is taken"), ("here", "exists"), ("numpy", "module of this name")],
+)
 def test_a_name_that_does_not_do_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, said: str
 ) -> None:
