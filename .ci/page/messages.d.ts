@@ -762,6 +762,7 @@ interface ObjectRow {
   y: number;
   theta: number;
   sigma: number;
+  sigma_theta: number | null;
   covariance: [number, number, number] | null;
   probability: number | null;
   support: number;

@@ -144,14 +144,16 @@ class Hall:
             probability = 0.62 if i == 5 and cycle % 400 < 40 and self.moving else 0.97 + 0.003 * (i % 10)
             out.append({
                 "number": i + 1, "model": "drum" if i < 6 or i % 5 else "wall", "x": x + 0.01, "y": y - 0.01,
-                "theta": 0.0, "sigma": spread, "covariance": [spread**2, 0.4 * spread**2, 0.6 * spread**2],
+                "theta": 0.0, "sigma": spread, "sigma_theta": None,
+                "covariance": [spread**2, 0.4 * spread**2, 0.6 * spread**2],
                 "probability": min(0.999, probability), "support": 40 + i, "score": 0.9, "confirmed": False,
                 "placed": False, "ends": None,
             })  # fmt: skip
         for i, (x1, y1, x2, y2) in enumerate(self.walls):
             out.append({
                 "number": 101 + i, "model": "wall", "x": (x1 + x2) / 2, "y": (y1 + y2) / 2,
-                "theta": math.atan2(y2 - y1, x2 - x1), "sigma": 0.01, "covariance": [0.1, 0.0, 0.0001],
+                "theta": math.atan2(y2 - y1, x2 - x1), "sigma": 0.01, "sigma_theta": 0.004,
+                "covariance": [0.1, 0.0, 0.0001],
                 "probability": 0.98, "support": 60, "score": 0.98, "confirmed": False, "placed": False,
                 "ends": [x1, y1, x2, y2],
             })  # fmt: skip

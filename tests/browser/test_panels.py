@@ -71,6 +71,7 @@ async def test_a_wall_is_an_object_and_what_it_hides_is_not_certain(server: Fake
     await expect(page.locator("#object-name")).to_have_text("101 wall")
     assert await opened.picture() != before, "the picked wall looks like any other"
     await opened.says("#object-facts", "4.92, 2.62 to 8.86, 2.62 ft")
+    await opened.says("#object-facts", "± 0.2°")
     for name in ("Confirm", "Move and turn"):
         await expect(page.get_by_role("button", name=name, exact=True)).to_be_hidden()
     await opened.save_screenshot("wall")

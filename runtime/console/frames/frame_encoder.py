@@ -315,6 +315,7 @@ def _object(detected: DetectedObject) -> ObjectRow:
         "y": round(detected.y, 4),
         "theta": round(detected.theta, 4),
         "sigma": round(detected.sigma, 5),
+        "sigma_theta": None if detected.sigma_theta is None else round(detected.sigma_theta, 5),
         "covariance": detected.covariance,
         "probability": detected.probability,
         "support": detected.support,

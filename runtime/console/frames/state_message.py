@@ -52,6 +52,7 @@ class ObjectRow(TypedDict):
     y: float
     theta: float
     sigma: float
+    sigma_theta: float | None
     covariance: Triple | None
     probability: float | None
     support: int

@@ -177,7 +177,7 @@ export class Objects extends Panel {
           : `behind wall ${object.hidden_by}, where no reading checks it; before: ${chance}`,
       ],
       ["place", isWall(object) ? this.#between(object.ends) : this.units.place(object.x, object.y, 3)],
-      ["turned by", degrees(object.theta)],
+      ["turned by", degrees(object.theta, object.sigma_theta)],
       isWall(object) ? ["length", this.#long(object.ends)] : ["uncertainty", this.units.spread(object.sigma)],
     ];
     if (object.covariance && !isWall(object)) {

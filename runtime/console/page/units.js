@@ -67,10 +67,11 @@ export const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s
 /** @template {number | null} T @param {T} degrees */
 export const radians = (degrees) => /** @type {T} */ (degrees === null ? null : (degrees * Math.PI) / 180);
 
-// From −180° to 180°, however often the robot has turned.
-/** @param {number} radians */
-export const degrees = (radians) =>
-  `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−");
+// From −180° to 180°, however often the robot has turned; with its standard error if that is known.
+/** @param {number} radians @param {number | null} [sigma] */
+export const degrees = (radians, sigma = null) =>
+  `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−") +
+  (sigma === null ? "" : ` ± ${((180 * sigma) / Math.PI).toFixed(1)}°`);
 
 // A probability; no evidence makes it 0 or 100.
 /** @param {number} share */
