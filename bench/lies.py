@@ -3,7 +3,7 @@
 Each trial is a drive in virtual time through a room, the protocol included. At a random moment a lie begins; from
 then on the drive lasts until the robot stops by itself, at most for `LIE_S`. What the robot touches, and how fast, is
 the emulator's truth and not what the robot reports. A lie is named by a stop with a reason, by a sensor that is
-reported, by a note of the driver, or by the reason why the robot drives slowly.
+reported, by a note of the driver, by the line that nothing is heard, or by the reason why the robot drives slowly.
 """
 
 from __future__ import annotations
@@ -294,7 +294,7 @@ def run_trial(
         place = truth.pose
         reports = {(report.sensor, report.fault): report.reason for report in state.perception.sensor_reports()}
         if run_s < begin_s:
-            known |= set(reports) | set(inputs.received.notes)
+            known |= set(reports) | set(inputs.received.notes) | {state.echo_watch.silence}
             held = state.hold_reason
             before_m_s, speed_m_s = truth.contact_m_s, abs(truth.twist.v)
             continue
@@ -306,6 +306,7 @@ def run_trial(
             if kind is not None:
                 texts += [text for key, text in reports.items() if key not in known]
                 texts += [note for note in inputs.received.notes if note not in known]
+                texts += [line for line in [state.echo_watch.silence] if line is not None and line not in known]
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
             held = held if state.hold_reason == held else None

@@ -32,6 +32,7 @@ class Alerts:
         """Of the known room: status, places refuted, rivals."""
         self._ring_problems: set[str] = set()
         self._has_told_lag = False
+        self._silence: str | None = None
         self.recovered: list[str] = []
         """Of the last update: what is well again, and needs nobody."""
 
@@ -51,6 +52,10 @@ class Alerts:
         if (problem := state.ring_problem) is not None and state.mode.reason != problem:
             facts += [] if problem in self._ring_problems else [f"while the robot does not drive: {problem}"]
             self._ring_problems.add(problem)
+        before, self._silence = self._silence, state.echo_watch.silence
+        if before != self._silence:
+            facts += [] if self._silence is None else [self._silence]
+            recovered += ["the ring hears echoes again"] if self._silence is None else []
         lines, self.recovered = self._limited(facts, run_s), self._limited(recovered, run_s)
         return lines
 

@@ -12,7 +12,7 @@ from config.load import load_settings
 from config.world import WorldConfig
 from drivers.emulator.faults import SilentRing
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
-from runtime.cycle.echo_watch import WAY_MIN_M, EchoWatch
+from runtime.cycle.echo_watch import OPEN_M, WAY_MIN_M, EchoWatch
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from tests.runtime.emulated_run import Run
@@ -43,6 +43,16 @@ def test_a_ring_that_reaches_less_may_drive_farther() -> None:
     for k in range(26):
         watch, reason = watch.observe(at(0.1 * k), heard(math.inf)).stopped(1.5)
         assert (reason is None) is (k < 25)
+
+
+def test_a_long_way_without_an_echo_later_is_a_line_and_no_stop() -> None:
+    watch = EchoWatch().observe(at(0.0), heard(2.0))
+    for k in range(60):
+        watch, reason = watch.observe(at(0.1 * k), heard(math.inf)).stopped(4.0)
+        assert reason is None
+        assert (watch.silence is not None) is (k >= 10.0 * OPEN_M)
+    assert watch.way_m == OPEN_M
+    assert watch.observe(at(6.0), heard(2.0)).silence is None
 
 
 @pytest.mark.compiled

@@ -11,6 +11,7 @@ from drivers.messages import Pose
 from perception.detected_object import MapCounts
 from perception.localization.submaps.echo_lag import FoundLag
 from perception.sensor_faults.report import SensorReport
+from runtime.cycle.echo_watch import OPEN_M, EchoWatch
 from runtime.cycle.logs.alerts import LINES_BURST, LINES_PER_S, Alerts
 
 NOTHING = Received((), None, rebooted=False)
@@ -39,8 +40,20 @@ def report(sensor: int, fault: str) -> SensorReport:
     return SensorReport(sensor=sensor, fault=fault, reason=f"sensor {sensor} is {fault}")  # type: ignore[arg-type]
 
 
-def state(perception: StubPerception, ring_problem: str | None = None, reason: str | None = None) -> Any:
-    return SimpleNamespace(perception=perception, ring_problem=ring_problem, mode=SimpleNamespace(reason=reason))
+def state(
+    perception: StubPerception, ring_problem: str | None = None, reason: str | None = None, way_m: float = 0.0
+) -> Any:
+    watch, mode = EchoWatch(is_over=True, way_m=way_m), SimpleNamespace(reason=reason)
+    return SimpleNamespace(perception=perception, ring_problem=ring_problem, mode=mode, echo_watch=watch)
+
+
+def test_a_long_silence_is_a_line_once_until_the_ring_hears_again() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    lines = [alerts.update(NOTHING, state(perception, way_m=way_m), 0.0) for way_m in (0.0, OPEN_M, OPEN_M)]
+    assert [len(line) for line in lines] == [0, 1, 0]
+    assert lines[1][0].startswith("no sensor has heard an echo over the last 4 m")
+    assert alerts.update(NOTHING, state(perception), 0.0) == []
+    assert alerts.recovered == ["the ring hears echoes again"]
 
 
 def test_each_fact_is_reported_once() -> None:
