@@ -24,7 +24,7 @@ from perception.localization.localized_pose import LocalizedPose
 from perception.localization.submaps.echo_lag import lag_of
 from runtime.recording.conventions.echo_lag import at_heard_poses
 from runtime.recording.replay_summary import ReplaySummary
-from runtime.recording.ring_log_replay import replay_localized
+from runtime.recording.ring_log_replay import FiringReplayer, replay_localized
 
 WAY_M: Final = 3.0
 """Way over which the error of a relative place is measured."""
@@ -51,6 +51,7 @@ def measure(folders: Iterable[Path], tell: Callable[[str], None]) -> dict[str, R
             found = followed(settings, heard)
             rows[name] = {"lag s": lag.lag_s, "± s": lag.sigma_s, **place_errors(found, poses, truth)}
             rows[name]["explained"] = _explained(found, ranges, bearings)
+            rows[name]["explained in a run"] = _explained(run(settings, heard), ranges, bearings)
     return rows
 
 
@@ -73,6 +74,20 @@ def followed(settings: Settings, firings: Sequence[Firing]) -> Followed:
     end: list[LocalizedPose] = []
     summary = replay_localized(settings, firings, lambda _, here: now.append(here), lambda _, here: end.append(here))
     return Followed(summary, now, end)
+
+
+def run(settings: Settings, firings: Sequence[Firing]) -> Followed:
+    """Follow a drive as a run does, drift corrected: its results are those of the quanta after each firing."""
+    localization = settings.perception.localization.model_copy(update={"correct_drift": True})
+    perceives = settings.perception.model_copy(update={"localization": localization})
+    replayer = FiringReplayer(settings.model_copy(update={"perception": perceives}), firings)
+    perception, taken = replayer.perception, []
+    for _ in replayer:
+        here = perception.localized()
+        if here is not None:
+            taken.append((here, perception.map_frame.moment()))
+    end = [perception.map_frame.as_known_now(then, moment) for then, moment in taken]
+    return Followed(replayer.summary(perception.odometry_from_map().inverse()), [then for then, _ in taken], end)
 
 
 def place_errors(found: Followed, odometry: Floats, truth: Floats) -> Row:

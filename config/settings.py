@@ -130,7 +130,7 @@ class LocalizationConfig(Strict):
     """Where the robot is: the drift of its odometry, and its place in a known room."""
 
     correct_drift: bool = False
-    """Correct the drift of odometry by the round objects that the Bayesian method recognises. The robot drives in the
+    """Correct the drift of odometry by round objects, or by matching maps of the way. The robot drives in the
     odometry's frame all the same, which stays continuous; objects move in it."""
     known_room: WorldConfig | None = None
     """The map of the room in which the robot finds itself, as ``run --map`` sets it: walls, boxes, polygons, drums.

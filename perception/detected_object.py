@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
-
 from drivers.messages import Pose
 
 
@@ -136,7 +134,10 @@ def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
         return replace(seen, x=place.x, y=place.y, theta=place.theta)
     xx, xy, yy = seen.covariance
     c, s = math.cos(to.theta), math.sin(to.theta)
-    turn = np.array([[c, -s], [s, c]])
-    turned = turn @ np.array([[xx, xy], [xy, yy]]) @ turn.T
-    covariance = (float(turned[0, 0]), float(turned[0, 1]), float(turned[1, 1]))
+    both = 2.0 * c * s * xy
+    covariance = (
+        c * c * xx - both + s * s * yy,
+        c * s * (xx - yy) + (c * c - s * s) * xy,
+        s * s * xx + both + c * c * yy,
+    )
     return replace(seen, x=place.x, y=place.y, theta=place.theta, covariance=covariance)

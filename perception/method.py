@@ -12,6 +12,7 @@ from drivers.messages import Firing
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Evidence, MapEdit, Segments
 from perception.kernel import Floats
+from perception.map_moves import MapMoves
 
 
 class Method(Protocol):
@@ -96,6 +97,10 @@ class Method(Protocol):
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move an object and what is kept for it by a vector (m), after its place in the map was corrected."""
+        ...
+
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+        """Note the number of the map of the way that goes on, and move what the robot left behind in each."""
         ...
 
     def reset(self) -> None:

@@ -12,6 +12,7 @@ from config.settings import PerceptionConfig
 from drivers.messages import Firing, Floats
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Evidence, MapEdit, Segments
+from perception.map_moves import MapMoves
 
 NOT_READY: Final = "recognition is not ready yet: wait until it is"
 NOTHING: Final = MapCounts(segments=0, segments_total=0, hypotheses=0)
@@ -68,6 +69,9 @@ class NoMethod:
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move nothing: there are no objects."""
+
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+        """Move nothing, likewise."""
 
     def reset(self) -> None:
         """Leave the empty map as it is."""

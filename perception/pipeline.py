@@ -166,6 +166,7 @@ class Perception:
         """Return a firing at the pose at which `method` enters it: by odometry, until that is refuted."""
         if self._other is None:
             return firing
+        self.map_frame.move((self.method, self.surfaces, self.vacant))
         fed = self._fed()
         placed = self.map_frame.follow(firing, self.vacant.outside(fed[-1].near_objects()), fed[-1].shift_object)
         if len(fed) > 1 and self.map_frame.is_applied:
@@ -173,7 +174,7 @@ class Perception:
             self.surfaces.clear()  # it was in odometry's frame
         elif len(fed) > 1:
             self._other.observe(placed)
-        return placed if self.map_frame.is_applied else firing
+        return placed if self.map_frame.is_settled else firing
 
     def refine(self) -> int:
         """Do one quantum of refinement and return its iterations, zero if nothing is left to improve.

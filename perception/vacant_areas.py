@@ -13,6 +13,7 @@ import numpy as np
 
 from perception.bounds import COUNT, PLACE, bounds, up_to
 from perception.detected_object import DetectedObject
+from perception.map_moves import MapMoves
 from perception.polyline import Polyline
 
 AREAS_MAX: Final = 64
@@ -110,6 +111,13 @@ class VacantAreas:
     def lift_at(self, x: float, y: float) -> None:
         """Remove the areas that contain a place (m): the operator put an object there."""
         self._keep(np.flatnonzero(~self._contain(x, y)))
+
+    def follow_maps(self, _submap: int, moves: MapMoves | None) -> None:
+        """Move each area with the map of the way that is nearest to it, if these have moved."""
+        rows = self.rows[: self.count]
+        if moves is not None and len(rows):
+            rows["x"], rows["y"], _ = moves.moved(moves.nearest(rows["x"], rows["y"]), rows["x"], rows["y"])
+            self.drop_caches()
 
     def listed(self) -> tuple[VacantArea, ...]:
         """Return the areas, oldest first."""

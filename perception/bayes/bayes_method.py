@@ -68,6 +68,7 @@ from perception.edits import (
     WithdrawPlacement,
 )
 from perception.kernel import Floats
+from perception.map_moves import MapMoves
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array, mounts_at, ring_pose
 from perception.snapshot import bounds_of
@@ -339,15 +340,7 @@ class BayesPerception:
             return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
-        """Move a round object and the readings kept for it, after its place in the map was corrected.
-
-        Parameters
-        ----------
-        number : int
-            The object's; nothing moves if it has gone.
-        dx, dy : float
-            m
-        """
+        """Move a round object and the readings kept for it by a vector (m); nothing moves if it has gone."""
         circles = self.memory.circles
         kept = circles["bins"]["readings"]
         for row in np.flatnonzero((circles["number"] == number) & (circles["status"] != FREE)):
@@ -356,6 +349,11 @@ class BayesPerception:
             kept["x"][row] += dx
             kept["y"][row] += dy
         self._objects = None
+
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+        """Note the number of the map of the way that goes on, and move what the robot left behind in each."""
+        if self._archive.follow_maps(submap, moves):
+            self._objects = self._archived = self._archived_labels = None
 
     def reset(self) -> None:
         """Clear the memory, as after a reset of the odometry."""

@@ -31,9 +31,11 @@ from perception.localization.drift.drift_correction import DriftCorrection, Land
 from perception.localization.localized_pose import LocalizedPose, Moment
 from perception.localization.odometry_frame import AnyEdit, OdometryFrame
 from perception.localization.submaps.submap_graph import SubmapGraph
+from perception.map_moves import FollowsMaps
 from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
+STAYS: Final = Pose(0.0, 0.0, 0.0)
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
 
@@ -53,8 +55,7 @@ class MapFrame(OdometryFrame):
     drift : DriftCorrection
         The landmark filter.
     submaps : SubmapGraph
-        The pose by maps of a few metres of way; of both, the first that refutes odometry corrects it. What is
-        recognised stays in odometry's frame then.
+        The pose by maps of a few metres of way; of both, the first that refutes odometry corrects it.
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
@@ -112,7 +113,7 @@ class MapFrame(OdometryFrame):
         """
         if self.submaps.is_applied:  # what seems round among walls may be a corner
             self.submaps.observe(firing)
-            return firing
+            return self._in_filter(firing)
         self._near = {seen.number for seen in objects if seen.number is not None}
         self.drift.learn(
             SeenObject(seen.number, seen.x, seen.y, self._radii[seen.model])
@@ -128,6 +129,23 @@ class MapFrame(OdometryFrame):
         for number, dx, dy in self.drift.moved_landmarks(SHIFT_MIN_M, self._near):
             shift(number, dx, dy)
         return self.drift.corrected(firing)
+
+    def _in_filter(self, firing: Firing) -> Firing:
+        """Return a firing where maps of the way have it."""
+        if not self.submaps.held.is_moved:
+            return firing
+        x, y, yaw = self.submaps.in_filter().tolist()
+        return replace(firing, pose=Pose(x, y, yaw + firing.pose.theta - firing.ring_yaw), ring_yaw=yaw)
+
+    def _odometry_from_filter(self) -> Pose:
+        """Return the pose of the filter's frame in odometry's frame, at the last firing."""
+        return self.drift.odometry_from_filter() if self.drift.is_applied else self.submaps.odometry_from_filter()
+
+    def move(self, memories: Iterable[FollowsMaps]) -> None:
+        """Move what is remembered with the maps of the way."""
+        moves = self.submaps.moves()
+        for memory in memories:
+            memory.follow_maps(self.submaps.count, moves)
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing: by landmarks where there are some, or by maps of the way."""
@@ -156,7 +174,7 @@ class MapFrame(OdometryFrame):
     def in_map(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the filter's frame in the map frame."""
         if not self.drift.is_applied:
-            to = self.submaps.odometry_from_map().inverse()
+            to = self.submaps.odometry_from_map().inverse().compose(self._odometry_from_filter())
             return tuple(turned_object(to, seen) for seen in objects) if self.submaps.is_applied else tuple(objects)
         to = self.drift.map_from_filter()
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
@@ -168,21 +186,19 @@ class MapFrame(OdometryFrame):
 
     def objects_in_odometry(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the filter's frame in odometry's frame."""
+        to = self._odometry_from_filter()
         if not self.drift.is_applied:
-            return tuple(objects)
-        to = self.drift.odometry_from_filter()
+            return tuple(objects) if to == STAYS else tuple(turned_object(to, seen) for seen in objects)
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
 
     def polylines_in_odometry(self, polylines: tuple[Polyline, ...]) -> tuple[Polyline, ...]:
         """Return polylines of the filter's frame in odometry's frame."""
-        if not self.drift.is_applied:
-            return polylines
-        to = self.drift.odometry_from_filter()
-        return tuple(polyline.in_frame(to) for polyline in polylines)
+        to = self._odometry_from_filter()
+        return polylines if to == STAYS else tuple(polyline.in_frame(to) for polyline in polylines)
 
     def segments_in_odometry(self, geometry: Floats) -> Floats:
         """Return segments in odometry's frame: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
-        to = self.drift.odometry_from_filter()
+        to = self._odometry_from_filter()
         c, s = math.cos(to.theta), math.sin(to.theta)
         turned = geometry.copy()
         for x, y in ((0, 1), (2, 3)):
@@ -193,7 +209,7 @@ class MapFrame(OdometryFrame):
 
     def areas_in_odometry(self, areas: tuple[VacantArea, ...]) -> tuple[VacantArea, ...]:
         """Return vacant areas of the filter's frame in odometry's frame."""
-        to = self.drift.odometry_from_filter()
+        to = self._odometry_from_filter()
         places = [to.compose(Pose(area.x, area.y, 0.0)) for area in areas]
         return tuple(area._replace(x=at.x, y=at.y) for area, at in zip(areas, places, strict=True))
 
@@ -201,7 +217,7 @@ class MapFrame(OdometryFrame):
         """Return the evidence for an object of the filter's frame in odometry's frame."""
         if evidence is None:
             return None
-        to = self.drift.odometry_from_filter()
+        to = self._odometry_from_filter()
         arcs = [(arc, to.compose(Pose(arc.x, arc.y, arc.direction))) for arc in evidence.arcs]
         lines = [
             (line, to.compose(Pose(line.x1, line.y1, 0.0)), to.compose(Pose(line.x2, line.y2, 0.0)))
@@ -218,7 +234,7 @@ class MapFrame(OdometryFrame):
 
     def edit_in_filter(self, edit: AnyEdit) -> AnyEdit:
         """Return an operator's edit, whose places are in odometry's frame, in the filter's frame."""
-        to = self.drift.odometry_from_filter().inverse()
+        to = self._odometry_from_filter().inverse()
         if isinstance(edit, RestoreSegments):
             return replace(edit, rows=tuple(_turned_row(to, row) for row in edit.rows))
         if isinstance(edit, RestoreObjects):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from config.model import ModelConfig
@@ -11,6 +11,7 @@ from perception.detected_object import DetectedObject
 from perception.edits import AreaEdit, Evidence, MapEdit
 from perception.kernel import Floats
 from perception.localization.localized_pose import LocalizedPose, Moment
+from perception.map_moves import FollowsMaps
 from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
@@ -58,6 +59,9 @@ class OdometryFrame:
     ) -> Firing:
         """Return a firing at its pose in the frame in which the method enters it."""
         return firing
+
+    def move(self, memories: Iterable[FollowsMaps]) -> None:
+        """Move what is remembered with the maps of the way."""
 
     def localized(self) -> LocalizedPose | None:
         """Return where the robot was at the last firing; None where the map frame is odometry's."""

@@ -9,6 +9,7 @@ from config.model import ModelConfig
 from config.settings import SurfacesConfig
 from drivers.messages import Firing
 from perception.detected_object import DetectedObject
+from perception.map_moves import MapMoves
 from perception.polyline import Polyline
 
 
@@ -41,6 +42,9 @@ class NoSurfaces:
     def converged(self) -> bool:
         """Whether nothing is left to improve."""
         return True
+
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+        """Note the number of the map of the way that goes on, and move what is remembered of each."""
 
     def observe(self, firing: Firing) -> None:
         """Take a firing; its readings are entered by `refine`."""

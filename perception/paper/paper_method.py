@@ -40,6 +40,7 @@ from perception.edits import (
     not_restorable,
 )
 from perception.kernel import Floats, Ints
+from perception.map_moves import MapMoves
 from perception.object_model import ObjectModel
 from perception.paper.candidates import Candidates
 from perception.paper.clusters import Clusters
@@ -168,6 +169,9 @@ class PaperPerception:
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move nothing: this method's objects are no landmarks, because they have no covariance."""
+
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+        """Move nothing: segments that the robot has left behind are forgotten."""
 
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""

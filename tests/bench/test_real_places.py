@@ -27,4 +27,5 @@ def test_exact_odometry_stays_exact(tmp_path: Path) -> None:
     assert rows["aisle-cone, exact"]["end"] < 1e-9
     assert rows["aisle-cone, exact"]["wrong"] == 0.0
     assert 0.0 <= rows["aisle-cone, exact"]["explained"] <= 1.0
+    assert rows["aisle-cone, exact"]["explained in a run"] == rows["aisle-cone, exact"]["explained"]
     assert rows["aisle-cone, exact"]["not tracking"] < 1.0

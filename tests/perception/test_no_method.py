@@ -19,6 +19,7 @@ def test_the_empty_map_refuses_edits_and_changes_with_nothing() -> None:
     perception.set_models(())
     perception.reset()
     perception.method.drop_caches()
+    perception.method.follow_maps(1, None)
     assert perception.segment_geometry().shape == (0, 5)
     assert len(before.numbers) == len(before.times) == len(before.pinned) == 0
     assert (perception.counts, perception.objects(), perception.evidence(1)) == (NOTHING, (), None)

@@ -11,6 +11,7 @@ import pytest
 from drivers.messages import Firing
 from perception.detected_object import DetectedObject
 from perception.edits import LiftArea, MarkVacant, MoveObject, PlaceModel, RejectObject
+from perception.map_moves import MapMoves
 from perception.pipeline import Perception
 from perception.vacant_areas import AREAS_MAX, RADIUS_MIN_M, VacantAreas, invalid_area, radius_of
 from tests.perception.edited import DRUM, again, at, hear, number_of, there
@@ -123,3 +124,17 @@ def test_a_polyline_is_hidden_where_an_area_contains_all_of_it() -> None:
     assert areas.polylines_outside(polylines) == polylines[1:]
     areas.lift(3)
     assert areas.polylines_outside(polylines) == polylines
+
+
+def test_areas_move_with_the_nearest_map_of_the_way() -> None:
+    areas = VacantAreas()
+    moves = MapMoves(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), np.array([[0.0, 0.0], [9.0, 0.0]]))
+    areas.follow_maps(2, moves)
+    for x in (1.0, 8.0):
+        assert areas.mark(x, 1.0, 0.5) is None
+    seen = (drum(1, 7.8, 1.0), drum(2, 1.0, 1.0))
+    areas.follow_maps(2, None)
+    assert areas.archived_outside(seen) == ()
+    areas.follow_maps(2, moves)
+    assert [(area.x, area.y) for area in areas.listed()] == [(1.0, 1.0), (8.5, 1.0)]
+    assert areas.archived_outside(seen) == seen[:1]

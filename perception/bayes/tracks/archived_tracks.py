@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.memory.state import CircleTrack, PolygonTrack
-from perception.bounds import FLAG, PLACE, Fields, up_to
+from perception.bounds import COUNT, FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
+from perception.map_moves import MapMoves
 
 ARCHIVED_READINGS: Final = 48
 """Readings of an archived track: one of each bearing, and some more."""
@@ -25,18 +26,20 @@ BINS: Final = "bins"
 def archived_dtype(track: type[CircleTrack | PolygonTrack]) -> np.dtype[Any]:
     """Return the dtype of an archived track.
 
-    Besides the track's own fields it has `is_reported` (int; 1 where it is reported as a model), `kept` (int), and
-    `readings`: x and y of the sensor about the track's centre (m), direction of its axis (rad) and range (m).
+    Besides the track's own fields it has `is_reported` (int; 1 where it is reported as a model), `submap` (int; the
+    number of the map of the way with which it moves), `kept` (int), and `readings`: x and y of the sensor about the
+    track's centre (m), direction of its axis (rad) and range (m).
     """
     fields = [(name, track.DTYPE[name]) for name in (track.DTYPE.names or ())[:-1]]  # the last are the readings
     readings = ("readings", np.float32, (ARCHIVED_READINGS, 4))
-    return np.dtype((np.record, [*fields, ("is_reported", np.int64), ("kept", np.int64), readings]))
+    numbers = [(name, np.int64) for name in ("is_reported", "submap", "kept")]
+    return np.dtype((np.record, [*fields, *numbers, readings]))
 
 
 def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
     """Return the bounds of the fields of an archived track."""
     own = {name: bound for name, bound in track.BOUNDS.items() if name != BINS}
-    return {**own, "is_reported": FLAG, "kept": up_to(ARCHIVED_READINGS), "readings": PLACE}
+    return {**own, "is_reported": FLAG, "submap": COUNT, "kept": up_to(ARCHIVED_READINGS), "readings": PLACE}
 
 
 def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDArray[Any]:
@@ -86,6 +89,26 @@ def unpack(row: NDArray[Any], track: NDArray[Any]) -> None:
     readings["axis_x"][b, in_bin], readings["axis_y"][b, in_bin] = np.cos(kept[:, 2]), np.sin(kept[:, 2])
     readings["range_m"][b, in_bin] = kept[:, 3]
     readings["listener_x"][b, in_bin] = readings["listener_y"][b, in_bin] = 0.0
+
+
+def move_rows(rows: NDArray[Any], moves: MapMoves) -> None:
+    """Move archived tracks with their maps of the way; corrections turn too little to turn covariances.
+
+    Parameters
+    ----------
+    rows : (n,) record of `archived_dtype`
+        Updated.
+    moves : MapMoves
+        Of the maps.
+    """
+    for place in (rows, rows["challenger"]) if "challenger" in (rows.dtype.names or ()) else (rows,):
+        place["x"], place["y"], turn = moves.moved(rows["submap"], place["x"], place["y"])
+        if "heading" in (place.dtype.names or ()):
+            place["heading"] += turn
+    turn, readings = moves.of(rows["submap"])[:, 2, None], rows["readings"]
+    c, s, x, y = np.cos(turn), np.sin(turn), readings[..., 0].copy(), readings[..., 1].copy()
+    readings[..., 0], readings[..., 1] = c * x - s * y, s * x + c * y
+    readings[..., 2] += turn
 
 
 def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:

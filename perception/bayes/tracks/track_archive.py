@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE, CircleTrack, Memory, PolygonTrack
-from perception.bayes.tracks.archived_tracks import archived_bounds, archived_dtype, pack, unpack
+from perception.bayes.tracks.archived_tracks import archived_bounds, archived_dtype, move_rows, pack, unpack
 from perception.bayes.tracks.manual_tracks import leave_job
 from perception.bayes.tracks.naming import sure_polygons
 from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats, Ints
+from perception.map_moves import MapMoves
 from perception.mapping.archive import Archive
 
 BEHIND_M: Final = 2.0
@@ -48,14 +49,16 @@ class TrackArchive:
         Their records, of `archived_tracks.archived_dtype`.
     waiting : int
         Archived objects near the robot for which no track was free at the last look.
+    submap : int
+        Number of the map of the way that goes on, with which what is archived now moves.
     """
 
-    BOUNDS: Final = bounds(waiting=COUNT, _numbered=COUNT, _looked_x=LOOKED, _looked_y=LOOKED)
+    BOUNDS: Final = bounds(waiting=COUNT, submap=COUNT, _numbered=COUNT, _looked_x=LOOKED, _looked_y=LOOKED)
 
     def __init__(self) -> None:
         self.circles = Archive(archived_dtype(CircleTrack), archived_bounds(CircleTrack))
         self.polygons = Archive(archived_dtype(PolygonTrack), archived_bounds(PolygonTrack))
-        self.waiting = 0
+        self.waiting = self.submap = 0
         self._numbered = 0
         self._looked_x = self._looked_y = math.inf
         self._is_due = False
@@ -70,6 +73,16 @@ class TrackArchive:
         """Build what is derived anew, after a snapshot was restored."""
         self.circles.drop_caches()
         self.polygons.drop_caches()
+
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> bool:
+        """Note the map of the way that goes on, and move each object with its map; return whether any may move."""
+        self.submap = submap
+        if moves is None:
+            return False
+        for archive in (self.circles, self.polygons):
+            move_rows(archive.held(), moves)
+            archive.drop_caches()
+        return True
 
     def update(self, memory: Memory, p: SettingsRecord, sure: float) -> bool:
         """Archive or take up at most one object of each kind; return whether any track became another.
@@ -151,17 +164,17 @@ class TrackArchive:
         yield
 
     def _kinds(self, memory: Memory, p: SettingsRecord, sure: float) -> Sequence[_Kind]:
-        kinds: list[_Kind] = [_Circles(self.circles, memory, memory.circles)]
+        kinds: list[_Kind] = [_Circles(self.circles, memory, memory.circles, self.submap)]
         if p[0].polygon_count > 0:
-            kinds.append(_Polygons(self.polygons, memory, memory.polygons, sure))
+            kinds.append(_Polygons(self.polygons, memory, memory.polygons, self.submap, sure))
         return kinds
 
 
 class _Kind(ABC):
     """The tracks of one kind and their archive."""
 
-    def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any]) -> None:
-        self.archive, self.memory, self.tracks = archive, memory, tracks
+    def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any], submap: int) -> None:
+        self.archive, self.memory, self.tracks, self.submap = archive, memory, tracks, submap
         self.waiting = 0
 
     def free(self) -> int:
@@ -241,9 +254,9 @@ class _Kind(ABC):
     def put_away(self, t: int) -> None:
         """Archive track `t`."""
         self.leave(t)
-        self.archive.add(
-            pack(self.tracks[t : t + 1], self.archive.archived_rows.dtype, is_reported=self.is_reported(t))
-        )
+        row = pack(self.tracks[t : t + 1], self.archive.archived_rows.dtype, is_reported=self.is_reported(t))
+        row["submap"] = self.submap
+        self.archive.add(row)
         self.tracks["status"][t] = FREE
         self.tracks["marks"][t] = 0
 
@@ -265,8 +278,8 @@ class _Circles(_Kind):
 
 
 class _Polygons(_Kind):
-    def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any], sure: float) -> None:
-        super().__init__(archive, memory, tracks)
+    def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any], submap: int, sure: float) -> None:
+        super().__init__(archive, memory, tracks, submap)
         self._sure = sure
 
     def is_reported(self, t: int) -> bool:

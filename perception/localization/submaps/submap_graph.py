@@ -21,6 +21,7 @@ from drivers.messages import Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.localized_pose import LocalizedPose, Moment, Status
+from perception.localization.submaps.held_maps import HeldMaps
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
@@ -40,6 +41,7 @@ from perception.localization.submaps.submap_records import (
     scaled,
     spread_about,
 )
+from perception.map_moves import MapMoves
 from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
@@ -86,6 +88,7 @@ class SubmapGraph:
         _trail_count=up_to(SUBMAP_READINGS_MAX),
         _matched=COUNT,
         _quanta=COUNT,
+        _brought=COUNT,
         _scales=FINITE,
         _usual=FINITE,
         _spread=POSITIVE,
@@ -97,6 +100,8 @@ class SubmapGraph:
         self._readings = np.zeros((SUBMAP_READINGS_MAX, 5))
         """Of the map that goes on: sensor's place and ring's direction by odometry, sensor's direction on the ring,
         range."""
+        self.held = HeldMaps()
+        """Where what is remembered of the maps stands."""
         self._trail = np.zeros((SUBMAP_READINGS_MAX, 5))
         """The ring's poses of the map that goes on, as of `_here`."""
         self.reset()
@@ -107,6 +112,7 @@ class SubmapGraph:
         self._grids: dict[int, Floats] = {}
         self._job: Iterator[Outcome | None] | None = None
         self._readings[:] = self._trail[:] = 0.0
+        self.held.reset()
         self._latest = np.full((len(self._mounts), 3), math.inf)
         """The ring's pose at each sensor's last reading of the map that goes on."""
         self._count = self._trail_count = 0
@@ -116,8 +122,8 @@ class SubmapGraph:
         self._begin = np.zeros(2)
         """Way and turns until the map before ended."""
         self.is_applied = False
-        self._matched, self._quanta = 0, 0
-        """Maps that were compared with those before, and quanta done of the next one."""
+        self._matched, self._quanta, self._brought = 0, 0, 0
+        """Maps that were compared with those before, quanta done of the next one, and maps as `moves` knew them."""
         self._scales, self._usual = np.zeros(SCALES), np.array([USUAL_LOG * USUAL_READINGS, USUAL_READINGS])
         self._spread = np.zeros(2)
         """Variance of place (m²) and direction (rad²) of the last map in the map frame."""
@@ -174,6 +180,7 @@ class SubmapGraph:
             information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
             self._links.append(odometry_link(len(before) - 1, moved, information))
         self._nodes.append(node_at(node))
+        self.held.append(node if self.held.is_moved else middle[:3])
         self._renew_spread()
         self._begin[:] = self._here[3:]
         self._latest[:] = math.inf
@@ -222,6 +229,30 @@ class SubmapGraph:
         self._matched += 1
         self._quanta, self._job = 0, None
         self._renew_spread()
+
+    @property
+    def count(self) -> int:
+        """The number of maps that have ended."""
+        return len(self._submaps.archived_rows)
+
+    def moves(self) -> MapMoves | None:
+        """Return how what is remembered of the maps moves since it was asked last; None where it stays."""
+        if not self.is_applied or self._brought == self._matched:
+            return None
+        self._brought, nodes = self._matched, self._nodes.archived_rows
+        poses = np.column_stack([nodes["x"], nodes["y"], nodes["theta"]])
+        return self.held.move_to(poses, self._submaps.archived_rows["way"])
+
+    def in_filter(self) -> Floats:
+        """Return the ring's pose at the last firing in the filter's frame, x, y (m) and direction (rad)."""
+        moment = self.moment()
+        return self.held.in_filter(self.placed(moment)) if self.held.is_moved else moment.odometry
+
+    def odometry_from_filter(self) -> Pose:
+        """Return the pose of the filter's frame in odometry's frame, at the last firing."""
+        if not self.held.is_moved:
+            return Pose(0.0, 0.0, 0.0)
+        return Pose(*self.moment().odometry.tolist()).compose(Pose(*self.in_filter().tolist()).inverse())
 
     def _renew_spread(self) -> None:
         self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import bounds
 from perception.kernel import Floats, Ints
+from perception.map_moves import MapMoves
 from perception.mapping.surfaces.cells import make_again
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, REACH_M, READINGS_KEPT
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, LAST_REVISITS, REACH_M, READINGS_KEPT
 from perception.mapping.surfaces.piece_fit import group_echoes
 from perception.mapping.surfaces.pieces import order_cells
 from perception.mapping.surfaces.quantum import (
@@ -109,6 +110,31 @@ class LocalMapSearch:
         room["count"], room["carried"] = len(kept), np.count_nonzero(kept < entered)
         room["centre_x"], room["centre_y"] = x, y
         room["phase"] = CLEAR
+
+    def move(self, moves: MapMoves) -> None:
+        """Move each reading with its map of the way; the cells are made anew, and all echoes shared again."""
+        end_search(self.room, self._c)
+        room, (x, y) = self.local[0], self.centre
+        readings = room["readings"][: int(room["count"])]
+        at_x, at_y, turn = moves.moved(readings["submap"], readings["x"] + x, readings["y"] + y)
+        readings["x"], readings["y"] = at_x - x, at_y - y
+        readings["axis"] += turn
+        last = np.full(len(room["kept_x"]), len(moves.motions) - 1)
+        room["kept_x"], room["kept_y"], turn = moves.moved(last, room["kept_x"], room["kept_y"])
+        room["kept_axis"] += turn
+        room["carried"] = max(room["carried"], room["entered"])
+        for name in ("entered", "revisited", "swept"):
+            room[name] = 0
+        room["owed"] = max(room["owed"], LAST_REVISITS * room["carried"])
+        room["phase"] = CLEAR
+
+    def submaps(self, x: Floats, y: Floats) -> Ints:
+        """Return the map of the way whose readings were taken nearest to each place (m), shape (n,)."""
+        readings = self.local["readings"][0, : int(self.local["count"][0])]
+        numbers, of, counts = np.unique(readings["submap"], return_inverse=True, return_counts=True)
+        middle_x, middle_y = (np.bincount(of, readings[name]) / counts for name in ("x", "y"))
+        away = np.hypot(x[:, None] - self.centre[0] - middle_x, y[:, None] - self.centre[1] - middle_y)
+        return np.asarray(numbers[away.argmin(axis=1)])
 
     def refine(self) -> bool:
         """Do one quantum; return whether it ended a search, whose surfaces are there until the next quantum."""

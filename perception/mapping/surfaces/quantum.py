@@ -90,6 +90,7 @@ def keep(rooms: Records[LocalMap], mounts: Floats, pose: Floats, ranges: Floats,
         q = room.readings[room.count]
         q.x, q.y, q.axis = x - room.centre_x, y - room.centre_y, axis
         q.range_m = ranges[k] if ranges[k] < range_max else SILENCE
+        q.submap = room.submap
         room.count += 1
 
 

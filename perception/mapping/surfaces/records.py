@@ -57,6 +57,8 @@ class KeptReading(Record):
     """Its direction, rad."""
     range_m: Finite
     """10⁶ for silence."""
+    submap: Count
+    """Number of the map of the way in which it was heard."""
     shares: Annotated[Ints, WORDS, SHARES]
     """Shares of the echo of the places on its arc, `SHARES_A_WORD` in each number."""
 
@@ -120,6 +122,8 @@ class LocalMap(Record):
     """Of its readings, the first ones, so many were shared in the last map and keep what they said there."""
     swept: Annotated[int, up_to(READINGS_MAX)]
     """Readings that were entered when pieces were sought last."""
+    submap: Count
+    """Number of the map of the way that goes on."""
     is_left: Annotated[int, FLAG]
     """Whether the robot needs another map, once this one was searched with the last readings."""
     phase: Annotated[int, up_to(7)]

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bounds import COUNT, SIGNED, Finite, Flag, Place, bounds
+from perception.bounds import COUNT, SIGNED, Count, Finite, Flag, Place, bounds
 from perception.kernel import Floats, Ints, kernel
+from perception.map_moves import MapMoves
 from perception.mapping.surfaces.parameters import AGREES_M
 from perception.records import Record, zeros
 
@@ -19,6 +20,8 @@ class Surface(Record):
 
     number: Annotated[int, SIGNED]
     """The polyline's, in order of its parts; less than 0 of a straight piece, which may be a wall."""
+    submap: Count
+    """Number of the map of the way from which it was heard."""
     is_live: Flag
     """Whether it is of the present local map."""
     x1: Place
@@ -132,6 +135,12 @@ class SurfaceList:
         behind = behind[~is_covered(behind, rows)]
         # A part of what stays says less than the whole.
         self.archived_rows = np.concatenate([behind, rows[~is_covered(rows, behind)]])
+
+    def move(self, moves: MapMoves) -> None:
+        """Move each with its map of the way."""
+        rows = self.archived_rows
+        for x, y in (("x1", "y1"), ("x2", "y2")):
+            rows[x], rows[y], _ = moves.moved(rows["submap"], rows[x], rows[y])
 
     def leave(self) -> None:
         """Leave all behind: another local map begins."""

@@ -25,6 +25,7 @@ from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.bounds import CONSTANT, bounds
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
+from perception.map_moves import MapMoves
 from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
 from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
 from perception.mapping.surfaces.local_map import LocalMapSearch
@@ -95,6 +96,14 @@ class SurfaceMap(NoSurfaces):
         self._search.keep(firing, mounts_at(firing, self._mounts, self._turning))
         self._search.quanta_left = self._config.quanta_per_firing
 
+    def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+        """Note the number of the map of the way that goes on, and move what is remembered of each."""
+        self._search.local["submap"] = submap
+        if moves is not None:
+            self._search.move(moves)
+            self._list.move(moves)
+            self._forget_derived()
+
     def refine(self) -> int:
         """Do one quantum of refinement; return 1."""
         self._search.quanta_left -= 1
@@ -128,6 +137,7 @@ class SurfaceMap(NoSurfaces):
         self._list.numbered += len(rows)
         found = np.concatenate([rows, self._polyline_rows()])
         found["is_live"] = 1
+        found["submap"] = self._search.submaps(found["x1"], found["y1"])
         return found
 
     def _polyline_rows(self) -> NDArray[Any]:

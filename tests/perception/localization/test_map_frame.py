@@ -14,6 +14,7 @@ from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.edits import Arc, ClearMap, Evidence, Line, PlaceModel
 from perception.localization.map_frame import MapFrame
+from perception.map_moves import MapMoves
 from perception.pipeline import Perception
 from perception.polyline import Polyline
 from runtime.simulation.drift_trials import LEVELS, drum_hall, firings, oval
@@ -124,6 +125,35 @@ def test_once_maps_of_the_way_correct_the_pose_no_landmark_takes_over() -> None:
     assert frame.corrects_path
     assert not frame.is_applied
     assert frame.localized().pose == Pose(1.0, 2.0, 0.5)
+
+
+def test_maps_of_the_way_move_the_frame_in_which_firings_are_entered() -> None:
+    frame, silent = MapFrame(SETTINGS.ring, SETTINGS.models), np.full(len(SETTINGS.ring.mounts), np.nan)
+    noted: list[tuple[int, bool]] = []
+
+    class Memory:
+        """What is remembered notes what it is asked to follow."""
+
+        def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
+            noted.append((submap, moves is not None))
+
+    firing = Firing(0.0, Pose(1.0, 2.0, 0.5), 0.3, silent)
+    frame.move((Memory(),))
+    frame.follow(firing, (), lambda *_: None)
+    held = frame.submaps.held
+    frame.submaps.is_applied = held.is_moved = True
+    held._from_map[:] = 2.0, 0.0, 0.5 * math.pi
+    placed = frame.follow(firing, (), lambda *_: None)
+    assert (placed.pose.x, placed.pose.y) == pytest.approx((0.0, 1.0))
+    assert (placed.pose.theta, placed.ring_yaw) == pytest.approx((0.5 + 0.5 * math.pi, 0.3 + 0.5 * math.pi))
+    drum = DetectedObject("drum", 0.0, 2.0, 0.0, 0.02, 90, 1.0, number=3, covariance=(1e-4, 0.0, 4e-4))
+    (seen,), (mapped,) = frame.objects_in_odometry((drum,)), frame.in_map((drum,))
+    assert (seen.x, seen.y) == pytest.approx((2.0, 2.0)), "beside the robot, as it was heard"
+    assert (mapped.x, mapped.y) == pytest.approx((2.0, 2.0)), "the map frame is odometry's so far"
+    assert seen.covariance == pytest.approx((4e-4, 0.0, 1e-4))
+    edit = frame.edit_in_filter(PlaceModel("drum", 2.0, 2.0, 0.0))
+    assert (edit.x, edit.y) == pytest.approx((0.0, 2.0))
+    assert noted == [(0, False)]
 
 
 def test_without_recognition_the_pose_is_odometrys() -> None:

@@ -15,6 +15,7 @@ def test_nothing_is_done_and_nothing_is_reported() -> None:
     surfaces.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.ones(len(settings.ring.mounts))))
     surfaces.set_models(settings.models)
     surfaces.apply_settings(settings.perception.surfaces)
+    surfaces.follow_maps(1, None)
     surfaces.finish()
     surfaces.drop_caches()
     surfaces.clear()

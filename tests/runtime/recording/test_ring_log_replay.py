@@ -25,6 +25,7 @@ from tests.perception.localization.rooms import RING
 from tests.perception.localization.submaps.test_submap_graph import ROOM, driven
 
 PAPER = load_settings("hallway", ["perception.method=paper"])
+UNCORRECTED = load_settings(None).of_log().perception
 START_FT = -6.0
 """Where the robot starts in the hallway; its odometry counts from there."""
 
@@ -96,3 +97,26 @@ def test_walls_are_recognised_from_the_path_as_known_at_the_end() -> None:
     assert corrected["frame"] == "map"
     shares = share_in_place(corrected), share_in_place(replay_firings(settings, firings))
     assert shares[0] > 0.8 > 0.5 > shares[1], shares
+
+
+@pytest.mark.compiled
+def test_in_a_run_walls_move_with_their_maps_of_the_way_and_a_snapshot_goes_on_to_the_bit() -> None:
+    settings = load_settings(None, ["perception.localization.correct_drift=true"]).of_log()
+    settings = settings.model_copy(update={"ring": RING})
+    firings, _ = driven(0.04, 0.02, rounds=2)
+    first = FiringReplayer(settings, firings)
+    runs = [first]
+    for k, _ in enumerate(first):
+        if k == 300:
+            second = FiringReplayer(settings, firings[k + 1 :])
+            second.perception.restore(first.perception.snapshot())
+            runs.append(second)
+    for _ in runs[1]:
+        pass
+    assert first.perception.map_frame.corrects_path
+    to = first.perception.odometry_from_map().inverse()
+    summary, again = (run.summary(to) for run in runs)
+    for name in ("walls", "corners", "polylines", "objects"):
+        assert summary[name] == again[name]
+    assert share_in_place(summary) > 0.8
+    assert share_in_place(replay_firings(settings.model_copy(update={"perception": UNCORRECTED}), firings)) < 0.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivers.messages import Pose
 from perception.bayes.inference import reservoir
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY, Reading
 from perception.bayes.memory.state import CircleTrack, Memory, PolygonTrack
@@ -12,10 +13,12 @@ from perception.bayes.tracks.archived_tracks import (
     ARCHIVED_READINGS,
     archived_dtype,
     bearing_bins,
+    move_rows,
     newest_readings,
     pack,
     unpack,
 )
+from perception.map_moves import MapMoves
 from perception.records import records, zeros
 from tests.perception.bayes.random_tracks import new_memory, random_track
 
@@ -124,3 +127,23 @@ def test_cross_paths_are_left_out_of_an_archived_track() -> None:
         reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
     kept = newest_readings(memory.circles["bins"][0])
     assert kept["range_m"].tolist() == [1.0 + k for k in range(29, 9, -1) if k % 3 == 0]
+
+
+@pytest.mark.parametrize("kind", [CircleTrack, PolygonTrack])
+def test_an_archived_track_moves_with_its_map_of_the_way_and_its_readings_stay_about_it(
+    kind: type[CircleTrack] | type[PolygonTrack],
+) -> None:
+    rows, turn = np.zeros(2, archived_dtype(kind)), 0.3
+    rows["x"], rows["y"], rows["submap"] = 2.0, 1.0, (0, 1)
+    rows["kept"], rows["readings"][:, 0] = 1, (0.5, 0.0, 0.1, 0.4)
+    before = rows.copy()
+    move_rows(rows, MapMoves(np.array([[0.0, 0.0, 0.0], [0.5, -0.5, turn]]), np.zeros((2, 2))))
+    assert rows[0] == before[0]
+    to = Pose(0.5, -0.5, turn)
+    centre, sensor = to.compose(Pose(2.0, 1.0, 0.0)), to.compose(Pose(2.5, 1.0, 0.1))
+    assert (rows["x"][1], rows["y"][1]) == pytest.approx((centre.x, centre.y))
+    x, y, axis, range_m = rows["readings"][1, 0].tolist()
+    assert (centre.x + x, centre.y + y) == pytest.approx((sensor.x, sensor.y), abs=1e-6)
+    assert (axis, range_m) == pytest.approx((sensor.theta, 0.4), abs=1e-6)
+    if kind is PolygonTrack:
+        assert rows["heading"][1] == rows["challenger"]["heading"][1] == turn

@@ -17,6 +17,7 @@ from perception.bayes.memory.state import FREE
 from perception.bayes.tracks.track_archive import HELD_SHARE, LOOK_M
 from perception.detected_object import DetectedObject
 from perception.edits import ClearMap, ConfirmObject, MoveObject, PlaceModel, RemoveObject
+from perception.map_moves import MapMoves
 from perception.snapshot import put_back, snapshot_of
 from tests.naive_tracks import FT
 from tests.perception.bayes.random_tracks import SETTINGS
@@ -176,3 +177,24 @@ def test_where_more_is_near_than_fits_the_farthest_wait_and_are_counted() -> Non
     assert np.count_nonzero(perception.memory.circles["status"] != FREE) <= TRACKS
     perception.reset()
     assert perception.counts.waiting == 0
+
+
+@pytest.mark.compiled
+def test_what_was_left_behind_moves_with_its_map_of_the_way(there: tuple[BayesPerception, Places]) -> None:
+    perception, drums = there
+    archive = perception._archive
+    before = {seen.number: seen for seen in perception.archived_objects()}
+    assert perception.archived_objects() is perception.archived_objects()
+    rows = archive.circles.held()
+    rows["submap"] = np.arange(len(rows)) % 2
+    moved = {int(row["number"]) for row in rows if row["submap"] == 1}
+    perception.follow_maps(3, MapMoves(np.array([[0.0, 0.0, 0.0], [0.0, 0.25, 0.0]]), np.zeros((2, 2))))
+    assert archive.submap == 3
+    for seen in perception.archived_objects():
+        off = seen.y - before[seen.number].y
+        assert off == pytest.approx(0.25 if seen.number in moved else 0.0), seen
+    number = min(moved)
+    row = archive.circles.find(number)
+    assert row is not None
+    assert number in archive.circles.near(float(row["x"][0]), float(row["y"][0]), 0.01)
+    assert len(drums) > len(moved) > 0

@@ -148,3 +148,30 @@ def test_a_robot_that_turns_on_the_spot_makes_a_map_of_two_radians() -> None:
 def test_the_walk_grows_with_the_way() -> None:
     short, long = (walk(np.array([way, 0.0, 0.0]), way, 0.0) for way in (1.0, 3.0))
     assert np.all(np.linalg.eigvalsh(long - short) > 0.0)
+
+
+def test_what_is_remembered_moves_when_poses_are_corrected() -> None:
+    firings, truth = driven(0.04, 0.02)
+    graph, moved = SubmapGraph(RING), 0
+    for firing in firings:
+        moves = graph.moves()
+        assert graph.moves() is None, "once"
+        moved += moves is not None
+        assert graph.is_applied or moves is None
+        graph.observe(firing)
+        here = Pose(*graph.in_filter().tolist())
+        seen = graph.odometry_from_filter().compose(here)
+        assert (seen.x, seen.y) == pytest.approx((firing.pose.x, firing.pose.y))
+        while graph.can_refine:
+            graph.refine()
+    assert 1 <= moved <= graph.count
+    # The maps stand to each other as they truly do, and not as odometry had them.
+    odometry = graph._submaps.archived_rows["pose"]
+    entered = np.array([(one.pose.x, one.pose.y, one.pose.theta) for one in firings])
+    true = np.array([truth[np.abs(entered - pose).sum(axis=1).argmin()] for pose in odometry])
+    errors = []
+    for poses in (graph.held.archived_rows, odometry):
+        apart = np.hypot(*(poses[:, None, :2] - poses[None, :, :2]).transpose(2, 0, 1))
+        truly = np.hypot(*(true[:, None, :2] - true[None, :, :2]).transpose(2, 0, 1))
+        errors.append(float(np.abs(apart - truly).mean()))
+    assert errors[0] < 0.5 * errors[1], errors

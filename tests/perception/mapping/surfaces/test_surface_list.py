@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from perception.map_moves import MapMoves
 from perception.mapping.surfaces.surface_list import ENDS, Surface, SurfaceList, find_near, is_covered
 from perception.records import zeros
 
@@ -59,3 +60,15 @@ def test_what_is_left_behind_stays_until_it_is_seen_anew() -> None:
     assert live["x1"].tolist() == [4.9]  # this one shows the second wall whole
     listed.clear()
     assert len(listed.archived_rows) == 0
+
+
+def test_surfaces_move_with_their_maps_of_the_way() -> None:
+    held = SurfaceList()
+    held.replace_live(rows((0.0, 0.0, 1.0, 0.0), (0.0, 2.0, 1.0, 2.0)))
+    held.archived_rows["submap"] = 0, 7
+    held.move(MapMoves(np.array([[0.0, 0.0, 0.5 * np.pi], [0.0, 0.1, 0.0]]), np.zeros((2, 2))))
+    np.testing.assert_allclose(
+        [[row[name] for name in ENDS] for row in held.archived_rows],
+        [[0.0, 0.0, 0.0, 1.0], [0.0, 2.1, 1.0, 2.1]],
+        atol=1e-12,
+    )
