@@ -18,6 +18,7 @@ from perception.localization.localized_pose import LocalizedPose, Status
 from perception.pipeline import Perception
 from runtime.cycle.logs.mission_log import MissionRow
 from runtime.cycle.logs.mode_log import ModeLog
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
@@ -155,19 +156,24 @@ class LogRow(TypedDict):
     last_error: str | None
 
 
-class RunSummary(PerceivedRows):
-    """Summary of ``echolocate run``."""
+class StartSummary(PerceivedRows):
+    """Summary of a run that ended before its first cycle: the fields that need none."""
 
     cycles: int
     cycle_us: Quantiles
     late: int
     missed: int
-    lag_us: Quantiles
     link: LinkRow
-    sensors: list[SensorRow]
-    process: FootprintRow
     mode: str
     stop_reasons: list[str]
+
+
+class RunSummary(StartSummary):
+    """Summary of ``echolocate run``."""
+
+    lag_us: Quantiles
+    sensors: list[SensorRow]
+    process: FootprintRow
     hold_reasons: list[str]
     """Why the robot held or made no progress in DRIVE, in order."""
     mission: MissionRow | None
@@ -351,6 +357,24 @@ def run_summary(
     if here is not None:
         summary["pose"] = pose_row(here)
     return summary
+
+
+def failed_start(reason: str) -> StartSummary:
+    """Return the summary of a run that ended before its first cycle, given why."""
+    return {
+        "objects": [],
+        "walls": [],
+        "corners": [],
+        "canyons": [],
+        "polylines": [],
+        "cycles": 0,
+        "cycle_us": {"p50": 0.0, "p99": 0.0, "max": 0.0},
+        "late": 0,
+        "missed": 0,
+        "link": {"frames": 0, "bad": 0, "lost": 0},
+        "mode": Mode.CONNECTING.value,
+        "stop_reasons": [reason],
+    }
 
 
 def write_json(path: str, summary: object) -> None:

@@ -16,7 +16,17 @@ from perception.localization.localized_pose import LocalizedPose
 from perception.percept import Canyon
 from perception.pipeline import DetectedObject, Perception
 from perception.polyline import Polyline
-from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, perceived_rows, pose_row, write_json
+from runtime.cycle.summary import (
+    LinkRow,
+    ObjectRow,
+    RunSummary,
+    StartSummary,
+    failed_start,
+    object_row,
+    perceived_rows,
+    pose_row,
+    write_json,
+)
 from runtime.recording.replay_summary import ReplaySummary
 from runtime.simulation.evaluation import DrumRow, Outcome
 from tests.polylines import BEND
@@ -29,6 +39,7 @@ def test_the_summaries_have_the_fields_of_the_public_surface() -> None:
     assert {"objects", "cycles", "cycle_us", "late", "link", "mode", "stop_reasons", "timing"} <= set(
         get_type_hints(RunSummary)
     )
+    assert set(failed_start("no answer")) == set(get_type_hints(StartSummary)) < set(get_type_hints(RunSummary))
     assert set(get_type_hints(LinkRow)) == {"frames", "bad", "lost"}
     assert {"objects", "segments", "clusters", "cycles", "cycle_us"} <= set(get_type_hints(ReplaySummary))
     assert {"drums", "false", "mean_error", "max_error", "times_real_time"} <= set(get_type_hints(Outcome))

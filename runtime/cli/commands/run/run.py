@@ -232,7 +232,14 @@ def run(
                 )
                 return summary, recording
 
-        summary, recording = asyncio.run(whole_run())
+        try:
+            summary, recording = asyncio.run(whole_run())
+        except UserError as error:
+            if json is not None:  # else the file that is locked stays empty
+                from runtime.cycle.summary import failed_start, write_json
+
+                write_json(json, failed_start(str(error)))
+            raise
         recording.on_summary(summary)
     if recording.summary_row is not None:
         summary["recording"] = recording.summary_row

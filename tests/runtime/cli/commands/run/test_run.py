@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 from pathlib import Path
 
@@ -59,15 +60,17 @@ def sent(monkeypatch: pytest.MonkeyPatch) -> bytearray:
 
 
 @pytest.mark.promise("P13")
-def test_a_port_in_use(sent: bytearray, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_port_in_use(tmp_path: Path, sent: bytearray, capfd: pytest.CaptureFixture[str]) -> None:
+    summary = tmp_path / "summary.json"
     with Stranger() as stranger:
         fd = os.open(stranger.path, os.O_RDWR | os.O_NOCTTY)
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         try:
-            assert run_command(["run", "--port", stranger.path, *HEADLESS]) == FAILED
+            assert run_command(["run", "--port", stranger.path, "--json", str(summary), *HEADLESS]) == FAILED
         finally:
             os.close(fd)
         line = error_line(capfd)
+        assert line == f"echolocate: {json.loads(summary.read_bytes())['stop_reasons'][0]}"
         assert stranger.path in line
         assert "in use" in line
         assert not sent
