@@ -6,7 +6,7 @@ While it is paused, the other keys take effect with the next cycle, and the term
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from runtime.cycle.inputs import Request
@@ -48,17 +48,21 @@ class TimeKeys:
         self._control = control
         self._log = log
         self._task: asyncio.Task[None] | None = None
+        self._next: str | None = None
 
     def press(self, key: str) -> None:
-        """Handle a key, unless the last one is still being carried out."""
-        control = self._control
+        """Handle a key; while one is being carried out, only the newest further one is kept for after it."""
+        if key not in {"p", "s"}:
+            return
+        self._next = key
         if self._task is None or self._task.done():
-            if key == "p":
-                request = control.resume if control.is_paused else control.pause
-                self._task = asyncio.create_task(self._carry_out(request))
-            elif key == "s":
-                self._task = asyncio.create_task(self._carry_out(control.single_step))
+            self._task = asyncio.create_task(self._carry_out())
 
-    async def _carry_out(self, request: Callable[[], Awaitable[str | None]]) -> None:
-        if (why := await request()) is not None:
-            self._log.warning("the run cannot be paused or stepped", reason=why)
+    async def _carry_out(self) -> None:
+        control = self._control
+        while (key := self._next) is not None:
+            self._next = None
+            stepped_or_paused = control.single_step if key == "s" else control.pause
+            request = control.resume if key == "p" and control.is_paused else stepped_or_paused
+            if (why := await request()) is not None:
+                self._log.warning("the run cannot be paused or stepped", reason=why)

@@ -51,9 +51,20 @@ async def test_keys_control_time_one_after_the_other() -> None:
     keys = TimeKeys(control, get_logger())
     for key in ("p", "s", "s", "p", "x", "p"):
         keys.press(key)
-        keys.press("p")
         await settle()
-    assert control.asked == ["pause", "step", "step", "resume", "pause", "resume"]
+    assert control.asked == ["pause", "step", "step", "resume", "pause"]
+
+
+async def test_of_the_keys_pressed_meanwhile_the_newest_follows() -> None:
+    control = Control()
+    keys = TimeKeys(control, get_logger())
+    for pressed in ("pp", "psp", "p", "pxs"):
+        keys.press(pressed[0])
+        await asyncio.sleep(0)  # it is under way
+        for key in pressed[1:]:
+            keys.press(key)
+        await settle()
+    assert control.asked == ["pause", "resume", "pause", "resume", "pause", "resume", "step"]
 
 
 async def test_a_key_that_waits_for_the_end_of_a_pause_says_so() -> None:
