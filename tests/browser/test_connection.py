@@ -11,7 +11,7 @@ from tests.browser.open_page import MODULE, Opened, Opener
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 RETRY_MS = (250, 500, 1000, 2000, 4000, 4000)
-HALT_CONFIRM_MS = 800
+HALT_CONFIRM_MS = 500
 HALT_ANSWER_MS = 3000
 REFUSED = r"WebSocket connection to .* failed|Failed to load resource"
 COUNT_LOSSES = f"""async () => {{

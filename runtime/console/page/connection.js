@@ -9,7 +9,7 @@ const RETRY_REFUSED_MS = 60_000; // a page whose token is wrong: only a new run 
 const ANSWER_MAX_MS = 10_000;
 const SILENCE_MAX_MS = 10_000;
 // A HALT without an answer for this long is reported as not confirmed, and sent again over a new connection.
-const HALT_CONFIRM_MS = 800;
+const HALT_CONFIRM_MS = 500;
 const HALT_ANSWER_MS = 3000;
 const MESSAGE_MAX = 65_536;
 // Refused while a recording is shown: its object numbers and poses are not those of the live run.
