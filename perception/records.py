@@ -16,6 +16,7 @@ from typing import (
     ClassVar,
     Final,
     Protocol,
+    TypeAlias,
     TypeVar,
     cast,
     get_args,
@@ -37,6 +38,9 @@ INTERPRETED: Final = bool(cast("Any", numba).config.DISABLE_JIT)
 """Whether kernels run as plain Python."""
 ITEM_BYTES: Final = 8
 """Size of every number in a record, so that no record is padded."""
+Structured: TypeAlias = Any
+"""A structured array. As `NDArray[Any]` nothing is known of its fields either, but a type checker tries all overloads
+of each operator between two of them, which takes .2 s an operator, and more where one stands in another."""
 
 
 class Records(Protocol[T_co]):
@@ -77,7 +81,7 @@ class Record:
         cls._VIEW = _view_class(cls.__name__, fields, cls.DTYPE)
 
 
-def zeros(record: type[R], count: int) -> NDArray[Any]:
+def zeros(record: type[R], count: int) -> Structured:
     """Return an array of `count` records, all zero, as numpy's functions take it."""
     return np.zeros(count, record.DTYPE)
 
@@ -89,12 +93,12 @@ def records(record: type[R], array: NDArray[Any]) -> Records[R]:
     return cast("Records[R]", array)
 
 
-def array_of(of: Records[Any]) -> NDArray[Any]:
+def array_of(of: Records[Any]) -> Structured:
     """Return the array that `records` was made from."""
-    return cast("NDArray[Any]", of.array if isinstance(of, _RecordList) else of)
+    return of.array if isinstance(of, _RecordList) else of
 
 
-def column(of: Records[Any], name: str) -> NDArray[Any]:
+def column(of: Records[Any], name: str) -> Structured:
     """Return one field of all records as a view, whose first axis is the record; `of` comes from `records`."""
     return array_of(of)[name]
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from statistics import NormalDist
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from perception.records import Structured
+
+Array = Structured
 
 
 class Noise(NamedTuple):

@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.emulator._jit import kernel
 
@@ -29,8 +28,9 @@ CORNER: Final = np.dtype(
 )
 """An open sector at a point where surfaces meet: the point, m, the direction in which the sector starts, its opening
 counter-clockwise from there, rad, and how the surfaces at both sides of it answer; it does if both are mirrors."""
-Records: TypeAlias = NDArray[Any]
-"""A structured array of one of the types above, shape (n,)."""
+Records: TypeAlias = Any
+"""A structured array of one of the types above, shape (n,). To a type checker it is anything: with `NDArray[Any]`,
+which says no more of its fields, it tries all overloads of each operator between two of them, .2 s each."""
 
 
 @kernel

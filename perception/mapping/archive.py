@@ -11,9 +11,9 @@ import math
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bounds import COUNT, Fields, bounds
+from perception.records import Structured
 
 ARCHIVE_CELL_M: Final = 4.0
 """Edge of a grid cell: a ring looks as far as two."""
@@ -45,7 +45,7 @@ class Archive:
 
     def __init__(self, dtype: np.dtype[Any], row_bounds: Fields) -> None:
         self._row_bounds = row_bounds
-        self.archived_rows: NDArray[Any] = np.zeros(START, dtype)
+        self.archived_rows: Structured = np.zeros(START, dtype)
         self.count = 0
         self._cells: dict[tuple[int, int], list[int]] = {}
         self._index: dict[int, int] = {}
@@ -56,7 +56,7 @@ class Archive:
             return f"count is {self.count}, but not as many objects have a number of their own"
         return None
 
-    def add(self, row: NDArray[Any]) -> None:
+    def add(self, row: Structured) -> None:
         """Add a record, shape (1,), whose number is not in the archive."""
         if self.count == len(self.archived_rows):
             self.archived_rows = np.concatenate([self.archived_rows, np.zeros_like(self.archived_rows)])
@@ -64,7 +64,7 @@ class Archive:
         self._enter(self.count)
         self.count += 1
 
-    def take(self, number: int) -> NDArray[Any]:
+    def take(self, number: int) -> Structured:
         """Remove a record and return it, shape (1,).
 
         Raises
@@ -73,7 +73,7 @@ class Archive:
             There is none of this number.
         """
         at, last = self._index[number], self.count - 1
-        row: NDArray[Any] = self.archived_rows[at : at + 1].copy()
+        row: Structured = self.archived_rows[at : at + 1].copy()
         self._leave(at)
         if at != last:
             self._leave(last)
@@ -106,7 +106,7 @@ class Archive:
         nearest: list[int] = numbers[order[distances[order] <= radius]].tolist()
         return nearest
 
-    def held(self) -> NDArray[Any]:
+    def held(self) -> Structured:
         """Return the records as a view, shape (count,)."""
         return self.archived_rows[: self.count]
 
@@ -115,7 +115,7 @@ class Archive:
         row = self.archived_rows[self._index[number]]
         return math.hypot(float(row["x"]) - x, float(row["y"]) - y)
 
-    def find(self, number: int) -> NDArray[Any] | None:
+    def find(self, number: int) -> Structured | None:
         """Return the record of a number as a view, shape (1,), None if there is none."""
         at = self._index.get(number)
         return None if at is None else self.archived_rows[at : at + 1]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from perception.bounds import CONSTANT, COUNT, PLACE, SHARE, bounds
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.percept import Canyon
+from perception.records import Structured
 
 SURFACE_REACH_M: Final = 9.0
 """Surfaces farther from the place than this do not count."""
@@ -288,7 +289,7 @@ class CanyonMap:
 
     def __init__(self, sealed_m: float) -> None:
         self.sealed_m = sealed_m
-        self.rows: NDArray[Any] = np.zeros(CANYONS_MAX, CANYON_DTYPE)
+        self.rows: Structured = np.zeros(CANYONS_MAX, CANYON_DTYPE)
         self.numbered = 0
         self.firings = 0
         self.is_wanted = False

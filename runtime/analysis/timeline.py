@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.settings import Settings
 from config.world import WorldConfig
@@ -17,6 +16,7 @@ from drivers.messages import Floats, LinkCounts, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.mapping.grid.known_cells import KnownCells
 from perception.polyline import Polyline
+from perception.records import Structured
 
 ECHO: Final = np.dtype(
     [
@@ -31,7 +31,7 @@ ECHO: Final = np.dtype(
 )
 """A reading: time (s), sensor, its position (m) and bearing (rad), range (m, inf without an echo), and the time of
 the firing by the robot's clock (s)."""
-Echoes: TypeAlias = NDArray[np.void]
+Echoes: TypeAlias = Structured
 """Structured array (n,) of `ECHO`."""
 
 CROSS_PATH: Final = np.dtype(
@@ -51,7 +51,7 @@ CROSS_PATH: Final = np.dtype(
 )
 """A cross path: time (s), the sensor that fired and the one that listened, position (m) and bearing (rad) of each,
 half the path (m, inf if nothing was heard), and the time of the firing by the robot's clock (s)."""
-CrossPathRows: TypeAlias = NDArray[np.void]
+CrossPathRows: TypeAlias = Structured
 """Structured array (n,) of `CROSS_PATH`."""
 
 

@@ -6,10 +6,9 @@ explanation move to the explanation's new index, and are compared with the new e
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.memory.elements import REJECTIONS_MAX
 from perception.bayes.memory.parameters import RADIUS_CHANGED_UNSEEN
@@ -17,7 +16,7 @@ from perception.bayes.memory.scratch import POLYGON
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import FREE, Memory
 from perception.kernel import Floats, Ints
-from perception.records import column
+from perception.records import Structured, column
 
 EQUAL_RADIUS_M: Final = 1e-9
 """Radii nearer than this are one."""
@@ -25,10 +24,11 @@ EQUAL_RADIUS_M: Final = 1e-9
 
 def radii_of(p: SettingsRecord) -> Floats:
     """Return the radii (m) in competition, shape (n,)."""
-    return column(p, "circles")["radius_m"][0, : p[0].circle_count]
+    radii: Floats = column(p, "circles")["radius_m"][0, : p[0].circle_count]
+    return radii
 
 
-def migrate(memory: Memory, archived: NDArray[Any], before: SettingsRecord, after: SettingsRecord) -> None:
+def migrate(memory: Memory, archived: Structured, before: SettingsRecord, after: SettingsRecord) -> None:
     """Move values indexed by explanation to the indices of other settings.
 
     Parameters
@@ -50,7 +50,7 @@ def migrate(memory: Memory, archived: NDArray[Any], before: SettingsRecord, afte
             rejections["what"][k] = index[rejections["what"][k]]
 
 
-def _migrate_circles(circles: NDArray[Any], old: Floats, new: Floats, index: Ints) -> None:
+def _migrate_circles(circles: Structured, old: Floats, new: Floats, index: Ints) -> None:
     leads = np.zeros_like(circles["leads"])
     for k, to in enumerate(index.tolist()):
         leads[:, to] = circles["leads"][:, k]

@@ -8,10 +8,9 @@ wall that answers at its range, and to no object that is hidden by a wall.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -19,12 +18,13 @@ from perception.bayes.memory.state import Memory
 from perception.bayes.walls.contact import CORNER_SLACK_M, EXPLAINED_SIGMAS
 from perception.bayes.walls.report import has_mirrors
 from perception.kernel import Floats, Ints
+from perception.records import Structured
 
 POINT_M: Final = 1e-9
 """Length of a surface that is a point."""
 
 
-def own_echoes(circles: NDArray[Any], surfaces: Floats, memory: Memory, p: SettingsRecord) -> Ints:
+def own_echoes(circles: Structured, surfaces: Floats, memory: Memory, p: SettingsRecord) -> Ints:
     """Return how many of the echoes that each circle explains no surface does, shape (k,).
 
     Parameters

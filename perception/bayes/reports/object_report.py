@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import (
@@ -28,6 +27,7 @@ from perception.bayes.walls.crossing import CORNER_SINE_MIN
 from perception.bayes.walls.report import has_mirrors, room_report
 from perception.detected_object import DetectedObject, wall_between, worst_sigma
 from perception.kernel import Floats
+from perception.records import Structured
 
 CIRCLE_FIELDS: Final = (
     "x",
@@ -146,11 +146,11 @@ def archived_models(
         yield polygon_object(track, p, outlines[track.model], float(track.probability))
 
 
-def known_walls(memory: Memory) -> NDArray[Any]:
+def known_walls(memory: Memory) -> Structured:
     """Return the lines that recognition takes for walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
     is_wall = (lines["echoes"] > WALL_ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
-    return lines[is_wall]  # type: ignore[no-any-return]  # numpy types a field as Any
+    return lines[is_wall]
 
 
 def wall_object(segment: Row) -> DetectedObject:
@@ -225,7 +225,7 @@ def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[floa
     return x + float(across[k] * ty[k]), y - float(across[k] * tx[k])
 
 
-def is_heard_from_afar(circle: NDArray[Any]) -> bool:
+def is_heard_from_afar(circle: Structured) -> bool:
     """Return whether most readings of a point are from where, between mirrors, an edge is not heard.
 
     Parameters
@@ -272,7 +272,7 @@ def other_objects(
 
 
 def other_circles(
-    circles: NDArray[Any],
+    circles: Structured,
     memory: Memory,
     p: SettingsRecord,
     least: float,

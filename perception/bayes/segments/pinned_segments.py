@@ -13,7 +13,6 @@ from operator import itemgetter
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.memory.elements import BUCKET_CAPACITY, BUCKETS, MappedSegment
 from perception.bayes.memory.parameters import OUTLINE_CELL_M
@@ -21,7 +20,7 @@ from perception.bayes.memory.state import Memory
 from perception.bayes.segments.segment_list import count_again, mapped_segments, put_segment
 from perception.bounds import bounds, index_of, up_to
 from perception.kernel import Ints
-from perception.records import zeros
+from perception.records import Structured, zeros
 
 PINS_MAX: Final = 512
 """Greatest number of pinned segments."""
@@ -44,7 +43,8 @@ class Pins:
     @property
     def numbers(self) -> Ints:
         """The pinned segments' numbers."""
-        return self.segments["number"][: self.count]
+        numbers: Ints = self.segments["number"][: self.count]
+        return numbers
 
     def renew(self, memory: Memory) -> None:
         """Restore the pinned segments that were overwritten in the map."""
@@ -100,7 +100,7 @@ class Pins:
 
 def places_of(memory: Memory, numbers: Collection[int]) -> Ints:
     """Return bucket and place in the bucket of the segments of these numbers, shape (n, 2)."""
-    buckets: NDArray[Any] = memory.state["buckets"][0]
+    buckets: Structured = memory.state["buckets"][0]
     places = np.argwhere(np.arange(BUCKET_CAPACITY) < buckets["count"][:, None])
     wanted = np.array(sorted(numbers), np.int64)
     return places[np.isin(buckets["segments"]["number"][places[:, 0], places[:, 1]], wanted)]

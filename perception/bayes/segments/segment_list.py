@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.inference.outline_map import add_to_map, bucket_index
 from perception.bayes.memory.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.state import FREE, CircleTracks, Memory, StateRecord
 from perception.kernel import Floats, kernel
-from perception.records import Records, records, zeros
+from perception.records import Records, Structured, records, zeros
 
 SHOWN_M: Final = 0.1
 """Length at which a mapped segment is shown; the map keeps its middle and normal."""
@@ -92,14 +91,14 @@ def copy_segments(s: StateRecord, out: Records[MappedSegment]) -> None:
             n += 1
 
 
-def mapped_segments(memory: Memory) -> NDArray[Any]:
+def mapped_segments(memory: Memory) -> Structured:
     """Return the segments in the map as records of `state.MappedSegment`, shape (n,), a copy."""
     segments = zeros(MappedSegment, memory.state["segments_held"].item())
     copy_segments(memory.s, records(MappedSegment, segments))
     return segments
 
 
-def drawn(segments: NDArray[Any]) -> Floats:
+def drawn(segments: Structured) -> Floats:
     """Return ends x, y, x, y (m) and normal (rad), shape (n, 5), of mapped segments, shape (n,)."""
     ends = np.empty((len(segments), 5))
     x, y, nx, ny = (segments[name] for name in ("x", "y", "normal_x", "normal_y"))

@@ -16,6 +16,7 @@ from perception.bayes.memory.state import CircleTrack, PolygonTrack
 from perception.bounds import COUNT, FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
 from perception.map_moves import MapMoves
+from perception.records import Structured
 
 ARCHIVED_READINGS: Final = 48
 """Readings of an archived track: one of each bearing, and some more."""
@@ -42,7 +43,7 @@ def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
     return {**own, "is_reported": FLAG, "submap": COUNT, "kept": up_to(ARCHIVED_READINGS), "readings": PLACE}
 
 
-def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDArray[Any]:
+def pack(track: Structured, dtype: np.dtype[Any], *, is_reported: bool) -> Structured:
     """Return a track as an archived record, shape (1,).
 
     Parameters
@@ -65,7 +66,7 @@ def pack(track: NDArray[Any], dtype: np.dtype[Any], *, is_reported: bool) -> NDA
     return row
 
 
-def unpack(row: NDArray[Any], track: NDArray[Any]) -> None:
+def unpack(row: Structured, track: Structured) -> None:
     """Write an archived record to a track.
 
     Parameters
@@ -91,7 +92,7 @@ def unpack(row: NDArray[Any], track: NDArray[Any]) -> None:
     readings["listener_x"][b, in_bin] = readings["listener_y"][b, in_bin] = 0.0
 
 
-def move_rows(rows: NDArray[Any], moves: MapMoves) -> None:
+def move_rows(rows: Structured, moves: MapMoves) -> None:
     """Move archived tracks with their maps of the way; corrections turn too little to turn covariances.
 
     Parameters
@@ -111,7 +112,7 @@ def move_rows(rows: NDArray[Any], moves: MapMoves) -> None:
     readings[..., 2] += turn
 
 
-def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:
+def newest_readings(bins: Structured) -> Structured:
     """Return the newest echo of each bearing bin, then the second newest of each, and so on: (≤ 48,) `Reading`.
 
     Parameters
@@ -122,8 +123,8 @@ def newest_readings(bins: NDArray[Any]) -> NDArray[Any]:
     counts, capacity = bins["count"], bins["readings"].shape[1]
     rank = np.arange(capacity)[:, None]
     ranks, which = np.nonzero(rank < counts)
-    found: NDArray[Any] = bins["readings"][which, (counts[which] - 1 - ranks) % capacity]
-    echoes: NDArray[Any] = found[(found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)]
+    found: Structured = bins["readings"][which, (counts[which] - 1 - ranks) % capacity]
+    echoes: Structured = found[(found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)]
     return echoes[:ARCHIVED_READINGS]
 
 
@@ -141,7 +142,7 @@ def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:
     return (turns * count).astype(np.int64) % count
 
 
-def _copy_numbers(source: NDArray[Any], target: NDArray[Any]) -> None:
+def _copy_numbers(source: Structured, target: Structured) -> None:
     """Copy all fields before the readings; a track and an archived record begin with the same ones."""
     (size,) = (one.dtype.fields[BINS][1] for one in (source, target) if one.dtype.fields and BINS in one.dtype.fields)
     target.view(np.uint8)[:size] = source.view(np.uint8)[:size]

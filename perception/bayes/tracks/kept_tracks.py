@@ -14,12 +14,12 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.memory.state import FREE, Memory
 from perception.bayes.tracks.manual_tracks import leave_job
 from perception.bounds import Bound, check_values
 from perception.edits import ObjectRow, not_restorable
+from perception.records import Structured
 from perception.snapshot import numbers_of
 
 CIRCLE: Final = "circle"
@@ -99,7 +99,7 @@ def restore_walls(memory: Memory, text: str, bounds: Mapping[str, Bound]) -> str
     return None
 
 
-def _is_valid(name: str, record: NDArray[Any], bounds: Mapping[str, Bound]) -> bool:
+def _is_valid(name: str, record: Structured, bounds: Mapping[str, Bound]) -> bool:
     """Return whether each number of a record that the memory holds under this name is within its bound."""
     try:
         for path, values in numbers_of({name: record}):
@@ -114,7 +114,7 @@ def _packed(record: np.void) -> str:
     return base64.b64encode(zlib.compress(record.tobytes(), 1)).decode()
 
 
-def _unpacked(text: str, dtype: np.dtype[Any]) -> NDArray[Any] | None:
+def _unpacked(text: str, dtype: np.dtype[Any]) -> Structured | None:
     """Return the record in a text, shape (1,); None if it holds none of this type."""
     try:
         packed = base64.b64decode(text, validate=True)

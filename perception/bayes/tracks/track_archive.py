@@ -11,10 +11,9 @@ import contextlib
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE, CircleTrack, Memory, PolygonTrack
@@ -25,6 +24,7 @@ from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats, Ints
 from perception.map_moves import MapMoves
 from perception.mapping.archive import Archive
+from perception.records import Structured
 
 BEHIND_M: Final = 2.0
 """An object this much beyond the sensors' range is behind the robot, …"""
@@ -173,7 +173,7 @@ class TrackArchive:
 class _Kind(ABC):
     """The tracks of one kind and their archive."""
 
-    def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any], submap: int) -> None:
+    def __init__(self, archive: Archive, memory: Memory, tracks: Structured, submap: int) -> None:
         self.archive, self.memory, self.tracks, self.submap = archive, memory, tracks, submap
         self.waiting = 0
 
@@ -278,7 +278,7 @@ class _Circles(_Kind):
 
 
 class _Polygons(_Kind):
-    def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any], submap: int, sure: float) -> None:
+    def __init__(self, archive: Archive, memory: Memory, tracks: Structured, submap: int, sure: float) -> None:
         super().__init__(archive, memory, tracks, submap)
         self._sure = sure
 

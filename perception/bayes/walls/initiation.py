@@ -7,10 +7,9 @@ is fitted to them in three rounds; it becomes a wall if it is long, straight, an
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
@@ -42,6 +41,7 @@ from perception.bayes.walls.fit import fit_walls
 from perception.bayes.walls.numbers import number_spans
 from perception.bayes.walls.support import copy_near, support
 from perception.kernel import kernel
+from perception.records import Structured
 
 CANDIDATES_MAX: Final = 8
 """Lines that are scored for one echo."""
@@ -298,7 +298,7 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
         return False
     is_new = fit_candidate(memory, p)
     if is_new:
-        walls: NDArray[Any] = memory.state["room"]["walls"][0]
+        walls: Structured = memory.state["room"]["walls"][0]
         weight = walls["weight"][:MAX_WALLS]
         slot = int(np.argmin(weight))
         if weight[slot] < min(walls["weight"][CANDIDATE], REPLACED_WEIGHT_MAX):

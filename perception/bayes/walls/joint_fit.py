@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.walls.corners import CORNER_ECHOES_MIN, CORNER_SYSTEMATIC_M, KEPT
 from perception.kernel import Floats
+from perception.records import Structured
 
 APART_SIGMAS: Final = 3.0
 """A corner whose echoes place it farther from a wall's line, in σ, does not correct that wall."""
@@ -62,7 +63,7 @@ class Incidences:
     levels: Floats
 
 
-def fit_together(walls: Lines, corners: NDArray[Any], numbers: Sequence[int]) -> Floats:
+def fit_together(walls: Lines, corners: Structured, numbers: Sequence[int]) -> Floats:
     """Return the lines of walls, corrected by the corners that are heard on them, which are corrected in place.
 
     Parameters
@@ -91,7 +92,7 @@ def fit_together(walls: Lines, corners: NDArray[Any], numbers: Sequence[int]) ->
     return lines
 
 
-def _incidences(walls: Lines, points: NDArray[Any], pairs: NDArray[np.int64]) -> Incidences:
+def _incidences(walls: Lines, points: Structured, pairs: NDArray[np.int64]) -> Incidences:
     at, on = pairs.T
     ox, oy, nx, ny = walls.frames[on].T
     x, y, slope = points["x"][at], points["y"][at], walls.lines[on, 1]
@@ -100,7 +101,7 @@ def _incidences(walls: Lines, points: NDArray[Any], pairs: NDArray[np.int64]) ->
     return Incidences(at, on, along, rows, across + rows[:, 0] * x + rows[:, 1] * y)
 
 
-def _agreeing(walls: Lines, points: NDArray[Any], all_: Incidences) -> Incidences:
+def _agreeing(walls: Lines, points: Structured, all_: Incidences) -> Incidences:
     """Return those that the points' own echoes do not contradict."""
     heard = points["heard"][all_.points]
     xx, xy, yy = heard["xx"] + PLACE_INFORMATION, heard["xy"], heard["yy"] + PLACE_INFORMATION
@@ -118,7 +119,7 @@ def _agreeing(walls: Lines, points: NDArray[Any], all_: Incidences) -> Incidence
 
 
 def _solve(
-    walls: Lines, points: NDArray[Any], held: Incidences, at: NDArray[np.int64]
+    walls: Lines, points: Structured, held: Incidences, at: NDArray[np.int64]
 ) -> tuple[Floats, Floats, Floats]:
     """Return the lines (n, 5), and the points' places (m, 2) and covariances xx, xy, yy (m, 3).
 

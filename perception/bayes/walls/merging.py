@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -40,6 +39,7 @@ from perception.bayes.walls.contact import (
 )
 from perception.bayes.walls.fit import fit_walls
 from perception.kernel import kernel
+from perception.records import Structured
 
 SAME_TURN_RAD: Final = 0.14
 """Greatest angle between two parts of a wall."""
@@ -108,7 +108,7 @@ def find_same(s: StateRecord) -> int:
 
 def move_bins(main: Wall, part: Wall) -> None:
     """Move the readings of a wall to another one, and end it."""
-    source: NDArray[Any] = np.asarray(part.bins)
+    source: Structured = np.asarray(part.bins)
     bins = np.flatnonzero((source["weight"] > 0.0) & (source["precision"] > 0.0))
     source = source[bins]
     off, u = source["offset_sum"] / source["precision"], (bins - HALF + 0.5) * WALL_BIN_M
@@ -120,7 +120,7 @@ def move_bins(main: Wall, part: Wall) -> None:
     inside = (at >= 0) & (at < WALL_BINS)
     at, place, source, across, along = at[inside], place[inside], source[inside], across[inside], along[inside]
     across += main.slope * ((place + 0.5) * WALL_BIN_M - along)
-    target: NDArray[Any] = np.asarray(main.bins)
+    target: Structured = np.asarray(main.bins)
     np.add.at(target["offset_sum"], at, source["precision"] * across)
     for name in ("weight", "precision", "range_sum"):
         np.add.at(target[name], at, source[name])
@@ -155,7 +155,7 @@ def find_frameless(s: StateRecord, first: int) -> int:
     return -1
 
 
-def reframe(walls: NDArray[Any], k: int) -> None:
+def reframe(walls: Structured, k: int) -> None:
     """Give wall `k` a frame along its line, about the middle of its readings.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.bayes.walls.straight import TINY_M, Straight, kept_bins, straight, straighten
 from perception.kernel import Floats
-from perception.records import Record
+from perception.records import Record, Structured
 
 WALL_CHI2_MIN: Final = 40.0
 """Least evidence of the best span, or of all together; of the best span of the first wall: where nothing but drums
@@ -112,12 +112,12 @@ class CornerPoint(Record):
     log_odds: float
 
 
-def wall_segments(memory: Memory) -> NDArray[Any]:
+def wall_segments(memory: Memory) -> Structured:
     """Return the walls that are sure, one segment for each span, as records of `WallSegment`, shape (n,)."""
     return room_report(memory)[0]
 
 
-def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
+def room_report(memory: Memory) -> tuple[Structured, Structured]:
     """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
     with np.errstate(all="ignore"):  # numbers of a damaged recording
         walls, found = sure_room(memory)
@@ -160,7 +160,7 @@ def edges_answer(memory: Memory) -> bool:
     return echoes > EDGES_SHARE * silences + (-EDGES_LEAD if is_loud == 1.0 else EDGES_LEAD)
 
 
-def is_of_body(segment: tuple[float, ...], bodies: NDArray[Any]) -> bool:
+def is_of_body(segment: tuple[float, ...], bodies: Structured) -> bool:
     """Return whether a segment goes through a round object or is the side of one.
 
     Drums in a row have a line along them, and no wall.
@@ -192,7 +192,7 @@ def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
         yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence, number)
 
 
-def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight]:
+def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
     """Return the walls that are sure, by their number: alone, or as a sure wall's neighbour at a corner.
 
     Parameters
@@ -230,7 +230,7 @@ def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight
     return found
 
 
-def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.bool_]:
+def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bool_]:
     """Return which spans of a wall can be reported: none unless it is a wall, by its best span or by all together.
 
     Parameters
@@ -252,7 +252,7 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     return np.asarray(sure)
 
 
-def kept_spans(spans: NDArray[Any], kept: NDArray[np.bool_], numbers: NDArray[Any]) -> NDArray[np.bool_]:
+def kept_spans(spans: Structured, kept: NDArray[np.bool_], numbers: Structured) -> NDArray[np.bool_]:
     """Return which spans of a wall were sure when the robot stopped.
 
     Parameters
@@ -290,7 +290,7 @@ def _extend(owners: list[Straight], places: list[tuple[float, float, tuple[int, 
     return are_met
 
 
-def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool) -> list[tuple[float, ...]]:
+def reach_corners(walls: dict[int, Straight], corners: Structured, are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the corners in which they end, unless ranges passed there.
 
     A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
@@ -328,7 +328,7 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any], are_mirrors
     return found
 
 
-def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: bool) -> list[tuple[float, ...]]:
+def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the edges that are heard there.
 
     Parameters
@@ -372,13 +372,13 @@ def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: b
     return found
 
 
-def is_one_way(heard: NDArray[Any]) -> bool:
+def is_one_way(heard: Structured) -> bool:
     """Return whether a point's echoes place it along one direction only; they are a record of `PointInformation`."""
     xx, xy, yy = (float(heard[name]) for name in ("xx", "xy", "yy"))
     return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy) < 1.0 / ONE_WAY_SIGMA_M**2
 
 
-def _point(corner: NDArray[Any], signs: float) -> tuple[float, ...]:
+def _point(corner: Structured, signs: float) -> tuple[float, ...]:
     """Return a corner as `CornerPoint` has it; `signs` of it, as an echo is one, against the ranges that passed."""
     log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (signs - float(corner["passes"]))
     place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))

@@ -14,6 +14,7 @@ from perception.bayes.walls.fit import CRACK_PASSES_MIN, OPENING_PASSES_MIN, ROU
 from perception.bayes.walls.joint_fit import Lines, fit_together
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.kernel import Floats
+from perception.records import Structured
 
 FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y")
 LINE: Final = ("offset", "slope", "variance_offset", "covariance", "variance_slope")
@@ -37,7 +38,7 @@ class Straight:
     """
 
     wall: Any
-    spans: NDArray[Any]
+    spans: Structured
     frame: tuple[float, ...]
     variances: tuple[float, ...]
     ends: Floats
@@ -99,7 +100,7 @@ class Straight:
             self.ends[k, 1] = max(self.ends[k, 1], (end - HALF) * WALL_BIN_M)
 
 
-def kept_bins(bins: NDArray[Any]) -> NDArray[np.bool_]:
+def kept_bins(bins: Structured) -> NDArray[np.bool_]:
     """Return where a wall was sure when the robot stopped, and ranges do not pass now, of records of `WallBin`.
 
     One range may be a stray; where the surroundings have changed, a sensor that stands counts more than one.
@@ -107,23 +108,21 @@ def kept_bins(bins: NDArray[Any]) -> NDArray[np.bool_]:
     return np.asarray((bins["is_kept"] == 1) & (bins["passes"] < np.maximum(bins["weight"], CRACK_PASSES_MIN)))
 
 
-def straight(wall: NDArray[Any], spans: NDArray[Any]) -> Straight:
+def straight(wall: Structured, spans: Structured) -> Straight:
     """Return a wall with these of its spans."""
     frame, line = tuple(float(wall[name]) for name in FRAME), reported_line(wall)
     ends = np.column_stack([spans["low"], spans["high"]])
     return Straight(wall, spans, (*frame, *line[:2]), line[2:], ends)
 
 
-def reported_line(wall: NDArray[Any]) -> tuple[float, ...]:
+def reported_line(wall: Structured) -> tuple[float, ...]:
     """Return the fields `LINE` of a wall's fit to its bins, or of its review where that had more information."""
     line, reviewed = (tuple(float(of[name]) for name in LINE) for of in (wall, wall["reviewed"]))
     information = float(wall["reviewed"]["information"])
     return reviewed if information * (line[2] * line[4] - line[3] ** 2) > 1.0 else line
 
 
-def straighten(
-    walls: dict[int, Straight], corners: NDArray[Any], edges: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def straighten(walls: dict[int, Straight], corners: Structured, edges: Structured) -> tuple[Structured, Structured]:
     """Fit the walls and the corners that are heard together.
 
     Parameters

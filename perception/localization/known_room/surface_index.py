@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.kernel import Floats, Ints, kernel
 from perception.localization.room.room import Room
-from perception.records import Record, Records, zeros
+from perception.records import Record, Records, Structured, zeros
 
 INDEX_BIN_M: Final = 4.0
 """Edge of a bin of the index: each lists what sensors at its places can hear."""
@@ -29,7 +28,7 @@ class Bins(Record):
     rows: int
 
 
-def make_index(room: Room, window_m: float) -> tuple[NDArray[Any], Ints, Ints]:
+def make_index(room: Room, window_m: float) -> tuple[Structured, Ints, Ints]:
     """Return the index of a room's surfaces.
 
     Parameters

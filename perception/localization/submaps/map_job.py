@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
@@ -29,7 +28,7 @@ from perception.localization.submaps.pose_graph import (
     linearise,
 )
 from perception.localization.submaps.submap_records import between, match_link, pose_of, spread_about
-from perception.records import records, zeros
+from perception.records import Structured, records, zeros
 
 OVERLAP_M: Final = 6.0
 """Maps nearer to each other than this may overlap."""
@@ -62,9 +61,9 @@ STEP_MIN: Final = 1e-4
 class Maps(NamedTuple):
     """What a job begins with: the maps up to the one to be compared, which is the last."""
 
-    submaps: NDArray[Any]
-    nodes: NDArray[Any]
-    links: NDArray[Any]
+    submaps: Structured
+    nodes: Structured
+    links: Structured
     scales: Floats
     usual: Floats
     """Sum of the log likelihoods of known readings where maps fitted, and their number, shape (2,)."""
@@ -75,8 +74,8 @@ class Maps(NamedTuple):
 class Outcome(NamedTuple):
     """What a job ends with."""
 
-    nodes: NDArray[Any]
-    links: NDArray[Any]
+    nodes: Structured
+    links: Structured
     scales: Floats
     usual: Floats
     gain: float
@@ -95,7 +94,7 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
     spread = spread_about(number, links, nodes)
     here = pose_of(nodes[number])
     distances = np.hypot(nodes["x"][:number] - here[0], nodes["y"][:number] - here[1])
-    found: list[NDArray[Any]] = []
+    found: list[Structured] = []
     for run in _runs(np.flatnonzero(distances < OVERLAP_M).tolist()) if count else ():
         nearest = min(run, key=lambda k: distances[k])
         joined = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS))

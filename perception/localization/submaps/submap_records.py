@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from drivers.messages import wrap_angle
 from perception.bounds import PLACE, Finite, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import OF_ODOMETRY, Link, Node, spread_from
-from perception.records import Record, records, zeros
+from perception.records import Record, Structured, records, zeros
 
 LOST_WAY: Final = (0.02, 0.01)
 """Share of its way that a match with the map before, and one with another, usually loses. Four real drives, two
@@ -53,9 +53,9 @@ class Rows:
 
     def __init__(self, record: type[Record]) -> None:
         self._record = record
-        self.archived_rows: NDArray[Any] = zeros(record, 0)
+        self.archived_rows: Structured = zeros(record, 0)
 
-    def append(self, row: NDArray[Any]) -> None:
+    def append(self, row: Structured) -> None:
         """Add one."""
         self.archived_rows = np.concatenate([self.archived_rows, row])
 
@@ -98,7 +98,7 @@ def scaled(moved: Floats, scales: Floats) -> Floats:
     return np.stack([share * (c * x - s * y), share * (s * x + c * y), (1.0 + scales[1]) * turn], axis=-1)
 
 
-def odometry_link(of: int, moved: Floats, information: Floats) -> NDArray[Any]:
+def odometry_link(of: int, moved: Floats, information: Floats) -> Structured:
     """Return what odometry says of the next map: how it moved, and the derivatives by its scales."""
     row = zeros(Link, 1)
     x, y, turn = moved
@@ -107,7 +107,7 @@ def odometry_link(of: int, moved: Floats, information: Floats) -> NDArray[Any]:
     return row
 
 
-def match_link(of: int, to: int, pose: Floats, information: Floats, *, is_next: bool) -> NDArray[Any]:
+def match_link(of: int, to: int, pose: Floats, information: Floats, *, is_next: bool) -> Structured:
     """Return a match of two maps, of which one may have been driven right after the other."""
     row = zeros(Link, 1)
     row["of"], row["to"], row["is_match"], row["weight"] = of, to, 1, 1.0
@@ -117,19 +117,19 @@ def match_link(of: int, to: int, pose: Floats, information: Floats, *, is_next: 
     return row
 
 
-def node_at(pose: Floats) -> NDArray[Any]:
+def node_at(pose: Floats) -> Structured:
     """Return a map's pose as a record."""
     row = zeros(Node, 1)
     row["x"], row["y"], row["theta"] = pose
     return row
 
 
-def pose_of(node: NDArray[Any]) -> Floats:
+def pose_of(node: Structured) -> Floats:
     """Return the pose of a map's record, shape (3,)."""
     return np.array([node["x"], node["y"], node["theta"]])
 
 
-def spread_about(number: int, links: NDArray[Any], nodes: NDArray[Any]) -> Floats:
+def spread_about(number: int, links: Structured, nodes: Structured) -> Floats:
     """Return how uncertain each map lies to one: variances of place (m²) and direction (rad²), shape (n, 2)."""
     spread = np.full((len(nodes), 2), math.inf)
     spread[number] = 0.0

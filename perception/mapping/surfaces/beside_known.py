@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from perception.mapping.surfaces.parameters import (
 )
 from perception.mapping.surfaces.surface_list import ENDS, find_near, places_on
 from perception.polyline import Polyline
+from perception.records import Structured
 
 PLACES: Final = 16
 """Places along a piece that are compared, those at its ends half a step inside."""
@@ -56,7 +57,7 @@ Runs = list[tuple[float, float]]
 
 
 def nearness(
-    rows: NDArray[Any], known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]
+    rows: Structured, known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]
 ) -> NDArray[np.int64]:  # fmt: skip
     """Return how near places along surfaces are to what is known, from `UNSURE` to `ON_BODY`, shape (n, PLACES).
 
@@ -93,7 +94,7 @@ def _bodies(known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]) -> 
     return found[:, [0, 1, 0, 1]], found[:, 2]
 
 
-def beside_known(rows: NDArray[Any], near: NDArray[np.int64], prior: float) -> SurfaceReport:
+def beside_known(rows: Structured, near: NDArray[np.int64], prior: float) -> SurfaceReport:
     """Return the walls and the polylines that are reported beside what is known, or in place of its walls.
 
     Parameters
@@ -124,12 +125,12 @@ def beside_known(rows: NDArray[Any], near: NDArray[np.int64], prior: float) -> S
     return SurfaceReport(tuple(found), tuple(_polylines(rows[rest])), prior > 0.0)
 
 
-def lengths(rows: NDArray[Any]) -> Floats:
+def lengths(rows: Structured) -> Floats:
     """Return the lengths of pieces, 0 of parts of polylines, shape (n,), m."""
     return np.asarray(np.hypot(rows["x2"] - rows["x1"], rows["y2"] - rows["y1"]) * (rows["number"] < 0))
 
 
-def wall_prior(rows: NDArray[Any], near: NDArray[np.int64]) -> float:
+def wall_prior(rows: Structured, near: NDArray[np.int64]) -> float:
     """Return the log odds that a piece of this place is a wall, before its own evidence, nat.
 
     Parameters
@@ -151,7 +152,7 @@ def wall_prior(rows: NDArray[Any], near: NDArray[np.int64]) -> float:
 
 
 def refuted(
-    rows: NDArray[Any], known: tuple[DetectedObject, ...], radius_m: Mapping[str, float]
+    rows: Structured, known: tuple[DetectedObject, ...], radius_m: Mapping[str, float]
 ) -> frozenset[int]:  # fmt: skip
     """Return the numbers of round objects that are none, where pieces stand for the walls.
 
@@ -198,7 +199,7 @@ def _wall(wall: tuple[float, ...], begin: float, end: float) -> DetectedObject:
     )  # fmt: skip
 
 
-def _polylines(rows: NDArray[Any]) -> Iterator[Polyline]:
+def _polylines(rows: Structured) -> Iterator[Polyline]:
     """Yield the polylines of rows, which follow each other in order; a piece that is no wall is one, too."""
     if not len(rows):
         return

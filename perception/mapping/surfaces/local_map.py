@@ -6,10 +6,9 @@ earlier echoes again, or does a part of a search for surfaces. A search sees the
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.messages import Firing
 from perception.bounds import bounds
@@ -32,7 +31,7 @@ from perception.mapping.surfaces.quantum import (
     leave,
 )
 from perception.mapping.surfaces.records import CellCounts, LocalMap
-from perception.records import records, zeros
+from perception.records import Structured, records, zeros
 
 
 class LocalMapSearch:
@@ -153,12 +152,12 @@ class LocalMapSearch:
             pass
         return True
 
-    def pieces(self) -> NDArray[Any]:
+    def pieces(self) -> Structured:
         """Return the pieces that the last search has found, as records of `Piece`."""
         room = self.local[0]
-        return room["pieces"][: int(room["piece_count"])]  # type: ignore[no-any-return]  # numpy types a field as Any
+        return room["pieces"][: int(room["piece_count"])]
 
-    def chains(self) -> tuple[NDArray[Any], Ints]:
+    def chains(self) -> tuple[Structured, Ints]:
         """Return the cells of the last search's polylines, as records of `SurfaceCell`, and each one's number."""
         room = self.local[0]
         numbers = room["chains"][: int(room["chained"])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from perception.bounds import COUNT, SIGNED, Count, Finite, Flag, Place, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.map_moves import MapMoves
 from perception.mapping.surfaces.parameters import AGREES_M
-from perception.records import Record, zeros
+from perception.records import Record, Structured, zeros
 
 
 class Surface(Record):
@@ -44,7 +44,7 @@ COMPARED: Final = 5
 """Places along a surface that are compared with others."""
 
 
-def ends_of(rows: NDArray[Any]) -> Floats:
+def ends_of(rows: Structured) -> Floats:
     """Return the ends x, y, x, y of surfaces, shape (n, 4), m."""
     return np.column_stack([rows[name] for name in ENDS]).reshape(-1, 4)
 
@@ -90,14 +90,14 @@ def find_near(points: Floats, ends: Floats, reaches: Floats, found: Ints) -> Non
                     found[n] = 1
 
 
-def places_on(rows: NDArray[Any], count: int) -> Floats:
+def places_on(rows: Structured, count: int) -> Floats:
     """Return places along surfaces, shape (n · count, 2), m."""
     ends = ends_of(rows)
     shares = (np.arange(count) + 0.5) / count
     return (ends[:, None, :2] + shares[:, None] * (ends[:, None, 2:] - ends[:, None, :2])).reshape(-1, 2)
 
 
-def is_covered(rows: NDArray[Any], by: NDArray[Any]) -> NDArray[np.bool_]:
+def is_covered(rows: Structured, by: Structured) -> NDArray[np.bool_]:
     """Return which surfaces lie along others, shape (n,); a polyline covers no straight piece, which says more."""
     covered = np.zeros(len(rows), np.bool_)
     for which, others in ((rows["number"] < 0, by[by["number"] < 0]), (rows["number"] >= 0, by)):
@@ -108,7 +108,7 @@ def is_covered(rows: NDArray[Any], by: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 class SurfaceList:
-    """Rows of surfaces.
+    """Structured of surfaces.
 
     Attributes
     ----------
@@ -125,11 +125,11 @@ class SurfaceList:
         self.numbered = 0
 
     @property
-    def left_behind(self) -> NDArray[Any]:
+    def left_behind(self) -> Structured:
         """Those that are not of the present local map."""
         return np.asarray(self.archived_rows[self.archived_rows["is_live"] == 0])
 
-    def replace_live(self, rows: NDArray[Any]) -> None:
+    def replace_live(self, rows: Structured) -> None:
         """Replace those of the present local map; what they show anew is no longer among those left behind."""
         behind = self.left_behind
         behind = behind[~is_covered(behind, rows)]

@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.model import ModelConfig
 from config.robot import RingConfig
@@ -31,7 +30,7 @@ from perception.mapping.surfaces.beside_known import beside_known, nearness, ref
 from perception.mapping.surfaces.local_map import LocalMapSearch
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_KEPT_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
-from perception.records import zeros
+from perception.records import Structured, zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
 HALF_ANGLE_MAX: Final = math.radians(45.0)
@@ -120,7 +119,7 @@ class SurfaceMap(NoSurfaces):
         self._list.replace_live(self._found())
         self._forget_derived()
 
-    def _found(self) -> NDArray[Any]:
+    def _found(self) -> Structured:
         """Return the surfaces of the search that has just ended, as records of `Surface`."""
         pieces = self._search.pieces()
         pieces = pieces[pieces["high"] - pieces["low"] >= PIECE_KEPT_M]
@@ -140,7 +139,7 @@ class SurfaceMap(NoSurfaces):
         found["submap"] = self._search.submaps(found["x1"], found["y1"])
         return found
 
-    def _polyline_rows(self) -> NDArray[Any]:
+    def _polyline_rows(self) -> Structured:
         """Return the parts of the polylines through the middles of cells, as records of `Surface`."""
         cells, of = self._search.chains()
         if not len(cells):

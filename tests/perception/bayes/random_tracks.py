@@ -156,7 +156,7 @@ def unit(angle: Any) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def around(rng: np.random.Generator, n: int, centre: np.ndarray, rho: float) -> np.ndarray:
+def around(rng: np.random.Generator, n: int, centre: Floats, rho: float) -> Floats:
     """Return readings of a circle as rows of place, axis and range: most are right, some wild, some silent."""
     bearing = rng.uniform(0, 2 * math.pi) + rng.uniform(0, 2 * math.pi, n) * rng.random()
     d = rho + rng.uniform(0.1, 3.0, n)
@@ -188,7 +188,7 @@ def place_of(memory: Memory, t: int) -> Floats:
     return np.array([memory.circles["x"][t], memory.circles["y"][t]])
 
 
-def add_segment(memory: Memory, row: np.ndarray, number: int) -> int:
+def add_segment(memory: Memory, row: Floats, number: int) -> int:
     """Put a segment (middle, normal) into the map; return its bucket."""
     x, y, nx, ny = row.tolist()
     put_segment(memory.s, x, y, nx, ny, number, 0.1 * number)

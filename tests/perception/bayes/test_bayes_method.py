@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
@@ -22,7 +21,7 @@ from perception.bayes.tracks import naming
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import ConfirmObject, PinSegments, PlaceModel
 from perception.kernel import Floats, kernel
-from perception.records import records, zeros
+from perception.records import Structured, records, zeros
 from runtime.simulation.scenes import halls, readings
 from tests.perception.bayes.random_tracks import BOXES, NOISES, SENSORS, SETTINGS
 
@@ -71,7 +70,7 @@ def garbage(rng: np.random.Generator) -> Firing:
     return Firing(time_s * 10.0, Pose(x, y, heading), heading, ranges)
 
 
-def leaves(array: NDArray[Any]) -> Iterator[NDArray[Any]]:
+def leaves(array: Structured) -> Iterator[Structured]:
     """Yield the numbers of an array of records, field by field."""
     if array.dtype.names is None:
         yield array

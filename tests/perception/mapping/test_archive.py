@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from perception.mapping.archive import Archive
+from perception.records import Structured
 
 DTYPE = np.dtype([("number", np.int64), ("x", np.float64), ("y", np.float64), ("what", np.float64, (3,))])
 
 
-def record(number: int, x: float, y: float) -> NDArray[Any]:
+def record(number: int, x: float, y: float) -> Structured:
     return np.array([(number, x, y, (number, x, y))], DTYPE)
 
 

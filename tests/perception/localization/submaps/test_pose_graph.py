@@ -27,12 +27,12 @@ from perception.localization.submaps.submap_records import (
     odometry_link,
     scaled,
 )
-from perception.records import records
+from perception.records import Structured, records
 
 INFORMATION = np.diag([400.0, 300.0, 900.0])
 
 
-def chain(count: int = 7, scales: Floats | None = None) -> tuple[list[Floats], NDArray[np.void]]:
+def chain(count: int = 7, scales: Floats | None = None) -> tuple[list[Floats], Structured]:
     """Return poses round a corner, and odometry's links between them, which is wrong by its scales."""
     rng = np.random.default_rng(1)
     poses, links = [np.array([1.0, 2.0, 0.3])], []
@@ -43,7 +43,7 @@ def chain(count: int = 7, scales: Floats | None = None) -> tuple[list[Floats], N
     return poses, np.concatenate(links)
 
 
-def solve(links: NDArray[np.void], nodes: NDArray[np.void], steps: int = 8) -> tuple[Floats, float]:
+def solve(links: Structured, nodes: NDArray[np.void], steps: int = 8) -> tuple[Floats, float]:
     """Solve the graph in place; return the scales and the last cost."""
     held, at, scales = records(Link, links), records(Node, nodes), np.zeros(SCALES)
     jacobians, residuals = np.empty((len(links), 3, 6 + SCALES)), np.empty((len(links), 3))
@@ -59,7 +59,7 @@ def solve(links: NDArray[np.void], nodes: NDArray[np.void], steps: int = 8) -> t
     return scales, cost
 
 
-def at_poses(poses: list[Floats]) -> NDArray[np.void]:
+def at_poses(poses: list[Floats]) -> Structured:
     """Return nodes at poses."""
     return np.concatenate([node_at(pose) for pose in poses])
 

@@ -11,10 +11,10 @@ from perception.detected_object import DetectedObject, wall_between
 from perception.mapping.no_surfaces import SurfaceReport
 from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
 from perception.mapping.surfaces.surface_list import ENDS, Surface
-from perception.records import zeros
+from perception.records import Structured, zeros
 
 
-def pieces(*ends: tuple[float, float, float, float], evidence: float = 60.0, echoes: float = 100.0) -> np.ndarray:
+def pieces(*ends: tuple[float, float, float, float], evidence: float = 60.0, echoes: float = 100.0) -> Structured:
     """Return straight pieces with so many echoes a metre."""
     made = zeros(Surface, len(ends))
     for k, (row, end) in enumerate(zip(made, ends, strict=True)):
@@ -26,7 +26,7 @@ def pieces(*ends: tuple[float, float, float, float], evidence: float = 60.0, ech
     return made
 
 
-def room(height: float = 6.0) -> np.ndarray:
+def room(height: float = 6.0) -> Structured:
     """Return the pieces of a room that the method knows nothing of."""
     corners = [(0.0, 0.0), (8.0, 0.0), (8.0, height), (0.0, height), (0.0, 0.0)]
     return pieces(*[(*a, *b) for a, b in itertools.pairwise(corners)])
@@ -37,7 +37,7 @@ def known_wall(x1: float, y1: float, x2: float, y2: float) -> DetectedObject:
 
 
 def report(
-    rows: np.ndarray, known: tuple[DetectedObject, ...] = (), reach_m: dict[str, float] | None = None
+    rows: Structured, known: tuple[DetectedObject, ...] = (), reach_m: dict[str, float] | None = None
 ) -> SurfaceReport:  # fmt: skip
     near = nearness(rows, known, reach_m or {})
     return beside_known(rows, near, wall_prior(rows, near))

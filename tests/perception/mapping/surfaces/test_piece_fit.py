@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from perception.mapping.surfaces.parameters import READINGS_MAX
 from perception.mapping.surfaces.piece_fit import group_echoes, judge
 from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
-from perception.records import records, zeros
+from perception.records import Structured, records, zeros
 
 pytestmark = pytest.mark.compiled
 RADII = np.array([0.107, 0.29, 0.671])
 
 
-def judged(points: NDArray[Any], sensors: NDArray[Any], sigma_m: float) -> NDArray[Any]:
+def judged(points: Structured, sensors: Structured, sigma_m: float) -> Structured:
     """Return a piece after its echoes came from some places, with errors."""
     local = zeros(LocalMap, 1)
     count = len(points)
@@ -35,7 +33,7 @@ def judged(points: NDArray[Any], sensors: NDArray[Any], sigma_m: float) -> NDArr
     room, counts = records(LocalMap, local), records(CellCounts, zeros(CellCounts, 1))
     group_echoes(room, counts)
     judge(room[0], counts[0], 0, RADII)
-    return local["pieces"][0, 0]  # type: ignore[no-any-return]  # numpy types a field as Any
+    return local["pieces"][0, 0]
 
 
 @pytest.mark.parametrize("turn", [-0.2, 0.0, 0.15])

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, WHOLE
 from perception.mapping.surfaces.pieces import (
@@ -22,12 +20,12 @@ from perception.mapping.surfaces.pieces import (
     order_cells,
 )
 from perception.mapping.surfaces.records import ANGLES, BLOCK, FREE, CellCounts, LocalMap
-from perception.records import Records, records, zeros
+from perception.records import Records, Structured, records, zeros
 
 pytestmark = pytest.mark.compiled
 
 
-def mapped(points: NDArray[Any], echoes: float = 3.0) -> tuple[Records[LocalMap], NDArray[Any], NDArray[Any]]:
+def mapped(points: Structured, echoes: float = 3.0) -> tuple[Records[LocalMap], Structured, Structured]:
     """Return a map, in two views, whose cells at some places (m from the centre) have been heard, and its counts."""
     counts, local = zeros(CellCounts, 1), zeros(LocalMap, 1)
     for x, y in points:
@@ -42,16 +40,16 @@ def mapped(points: NDArray[Any], echoes: float = 3.0) -> tuple[Records[LocalMap]
     return room, local, counts
 
 
-def grown(points: NDArray[Any]) -> NDArray[Any]:
+def grown(points: Structured) -> Structured:
     """Return the pieces in such a map, the longest first."""
     room, local, counts = mapped(points)
     assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
     found = local["pieces"][0, : int(local["piece_count"][0])]
-    longest: NDArray[Any] = found[np.argsort(found["low"] - found["high"])]
+    longest: Structured = found[np.argsort(found["low"] - found["high"])]
     return longest
 
 
-def line(x1: float, y1: float, x2: float, y2: float) -> NDArray[Any]:
+def line(x1: float, y1: float, x2: float, y2: float) -> Structured:
     shares = np.linspace(0.0, 1.0, 1 + int(math.hypot(x2 - x1, y2 - y1) / 0.02))[:, None]
     return np.asarray(np.array([x1, y1]) + shares * (np.array([x2, y2]) - np.array([x1, y1])))
 

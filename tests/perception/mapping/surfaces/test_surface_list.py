@@ -6,10 +6,10 @@ import numpy as np
 
 from perception.map_moves import MapMoves
 from perception.mapping.surfaces.surface_list import ENDS, Surface, SurfaceList, find_near, is_covered
-from perception.records import zeros
+from perception.records import Structured, zeros
 
 
-def rows(*ends: tuple[float, float, float, float], number: int = -1) -> np.ndarray:
+def rows(*ends: tuple[float, float, float, float], number: int = -1) -> Structured:
     """Return straight pieces between these ends, of the present local map, or parts of a polyline."""
     made = zeros(Surface, len(ends))
     made["number"] = number
