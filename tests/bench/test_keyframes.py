@@ -55,7 +55,7 @@ def test_the_map_of_surfaces_meets_all_in_runs_that_keep_it() -> None:
 
 
 def test_each_number_of_each_state_has_a_bound() -> None:
-    for run in ROWS:
+    for run in SHORT:
         settings = settings_of(run)
         perception = fresh_state(settings).perception
         snapshot = perception.snapshot()

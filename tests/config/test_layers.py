@@ -99,10 +99,10 @@ def test_a_section_that_no_robot_file_may_have(tmp_path: Path) -> None:
 
 
 def test_too_many_problems_are_counted_not_listed(tmp_path: Path) -> None:
-    run = write(tmp_path / "run.toml", "robot = 'denning'\n" + "".join(f"k{i} = 1\n" for i in range(5000)))
+    run = write(tmp_path / "run.toml", "robot = 'denning'\n" + "".join(f"k{i} = 1\n" for i in range(300)))
     lines = problems(run)
     assert len(lines) == 101
-    assert lines[-1] == "… and 4900 problems more"
+    assert lines[-1] == "… and 200 problems more"
 
 
 def test_entries_of_a_wrong_list_are_reported_once() -> None:

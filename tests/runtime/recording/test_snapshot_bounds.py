@@ -223,7 +223,7 @@ def moments(edited: Path) -> dict[int, Moment]:
 @pytest.mark.compiled
 @pytest.mark.boundscheck
 @pytest.mark.promise("P21")
-@pytest.mark.parametrize("share", [pytest.param(1, marks=pytest.mark.soak, id="all"), pytest.param(4, id="quick")])
+@pytest.mark.parametrize("share", [pytest.param(1, marks=pytest.mark.soak, id="all"), pytest.param(8, id="quick")])
 def test_every_poisoned_number_is_refused_or_harmless(
     moments: dict[int, Moment], measured: Callable[[str], None], share: int
 ) -> None:

@@ -303,7 +303,7 @@ def test_a_way_that_does_not_follow_theta_does_not_show_the_units(tmp_path: Path
     check_unchanged(path, drive.robot)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.soak) for seed in (1, 2))])
 def test_a_good_table_passes_to_the_bit(seed: int, tmp_path: Path) -> None:
     for drive in good_tables(seed):
         path = written(drive, Convention(), np.random.default_rng(seed), tmp_path / "table.csv")

@@ -184,6 +184,7 @@ def _time_is_up_by_firings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(RingTest, "_exchange", counted)
 
 
+@pytest.mark.soak
 @pytest.mark.usefixtures("_time_is_up_by_firings")
 @pytest.mark.parametrize("plugged", ["FAKE_DEAD = (3,)"], indirect=True)
 def test_a_dead_sensor_of_the_real_firmware_is_found(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -198,6 +199,7 @@ def test_a_dead_sensor_of_the_real_firmware_is_found(plugged: list[str], capsys:
     assert not any(line.startswith("motors ") for line in lines), "no wheel has turned"
 
 
+@pytest.mark.soak
 @pytest.mark.soak
 @pytest.mark.parametrize("plugged", [""], indirect=True)
 def test_the_motors_of_the_real_firmware(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
