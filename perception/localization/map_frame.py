@@ -167,6 +167,13 @@ class MapFrame(OdometryFrame):
         x, y, yaw = self.submaps.placed(moment).tolist()
         return then._replace(pose=Pose(x, y, yaw + moment.turned), ring_yaw=yaw)
 
+    def moved_since(self, moment: Moment) -> Pose:
+        """Return the pose of odometry's frame of a moment in that of now, as known now."""
+        if not self.submaps.is_applied:
+            return STAYS
+        then, at = Pose(*moment.odometry.tolist()), Pose(*self.submaps.placed(moment).tolist())
+        return self.submaps.odometry_from_map().compose(at).compose(then.inverse())
+
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
         return self.drift.odometry_from_map() if self.drift.is_applied else self.submaps.odometry_from_map()

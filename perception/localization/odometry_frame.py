@@ -75,6 +75,10 @@ class OdometryFrame:
         """Return where the robot was at a moment, as known now, instead of as it was known then."""
         return then
 
+    def moved_since(self, _moment: Moment) -> Pose:
+        """Return the pose of odometry's frame of a moment in that of now, as known now."""
+        return Pose(0.0, 0.0, 0.0)
+
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame."""
         return Pose(0.0, 0.0, 0.0)

@@ -172,7 +172,9 @@ class Timeline:
     cycle_unix: list[tuple[float, int]] = field(default_factory=list)
     """Time (s) and Unix time (ns) of each cycle; empty for a ring log. They differ by more after a pause."""
     echoes: Echoes = field(default_factory=lambda: np.empty(0, ECHO))
-    """Every reading of the run."""
+    """Every reading of the run, at its pose by odometry."""
+    known_echoes: Echoes | None = None
+    """The same at poses as known at the end, in odometry's frame of the end; None where none was corrected."""
     cross_paths: CrossPathRows = field(default_factory=lambda: np.empty(0, CROSS_PATH))
     """Every cross path of the run, in order of time; empty where no sensor listens to others."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)

@@ -15,6 +15,8 @@ import numpy as np
 from config.world import WorldConfig
 from drivers.messages import Firing, Floats, Odometry, Pose
 from perception.detected_object import DetectedObject, turned_object
+from perception.localization.localized_pose import Moment
+from perception.localization.odometry_frame import OdometryFrame
 from perception.mapping.grid.known_cells import known_cells
 from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception
@@ -69,6 +71,7 @@ class TimelineBuilder:
         self._near_map: dict[int | None, DetectedObject] = {}
         self._room: WorldConfig | None = None
         self._unplaced = 0
+        self._moments: list[tuple[int, Moment]] = []
 
     @property
     def pose(self) -> Pose | None:
@@ -80,7 +83,7 @@ class TimelineBuilder:
         self._timeline.notes.append(f"the robot restarted after {t_s:.1f} s; nothing before that is shown")
         self._rows, self._row_count, self._segments, self._pose = [], 0, {}, None
         self._crosses = []
-        self._placed, self._near_map, self._unplaced = [], {}, 0
+        self._placed, self._near_map, self._unplaced, self._moments = [], {}, 0, []
         self._timeline.snapshots, self._timeline.odometry = [], []
 
     def add_firing(self, t_s: float, firing: Firing) -> None:
@@ -125,6 +128,9 @@ class TimelineBuilder:
         self._timeline.seconds = t_s
         if perception.known_room is not None:
             self._place_in_map(perception)
+        moment = perception.map_frame.moment()
+        if moment is not None and len(self._rows) > (self._moments[-1][0] if self._moments else 0):
+            self._moments.append((len(self._rows), moment))
         if t_s >= self._next_s:
             self._next_s = t_s + self._interval_s
             self._add_snapshot(t_s, perception)
@@ -138,10 +144,20 @@ class TimelineBuilder:
             timeline.map_view = self._map_view(perception, perception.room)
         if self._rows:
             timeline.echoes = np.concatenate(self._rows)
+            if perception is not None and perception.map_frame.corrects_path:
+                timeline.known_echoes = self._known_echoes(perception.map_frame)
         if self._crosses:
             timeline.cross_paths = np.concatenate(self._crosses)
         if self._segments:
             timeline.segments = np.array([[first, last, *row] for first, last, row in self._segments.values()])
+
+    def _known_echoes(self, frame: OdometryFrame) -> Echoes:
+        known, begin = list[Echoes](), 0
+        for end, moment in self._moments:
+            to = frame.moved_since(moment)
+            known += [_turned_echoes(to, rows) for rows in self._rows[begin:end]]
+            begin = end
+        return np.concatenate([*known, *self._rows[begin:]])
 
     def _place_in_map(self, perception: Perception) -> None:
         """Keep the readings since the last cycle, and the objects nearby, in the map frame as it is known now."""

@@ -61,7 +61,7 @@ def map_run(
     from config.world import ITEMS_MAX
     from runtime.analysis.export.geojson import world_geojson
     from runtime.analysis.export.occupancy_image import occupancy_image, yaml_beside
-    from runtime.analysis.export.shapes import firing_scans
+    from runtime.analysis.export.shapes import scans_of
     from runtime.analysis.export.world_file import round_names, with_places, world_of, world_text
     from runtime.analysis.map_changes import MapChange, compare_with_map
     from runtime.analysis.timeline_builder import wall_ends
@@ -79,7 +79,8 @@ def map_run(
     )
     if len(objects) + len(walls) + sum(len(one.points) - 1 for one in polylines) > ITEMS_MAX:
         raise UserError(f"{file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
-    world, echoes = world_of(objects, walls, settings.models, polylines if view is None else ()), timeline.echoes
+    world = world_of(objects, walls, settings.models, polylines if view is None else ())
+    echoes = timeline.echoes if timeline.known_echoes is None else timeline.known_echoes
     half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)
     head = f"Map of {utf8(Path(file).name)}: what was recognised, in the frame of its odometry (m)."
     if view is not None:
@@ -112,7 +113,7 @@ def map_run(
         output.print(f"{geojson}: {len(features['features'])} features")
     if grid is not None:
         try:
-            scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
+            scans = np.array([(scan.x, scan.y) for scan in scans_of(echoes, settings.ring)]).reshape(-1, 2)
             way = scans if view is None else view.way
             with progress(console, "drawing the map"):
                 image = occupancy_image(

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from drivers.messages import CrossPaths, Firing, Flags, Odometry, Pose, Twist
+from perception.localization.localized_pose import Moment
+from perception.localization.odometry_frame import OdometryFrame
 from perception.pipeline import Perception
 from runtime.analysis import timeline_builder
 from runtime.analysis.timeline import Timeline
@@ -123,3 +125,34 @@ def test_a_snapshot_has_the_polylines(timeline: Timeline, monkeypatch: pytest.Mo
     builder.add_odometry(0.0, odometry(0.0))
     builder.end_cycle(0.0, perception())
     assert timeline.polylines == timeline.snapshots[0].polylines == (BEND,)
+
+
+class CorrectedFrame(OdometryFrame):
+    """A frame that knows at the end that odometry was 0.1 m too far for each map of the way before."""
+
+    corrects_path = True
+    submap = 0
+
+    def moment(self) -> Moment:
+        """Return the moment of the last firing."""
+        return Moment(self.submap, np.zeros(3), 0.0)
+
+    def moved_since(self, moment: Moment) -> Pose:
+        """Return how what was heard then moves."""
+        return Pose(0.1 * (moment.submap - self.submap), 0.0, 0.0)
+
+
+def test_echoes_are_also_at_poses_as_known_at_the_end(timeline: Timeline) -> None:
+    builder, seen, frame = TimelineBuilder(timeline), perception(), CorrectedFrame()
+    seen.map_frame = frame
+    for k in range(3):
+        frame.submap = k
+        for _ in range(k):
+            builder.add_firing(0.1 * k, firing(0.1 * k, Pose(float(k), 0.0, 0.0), s0=1.0))
+        builder.end_cycle(0.1 * k, seen)
+    builder.add_firing(0.3, firing(0.3, Pose(3.0, 0.0, 0.0), s0=1.0))
+    builder.finish(seen)
+    assert timeline.known_echoes is not None
+    moved = timeline.known_echoes["x"] - timeline.echoes["x"]
+    assert moved.tolist() == pytest.approx([-0.1, 0.0, 0.0, 0.0])
+    assert timeline.echoes["x"].tolist() == pytest.approx([k + RADIUS_M for k in (1.0, 2.0, 2.0, 3.0)])

@@ -105,16 +105,26 @@ def test_in_a_run_walls_move_with_their_maps_of_the_way_and_a_snapshot_goes_on_t
     settings = settings.model_copy(update={"ring": RING})
     firings, _ = driven(0.04, 0.02, rounds=2)
     first = FiringReplayer(settings, firings)
-    runs = [first]
+    runs, frame, moments = [first], first.perception.map_frame, []
     for k, _ in enumerate(first):
+        moments.append(frame.moment())
         if k == 300:
             second = FiringReplayer(settings, firings[k + 1 :])
             second.perception.restore(first.perception.snapshot())
             runs.append(second)
     for _ in runs[1]:
         pass
-    assert first.perception.map_frame.corrects_path
+    assert frame.corrects_path
     to = first.perception.odometry_from_map().inverse()
+    for moment, firing in zip(moments, firings, strict=True):
+        here = first.perception.localized()
+        assert moment is not None
+        assert here is not None
+        known, moved = (
+            frame.as_known_now(here, moment).pose,
+            to.compose(frame.moved_since(moment)).compose(firing.pose),
+        )
+        assert (moved.x, moved.y) == pytest.approx((known.x, known.y))
     summary, again = (run.summary(to) for run in runs)
     for name in ("walls", "corners", "polylines", "objects"):
         assert summary[name] == again[name]
