@@ -13,25 +13,24 @@ A robot inside a known canyon leaves it, however free its goal's direction is th
 are within the room that is kept is left by its middle line: what is heard at the ends of its walls is placed on the
 axes of the sensors, so that the exit may seem too narrow for a robot that has come in through it.
 
-Progress is state, and behaviours hold none: the detour is passed in and returned with each call. Ways are measured in
-metres, never in cycles, so that a robot that stands gives up nothing.
+Progress is state, and behaviours hold none: the detour (`behaviors.memory.detour`) is passed in and returned with
+each call.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Final, Literal, TypeAlias
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from behaviors.memory.near_memory import NearEchoes, places, remember
+from behaviors.memory.detour import Detour, Side
+from behaviors.memory.near_memory import places, remember
 from behaviors.response import Response
 from behaviors.steady_heading import turned_towards
 from behaviors.surroundings.blocked_ahead import (
-    Ahead,
-    Block,
     between,
     blocked_ahead,
     outline,
@@ -41,41 +40,18 @@ from behaviors.surroundings.blocked_ahead import (
 )
 from behaviors.surroundings.clearance import free_paths_m
 from config.behaviors import LeaveCanyonConfig
-from config.bounded import Coordinate, Count
 from config.robot import PASSAGE_M
 from perception.percept import Canyon, Floats, Percept, Pose, wrap_angle
 
 SCHEMA: Final = "leave_canyon"
-Side: TypeAlias = Literal[-1, 1]
 
 OPEN_SIDE_M: Final = 2.0
 """Nothing is presumed where neither side is free for this far beyond the robot's way: that is a corridor."""
-LEAVE_FREE_M: Final = 1.2
-"""The detour ends where the goal's direction is free for this far, …"""
-PROGRESS_M: Final = 0.4
-"""… and the goal is nearer by this than it has been before: so no detour ends where an earlier one began."""
-TURNED_BACK_RAD: Final = math.radians(150.0)
-"""What was only presumed is given up if going round it leads back more than this, …"""
-FARTHER_M: Final = 1.5
-"""… or so much farther from the goal than where the detour began: then other walls are followed, in turn."""
-PRESUMED_SHARE: Final = 0.7
-"""Nothing more is presumed until the robot has come nearer by this share of the distance at which it was."""
-NEARER_M: Final = 0.1
-STALL_M: Final = 2.0
-"""A robot that comes no nearer than this in so much driving is held."""
-LED_AWAY_M: Final = 3.0
-"""With an evidence grid a detour that leads so much farther from the goal than where it began tries its other side,
-m: the grid's way may have been on the other one."""
-LOOP_M: Final = 4.0
-SAME_PLACE_M: Final = 0.4
-"""A robot that is back where the detour began after this way has gone all round, and tries the other side."""
 SAME_WALL_RAD: Final = math.radians(100.0)
 NEXT_WALL_RAD: Final = math.radians(135.0)
 """A heading farther than this from the obstacle's direction leads along the next one, in a corner or at a back."""
 LOST_M: Final = 1.0
 """The obstacle is what is nearest within this angle of where it lay, and within this distance of the way."""
-FAR_M: Final = 1e6
-"""Farther than any goal."""
 NO_POINTS: Final = np.empty((0, 2))
 TURN_SHARE: Final = 0.15
 """The direction turns by this share of the angle to the chosen one in each cycle."""
@@ -85,46 +61,6 @@ THROUGH_M: Final = 1.5
 """A gap is passed if the robot sees so far through it, m."""
 TURNS: Final = np.arange(0.0, 2.0 * math.pi, math.radians(5.0))
 """Turns from the obstacle's direction that are tried, in this order."""
-
-
-@dataclass(frozen=True, slots=True)
-class Detour:
-    """The progress of the schema (m, rad, odometry's frame)."""
-
-    side: Literal[-1, 0, 1] = 0
-    """Of the obstacle that is gone round: +1 it stays on the left, −1 on the right; 0 without a detour."""
-    began_m: Coordinate = 0.0
-    """Least distance to the goal until the detour began, …"""
-    began_x: Coordinate = 0.0
-    began_y: Coordinate = 0.0
-    """… the place where it did, …"""
-    began_driven_m: Coordinate = 0.0
-    """… and how far the robot had driven by then."""
-    driven_m: Coordinate = 0.0
-    """The way since the goal was set."""
-    rounds: Count = 0
-    """How often the robot has gone all round."""
-    nearest_m: Coordinate = FAR_M
-    nearest_driven_m: Coordinate = 0.0
-    """The least distance to the goal so far, and how far the robot had driven by then."""
-    near: NearEchoes = ()
-    """What was heard near the robot on its way."""
-    wall_rad: Coordinate = 0.0
-    """Where the obstacle lay in the last cycle."""
-    x: Coordinate | None = None
-    y: Coordinate | None = None
-    """The robot's place in the last cycle."""
-    leaving: Canyon | None = None
-    """The narrow canyon that the robot is in and must leave."""
-    ahead: Ahead | None = None
-    """What stays far ahead, …"""
-    block: Block | None = None
-    """… what it is presumed to be a part of, …"""
-    presume_below_m: Coordinate = FAR_M
-    """… and the distance to the goal below which something may be presumed."""
-
-
-NO_DETOUR: Final = Detour()
 
 
 def leave_canyon(
@@ -164,21 +100,13 @@ def leave_canyon(
     # With an evidence grid the look-ahead goes round what was heard; in a building a wall answers ahead on most ways.
     reach_m = config.look_ahead_m if percept.occupancy is None else 0.0
     detour = _presume(echoes, pose, detour, to_goal, bearing, room, reach_m, room + 0.5 * config.look_m)
-    virtual = [between(*canyon.mouth) for canyon in percept.canyons if is_closed(canyon, pose, goal, config)]
-    if detour.block is not None:
-        virtual.append(outline(detour.block))
+    virtual = _virtual(percept, goal, detour, config)
     held = [canyon for canyon in percept.canyons if holds(canyon, pose, goal, config)]
     leaving = _leaving(held, detour.leaving, pose, room)
-    is_nearer = to_goal < detour.nearest_m - NEARER_M
-    detour = replace(
-        detour,
-        near=remember(detour.near, echoes, pose, detour.driven_m, body_radius_m),
-        nearest_m=to_goal if is_nearer else detour.nearest_m,
-        nearest_driven_m=detour.driven_m if is_nearer else detour.nearest_driven_m,
-        leaving=leaving,
-    )
+    near = remember(detour.near, echoes, pose, detour.driven_m, body_radius_m)
+    detour = replace(detour.nearer(to_goal), near=near, leaving=leaving)
     is_held = leaving is not None or len(held) > 0
-    waits = waits and detour.side == 0 and detour.driven_m - detour.nearest_driven_m < STALL_M
+    waits = waits and detour.side == 0 and not detour.is_held
     if waits and not virtual and not is_held:  # only echoes could close the way
         return None, detour
     points = np.concatenate([echoes, places(detour.near), *virtual])
@@ -188,34 +116,32 @@ def leave_canyon(
         if free >= min(to_goal, config.look_m) and not is_held:
             return None, detour
         detour = _begin(points, pose, goal, percept.canyons, detour, room, config)
-    elif not is_held and to_goal < detour.began_m - PROGRESS_M and free >= _needed_m(detour, to_goal):
-        return None, replace(detour, side=0, ahead=None, block=None)
-    elif percept.occupancy is not None and to_goal > _began_m(detour, goal) + LED_AWAY_M:
-        detour = replace(
-            detour, side=_other(detour.side), began_x=pose.x, began_y=pose.y, began_driven_m=detour.driven_m
-        )
-    elif _is_round(detour, pose):
-        detour = replace(
-            detour,
-            side=_other(detour.side),
-            began_driven_m=detour.driven_m,
-            wall_rad=bearing,
-            rounds=detour.rounds + 1,
-        )
+    elif not is_held and detour.ends_at(to_goal, free):
+        return None, detour.ended()
+    else:
+        detour = detour.on_a_side_that_leads_on(pose, goal, has_grid=percept.occupancy is not None)
     wall, heading = _along(points, pose, detour.side, detour.wall_rad, room, config)
     if leaving is not None:
         heading = _outwards(leaving, pose)
-    if detour.block is not None and (
-        abs(wrap_angle(heading - detour.block.axis_rad)) > TURNED_BACK_RAD or to_goal > detour.began_m + FARTHER_M
-    ):
-        below = min(to_goal, detour.began_m) - PRESUMED_SHARE * (detour.block.back_m - detour.block.front_m)
-        return None, replace(detour, side=0, ahead=None, block=None, presume_below_m=below)
+    if (kept := detour.given_up(to_goal, heading)) is not None:
+        return None, kept
     if last_rad is not None:
-        turned = turned_towards(last_rad, heading, TURN_SHARE)
-        if _free_m(points, pose, turned, body_radius_m + PASSAGE_M) >= config.look_m:
-            heading = turned
+        heading = _steadied(points, pose, last_rad, heading, body_radius_m + PASSAGE_M, config.look_m)
     gain, detour = config.leave_canyon_gain, replace(detour, wall_rad=wall)
     return Response(SCHEMA, gain * math.cos(heading), gain * math.sin(heading)), detour
+
+
+def _virtual(percept: Percept, goal: tuple[float, float], detour: Detour, config: LeaveCanyonConfig) -> list[Floats]:
+    """Return points on walls that are only thought of, each (n, 2): mouths that are closed, and what is presumed."""
+    closed = [canyon for canyon in percept.canyons if is_closed(canyon, percept.pose, goal, config)]
+    walls = [between(*canyon.mouth) for canyon in closed]
+    return walls if detour.block is None else [*walls, outline(detour.block)]
+
+
+def _steadied(points: Floats, pose: Pose, last_rad: float, heading_rad: float, room_m: float, look_m: float) -> float:
+    """Return the direction of the last cycle turned a little towards the wanted one if that way is free, rad."""
+    turned = turned_towards(last_rad, heading_rad, TURN_SHARE)
+    return turned if _free_m(points, pose, turned, room_m) >= look_m else heading_rad
 
 
 def _free_m(points: Floats, pose: Pose, heading_rad: float, room_m: float) -> float:
@@ -302,26 +228,6 @@ def _open_sides(points: Floats, pose: Pose, way_rad: float, room_m: float) -> li
     across = np.array([way_rad - 0.5 * math.pi * side for side in sides])
     free = free_paths_m(points, pose, across, room_m)
     return [side for side, path in zip(sides, free.tolist(), strict=True) if path >= OPEN_SIDE_M]
-
-
-def _is_round(detour: Detour, pose: Pose) -> bool:
-    """Return whether the robot is back where the detour began, after a long way."""
-    way = detour.driven_m - detour.began_driven_m
-    return way > LOOP_M and math.hypot(pose.x - detour.began_x, pose.y - detour.began_y) < SAME_PLACE_M
-
-
-def _other(side: int) -> Side:
-    return -1 if side == 1 else 1
-
-
-def _began_m(detour: Detour, goal: tuple[float, float]) -> float:
-    """Return the distance of the goal from where the detour began, m."""
-    return math.dist((detour.began_x, detour.began_y), goal)
-
-
-def _needed_m(detour: Detour, to_goal_m: float) -> float:
-    """Return how far the goal's direction must be free: past all of what is only presumed."""
-    return to_goal_m if detour.block is not None else min(to_goal_m, LEAVE_FREE_M)
 
 
 def _begin(

@@ -10,8 +10,9 @@ from behaviors.arbiter import Decision, Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import Zone, avoid_static_obstacle
 from behaviors.follow_valley import AT_GOAL_M, Valley, follow_valley
-from behaviors.leave_canyon import NO_DETOUR, Detour, leave_canyon
+from behaviors.leave_canyon import leave_canyon
 from behaviors.memory.commitment import Commitment
+from behaviors.memory.detour import NO_DETOUR, Detour
 from behaviors.memory.goal_progress import Progress, observe_progress
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.response import Response

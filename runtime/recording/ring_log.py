@@ -170,18 +170,7 @@ def _check_header(
     names: Sequence[str], path: Path, row: int, angles: Sequence[str]
 ) -> tuple[int, int, list[tuple[int, int]]]:
     """Return the columns at which ranges begin and end, and the pair of sensors of each column of half paths."""
-    for mark, what in _SEPARATORS.items():
-        if len(names) == 1 and "theta" in names[0].split(mark):
-            hint = f"separate them by commas, and write decimals with a point; {_FORM}"
-            raise row_error(path, row, f"separates its columns by {what}", hint)
-    if any(names) and all(not name or _is_number(name) for name in names):
-        raise row_error(path, row, "holds numbers where the header belongs", f"write it above them; {_FORM}")
-    for name, times in Counter(names).items():
-        if times > 1:
-            raise row_error(path, row, f"names the column {_shown(name)} {times} times", f"each name once; {_FORM}")
-    for name in REQUIRED:
-        if name not in names:
-            raise row_error(path, row, f"lacks the column {name!r}", _FORM)
+    _check_names(names, path, row)
     lead = [*REQUIRED, RING_YAW] if RING_YAW in names else [*REQUIRED]
     first_cross = next(
         (i for i, name in enumerate(names) if i > len(lead) and name.startswith("x") and name != "x"), len(names)
@@ -195,24 +184,37 @@ def _check_header(
     if count == 0:
         raise row_error(path, row, "has no sensor column", _FORM)
     wanted = [*lead, *(f"r{i:02d}" for i in range(count)), *angles]
-    pairs = []
-    for name in names[first_cross:]:
-        found = _CROSS.fullmatch(name)
-        transmitter, listener = (int(found[1]), int(found[2])) if found else (0, 0)
-        if (
-            transmitter == listener
-            or max(transmitter, listener) >= count
-            or name != cross_column(transmitter, listener)
-        ):
-            hint = (
-                f"half paths come last, x00_01 for that of sensor 0's pulse to sensor 1, of sensors 0 to {count - 1}"
-            )
-            raise row_error(path, row, f"has the column {_shown(name)}", f"{hint}; {_FORM}")
-        pairs.append((transmitter, listener))
+    pairs = [_pair_of(name, count, path, row) for name in names[first_cross:]]
     for i, (name, want) in enumerate(zip(names[:first_cross], wanted, strict=True)):
         if name != want:
             raise row_error(path, row, f"has {_shown(name)} as column {i + 1} where {want!r} belongs", _FORM)
     return len(lead), len(lead) + count, pairs
+
+
+def _check_names(names: Sequence[str], path: Path, row: int) -> None:
+    """Raise an error unless these are names, separated by commas, each once and the required ones among them."""
+    for mark, what in _SEPARATORS.items():
+        if len(names) == 1 and "theta" in names[0].split(mark):
+            hint = f"separate them by commas, and write decimals with a point; {_FORM}"
+            raise row_error(path, row, f"separates its columns by {what}", hint)
+    if any(names) and all(not name or _is_number(name) for name in names):
+        raise row_error(path, row, "holds numbers where the header belongs", f"write it above them; {_FORM}")
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise row_error(path, row, f"names the column {_shown(name)} {times} times", f"each name once; {_FORM}")
+    for name in REQUIRED:
+        if name not in names:
+            raise row_error(path, row, f"lacks the column {name!r}", _FORM)
+
+
+def _pair_of(name: str, count: int, path: Path, row: int) -> tuple[int, int]:
+    """Return the sensors, one of `count` that pings and one that listens, of a column of half paths."""
+    found = _CROSS.fullmatch(name)
+    transmitter, listener = (int(found[1]), int(found[2])) if found else (0, 0)
+    if transmitter == listener or max(transmitter, listener) >= count or name != cross_column(transmitter, listener):
+        hint = f"half paths come last, x00_01 for that of sensor 0's pulse to sensor 1, of sensors 0 to {count - 1}"
+        raise row_error(path, row, f"has the column {_shown(name)}", f"{hint}; {_FORM}")
+    return transmitter, listener
 
 
 def cross_column(transmitter: int, listener: int) -> str:

@@ -12,7 +12,8 @@ import pytest
 from behaviors.arbiter import Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.leave_canyon import NO_DETOUR, SCHEMA, Detour, is_closed, leave_canyon
+from behaviors.leave_canyon import SCHEMA, is_closed, leave_canyon
+from behaviors.memory.detour import NO_DETOUR, Detour
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.surroundings.blocked_ahead import Block
 from config.behaviors import BehaviorsConfig, LeaveCanyonConfig

@@ -231,25 +231,12 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
     near, backward = _near_angles(motion, default)
     echoes = _opened(table, robot, units, list(dict.fromkeys([default, *near])))
     left = list(echoes)
-    if len(left) > 1 and options.heading == "auto" and _is_aimless(table, robot, units, motion):
-        raise RingLogError(
-            "the robot's steps do not follow theta, and the ranges do not show how headings are counted; "
-            f"correct theta, or say {default.options} if {default.words}"
-        )
+    if len(left) > 1 and options.heading == "auto":
+        _check_aim(table, robot, units, motion, default)
     forward = [one for one in near if one not in backward]
     shift = Shift(default, 0, 0.0)
-    if motion.is_related and options.sensor_order != "file":
-        reach = LENGTHS[units.range_]
-        shift = find_shift(table, robot, forward, reach, LENGTHS[units.length] / reach, echoes.values())
-    if shift.surely > SURE:
-        raise RingLogError(f"later echoes fall on earlier ones only if {shift.words(robot.ring)}")
-    if motion.is_related and options.sensor_order == "auto":
-        reach = LENGTHS[units.range_]
-        others = [default, *near]
-        way = max(forward, key=lambda one: float(echoes[one].mean()) if one in echoes else -math.inf)
-        exchange = find_exchange(table, robot, way, reach, LENGTHS[units.length] / reach, others)
-        if exchange is not None and exchange.surely > 0.5 * SURE:
-            raise RingLogError(f"later echoes fall on earlier ones only if {exchange.words(robot.ring, others)}")
+    if motion.is_related:
+        shift = _checked_order(table, robot, options, units, forward, [default, *near], echoes)
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
         doubts = [one for one in left if sureness(echoes[one], echoes[default]) > 0.5 * SURE]
@@ -258,24 +245,61 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
         fits = [default, *doubts]
     else:
         fits = _plainest(fits, default, echoes, backward)
+    shifted = f"{shift.angles.words}, and {shift.words(robot.ring)}" if shift.surely > 0.5 * SURE else ""
+    return _settled(fits, left, backward, options, shifted)
+
+
+def _settled(
+    fits: list[Angles], left: list[Angles], backward: dict[Angles, Angles], options: RingLogOptions, shifted: str
+) -> Angles:
+    """Return the one way that fits; raise an error with those that are left, and a ring that may be `shifted`."""
     is_open = options.heading == options.sensor_order == "auto"
     is_mirrored = is_open and any(HEADINGS[one.heading].hand < 0 for one in fits)
     is_backward = len(fits) == 1 and fits[0] in backward and options.heading == "auto"
     if len(fits) == 1 and not (is_mirrored or is_backward):
         return fits[0]
     names = _names(fits or left, is_mirrored=is_mirrored, is_backward=is_backward)
-    if shift.surely > 0.5 * SURE:
-        names.insert(0, f"{shift.angles.words}, and {shift.words(robot.ring)}")
+    if shifted:
+        names.insert(0, shifted)
     raise RingLogError(
         f"the robot's motion and the ranges leave open how headings are counted: {', or '.join(names)}"
     )
 
 
-def _is_aimless(table: Table, robot: RobotConfig, units: Units, motion: Motion) -> bool:
-    """Return whether a robot that can drive only along its heading drove elsewhere, and farther than its radius."""
+def _checked_order(
+    table: Table,
+    robot: RobotConfig,
+    options: RingLogOptions,
+    units: Units,
+    forward: list[Angles],
+    ways: list[Angles],
+    echoes: dict[Angles, Floats],
+) -> Shift:
+    """Return how far round the ring the sensors may be shifted; raise an error if their order is surely another."""
+    reach = LENGTHS[units.range_]
+    scale = LENGTHS[units.length] / reach
+    shift = Shift(ways[0], 0, 0.0)
+    if options.sensor_order != "file":
+        shift = find_shift(table, robot, forward, reach, scale, echoes.values())
+    if shift.surely > SURE:
+        raise RingLogError(f"later echoes fall on earlier ones only if {shift.words(robot.ring)}")
+    if options.sensor_order == "auto":
+        way = max(forward, key=lambda one: float(echoes[one].mean()) if one in echoes else -math.inf)
+        exchange = find_exchange(table, robot, way, reach, scale, ways)
+        if exchange is not None and exchange.surely > 0.5 * SURE:
+            raise RingLogError(f"later echoes fall on earlier ones only if {exchange.words(robot.ring, ways)}")
+    return shift
+
+
+def _check_aim(table: Table, robot: RobotConfig, units: Units, motion: Motion, default: Angles) -> None:
+    """Raise an error if a robot that drives only along its heading went elsewhere, and farther than its radius."""
     far_m = LENGTHS[units.length] * float(np.ptp(table.pose[:, :2], axis=0).max())
     is_unrelated = motion.is_known and not motion.is_related
-    return is_unrelated and not robot.body.synchro and far_m > robot.body.radius_m
+    if is_unrelated and not robot.body.synchro and far_m > robot.body.radius_m:
+        raise RingLogError(
+            "the robot's steps do not follow theta, and the ranges do not show how headings are counted; "
+            f"correct theta, or say {default.options} if {default.words}"
+        )
 
 
 def _check_turned(
