@@ -22,13 +22,15 @@ from perception.bayes.memory.parameters import (
     CERTAIN_PROBABILITY,
     CIRCLE_WALL_FRONT,
     CONFIRMED_SIDES,
+    IN_WALL_NAT,
     ROOM_MARGIN_M,
     SILENCE_MEMORY,
     TRUSTED_M,
 )
+from perception.bayes.memory.polygon_parameters import POLYGON_WALL_LENGTH_RADII
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
-from perception.bayes.memory.state import ESTABLISHED, CircleTrack, CircleTracks, StateRecord
-from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, MAX_WALLS, RoomCorner, WallMap
+from perception.bayes.memory.state import ESTABLISHED, CircleTrack, CircleTracks, PolygonTrack, StateRecord
+from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, MAX_WALLS, RoomCorner, Wall, WallMap
 from perception.bayes.tracks.naming import best_other_lead
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
@@ -135,6 +137,49 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
         if room.edges[c].is_used == KEPT:
             best = max(best, point_evidence(room.edges[c], q, p, level))
     return best
+
+
+@kernel
+def is_on_long_walls(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
+    """Return whether mapped walls that are longer than a polygon's sides explain the job's readings better than it.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The track, with its evidence.
+    """
+    outline, room = p[0].polygons[track.model], s[0].room
+    longest = outline.inner_radius_m
+    for i in range(outline.side_count):
+        longest = max(longest, 0.5 * outline.sides[i].length)
+    length_min = POLYGON_WALL_LENGTH_RADII * longest
+    edges = edges_answer(room)
+    evidence = 0.0
+    for j in range(s[0].job.reading_count):
+        q = s[0].job_readings[j]
+        level = level_of(p, s[0].noise_level, q.range_m)
+        best = float(p[0].table[level, TABLE_BINS - 1])
+        for k in range(MAX_WALLS):
+            wall = room.walls[k]
+            if wall.weight > 0.0 and not is_crossed(q):
+                kind, expected, along, _ = contact(wall, q, p)
+                answers = kind != NOWHERE and (kind != BEAM_EDGE or edges)
+                if answers and is_on_long_span(wall, along, length_min):
+                    best = max(best, log_likelihood(p, level, q.range_m - expected))
+        evidence += best
+    return evidence - track.log_likelihood_ratio > IN_WALL_NAT
+
+
+@kernel
+def is_on_long_span(wall: Wall, along: float, length_min: float) -> bool:
+    """Return whether a position lies on a span of a wall that is at least so long, m."""
+    for k in range(wall.span_count):
+        span = wall.spans[k]
+        if span.low <= along <= span.high and span.high - span.low >= length_min:
+            return True
+    return False
 
 
 @kernel

@@ -68,6 +68,7 @@ from perception.bayes.polygons.pose_restarts import (
     next_restart,
 )
 from perception.bayes.polygons.posterior import advance_lattice, begin_lattice, copy_triangle
+from perception.bayes.tracks.model_check import is_on_long_walls
 from perception.bayes.tracks.naming import is_sure_polygon
 from perception.bayes.tracks.track_selection import choose_polygon
 from perception.kernel import kernel
@@ -198,7 +199,7 @@ def judge_polygon(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: in
     track.hits = score.hits
     track.near = score.near
     track.sure_hits = score.sure_hits
-    if is_part_of_wall(s, p, track) and drop_track(track):
+    if (is_part_of_wall(s, p, track) or is_on_long_walls(s, p, track)) and drop_track(track):
         return
     compare_circles(s, tracks, p, track)
     update_polygon_status(s, p, track)

@@ -14,6 +14,7 @@ from perception.bayes.memory.wall_records import Wall
 from perception.bayes.tracks import model_check
 from tests import naive_bayes, naive_naming, naive_walls
 from tests.naive_walls import Array
+from tests.perception.bayes import box_readings
 from tests.perception.bayes.random_tracks import (
     COSINES,
     P,
@@ -182,3 +183,34 @@ def test_no_model_stands_in_a_wall() -> None:
         span.chi2 = chi2
         model_check.check_model(memory.s, P, track, 3)
         assert (track.room_lead >= 0.0) == is_cut
+
+
+@pytest.mark.parametrize(
+    ("ends", "short_m", "lead", "is_wall"),
+    [
+        ((-1.9, 1.9), 0.0, 7.0, True),
+        ((-1.9, 1.9), 0.0, 9.0, False),
+        ((-0.4, 0.4), 0.0, 0.0, False),
+        ((-1.9, 1.9), 0.1, 0.0, False),
+    ],
+    ids=["the wall explains them as well", "the box is far better", "its own side", "the box stands before it"],
+)
+def test_a_long_wall_that_explains_a_polygons_readings_as_well_is_in_its_place(
+    ends: tuple[float, float], short_m: float, lead: float, is_wall: bool
+) -> None:
+    """Also the readings that a beam's edge gets from it: a box has corners that would answer there."""
+    memory, room = new_room()
+    memory.state["noise_level"] = box_readings.LEVEL
+    room.edge_echoes = 100.0
+    place_wall(room.walls[0], np.zeros(2), 0.5 * math.pi, 1.0)
+    fill(memory, room.walls[0], *ends)
+    half, slant = float(S.half_angle_rad), math.radians(40.0)
+    w = [(0.04 * j - 0.2, 0.0, 0.0, 1.0, 1.0 - short_m) for j in range(10)]
+    reach = 1.0 / math.cos(slant - half)
+    w += [(0.04 * j - 0.8, 0.0, math.sin(slant), math.cos(slant), reach - short_m) for j in range(10)]
+    box_readings.enter_job(memory, np.array(w), box_readings.LEVEL)
+    track = memory.s[0].polygons[0]
+    track.status = ESTABLISHED
+    most = naive_bayes.evidence(noises()[box_readings.LEVEL], np.ones(1), np.zeros(1))[0]
+    track.log_likelihood_ratio = 20.0 * most + lead
+    assert model_check.is_on_long_walls(memory.s, box_readings.P, track) == is_wall
