@@ -17,6 +17,9 @@ class MapMoves(NamedTuple):
     middles: Floats
     """x, y of the middle of each map's way before it, m, shape (n, 2)."""
 
+    is_first: bool = False
+    """Whether all before was remembered where odometry had it, which is refuted now."""
+
     def of(self, submaps: Ints) -> Floats:
         """Return the motions of maps, shape (k, 3); the one that goes on moves with the last that has ended."""
         return np.asarray(self.motions[np.minimum(submaps, len(self.motions) - 1)])

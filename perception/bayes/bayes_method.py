@@ -352,6 +352,8 @@ class BayesPerception:
 
     def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
         """Note the number of the map of the way that goes on, and move what the robot left behind in each."""
+        if moves is not None and moves.is_first:
+            self.memory.clear_walls()  # summed over a way that odometry had wrong, and soon heard again
         if self._archive.follow_maps(submap, moves):
             self._objects = self._archived = self._archived_labels = None
 

@@ -334,6 +334,11 @@ class Memory:
         """The tracks of polygons as numpy takes them, shape (MAX_POLYGONS,)."""
         return self.state["polygons"][0]  # type: ignore[no-any-return]  # numpy types a field as Any
 
+    def clear_walls(self) -> None:
+        """Clear walls, corners and lines, and the readings from which new ones come."""
+        for part in ("room", "lines"):
+            self.state[part].view(np.uint8)[...] = 0
+
     def clear(self) -> None:
         """Clear the memory, except the numbers assigned so far."""
         kept = {name: self.state[name].copy() for name in ("sensor_count", "objects_numbered", "segments_numbered")}

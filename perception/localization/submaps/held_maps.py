@@ -77,9 +77,10 @@ class HeldMaps:
         x, y, turns = (stand - held).T
         if not (np.hypot(x, y) + HELD_REACH_M * np.abs(turns) > HELD_MOVED_M).any():
             return None
+        is_first = not self.is_moved
         self.archived_rows, self.is_moved = stand, True
         self._from_map[:] = *shift, turn
         c, s = np.cos(turns), np.sin(turns)
         to_x = stand[:, 0] - c * held[:, 0] + s * held[:, 1]
         to_y = stand[:, 1] - s * held[:, 0] - c * held[:, 1]
-        return MapMoves(np.column_stack([to_x, to_y, turns]), held[:, :2])
+        return MapMoves(np.column_stack([to_x, to_y, turns]), held[:, :2], is_first)

@@ -42,3 +42,13 @@ def test_kernels_and_numpy_see_the_same_memory() -> None:
     memory.tracks[2].number = 8
     memory.s[0].ring_x = 2.5
     assert (memory.polygons["x"][3], memory.circles["number"][2], memory.state["ring_x"][0]) == (1.5, 8, 2.5)
+
+
+def test_walls_are_cleared_alone() -> None:
+    memory, new = Memory(24, 5), Memory(24, 5)
+    memory.state["room"]["walls"]["weight"] = memory.state["lines"]["echoes"] = 3.0
+    memory.state["room"]["remembered_count"] = memory.state["segments_held"] = 9
+    memory.clear_walls()
+    assert memory.state["segments_held"][0] == 9
+    memory.state["segments_held"] = 0
+    assert memory.state.tobytes() == new.state.tobytes()

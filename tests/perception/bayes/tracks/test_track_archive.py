@@ -188,8 +188,11 @@ def test_what_was_left_behind_moves_with_its_map_of_the_way(there: tuple[BayesPe
     rows = archive.circles.held()
     rows["submap"] = np.arange(len(rows)) % 2
     moved = {int(row["number"]) for row in rows if row["submap"] == 1}
-    perception.follow_maps(3, MapMoves(np.array([[0.0, 0.0, 0.0], [0.0, 0.25, 0.0]]), np.zeros((2, 2))))
+    perception.memory.state["room"]["remembered_count"] = 1
+    moves = MapMoves(np.array([[0.0, 0.0, 0.0], [0.0, 0.25, 0.0]]), np.zeros((2, 2)))
+    perception.follow_maps(3, moves)
     assert archive.submap == 3
+    assert perception.memory.state["room"]["remembered_count"] == 1
     for seen in perception.archived_objects():
         off = seen.y - before[seen.number].y
         assert off == pytest.approx(0.25 if seen.number in moved else 0.0), seen
@@ -198,3 +201,5 @@ def test_what_was_left_behind_moves_with_its_map_of_the_way(there: tuple[BayesPe
     assert row is not None
     assert number in archive.circles.near(float(row["x"][0]), float(row["y"][0]), 0.01)
     assert len(drums) > len(moved) > 0
+    perception.follow_maps(3, moves._replace(is_first=True))
+    assert perception.memory.state["room"]["remembered_count"] == 0

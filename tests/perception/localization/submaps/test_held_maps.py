@@ -40,6 +40,7 @@ def test_what_lies_behind_moves_and_what_is_near_does_not() -> None:
     known[:3] += (0.6, -0.3, 0.1)
     moves = maps.move_to(known, WAY)
     assert moves is not None
+    assert moves.is_first
     assert maps.is_moved
     near, behind = (np.abs(maps.archived_rows - before)[which] for which in (slice(-3, None), slice(3)))
     assert near.max() < 0.15 < 0.2 < behind[:, :2].max()
@@ -52,6 +53,10 @@ def test_what_lies_behind_moves_and_what_is_near_does_not() -> None:
     maps.append(known[-1])
     assert maps.archived_rows[-1].tolist() == pytest.approx(maps.archived_rows[-2].tolist())
     assert moves.middles.tolist() == before[:, :2].tolist()
+    known[0] += 0.5
+    again = maps.move_to(np.vstack([known, known[-1:]]), np.append(WAY, 36.0))
+    assert again is not None
+    assert not again.is_first
 
 
 def test_a_turn_counts_by_what_it_moves() -> None:
