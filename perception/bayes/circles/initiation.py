@@ -229,6 +229,42 @@ def initiate_circle(
 
 
 @kernel
+def best_circle(
+    s: StateRecord,
+    p: SettingsRecord,
+    kind: int,
+    n: int,
+    at: tuple[float, float, float],
+    bearing: tuple[float, float],
+    own: float,
+) -> tuple[int, float, float, float]:
+    """Return the circle that explains the readings best, its evidence (nat) and its place (m).
+
+    Parameters
+    ----------
+    s, p, kind
+        As for `initiate_circle`.
+    n : int
+        Relevant readings in the scratch.
+    at : tuple of float
+        The place (m) of a circle of `kind`, and its radius.
+    bearing : tuple of float
+        Mean direction from the sensors, as of `mean_bearing`.
+    own : float
+        Its evidence, nat; another one must lead it.
+    """
+    fit = s[0].scratch.circle_fit
+    chosen, best, best_x, best_y = kind, own, at[0], at[1]
+    for k in range(p[0].circle_count):
+        if k != kind:
+            prior = p[0].model_prior_nat if k < p[0].model_count else 0.0
+            v = fit_other_circle(s, p, n, at, bearing, p[0].circles[k].radius_m, INITIATION_STEPS) + prior
+            if v > best + SWITCH_LEAD_NAT:
+                chosen, best, best_x, best_y = k, v, fit.x, fit.y
+    return chosen, best, best_x, best_y
+
+
+@kernel
 def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, nx: float, ny: float) -> int:
     """Start a track at the scratch's hypothesis if the readings support it; return which of the outcomes it is.
 
@@ -283,20 +319,7 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             enter_line(s, scratch.line_fit, x, y, line)
         return UNSUPPORTED
-    chosen = kind
-    best = own
-    best_x = x
-    best_y = y
-    for k in range(p[0].circle_count):
-        if k != kind:
-            v = fit_other_circle(s, p, n, (x, y, radius), bearing, p[0].circles[k].radius_m, INITIATION_STEPS) + (
-                prior if k < p[0].model_count else 0.0
-            )
-            if v > best + SWITCH_LEAD_NAT:
-                best = v
-                chosen = k
-                best_x = fit.x
-                best_y = fit.y
+    chosen, best, best_x, best_y = best_circle(s, p, kind, n, (x, y, radius), bearing, own)
     if chosen == kind and llr < p[0].unknown_nat * near:
         return UNSUPPORTED
     if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:

@@ -12,7 +12,7 @@ import math
 from perception.bayes.inference.cross_path import is_crossed, over_line
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.range_fit import FAR
-from perception.bayes.memory.elements import MAX_LINES
+from perception.bayes.memory.elements import MAX_LINES, Reading
 from perception.bayes.memory.parameters import (
     CIRCLE_WALL_BEHIND,
     CIRCLE_WALL_BEYOND_M,
@@ -182,6 +182,42 @@ def correct_line(line: Line, px: float, py: float, e: float, var: float) -> None
 
 
 @kernel
+def explain(s: StateRecord, i: int, k: int) -> None:
+    """Let line `k` explain fired reading `i`, if nothing does yet."""
+    explained_by = s[0].scratch.explained_by
+    if explained_by[i] == UNEXPLAINED:
+        explained_by[i] = ON_LINE - k
+
+
+@kernel
+def at_beam_edge(
+    line: Line, q: Reading, p: SettingsRecord, dot: float, foot: float, expected: float
+) -> tuple[float, float]:
+    """Return the range of a slanting wall, of which a cone's nearest point lies on the beam's edge, and its place.
+
+    Parameters
+    ----------
+    line, q, p
+        The wall's line, the reading and the settings.
+    dot : float
+        Cosine of the angle between the line's normal and the sensor's axis.
+    foot, expected : float
+        Place of the sensor's foot along the line, and its distance, m.
+    """
+    off = math.acos(min(1.0, dot)) - p[0].half_angle_rad
+    side = 1.0 if line.normal_x * q.axis_y - line.normal_y * q.axis_x < 0.0 else -1.0
+    return expected / math.cos(off), foot - expected * math.tan(off) * side
+
+
+@kernel
+def goes_through(line: Line, q: Reading, p: SettingsRecord, dot: float, foot: float, error: float) -> bool:
+    """Return whether a range that is longer by `error` (m) goes through a line; arguments as of `at_beam_edge`."""
+    if is_crossed(q) or error <= p[0].gate_m or dot < p[0].cos_must_answer:
+        return False
+    return reaches(line, foot, -LINE_SILENCE_WITHIN_M)
+
+
+@kernel
 def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
     """Associate fired readings with lines, correct the lines, and weaken those that a range goes through.
 
@@ -218,29 +254,23 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
             if dot >= p[0].cos_may_answer:
                 e = r - expected
                 if abs(e) < tight and reaches(line, foot, LINE_GROW_M):
-                    if scratch.explained_by[i] == UNEXPLAINED and associates:
-                        scratch.explained_by[i] = ON_LINE - k
+                    if associates:
+                        explain(s, i, k)
                     line.low = min(line.low, foot)
                     line.high = max(line.high, foot)
                     line.log_odds = min(line.log_odds + LINE_ECHO_LOG_ODDS, LINE_LOG_ODDS_MAX)
                     line.echoes += 1.0
                     correct_line(line, x - line.origin_x, y - line.origin_y, e, var)
-                elif is_crossed(q):
-                    continue
-                elif e > p[0].gate_m and dot >= p[0].cos_must_answer and reaches(line, foot, -LINE_SILENCE_WITHIN_M):
+                elif goes_through(line, q, p, dot, foot, e):
                     line.log_odds -= 1.0
                     if line.log_odds < 0.0:
                         line.echoes = 0.0
                         break
             elif r < FAR and not is_crossed(q):
-                # A cone's nearest point of a slanting wall lies on the beam's edge.
-                off = math.acos(min(1.0, dot)) - p[0].half_angle_rad
-                side = 1.0 if line.normal_x * q.axis_y - line.normal_y * q.axis_x < 0.0 else -1.0
-                at = foot - expected * math.tan(off) * side
-                near = abs(r - expected / math.cos(off)) < tight + LINE_EDGE_SLACK_M
-                if near and reaches(line, at, LINE_EDGE_GROW_M):
-                    if scratch.explained_by[i] == UNEXPLAINED and associates:
-                        scratch.explained_by[i] = ON_LINE - k
+                answer, at = at_beam_edge(line, q, p, dot, foot, expected)
+                if abs(r - answer) < tight + LINE_EDGE_SLACK_M and reaches(line, at, LINE_EDGE_GROW_M):
+                    if associates:
+                        explain(s, i, k)
                     if dot >= p[0].cos_half_angle - LINE_EDGE_COS:
                         line.low = min(line.low, at)
                         line.high = max(line.high, at)

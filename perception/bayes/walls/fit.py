@@ -154,14 +154,47 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
 
 
 @kernel
+def passes_of_a_gap(room: WallMap, wall: Wall, b: int) -> float:
+    """Return the weight of the ranges that passed a bin without a wall, −1 where there is one, or at the end."""
+    if b == WALL_BINS:
+        return -1.0
+    of = wall.bins[b]
+    if not is_covered(of) or (edges_answer(room) and of.weight < ROUGH_WEIGHT_MIN):
+        return of.passes
+    return of.weight if is_stray(room, wall, b) else -1.0
+
+
+@kernel
+def opens(width: float, passes: float, gap_max: float) -> bool:
+    """Return whether a gap of so many m, which so many ranges passed, ends a span."""
+    return width > gap_max or passes >= CRACK_PASSES_MIN or (width >= OPENING_MIN_M and passes >= OPENING_PASSES_MIN)
+
+
+@kernel
+def enter_span(wall: Wall, low: int, high: int, reach: float) -> None:
+    """Add the span between two bins, both included, if it fits, without what its ends explain better."""
+    if wall.span_count >= SPANS_MAX:
+        return
+    for side in range(1, -2, -2):  # a literal in the call would be a type of its own, compiled by itself
+        end = trimmed_end(wall, low, high, side, reach)
+        low = low if side > 0 else end
+        high = end if side > 0 else high
+    span = wall.spans[wall.span_count]
+    span.first_bin = low
+    span.end_bin = high + 1
+    span.low = (low - HALF) * WALL_BIN_M
+    span.high = (high + 1 - HALF) * WALL_BIN_M
+    wall.span_count += 1
+
+
+@kernel
 def find_spans(room: WallMap, wall: Wall) -> None:
     """Find the spans of a wall: runs of covered bins without a long gap, and without passes in a gap.
 
     What the ends of a run explain better than the line is left out.
     """
     wall.span_count = 0
-    is_rough = edges_answer(room)
-    gap_max = ROUGH_GAP_MAX_M if is_rough else GAP_MAX_M
+    gap_max = ROUGH_GAP_MAX_M if edges_answer(room) else GAP_MAX_M
     reach = EDGE_REACH_M + TRIM_REACH_SLACK_M if are_mirrors(room) else math.inf
     first = -1
     last = -1
@@ -169,36 +202,19 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     weight = 0.0  # of the run since its last long gap, …
     before = -1  # … and the last bin before that
     for b in range(WALL_BINS + 1):
-        is_end = b == WALL_BINS
-        if not is_end:
-            of = wall.bins[b]
-            if not is_covered(of) or (is_rough and of.weight < ROUGH_WEIGHT_MIN):
-                passes += of.passes
-                continue
-            if is_stray(room, wall, b):
-                passes += of.weight
-                continue
+        passed = passes_of_a_gap(room, wall, b)
+        if passed >= 0.0:
+            passes += passed
+            continue
         width = (b - last - 1) * WALL_BIN_M
-        is_opening = width > gap_max or passes >= CRACK_PASSES_MIN
-        is_opening = is_opening or (width >= OPENING_MIN_M and passes >= OPENING_PASSES_MIN)
-        is_gap = not is_end and width >= LONE_GAP_M
+        is_opening = b == WALL_BINS or opens(width, passes, gap_max)
+        is_gap = width >= LONE_GAP_M
         if is_gap and not is_opening and before < 0 and weight <= LONE_WEIGHT_MAX:
             first = b
-        if (is_end or is_opening) and before >= 0 and weight <= LONE_WEIGHT_MAX:
+        if is_opening and before >= 0 and weight <= LONE_WEIGHT_MAX:
             last = before
-        if first >= 0 and (is_end or is_opening) and wall.span_count < SPANS_MAX:
-            low = first
-            high = last
-            for side in range(1, -2, -2):  # a literal in the call would be a type of its own, compiled by itself
-                end = trimmed_end(wall, low, high, side, reach)
-                low = low if side > 0 else end
-                high = end if side > 0 else high
-            span = wall.spans[wall.span_count]
-            span.first_bin = low
-            span.end_bin = high + 1
-            span.low = (low - HALF) * WALL_BIN_M
-            span.high = (high + 1 - HALF) * WALL_BIN_M
-            wall.span_count += 1
+        if is_opening and first >= 0:
+            enter_span(wall, first, last, reach)
         if first < 0 or is_opening:
             first = b
             weight = 0.0

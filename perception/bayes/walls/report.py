@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import MAX_WALLS
 from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
-from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
-from perception.bayes.walls.crossing import CORNER_BEYOND_M, CORNER_INSIDE_M
 from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.walls.numbers import SPAN_MIN_M
+from perception.bayes.walls.reported_points import EVIDENCE_MAX_NAT, end_at_edges, reach_corners
 from perception.bayes.walls.straight import TINY_M, Straight, kept_bins, straight, straighten
 from perception.kernel import Floats
 from perception.records import Record, Structured
@@ -26,25 +25,19 @@ stands, thousands of their tangents are tried. With 14 for the others, not a met
 false walls across a real corridor."""
 SPAN_WEIGHT_MIN: Final = 3.0
 """Least weight of a span that is reported, …"""
+HEAVIEST_SPAN_MIN: Final = 12.0
+"""… and weight of the first wall's heaviest one."""
 REPORTED_MISFIT_MAX: Final = 2.5
 LIGHT_MISFIT_MAX: Final = 2.0
 LIGHT_WEIGHT: Final = 20.0
 """Greatest χ² of a wall's line for each degree of freedom, and that of a wall of less weight, which may be the side
 of a barrel that was heard from a few places."""
-CORNER_NEAR_M: Final = 1.0
-"""Distance from the ends of both walls within which a corner need not be heard …"""
-DOORWAY_MIN_M: Final = 1.05
-"""A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
-CORNER_PASSED_SHARE: Final = 0.2
-"""… if no more than this share of the ranges towards it went on."""
-HEAVIEST_SPAN_MIN: Final = 12.0
-"""… and weight of the first wall's heaviest one."""
 TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
 """Log prior odds of a line that passed the tests, before its evidence."""
 PROVEN_WEIGHT_MIN: Final = 6.0
-"""… of a wall that a corner proves …"""
+"""Least weight of a span of a wall that a corner proves, …"""
 SPAN_DENSITY: Final = 4.0
 """… and least weight for each metre."""
 PROOF_ECHOES: Final = 5.0
@@ -52,33 +45,10 @@ PROOF_LEAD: Final = 3.0
 """Echoes of a corner that proves its walls, and so many times its passes; …"""
 PROOF_SINE: Final = 0.8
 """… least sine of the angle between them: a line across a corner meets its walls at half of theirs."""
-EDGE_SIGMA_MAX_M: Final = 0.05
-"""Greatest uncertainty of a sure edge."""
-EDGE_LEAD_MIN: Final = 2.0
-"""Least lead of echoes over passes, of an edge where a sure wall ends."""
-EDGE_NEAR_M: Final = 0.18
-"""Ranges that passed so near the end of a span, three bins, may have passed beyond the edge."""
-CORNER_MET_M: Final = 0.3
-"""A corner is reported if both walls come so near it, …"""
-ALONE_ECHOES: Final = 8.0
-ALONE_EDGE_ECHOES: Final = 5.0
-ROUGH_LEAD: Final = 5.0
-"""… or if so many echoes come from it, and so many times its passes, whatever is known of its walls: from an inside
-corner between mirrors, from afar, or from an edge, of which between mirrors fewer are enough: it is heard from near
-alone. Where slanting walls answer, some of them may be a wall's."""
-POINT_PRIOR_NAT: Final = 0.0
-POINT_ECHO_NAT: Final = 1.0
-"""Log prior odds of a corner where walls end, and evidence of each echo."""
-ONE_WAY_SIGMA_M: Final = 0.1
-ONE_WAY_NAT_MAX: Final = 1.0
-"""An edge that its own echoes place no better than this along some axis was heard from one direction: so the wall
-answers where it goes on. In the rooms of `bench standing` four of seven such edges were true."""
 THROUGH: Final = 0.8
 """A wall this near to the middle of a named object, as a share of its radius, would go through it."""
 SIDE_M: Final = 0.08
 """A wall no longer than an object is wide, this near to touching it, is the object's side."""
-EVIDENCE_MAX_NAT: Final = 12.0
-"""Greatest evidence that is believed: readings are not independent."""
 
 
 class WallSegment(Record):
@@ -270,121 +240,6 @@ def kept_spans(spans: Structured, kept: NDArray[np.bool_], numbers: Structured) 
             spans["number"][k] = np.setdiff1d(numbers[first:end], spans["number"]).max(initial=0)
         are_kept[k] = kept[first:end].any() and spans["number"][k] > 0
     return are_kept
-
-
-def _is_proven(corner: np.void, passes: float, *, are_mirrors: bool) -> bool:
-    """Return whether its echoes from afar prove a corner, whatever is known of its walls."""
-    far = float(corner["far_echoes"])
-    lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
-    return far >= ALONE_ECHOES and far > lead * passes and bool(corner["is_edge"] != are_mirrors)
-
-
-def _extend(owners: list[Straight], places: list[tuple[float, float, tuple[int, int]]], *, is_reached: bool) -> bool:
-    """Move the ends of walls to their corner if it `is_reached` from near it; return whether all end there."""
-    are_met = True
-    for owner, (along, gap, at) in zip(owners, places, strict=True):
-        end = owner.ends[at]
-        if is_reached and -CORNER_INSIDE_M < gap < CORNER_BEYOND_M and not owner.is_passed(along, end):
-            owner.ends[at] = along
-        are_met = are_met and abs(owner.ends[at] - along) < CORNER_MET_M
-    return are_met
-
-
-def reach_corners(walls: dict[int, Straight], corners: Structured, are_mirrors: bool) -> list[tuple[float, ...]]:
-    """Move the ends of walls to the corners in which they end, unless ranges passed there.
-
-    A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
-    an inside corner answers from afar, and elsewhere only an edge: that one is sure whatever is known of its walls.
-
-    Parameters
-    ----------
-    walls : dict of Straight
-        The walls by their number; their ends are updated.
-    corners : (n,) record of `RoomCorner`
-        All corners.
-    are_mirrors : bool
-        Whether the walls are known to be mirrors.
-
-    Returns
-    -------
-    list of tuple
-        The corners that are sure, as `CornerPoint` has them.
-    """
-    found = []
-    for corner in corners[corners["is_used"] == 1]:
-        x, y, echoes, passes, ended = (float(corner[name]) for name in ("x", "y", "echoes", "passes", "ended"))
-        owners = [walls[number] for number in (int(corner["first"]), int(corner["second"])) if number in walls]
-        places = [owner.beyond(x, y) for owner in owners]
-        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
-        is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
-        is_near = is_near and passes < CORNER_PASSED_SHARE * ended
-        is_met = _extend(owners, places, is_reached=is_heard or is_near) and len(owners) == 2
-        # Ranges that end at both walls speak for their corner, whether it answers or not.
-        signs = max(echoes, CORNER_PASSED_SHARE * ended)
-        is_kept = corner["is_kept"] == 1 and signs > passes
-        is_proven = _is_proven(corner, passes, are_mirrors=are_mirrors)
-        if is_kept or is_proven or (is_met and (is_heard or is_near)):
-            found.append(_point(corner, signs if is_kept or (is_met and is_near) else echoes))
-    return found
-
-
-def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: bool) -> list[tuple[float, ...]]:
-    """Move the ends of walls to the edges that are heard there.
-
-    Parameters
-    ----------
-    walls : dict of Straight
-        The walls by their number; their ends are updated.
-    edges : (n,) record of `RoomCorner`
-        All edges.
-    are_mirrors : bool
-        Whether the walls are known to be mirrors; an edge is heard from near then.
-
-    Returns
-    -------
-    list of tuple
-        The edges that are sure, as `CornerPoint` has them.
-    """
-    found = []
-    for edge in edges[edges["is_used"] == 1]:
-        echoes, passes, owner = float(edge["echoes"]), float(edge["passes"]), walls.get(int(edge["first"]))
-        if are_mirrors and edge["is_edge"] == 1:
-            echoes -= float(edge["far_echoes"])
-        variance = float(edge["covariance_xx"] + edge["covariance_yy"])
-        is_kept = bool(edge["is_kept"] == 1 and edge["echoes"] > passes)
-        if not is_kept and (echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2):
-            continue
-        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ALONE_ECHOES
-        is_sure = is_kept or (echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes)
-        if owner is not None:
-            along, side = owner.along(float(edge["x"]), float(edge["y"])), int(edge["second"])
-            reach = EDGE_SAME_M if edge["is_edge"] == 1 else DOORWAY_MIN_M
-            beyond = (along - owner.ends[:, side]) * (2 * side - 1)
-            span = int(np.abs(beyond).argmin())
-            is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)
-            is_near = abs(beyond[span]) < EDGE_NEAR_M
-            is_end = echoes >= EDGE_ECHOES_MIN or is_near
-            if is_own and is_end and (is_near or not owner.is_passed(along, owner.ends[span, side])):
-                owner.ends[span, side] = along
-                is_sure = True
-        if is_sure:
-            found.append(_point(edge, float(edge["echoes"])))
-    return found
-
-
-def is_one_way(heard: Structured) -> bool:
-    """Return whether a point's echoes place it along one direction only; they are a record of `PointInformation`."""
-    xx, xy, yy = (float(heard[name]) for name in ("xx", "xy", "yy"))
-    return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy) < 1.0 / ONE_WAY_SIGMA_M**2
-
-
-def _point(corner: Structured, signs: float) -> tuple[float, ...]:
-    """Return a corner as `CornerPoint` has it; `signs` of it, as an echo is one, against the ranges that passed."""
-    log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (signs - float(corner["passes"]))
-    place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))
-    greatest = ONE_WAY_NAT_MAX if corner["is_edge"] == 1 and is_one_way(corner["heard"]) else EVIDENCE_MAX_NAT
-    clipped = min(max(log_odds, -EVIDENCE_MAX_NAT), greatest)
-    return (*place, int(corner["is_edge"]), float(corner["echoes"]), clipped)
 
 
 def wall_ends(memory: Memory) -> Floats:

@@ -40,7 +40,7 @@ from perception.bayes.walls.contact import (
     wall_point,
 )
 from perception.bayes.walls.fit import OFFSET_INFORMATION, SLOPE_SIGMA
-from perception.kernel import kernel
+from perception.kernel import Floats, kernel
 
 REMEMBERED_SPACING_M: Final = 0.08
 """Least distance between the remembered readings of a sensor."""
@@ -188,6 +188,12 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
         line.variance_offset = s2 / det
         line.covariance = -s1 / det
         line.variance_slope = s0 / det
+    stand_by_what_is_forgotten(wall, evidence)
+
+
+@kernel
+def stand_by_what_is_forgotten(wall: Wall, evidence: Floats) -> None:
+    """Let the bins speak where no reading is remembered."""
     for b in range(WALL_BINS):
         if evidence[b] == 0.0 and wall.bins[b].is_held == 1 and is_covered(wall.bins[b]):
             evidence[b] = FORGOTTEN_NAT

@@ -6,13 +6,13 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
+from perception.localization.known_room.mirror_points import expect_specular
 from perception.localization.known_room.mixed_reflection import Shares, mixed_ratio, range_variance
 from perception.localization.known_room.pose_particles import HypothesesRecord, Particle
 from perception.localization.known_room.surroundings import (
     Expected,
     Surroundings,
     expect_cone,
-    expect_specular,
     look_around,
 )
 from perception.records import Records

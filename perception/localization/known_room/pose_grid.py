@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from perception.bounds import CONSTANT, COUNT, PLACE, SHARE, Bound, bounds, up_to
 from perception.kernel import Floats, kernel
+from perception.localization.known_room.mirror_points import expect_specular
 from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
 from perception.localization.known_room.pose_starts import PROFILES_MAX, STARTS_MAX, Starts, offer
-from perception.localization.known_room.surroundings import Surroundings, expect_cone, expect_specular, look_around
+from perception.localization.known_room.surroundings import Surroundings, expect_cone, look_around
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room

@@ -41,6 +41,11 @@ class EscapingConsole(Console):
             file=file, stderr=stderr, soft_wrap=soft_wrap, highlight=highlight, markup=False, emoji=False
         )  # fmt: skip
 
+    @property
+    def can_draw(self) -> bool:
+        """Whether a view can be drawn on it: a terminal that moves its cursor."""
+        return self.is_terminal and not self.is_dumb_terminal
+
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401 - as rich's
         """Print as rich does, but no column of a table narrower than its longest word: rich would cut numbers.
 

@@ -252,7 +252,7 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
     from runtime.timing.cycle_stats import CycleStats
 
     settings, console = recording.settings, EscapingConsole(stderr=True)
-    view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
+    view = View(settings, console, units) if console.can_draw else None
     say = console.print if view is None else view.print
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,11 +16,16 @@ from runtime.timing.memory_policy import no_collection
 
 if TYPE_CHECKING:
     import asyncio
+    import contextlib
 
+    from rich.console import Console
+
+    from runtime.cli.commands.run.run_plan import RunPlan
     from runtime.cli.commands.run.run_recording import RunRecording
     from runtime.cli.terminal.view import View
     from runtime.cycle.summary import RunSummary
     from runtime.simulation.emulator_process import EmulatorHandle
+    from runtime.support.length_format import Units
     from runtime.timing.time_control import TimeControl
 
 
@@ -109,146 +114,203 @@ def run(
     import contextlib
 
     from runtime import VERSION
-    from runtime.cli.commands.foxglove import check_foxglove
     from runtime.cli.commands.output_files import check_outputs, refuse_existing
-    from runtime.cli.commands.run.offer import ask_for_robot, plugged_in
-    from runtime.cli.commands.run.run_settings import SettingsFiles, refuse_impossible, with_port
-    from runtime.cli.start_signals import ending_the_start
+    from runtime.cli.commands.run.offer import Offered, ask_for_robot, plugged_in
+    from runtime.cli.commands.run.run_plan import RunPlan
+    from runtime.cli.commands.run.run_settings import SettingsFiles, with_port
     from runtime.cli.terminal.escaping_console import EscapingConsole
     from runtime.support.file_lock import file_lock
-    from runtime.support.kernel_cache import EMULATOR, is_compiled
-    from runtime.support.logs import LogStatus, log_path, open_log
+    from runtime.support.logs import LogStatus, log_path
     from runtime.support.restart import Restart, restart_refusal
     from runtime.timing.run_clock import RunClock, ScaledClock
 
-    if seconds is not None and not seconds > 0.0:
-        raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
-    if foxglove:
-        check_foxglove(no_console=no_console)
+    check_options(seconds, foxglove=foxglove, no_console=no_console)
     emulator = EmulatorOptions(world, seed, trace, faults, force=force)
     files = SettingsFiles(config, sets, robot, world, map_file, mission, goal, no_console=no_console)
     settings = files.read_unchecked()
     console = EscapingConsole(stderr=True)
-    live = not headless and console.is_terminal and not console.is_dumb_terminal
+    live = not headless and console.can_draw
     if live:
         console.print(f"echolocate {VERSION} is starting", highlight=False)
-    was_chosen = False
     plugged = [] if (port or settings.link.port) is not None else plugged_in()
+    found: Offered | None = None
     if plugged and live and sys.stdin.isatty() and not emulator.is_chosen:
-        found = ask_for_robot(plugged, None if config is None and robot is None else settings, console, sys.stdin)
-        if found is not None:
-            port, arm, was_chosen = found.port, False, True
-            files = replace(files, robot=found.robot or robot)
-            settings = files.read_unchecked()
+        found = ask_for_robot(plugged, settings if files.name_a_robot else None, console, sys.stdin)
+    if found is not None:
+        port, arm, files = found.port, False, replace(files, robot=found.robot or robot)
+        settings = files.read_unchecked()
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = with_port(settings, port)
     own_files = {"--record": record, "--json": json}
-    restart = Restart(restart_refusal({**own_files, "--trace": trace}, force=force, was_chosen=was_chosen))
+    restart = Restart(restart_refusal({**own_files, "--trace": trace}, force=force, was_chosen=found is not None))
     check_outputs(
         {**own_files, "--trace": trace},
         (faults, port),
         force=force,
         appended={"log.file": log_path(settings.log)},
     )
-    log_status = LogStatus()
+    plan = RunPlan(
+        settings=settings,
+        files=files,
+        port=port_option,
+        clock=ScaledClock() if port is None else RunClock(),
+        log_status=LogStatus(),
+        restart=restart,
+        units=units,
+        emulated=port is None,
+        arm=arm,
+        seconds=seconds,
+        foxglove=foxglove,
+        record=record,
+        no_record=no_record,
+    )
     with contextlib.ExitStack() as stack:
-        for option, path in own_files.items():
-            if path is not None:
-                stack.enter_context(file_lock(Path(path), f"{option} {path}"))
+        for option, path in _given(own_files):
+            stack.enter_context(file_lock(Path(path), f"{option} {path}"))
         refuse_existing(own_files, force=force)  # another run may have written them while kernels were prepared
-        clock = ScaledClock() if port is None else RunClock()
-
-        async def whole_run() -> tuple[RunSummary, RunRecording]:
-            from runtime.simulation.emulator_process import start_emulator
-
-            async with contextlib.AsyncExitStack() as running:
-                running.enter_context(ending_the_start())  # until `signals` takes over
-                emulator_start: asyncio.Task[EmulatorHandle] | None = None
-                if isinstance(clock, ScaledClock):  # first of all: it takes as long as what follows
-                    arguments = emulator.arguments(config, sets, files.robot)
-                    starting = start_emulator(arguments, clock, compiled=is_compiled(EMULATOR))
-                    emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
-                    running.push_async_callback(_end_task, emulator_start)
-                if settings.console.enabled:  # meanwhile: it reads certificates, for which it needs no interpreter
-                    http = asyncio.create_task(asyncio.to_thread(_import_http), name="import of HTTP")
-                    running.push_async_callback(asyncio.wait, [http])
-                await asyncio.sleep(0.0)
-                view: View | None = None
-                if live:
-                    from runtime.cli.terminal.view import View
-
-                    view = View(settings, console, units)
-                    running.enter_context(view.shown())
-                from runtime.cli.commands.run.run_process import import_rest, run_process
-                from runtime.cli.commands.run.run_recording import open_run_recording
-                from runtime.cycle.line_messages import ProgramLine, messages_on
-                from runtime.support.config_lint import lint_settings
-                from runtime.support.kernel_loader import begin_preparation
-                from runtime.timing.time_control import NoTimeControl
-
-                refuse_impossible(settings)
-                preparation = begin_preparation(settings)
-                recording = stack.enter_context(
-                    open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)
-                )
-                log = stack.enter_context(
-                    open_log(settings.log, terminal=not live, listener=recording.on_log, status=log_status)
-                )
-                log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
-                for text in lint_settings(settings):
-                    log.warning(text)
-                if port is None and plugged:
-                    runs = f"`echolocate probe` names the robot, `echolocate run --port {plugged[0]}` runs it"
-                    log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
-                run_settings = settings
-                control: TimeControl = NoTimeControl()
-                line_messages = messages_on(port)
-                importing = asyncio.create_task(asyncio.to_thread(import_rest))
-                if preparation is not None:
-                    preparation.begin_ring(settings)
-                await importing
-                if emulator_start is not None:
-                    emulated = await emulator_start
-                    run_settings, control = with_port(settings, emulated.port), emulated.control
-                    line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
-                summary = await run_process(
-                    run_settings,
-                    log,
-                    clock=clock,
-                    control=control,
-                    view=view,
-                    units=units,
-                    recording=recording,
-                    log_status=log_status,
-                    arm=arm or port is None,
-                    seconds=seconds,
-                    foxglove=foxglove,
-                    restart=restart,
-                    emulated=port is None,
-                    preparation=preparation,
-                    line_messages=line_messages,
-                    reload=lambda: files.read_again(port_option, None if port else run_settings.link.port),
-                )
-                return summary, recording
-
+        arguments = emulator.arguments(config, sets, files.robot)
         try:
-            summary, recording = asyncio.run(whole_run())
+            summary, recording = asyncio.run(_whole_run(plan, arguments, plugged, console if live else None, stack))
         except UserError as error:
-            if json is not None:  # else the file that is locked stays empty
-                from runtime.cycle.summary import failed_start, write_json
+            from runtime.cycle.summary import failed_start
 
-                write_json(json, failed_start(str(error)))
+            _write_json(json, failed_start(str(error)))  # else the file that is locked stays empty
             raise
         recording.on_summary(summary)
     if recording.summary_row is not None:
         summary["recording"] = recording.summary_row
-    summary["log"] = {"lost": log_status.lost, "last_error": log_status.last_error}
-    if json is not None:
+    summary["log"] = {"lost": plan.log_status.lost, "last_error": plan.log_status.last_error}
+    _write_json(json, summary)
+    _print_summary(summary, units)
+    restart.if_requested()
+    if summary["mode"] == "FAULT":
+        raise UserError(summary["stop_reasons"][-1], FAILED)
+    recording.raise_if_incomplete()
+    return DONE
+
+
+def check_options(seconds: float | None, *, foxglove: bool, no_console: bool) -> None:
+    """Raise an error if a run can't last so long, or be served to Foxglove."""
+    from runtime.cli.commands.foxglove import check_foxglove
+
+    if seconds is not None and not seconds > 0.0:
+        raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
+    if foxglove:
+        check_foxglove(no_console=no_console)
+
+
+def _given(files: Mapping[str, str | None]) -> list[tuple[str, str]]:
+    return [(option, path) for option, path in files.items() if path is not None]
+
+
+def _write_json(path: str | None, summary: object) -> None:
+    if path is not None:
         from runtime.cycle.summary import write_json
 
-        write_json(json, summary)
+        write_json(path, summary)
+
+
+async def _whole_run(
+    plan: RunPlan,
+    emulator_arguments: Sequence[str],
+    plugged: Sequence[str],
+    console: Console | None,
+    stack: contextlib.ExitStack,
+) -> tuple[RunSummary, RunRecording]:
+    """Start what a run needs, the slowest first, and run it; return its summary and its recording.
+
+    Parameters
+    ----------
+    plan : RunPlan
+        Of the run.
+    emulator_arguments : sequence of str
+        Of the emulator, which is started only if the robot is emulated.
+    plugged : sequence of str
+        Serial ports that an emulated run mentions in its log.
+    console : Console, optional
+        Where the live view is shown; None without one.
+    stack : ExitStack
+        Closes the log and the recording, after the run's summary was added to it.
+    """
+    import asyncio
+    import contextlib
+
+    from runtime import VERSION
+    from runtime.cli.start_signals import ending_the_start
+    from runtime.simulation.emulator_process import start_emulator
+    from runtime.support.kernel_cache import EMULATOR, is_compiled
+    from runtime.support.logs import open_log
+    from runtime.timing.run_clock import ScaledClock
+
+    settings = plan.settings
+    async with contextlib.AsyncExitStack() as running:
+        running.enter_context(ending_the_start())  # until `signals` takes over
+        emulator_start: asyncio.Task[EmulatorHandle] | None = None
+        if isinstance(plan.clock, ScaledClock):  # first of all: it takes as long as what follows
+            starting = start_emulator(emulator_arguments, plan.clock, compiled=is_compiled(EMULATOR))
+            emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
+            running.push_async_callback(_end_task, emulator_start)
+        if settings.console.enabled:  # meanwhile: it reads certificates, for which it needs no interpreter
+            http = asyncio.create_task(asyncio.to_thread(_import_http), name="import of HTTP")
+            running.push_async_callback(asyncio.wait, [http])
+        await asyncio.sleep(0.0)
+        view: View | None = None
+        if console is not None:
+            from runtime.cli.terminal.view import View
+
+            view = View(settings, console, plan.units)
+            running.enter_context(view.shown())
+        from runtime.cli.commands.run.run_process import import_rest, run_process
+        from runtime.cli.commands.run.run_recording import open_run_recording
+        from runtime.cli.commands.run.run_settings import refuse_impossible
+        from runtime.cycle.line_messages import ProgramLine, messages_on
+        from runtime.support.config_lint import lint_settings
+        from runtime.support.kernel_loader import begin_preparation
+        from runtime.timing.time_control import NoTimeControl
+
+        refuse_impossible(settings)
+        preparation = begin_preparation(settings)
+        recording = stack.enter_context(
+            open_run_recording(
+                settings, plan.record, no_record=plan.no_record, emulated=plan.emulated, clock=plan.clock
+            )
+        )
+        log = stack.enter_context(
+            open_log(settings.log, terminal=console is None, listener=recording.on_log, status=plan.log_status)
+        )
+        log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
+        for text in lint_settings(settings):
+            log.warning(text)
+        if plan.emulated and plugged:
+            runs = f"`echolocate probe` names the robot, `echolocate run --port {plugged[0]}` runs it"
+            log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
+        control: TimeControl = NoTimeControl()
+        line_messages = messages_on(settings.link.port)
+        importing = asyncio.create_task(asyncio.to_thread(import_rest))
+        if preparation is not None:
+            preparation.begin_ring(settings)
+        await importing
+        if emulator_start is not None:
+            emulated = await emulator_start
+            plan, control = plan.with_port(emulated.port), emulated.control
+            line_messages = ProgramLine("the emulator", "start the run again", emulated.control.has_ended)
+        summary = await run_process(
+            plan,
+            log,
+            control=control,
+            view=view,
+            recording=recording,
+            preparation=preparation,
+            line_messages=line_messages,
+        )
+        return summary, recording
+
+
+def _print_summary(summary: RunSummary, units: Units) -> None:
+    """Print what a run found, its timing, and what became of its recording and its log."""
     from runtime.cli.tables import objects_table, polylines_line, timing_line, timing_table, walls_table
+    from runtime.cli.terminal.escaping_console import EscapingConsole
 
     output = EscapingConsole()
     output.print(objects_table(summary["objects"], units))
@@ -258,18 +320,13 @@ def run(
         output.print(polylines_line(summary["polylines"], units))
     output.print(timing_table(summary))
     output.print(timing_line(summary))
-    if recording.summary_row is not None and recording.summary_row["file"] is not None:
-        output.print(f"recorded in {recording.summary_row['file']}", soft_wrap=True)
-    if log_status.lost:
+    recorded, log = summary.get("recording"), summary["log"]
+    if recorded is not None and recorded["file"] is not None:
+        output.print(f"recorded in {recorded['file']}", soft_wrap=True)
+    if log["lost"]:
         output.print(
-            f"{log_status.lost} lines of the log are missing: {log_status.last_error}; make room or choose another "
-            "log.file"
+            f"{log['lost']} lines of the log are missing: {log['last_error']}; make room or choose another log.file"
         )
-    restart.if_requested()
-    if summary["mode"] == "FAULT":
-        raise UserError(summary["stop_reasons"][-1], FAILED)
-    recording.raise_if_incomplete()
-    return DONE
 
 
 def _import_http() -> None:

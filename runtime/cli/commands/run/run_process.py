@@ -7,23 +7,19 @@ import signal
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from config.settings import Settings
 from runtime.cli.commands.foxglove import foxglove_beside
 from runtime.cli.commands.run.run_recording import RunRecording
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import handled_by_loop
 from runtime.support.kernel_loader import KernelPreparation
-from runtime.support.length_format import Units
-from runtime.support.logs import LogStatus
-from runtime.support.restart import Restart
 from runtime.support.sd_notify import SdNotifier
 from runtime.support.user_folders import state_folder
-from runtime.timing.run_clock import RunClock
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
+    from runtime.cli.commands.run.run_plan import RunPlan
     from runtime.cli.terminal.view import View
     from runtime.cycle.line_messages import LineMessages
     from runtime.cycle.process import OnCycle, RobotProcess
@@ -41,54 +37,33 @@ def import_rest() -> None:
 
 
 async def run_process(
-    settings: Settings,
+    plan: RunPlan,
     log: FilteringBoundLogger,
     *,
-    clock: RunClock,
     control: TimeControl,
     view: View | None,
-    units: Units,
     recording: RunRecording,
-    log_status: LogStatus,
-    arm: bool,
-    seconds: float | None,
-    foxglove: bool,
-    restart: Restart,
-    emulated: bool,
     preparation: KernelPreparation | None,
     line_messages: LineMessages,
-    reload: Callable[[], Settings],
 ) -> RunSummary:
     """Run the robot's process with live view, console, signals and keys; return the summary of the run.
 
     Parameters
     ----------
-    settings, log, clock
+    plan : RunPlan
+        Of the run.
+    log : FilteringBoundLogger
         As of `runtime.cycle.process.RobotProcess`.
     control : TimeControl
         Of the run.
     view : View, optional
         The live view, which is shown; None without one.
-    units : {"m", "ft"}
-        Units of the operator console.
     recording : RunRecording
         Of the run.
-    log_status : LogStatus
-        Of the run's log.
-    arm, seconds
-        As of `runtime.cycle.process.RobotProcess.run`.
-    foxglove : bool
-        Whether the run is served to Foxglove.
-    restart : Restart
-        Is asked to start the run again.
-    emulated : bool
-        Whether the robot is emulated.
     preparation : KernelPreparation, optional
         Prepares recognition beside the run; None if it is ready.
     line_messages : LineMessages
         About the line.
-    reload : callable
-        Reads the settings again.
     """
     from runtime.cli.terminal.keys import keys
     from runtime.cli.terminal.time_keys import TimeKeys, noting_what_waits
@@ -98,6 +73,7 @@ async def run_process(
     from runtime.cycle.reloader import Reloader
     from runtime.support.kernel_loader import KernelLoader
 
+    settings, log_status = plan.settings, plan.log_status
     async with contextlib.AsyncExitStack() as stack:
         listeners: list[OnCycle] = []
 
@@ -110,7 +86,7 @@ async def run_process(
             settings,
             log,
             observers,
-            clock,
+            plan.clock,
             stack.enter_context(SdNotifier.from_environment()),
             preparation,
             line_messages,
@@ -120,7 +96,7 @@ async def run_process(
         if preparation is not None:
             stack.push_async_callback(preparation.close)
         kernel_loader = KernelLoader(log, preparation=preparation)
-        reloader = Reloader(process.live_settings, reload, log, kernel_loader)
+        reloader = Reloader(process.live_settings, plan.reload, log, kernel_loader)
         if settings.log.webhook is not None:
             from runtime.support.webhook import Webhook
 
@@ -141,10 +117,10 @@ async def run_process(
                     kernel_loader,
                     recording,
                     control,
-                    emulated=emulated,
-                    units=units,
-                    reload=reload,
-                    restart=restart,
+                    emulated=plan.emulated,
+                    units=plan.units,
+                    reload=plan.reload,
+                    restart=plan.restart,
                 )
             )
             log_status.listeners.append(page.hub.on_log)
@@ -155,7 +131,7 @@ async def run_process(
             presence = await stack.enter_async_context(on_the_network(page, process, settings.console, log))
             if presence is not None:
                 listeners.append(presence.on_cycle)
-            if foxglove:
+            if plan.foxglove:
                 await stack.enter_async_context(foxglove_beside(page.url, log))
             if view is not None:
                 for line in page.hints():
@@ -164,13 +140,13 @@ async def run_process(
         stack.enter_context(signals(process, reloader))
         if view is not None:
             view.is_paused = lambda: control.is_paused
-            clock.on_change(view.draw_again)
+            plan.clock.on_change(view.draw_again)
             on_request = noting_what_waits(process.request, control, view.print)
             stack.enter_context(keys(on_request, process.stop, TimeKeys(control, log).press, view.draw_again))
             process.health.watch("view", view.probe)
         for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)
-        summary = await process.run(arm=arm, seconds=seconds)
+        summary = await process.run(arm=plan.is_armed, seconds=plan.seconds)
         summary["process"]["compilations"] -= kernel_loader.loaded  # they delayed no cycle
         return summary
 

@@ -28,6 +28,11 @@ class SettingsFiles:
     goal: str | None = None
     no_console: bool = False
 
+    @property
+    def name_a_robot(self) -> bool:
+        """Whether a run file or an option says which robot it is."""
+        return self.config is not None or self.robot is not None
+
     def read(self) -> Settings:
         """Return the settings as the files are now, on the port that they name.
 

@@ -24,7 +24,8 @@ from perception.bayes.walls.points import (
     count_cuts,
     find_heard_points,
 )
-from perception.bayes.walls.report import ALONE_EDGE_ECHOES, room_report
+from perception.bayes.walls.report import room_report
+from perception.bayes.walls.reported_points import ALONE_EDGE_ECHOES
 from tests.naive_walls import line_cuts
 from tests.perception.bayes.random_tracks import P
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall

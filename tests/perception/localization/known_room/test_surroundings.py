@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.trials.furnished_rooms import furnished_room
+from perception.localization.known_room.mirror_points import expect_specular
 from perception.localization.known_room.surroundings import (
     FRINGE_RAD,
     NEAR_MAX,
     expect_cone,
-    expect_specular,
     insert_nearest,
     look_around,
     make_surroundings,
@@ -86,12 +86,3 @@ def test_a_full_list_keeps_the_nearest() -> None:
     assert count == NEAR_MAX
     assert distances == pytest.approx(np.arange(NEAR_MAX))
     assert away[indices] == pytest.approx(distances)
-
-
-def test_a_wall_between_hides_a_mirror_point() -> None:
-    room = make_room(np.array([[2.0, -1.0, 2.0, 1.0], [1.0, -0.2, 1.2, 0.2]]))
-    around = make_surroundings(room, MODEL, HALF_ANGLE)
-    look_around(around, 0.0, 0.0, 0.0)
-    assert expect_specular(around, 0.0, 0.0, 1.0, 0.0, around.sensor[0].cos_half)[0][0] == math.inf
-    assert expect_specular(around, 0.0, 0.6, 1.0, 0.0, around.sensor[0].cos_half)[0][0] == pytest.approx(2.0)
-    assert expect_specular(around, 0.0, 0.6, -1.0, 0.0, around.sensor[0].cos_half)[0][0] == math.inf

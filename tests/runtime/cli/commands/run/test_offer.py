@@ -17,6 +17,7 @@ from runtime.cli.commands.robots import port_probe
 from runtime.cli.commands.robots.port_probe import Finding
 from runtime.cli.commands.run import offer
 from runtime.cli.commands.run.offer import Offered, ask_for_robot, plugged_in
+from runtime.cli.commands.run.run_plan import RunPlan
 from runtime.cli.terminal.escaping_console import EscapingConsole
 
 FOUND = {
@@ -117,8 +118,8 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
 @pytest.mark.usefixtures("tried")
 def test_a_robot_that_was_offered_is_not_armed_whatever_the_command_line_says(terminal: pytest.MonkeyPatch) -> None:
-    async def begins(settings: RobotConfig, *_: object, arm: bool, **__: object) -> None:
-        raise RunStartedError(settings.link.port, arm)
+    async def begins(plan: RunPlan, *_: object, **__: object) -> None:
+        raise RunStartedError(plan.settings.link.port, plan.is_armed)
 
     terminal.setattr("runtime.support.kernel_loader.begin_preparation", lambda _: None)
     terminal.setattr("runtime.cli.commands.run.run_process.run_process", begins)
