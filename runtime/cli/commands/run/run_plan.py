@@ -35,7 +35,7 @@ class RunPlan:
     arm: bool
     """Whether a robot on a port is armed at the start."""
     seconds: float | None
-    """How long the run lasts once recognition has begun; None: until it is ended."""
+    """How long the run lasts after recognition began; None: until it is ended."""
     foxglove: bool
     """Whether it is served to Foxglove."""
     record: str | None
