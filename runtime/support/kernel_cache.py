@@ -186,7 +186,7 @@ def compiled_signatures() -> int:
         id(value): value
         for name, module in list(sys.modules.items())
         if name.rpartition(".")[0] in PACKAGES
-        for value in vars(module).values()
+        for value in list(vars(module).values())  # another thread may be importing it
         if isinstance(value, dispatchers.Dispatcher)
     }
     return sum(len(kernel.overloads) for kernel in kernels.values())

@@ -9,6 +9,7 @@ import sys
 import tempfile
 from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -251,3 +252,23 @@ def test_without_any_place_it_is_said(homeless: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(tempfile, "tempdir", str(homeless / "nowhere"))
     with pytest.raises(UserError, match=r"neither in .* nor in a temporary folder: No such file"):
         kernels.cache_folder()
+
+
+def test_signatures_are_counted_while_another_thread_imports_a_module(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType(f"{kernels.PACKAGES[0]}.half_imported")
+
+    class Growing:
+        """Adds a name to the module as it is looked at, as the import does meanwhile."""
+
+        @property  # type: ignore[misc]
+        def __class__(self) -> type:
+            setattr(module, f"name{len(vars(module))}", 0)
+            return object
+
+    module.first = Growing()  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    dispatchers = ModuleType("numba.core.dispatcher")
+    dispatchers.Dispatcher = type("Dispatcher", (), {"overloads": ()})  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, dispatchers.__name__, dispatchers)
+    assert kernels.compiled_signatures() == 0
+    assert len(vars(module)) > 1
