@@ -73,7 +73,7 @@ LIMITS: Sequence[str] = (
     "it heard, and presumes that they go on; a wall that begins between two looks is not known. A ring that does not "
     "turn with the wheels cannot look: a goal or mission that leads to its blind side is refused. Nor does a ring "
     "all round hear such a wall between two beams that do not touch: a `p3at`, of whose ring 10° at 70° from "
-    "ahead hear nothing, touched one in 7 h of honest drives, and none of 17 robots in the 6.5 h since.",
+    "ahead hear nothing, touched one in 7 h of honest drives, and none of 17 robots in the 9.5 h since.",
     "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",
     "Odometry that is wrong by less than a quarter: the map suffers, and the distances that are kept do not.",
 )
