@@ -35,7 +35,7 @@ from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
-from runtime.cycle.unheard_limit import LOST, UNHEARD
+from runtime.cycle.unheard_limit import LOST, NOTHING_YET, UNHEARD
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
 ROBOTS: Final = (
@@ -310,7 +310,7 @@ def run_trial(
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
             held = held if state.hold_reason == held else None
-            if kind is not None and held is None and state.hold_reason in {LOST, UNHEARD}:
+            if kind is not None and held is None and state.hold_reason in {LOST, NOTHING_YET, UNHEARD}:
                 texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]

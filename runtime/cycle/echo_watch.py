@@ -1,8 +1,9 @@
 """The watch on a ring that hears no echo: wires that carry none look like open space.
 
 A pin that a 5 V echo destroyed, a ring without its supply, a ring under a cover: each firing reports silence. So
-does open ground. A robot that has never heard an echo is stopped once, after a short way, with what to try; armed
-again it drives on. Later a long way without an echo is a line of the log, and no stop.
+does open ground. A robot that has never heard an echo drives slowly (`runtime.cycle.unheard_limit`) and is stopped
+once, after a short way, with what to try; armed again it drives on. Later a long way without an echo is a line of the
+log, and no stop.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from config.bounded import Coordinate
 from drivers.messages import Firing, Odometry, Pose
 
 WAY_MIN_M: Final = 1.0
-"""Way without an echo since the start after which a robot stops whose ring reaches far, m: within 4 s at .3 m/s."""
+"""Way without an echo since the start after which a robot stops whose ring reaches far, m."""
 OPEN_M: Final = 4.0
 """Way and reach together at which a ring that hears nothing stops the robot, m: from the middle of a room 8 m wide it
 has come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m. After

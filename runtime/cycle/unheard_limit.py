@@ -1,4 +1,4 @@
-"""The speed beside echoes that the ring has lost although it came nearer to them: they may still be there."""
+"""The speed beside echoes that the ring has lost although it came nearer to them, and before its first echo."""
 
 from __future__ import annotations
 
@@ -15,6 +15,10 @@ from runtime.cycle.drive_requests import DriveRequest
 
 CREEP_M_S: Final = 0.04
 """Speed that is always left, m/s: most of what falls silent is a mirror that left the beam, and a bumper bears it."""
+NOTHING_YET: Final = (
+    "no sensor has heard an echo since the start: the robot drives slowly until one does; in the open that is right, "
+    "else check the ring's power and cables"
+)
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
 LOST: Final = (
@@ -60,9 +64,11 @@ def lost_ahead(
 
 
 def limit_unheard(
-    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings
+    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings, *, has_heard: bool
 ) -> tuple[Twist, str | None]:
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
+
+    A ring that has never heard anything may be deaf: until its first echo the robot is slow everywhere.
 
     Parameters
     ----------
@@ -75,7 +81,12 @@ def limit_unheard(
         last echo.
     settings
         The base's limits and the arbiter's clearance.
+    has_heard
+        Whether the ring has heard an echo, or the operator has let the robot go on without one.
     """
+    if not has_heard:
+        slow = twist.at_most(CREEP_M_S)
+        return slow, None if slow == twist else NOTHING_YET
     if abs(twist.v) <= CREEP_M_S or not len(points := unheard.points()):
         return twist, None
     limit, is_ring_silent = CREEP_M_S, unheard.is_ring_silent

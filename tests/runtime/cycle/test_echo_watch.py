@@ -60,7 +60,7 @@ def test_an_honest_ring_of_little_reach_drives_on_in_the_middle_of_a_room() -> N
     settings = load_settings("room", robot="servo1")
     assert settings.world is not None
     run = Run(settings, settings.world, 1, preparing="left out")
-    run.until_true(lambda: run.state.echo_watch.is_over, 30.0)
+    run.until_true(lambda: run.state.echo_watch.is_over, 60.0)
     assert run.mode is Mode.DRIVE
     assert run.state.echo_watch.way_m == 0.0, "it has heard an echo"
 
@@ -84,9 +84,9 @@ def test_a_ring_that_never_hears_stops_the_robot_before_it_touches(
     run = Run(settings, settings.world, 1, (silent,), preparing="left out")
     while run.mode is not Mode.SAFE_STOP:
         run.cycle()
-        assert run.run_s < 30.0
+        assert run.run_s < 90.0
+        assert run.truths[-1].contact_m_s <= TOUCH_M_S
     assert "ring-test --hand" in str(run.state.mode.reason)
-    assert run.truths[-1].contact_m_s <= TOUCH_M_S
     measured(f"{robot} that never hears an echo: stopped after {run.run_s:.1f} s")
 
 

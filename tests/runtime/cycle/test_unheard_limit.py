@@ -15,20 +15,22 @@ from drivers.messages import Twist
 from perception.obstacle_echoes.unheard_echoes import ALONE, UnheardEchoes
 from perception.percept import Percept, Pose
 from runtime.cycle.drive_requests import DriveRequest
-from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard, lost_ahead
+from runtime.cycle.unheard_limit import CREEP_M_S, LOST, NOTHING_YET, UNHEARD, limit_unheard, lost_ahead
 from tests.behaviors.views import EVERYWHERE
 
 SETTINGS = load_settings("room", robot="denning")
 RIM_M = SETTINGS.body.radius_m
 
 
-def limited(twist: Twist, *places: tuple[float, float], silent: bool = False) -> tuple[Twist, str | None]:
+def limited(
+    twist: Twist, *places: tuple[float, float], silent: bool = False, has_heard: bool = True
+) -> tuple[Twist, str | None]:
     percept = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
     unheard = UnheardEchoes(np.zeros((max(1, len(places)), 3)))
     for echo, (x, y) in zip(unheard.records, places, strict=False):
         echo.state, echo.x, echo.y = ALONE, 1.0 + x, y
     unheard.silences[:] = len(unheard.records) if silent else 0
-    return limit_unheard(twist, percept, unheard, SETTINGS)
+    return limit_unheard(twist, percept, unheard, SETTINGS, has_heard=has_heard)
 
 
 @pytest.mark.parametrize("v", [0.3, -0.3])
@@ -52,6 +54,12 @@ def test_farther_away_it_can_still_stop() -> None:
         stoppable_speed_m_s(percept, SETTINGS.body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
     )
     assert limited(Twist(0.3, 0.0), (3.0, 0.0)) == (Twist(0.3, 0.0), None)
+
+
+def test_before_its_first_echo_a_robot_creeps_and_turns_freely() -> None:
+    """A deaf ring and open ground are alike until then."""
+    assert limited(Twist(0.3, 0.0), has_heard=False) == (Twist(CREEP_M_S, 0.0), NOTHING_YET)
+    assert limited(Twist(0.0, 1.0), has_heard=False) == (Twist(0.0, 1.0), None)
 
 
 def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() -> None:
