@@ -230,9 +230,8 @@ def weigh_length(k: int, reach: float, echoes: Records[EchoTrace], expected: Rec
         As for `weigh_changes`.
     """
     longer = echoes[k].latest.range_m - 0.5 * (expected[k].low + expected[k].high)
-    evidence = (
-        math.log((1.0 - expected[k].missed) / (2.0 * reach)) - expected[k].honest_nat
-    )  # any length is as likely
+    # Any length is as likely.
+    evidence = math.log((1.0 - expected[k].missed) / (2.0 * reach)) - expected[k].honest_nat
     for i in range(len(echoes)):
         one = expected[i]
         if i != k and one.source >= 0 and one.high >= 0.0:
