@@ -43,9 +43,9 @@ LIMITS: Sequence[str] = (
     "they became too short): they change as the robot's motion says. "
     "A map of the room contradicts them; without one, only a bumper stops the robot.",
     "A ring that hears nothing from its first reading on: the robot creeps at 0.04 m/s, says why, and is stopped "
-    "after 1 m, or, if the ring reaches less than 3 m, after 4 m less its reach (`servo1`: 2.3 m); what stands "
-    "within that way is touched at no more (36 drives of six robots among mirrors). "
-    "So does an honest ring in the open.",
+    "after 1 m; what stands within it is touched at no more. If the ring reaches less than 3 m, which hears a room "
+    "late, the robot drives as usual, and is stopped after 4 m less its reach (`servo1`: 2.3 m; 3 of 12 drives among "
+    "mirrors touched something). So does an honest ring in the open.",
     "A part of the ring that freezes or falls silent while the rest still hears: a sensor that does not change is "
     "named after a metre or two on which its neighbours change, and what stood ahead may be touched before.",
     "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "

@@ -1,9 +1,9 @@
 """The watch on a ring that hears no echo: wires that carry none look like open space.
 
 A pin that a 5 V echo destroyed, a ring without its supply, a ring under a cover: each firing reports silence. So
-does open ground. A robot that has never heard an echo drives slowly (`runtime.cycle.unheard_limit`) and is stopped
-once, after a short way, with what to try; armed again it drives on. Later a long way without an echo is a line of the
-log, and no stop.
+does open ground. A robot that has never heard an echo is stopped once, after a short way, with what to try; armed
+again it drives on. If its ring reaches far, so that it would hear any room, it drives slowly until then
+(`runtime.cycle.unheard_limit`). Later a long way without an echo is a line of the log, and no stop.
 """
 
 from __future__ import annotations
@@ -44,6 +44,10 @@ class EchoWatch:
         pose = odometry.pose
         way = 0.0 if self.at is None else math.dist((pose.x, pose.y), (self.at.x, self.at.y))
         return replace(self, way_m=min(self.way_m + way, OPEN_M), at=pose)
+
+    def may_be_deaf(self, reach_m: float) -> bool:
+        """Return whether a ring that reaches so far, m, would have heard any room; a short one hears it late."""
+        return not self.is_over and reach_m >= OPEN_M - WAY_MIN_M
 
     @property
     def silence(self) -> str | None:

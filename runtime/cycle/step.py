@@ -359,8 +359,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
             reason, decision = decision.reason, Drive(STANDSTILL)
     if isinstance(decision, Drive):
-        has_heard = state.echo_watch.is_over
-        twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, has_heard=has_heard)
+        may_be_deaf = state.echo_watch.may_be_deaf(settings.ring.range_max_m)
+        twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, may_be_deaf=may_be_deaf)
         if zones is not None:
             commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
             last = commands[-1].twist if commands else STANDSTILL

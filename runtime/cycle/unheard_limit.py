@@ -64,11 +64,11 @@ def lost_ahead(
 
 
 def limit_unheard(
-    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings, *, has_heard: bool
+    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings, *, may_be_deaf: bool
 ) -> tuple[Twist, str | None]:
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
 
-    A ring that has never heard anything may be deaf: until its first echo the robot is slow everywhere.
+    Until the first echo of a ring that may be deaf it is slow everywhere.
 
     Parameters
     ----------
@@ -81,10 +81,10 @@ def limit_unheard(
         last echo.
     settings
         The base's limits and the arbiter's clearance.
-    has_heard
-        Whether the ring has heard an echo, or the operator has let the robot go on without one.
+    may_be_deaf
+        As of `EchoWatch.may_be_deaf`.
     """
-    if not has_heard:
+    if may_be_deaf:
         slow = twist.at_most(CREEP_M_S)
         return slow, None if slow == twist else NOTHING_YET
     if abs(twist.v) <= CREEP_M_S or not len(points := unheard.points()):

@@ -45,6 +45,12 @@ def test_a_ring_that_reaches_less_may_drive_farther() -> None:
         assert (reason is None) is (k < 25)
 
 
+def test_a_ring_that_reaches_far_may_be_deaf_until_its_first_echo() -> None:
+    assert EchoWatch().may_be_deaf(OPEN_M)
+    assert not EchoWatch().may_be_deaf(1.7)
+    assert not EchoWatch().observe(at(0.0), heard(2.0)).may_be_deaf(OPEN_M)
+
+
 def test_a_long_way_without_an_echo_later_is_a_line_and_no_stop() -> None:
     watch = EchoWatch().observe(at(0.0), heard(2.0))
     for k in range(60):
@@ -60,7 +66,7 @@ def test_an_honest_ring_of_little_reach_drives_on_in_the_middle_of_a_room() -> N
     settings = load_settings("room", robot="servo1")
     assert settings.world is not None
     run = Run(settings, settings.world, 1, preparing="left out")
-    run.until_true(lambda: run.state.echo_watch.is_over, 60.0)
+    run.until_true(lambda: run.state.echo_watch.is_over, 30.0)
     assert run.mode is Mode.DRIVE
     assert run.state.echo_watch.way_m == 0.0, "it has heard an echo"
 

@@ -23,14 +23,14 @@ RIM_M = SETTINGS.body.radius_m
 
 
 def limited(
-    twist: Twist, *places: tuple[float, float], silent: bool = False, has_heard: bool = True
+    twist: Twist, *places: tuple[float, float], silent: bool = False, may_be_deaf: bool = False
 ) -> tuple[Twist, str | None]:
     percept = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
     unheard = UnheardEchoes(np.zeros((max(1, len(places)), 3)))
     for echo, (x, y) in zip(unheard.records, places, strict=False):
         echo.state, echo.x, echo.y = ALONE, 1.0 + x, y
     unheard.silences[:] = len(unheard.records) if silent else 0
-    return limit_unheard(twist, percept, unheard, SETTINGS, has_heard=has_heard)
+    return limit_unheard(twist, percept, unheard, SETTINGS, may_be_deaf=may_be_deaf)
 
 
 @pytest.mark.parametrize("v", [0.3, -0.3])
@@ -58,8 +58,8 @@ def test_farther_away_it_can_still_stop() -> None:
 
 def test_before_its_first_echo_a_robot_creeps_and_turns_freely() -> None:
     """A deaf ring and open ground are alike until then."""
-    assert limited(Twist(0.3, 0.0), has_heard=False) == (Twist(CREEP_M_S, 0.0), NOTHING_YET)
-    assert limited(Twist(0.0, 1.0), has_heard=False) == (Twist(0.0, 1.0), None)
+    assert limited(Twist(0.3, 0.0), may_be_deaf=True) == (Twist(CREEP_M_S, 0.0), NOTHING_YET)
+    assert limited(Twist(0.0, 1.0), may_be_deaf=True) == (Twist(0.0, 1.0), None)
 
 
 def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() -> None:
