@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntFlag
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +84,10 @@ class Pose:
         """Return the pose p with ``p.compose(self)`` the identity."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         return Pose(-c * self.x - s * self.y, s * self.x - c * self.y, -self.theta)
+
+
+IDENTITY: Final = Pose(0.0, 0.0, 0.0)
+"""The pose of a frame in itself."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from drivers.messages import Pose
+from drivers.messages import IDENTITY, Pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class MapCounts(NamedTuple):
 
 def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
     """Return an object in another frame, in which the present origin lies at `to`."""
-    if to == Pose(0.0, 0.0, 0.0):
+    if to == IDENTITY:
         return seen
     place = to.compose(Pose(seen.x, seen.y, seen.theta))
     if seen.covariance is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.messages import Floats, Pose
+from drivers.messages import IDENTITY, Floats, Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class Polyline:
 
     def in_frame(self, to: Pose) -> Polyline:
         """Return it in another frame, in which the present origin lies at `to`."""
-        if to == Pose(0.0, 0.0, 0.0):
+        if to == IDENTITY:
             return self
         c, s = math.cos(to.theta), math.sin(to.theta)
         x, y = self.points.T

@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from perception.records import Structured
-
-Array = Structured
+Array = NDArray[Any]
 
 
 class Noise(NamedTuple):

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from perception.records import Structured
-
-Array = Structured
+Array = NDArray[Any]
 HEADING, OFFSET, ODOMETER, TURN, RANGE = 0, 3, 4, 5, 6
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 

@@ -9,14 +9,15 @@ import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from perception.records import Structured
 from tests import naive_bayes
 from tests.naive_bayes import Noise
 
-Array = Structured
+Array = NDArray[Any]
 FT = 0.3048
 SILENT = 1e6
 

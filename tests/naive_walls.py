@@ -6,12 +6,12 @@ They share no code with the product; constants are repeated.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from perception.records import Structured
-
-Array = Structured
+Array = NDArray[Any]
 
 
 def touch(sensor: Array, axis: float, half_angle: float, normal: float, distance: float) -> tuple[float, float]:

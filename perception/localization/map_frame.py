@@ -14,7 +14,7 @@ from typing import Final, TypeAlias
 
 from config.model import ModelConfig
 from config.robot import RingConfig
-from drivers.messages import Firing, Pose
+from drivers.messages import IDENTITY, Firing, Pose
 from perception.detected_object import DetectedObject, turned_object, worst_sigma
 from perception.edits import (
     Evidence,
@@ -35,7 +35,6 @@ from perception.map_moves import FollowsMaps
 from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
 
-STAYS: Final = Pose(0.0, 0.0, 0.0)
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
 
@@ -170,7 +169,7 @@ class MapFrame(OdometryFrame):
     def moved_since(self, moment: Moment) -> Pose:
         """Return the pose of odometry's frame of a moment in that of now, as known now."""
         if not self.submaps.is_applied:
-            return STAYS
+            return IDENTITY
         then, at = Pose(*moment.odometry.tolist()), Pose(*self.submaps.placed(moment).tolist())
         return self.submaps.odometry_from_map().compose(at).compose(then.inverse())
 
@@ -195,13 +194,13 @@ class MapFrame(OdometryFrame):
         """Return objects of the filter's frame in odometry's frame."""
         to = self._odometry_from_filter()
         if not self.drift.is_applied:
-            return tuple(objects) if to == STAYS else tuple(turned_object(to, seen) for seen in objects)
+            return tuple(objects) if to == IDENTITY else tuple(turned_object(to, seen) for seen in objects)
         return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
 
     def polylines_in_odometry(self, polylines: tuple[Polyline, ...]) -> tuple[Polyline, ...]:
         """Return polylines of the filter's frame in odometry's frame."""
         to = self._odometry_from_filter()
-        return polylines if to == STAYS else tuple(polyline.in_frame(to) for polyline in polylines)
+        return polylines if to == IDENTITY else tuple(polyline.in_frame(to) for polyline in polylines)
 
     def segments_in_odometry(self, geometry: Floats) -> Floats:
         """Return segments in odometry's frame: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from config.model import ModelConfig
-from drivers.messages import Firing, Pose
+from drivers.messages import IDENTITY, Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.edits import AreaEdit, Evidence, MapEdit
 from perception.kernel import Floats
@@ -77,11 +77,11 @@ class OdometryFrame:
 
     def moved_since(self, _moment: Moment) -> Pose:
         """Return the pose of odometry's frame of a moment in that of now, as known now."""
-        return Pose(0.0, 0.0, 0.0)
+        return IDENTITY
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame."""
-        return Pose(0.0, 0.0, 0.0)
+        return IDENTITY
 
     def in_map(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
         """Return objects of the method's frame in the map frame."""

@@ -85,16 +85,16 @@ def limit_unheard(
         As of `EchoWatch.may_be_deaf`.
     """
     if may_be_deaf:
-        slow = twist.at_most(CREEP_M_S)
-        return slow, None if slow == twist else NOTHING_YET
-    if abs(twist.v) <= CREEP_M_S or not len(points := unheard.points()):
+        limit, reason = CREEP_M_S, NOTHING_YET
+    elif abs(twist.v) <= CREEP_M_S or not len(points := unheard.points()):
         return twist, None
-    limit, is_ring_silent = CREEP_M_S, unheard.is_ring_silent
-    if not is_ring_silent:
+    elif unheard.is_ring_silent:
+        limit, reason = CREEP_M_S, LOST
+    else:
         pose, arbiter = percept.pose, settings.behaviors.arbiter
         heading = pose.theta if twist.v > 0.0 else pose.theta + math.pi
         ahead = Percept(Pose(pose.x, pose.y, heading), points, percept.field_of_view)
         stoppable = stoppable_speed_m_s(ahead, settings.body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
-        limit = max(CREEP_M_S, stoppable)
+        limit, reason = max(CREEP_M_S, stoppable), UNHEARD
     slow = twist.at_most(limit)
-    return slow, None if slow == twist else LOST if is_ring_silent else UNHEARD
+    return slow, None if slow == twist else reason

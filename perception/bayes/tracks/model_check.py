@@ -39,7 +39,6 @@ from perception.bayes.walls.contact import (
     contact,
     cuts_circle,
     edges_answer,
-    is_on_span,
     wall_normal,
 )
 from perception.bayes.walls.corners import KEPT
@@ -105,17 +104,29 @@ def point_evidence(point: RoomCorner, q: Reading, p: SettingsRecord, level: int)
 
 
 @kernel
-def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edges: bool) -> float:
-    """Return the greatest log likelihood ratio (nat) of a range under the mapped walls, corners and edges.
+def is_on_long_span(wall: Wall, along: float, margin: float, length_min: float) -> bool:
+    """Return whether a position lies on a span that is so long, m, or at most `margin` (m) beyond its ends."""
+    for k in range(wall.span_count):
+        span = wall.spans[k]
+        if span.low - margin <= along <= span.high + margin and span.high - span.low >= length_min:
+            return True
+    return False
+
+
+@kernel
+def wall_evidence(
+    room: WallMap, q: Reading, p: SettingsRecord, level: int, edges: bool, margin: float, length_min: float
+) -> float:
+    """Return the greatest log likelihood ratio (nat) of a range under the mapped walls, off all without one.
 
     Parameters
     ----------
-    room, q, p
-        Walls and corners, the reading and the settings.
-    level : int
-        Its noise level.
-    edges : bool
-        Whether walls answer from the beam's edge.
+    room, q, p, level, edges
+        As for `room_evidence`.
+    margin : float
+        So far beyond its ends a span answers, m.
+    length_min : float
+        Length of the spans that count, at least, m.
     """
     best = float(p[0].table[level, TABLE_BINS - 1])
     for k in range(MAX_WALLS):
@@ -128,8 +139,25 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
                 nx, ny = wall_normal(wall)
                 expected, _, _ = over_line(q, nx, ny, expected)
                 along += 0.5 * (nx * q.listener_y - ny * q.listener_x)
-            if kind != NOWHERE and (kind != BEAM_EDGE or edges) and is_on_span(wall, along, ROOM_MARGIN_M):
+            if kind != NOWHERE and (kind != BEAM_EDGE or edges) and is_on_long_span(wall, along, margin, length_min):
                 best = max(best, log_likelihood(p, level, q.range_m - expected))
+    return best
+
+
+@kernel
+def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edges: bool) -> float:
+    """Return the greatest log likelihood ratio (nat) of a range under the mapped walls, corners and edges.
+
+    Parameters
+    ----------
+    room, q, p
+        Walls and corners, the reading and the settings.
+    level : int
+        Its noise level.
+    edges : bool
+        Whether walls answer from the beam's edge.
+    """
+    best = wall_evidence(room, q, p, level, edges, ROOM_MARGIN_M, 0.0)
     for c in range(CORNERS_MAX):
         if room.corners[c].is_used == 1:
             best = max(best, point_evidence(room.corners[c], q, p, level))
@@ -160,26 +188,11 @@ def is_on_long_walls(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> 
     for j in range(s[0].job.reading_count):
         q = s[0].job_readings[j]
         level = level_of(p, s[0].noise_level, q.range_m)
-        best = float(p[0].table[level, TABLE_BINS - 1])
-        for k in range(MAX_WALLS):
-            wall = room.walls[k]
-            if wall.weight > 0.0 and not is_crossed(q):
-                kind, expected, along, _ = contact(wall, q, p)
-                answers = kind != NOWHERE and (kind != BEAM_EDGE or edges)
-                if answers and is_on_long_span(wall, along, length_min):
-                    best = max(best, log_likelihood(p, level, q.range_m - expected))
-        evidence += best
+        if is_crossed(q):
+            evidence += float(p[0].table[level, TABLE_BINS - 1])
+        else:
+            evidence += wall_evidence(room, q, p, level, edges, 0.0, length_min)
     return evidence - track.log_likelihood_ratio > IN_WALL_NAT
-
-
-@kernel
-def is_on_long_span(wall: Wall, along: float, length_min: float) -> bool:
-    """Return whether a position lies on a span of a wall that is at least so long, m."""
-    for k in range(wall.span_count):
-        span = wall.spans[k]
-        if span.low <= along <= span.high and span.high - span.low >= length_min:
-            return True
-    return False
 
 
 @kernel

@@ -154,12 +154,12 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
 
 
 @kernel
-def passes_of_a_gap(room: WallMap, wall: Wall, b: int) -> float:
+def passes_of_a_gap(room: WallMap, wall: Wall, b: int, is_rough: bool) -> float:
     """Return the weight of the ranges that passed a bin without a wall, −1 where there is one, or at the end."""
     if b == WALL_BINS:
         return -1.0
     of = wall.bins[b]
-    if not is_covered(of) or (edges_answer(room) and of.weight < ROUGH_WEIGHT_MIN):
+    if not is_covered(of) or (is_rough and of.weight < ROUGH_WEIGHT_MIN):
         return of.passes
     return of.weight if is_stray(room, wall, b) else -1.0
 
@@ -194,7 +194,8 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     What the ends of a run explain better than the line is left out.
     """
     wall.span_count = 0
-    gap_max = ROUGH_GAP_MAX_M if edges_answer(room) else GAP_MAX_M
+    is_rough = edges_answer(room)
+    gap_max = ROUGH_GAP_MAX_M if is_rough else GAP_MAX_M
     reach = EDGE_REACH_M + TRIM_REACH_SLACK_M if are_mirrors(room) else math.inf
     first = -1
     last = -1
@@ -202,7 +203,7 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     weight = 0.0  # of the run since its last long gap, …
     before = -1  # … and the last bin before that
     for b in range(WALL_BINS + 1):
-        passed = passes_of_a_gap(room, wall, b)
+        passed = passes_of_a_gap(room, wall, b, is_rough)
         if passed >= 0.0:
             passes += passed
             continue

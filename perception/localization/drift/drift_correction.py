@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.messages import Firing, Pose
+from drivers.messages import IDENTITY, Firing, Pose
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
 from perception.localization.drift.drift_evidence import DriftEvidence
@@ -215,7 +215,7 @@ class DriftCorrection:
     def map_from_filter(self) -> Pose:
         """Return the pose of the filter's frame in the map frame: a turn about the first firing, and a shift."""
         if not self.is_applied:
-            return Pose(0.0, 0.0, 0.0)
+            return IDENTITY
         turn, x, y = self._motion.tolist()
         start = Pose(self._map_heading.start_x, self._map_heading.start_y, 0.0)
         return Pose(start.x + x, start.y + y, turn).compose(start.inverse())
@@ -223,7 +223,7 @@ class DriftCorrection:
     def odometry_from_filter(self) -> Pose:
         """Return the pose of the filter's frame in odometry's frame, at the last firing."""
         if self._arrived == 0 or not self.is_applied:
-            return Pose(0.0, 0.0, 0.0)
+            return IDENTITY
         x, y, theta, yaw = self._waiting[(self._arrived - 1) % WAITING_MAX, :POSE].tolist()
         here, here_yaw = self._pose_of(Pose(x, y, theta), yaw)
         return Pose(x, y, yaw).compose(Pose(here.x, here.y, here_yaw).inverse())
@@ -232,7 +232,7 @@ class DriftCorrection:
         """Return where the robot was at the last firing, in the map frame."""
         e = self.e[0]
         if self._arrived == 0:
-            return LocalizedPose(Pose(0.0, 0.0, 0.0), 0.0, np.zeros((3, 3)), "localizing", 1.0)
+            return LocalizedPose(IDENTITY, 0.0, np.zeros((3, 3)), "localizing", 1.0)
         x, y, theta, yaw = self._waiting[(self._arrived - 1) % WAITING_MAX, :POSE].tolist()
         pose, ring_yaw = self._pose_of(Pose(x, y, theta), yaw) if self.is_applied else (Pose(x, y, theta), yaw)
         to = np.zeros((3, FIRST))
@@ -295,7 +295,7 @@ class DriftCorrection:
             self.e[0].range_scale,
         )
         found = find_slip(self._tracker, echoes, self._half_angle, self._tracker.range_max_m)
-        self._stands_firm = found is not None and found.pose == Pose(0.0, 0.0, 0.0)
+        self._stands_firm = found is not None and found.pose == IDENTITY
         if found is not None and not self._stands_firm:
             self._tracker.displace(found.pose, found.covariance_matrix())
 

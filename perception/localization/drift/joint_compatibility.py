@@ -15,7 +15,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drivers.messages import Pose, wrap_angle
+from drivers.messages import IDENTITY, Pose, wrap_angle
 from perception.kernel import Floats
 
 PLACE_SIGMA_M: Final = 0.4
@@ -42,7 +42,6 @@ ALIKE_RAD: Final = math.radians(6.0)
 
 GAIN_MIN: Final = 5.0
 """A landmark's squared innovations must fall by so much to be clearly better."""
-HERE: Final = Pose(0.0, 0.0, 0.0)
 """No displacement."""
 
 Covariance: TypeAlias = tuple[float, float, float, float, float, float]
@@ -105,7 +104,7 @@ def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle:
     nearest = _nearest(echoes)
     least = max(PAIRS_MIN, math.ceil(PAIRED_SHARE * len(nearest)))
     prior = (PLACE_SIGMA_M**2, 0.0, 0.0, PLACE_SIGMA_M**2, 0.0, SLIP_TURN_SIGMA**2)
-    stack = [(0, _Branch(HERE, prior, 0.0, ()))]
+    stack = [(0, _Branch(IDENTITY, prior, 0.0, ()))]
     best: _Branch | None = None
     is_ambiguous = False
     for _ in range(BRANCHES_MAX):
@@ -151,7 +150,7 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
     nearest = _nearest(echoes)
     gains: dict[int, float] = {}
     for k, i in found.pairs:
-        before, after = (_squared(pose, nearest[k], discs[i], half_angle) for pose in (HERE, found.pose))
+        before, after = (_squared(pose, nearest[k], discs[i], half_angle) for pose in (IDENTITY, found.pose))
         gains[i] = gains.get(i, 0.0) + before - after
     return sum(gain > GAIN_MIN for gain in gains.values()) / len(gains)
 

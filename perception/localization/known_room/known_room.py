@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.messages import Firing, Pose, wrap_angle
+from drivers.messages import IDENTITY, Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, bounds, index_of, up_to
 from perception.localization.known_room.background import Background
 from perception.localization.known_room.keyframes import Keyframes
@@ -252,7 +252,7 @@ class KnownRoom:
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame; they are the same until a place is known."""
         at = self._at_last_firing()
-        return at.compose(self._tracked.pose(at).inverse()) if len(self._tracked) else Pose(0.0, 0.0, 0.0)
+        return at.compose(self._tracked.pose(at).inverse()) if len(self._tracked) else IDENTITY
 
     def drop_caches(self) -> None:
         """Discard cached results, after the memory was restored from a snapshot."""

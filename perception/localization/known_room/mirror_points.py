@@ -12,10 +12,27 @@ Mirrors = tuple[Expected, Expected]
 """Of the nearest mirror point in the beam, and of a nearer one beside it."""
 
 
+Found = tuple[float, float, float, float, float, float]
+"""Distance and place (m) about the sensor of the nearest point in the beam, then of the nearest beside it."""
+
+
 @kernel
-def is_skipped(distance: float, is_inside: bool, is_outside: bool, best: float, beside: float) -> bool:
-    """Return whether a point is too far beside the beam, or farther (m) than the best in the beam, or beside it."""
-    return is_outside or distance >= (best if is_inside else min(best, beside))
+def is_skipped(distance: float, is_inside: bool, is_outside: bool, found: Found) -> bool:
+    """Return whether a point is too far beside the beam, or no nearer (m) than what was found in it, or beside it."""
+    return is_outside or distance >= (found[0] if is_inside else min(found[0], found[3]))
+
+
+@kernel
+def with_point(
+    s: Surroundings, x: float, y: float, px: float, py: float, distance: float, is_inside: bool, found: Found
+) -> Found:
+    """Return what was found, with a nearer point at (px, py) from a sensor at (x, y), unless a surface hides that."""
+    if is_surface_hidden(s, x, y, px, py):
+        return found
+    best, best_x, best_y, beside, beside_x, beside_y = found
+    if is_inside:
+        return distance, px, py, beside, beside_x, beside_y
+    return best, best_x, best_y, distance, px, py
 
 
 @kernel
@@ -35,55 +52,45 @@ def expect_specular(s: Surroundings, x: float, y: float, cos: float, sin: float,
     """
     near, cos_half = s.near[0], s.sensor[0].cos_half
     off = math.hypot(x - near.x, y - near.y)
-    best, best_x, best_y = math.inf, 0.0, 0.0
-    beside, beside_x, beside_y = math.inf, 0.0, 0.0
+    found = (math.inf, 0.0, 0.0, math.inf, 0.0, 0.0)
     for k in range(near.wall_count):
-        if near.wall_m[k] - off > best:
+        if near.wall_m[k] - off > found[0]:
             break
         wall = s.walls[near.walls[k]]
         height = wall.offset - wall.nx * x - wall.ny * y
         px, py, distance = height * wall.nx, height * wall.ny, abs(height)
         ahead = px * cos + py * sin
         is_inside = ahead >= distance * cos_half
-        if is_skipped(distance, is_inside, ahead < distance * cos_fringe, best, beside):
+        if is_skipped(distance, is_inside, ahead < distance * cos_fringe, found):
             continue
         ax, ay, bx, by = wall.x1 - x - px, wall.y1 - y - py, wall.x2 - x - px, wall.y2 - y - py
-        if ax * bx + ay * by <= 0.0 and not is_surface_hidden(s, x, y, px, py):
-            if is_inside:
-                best, best_x, best_y = distance, px, py
-            else:
-                beside, beside_x, beside_y = distance, px, py
+        if ax * bx + ay * by <= 0.0:
+            found = with_point(s, x, y, px, py, distance, is_inside, found)
     for k in range(near.corner_count):
-        if near.corner_m[k] - off > best:
+        if near.corner_m[k] - off > found[0]:
             break
         corner = s.corners[near.corners[k]]
         px, py = corner.x - x, corner.y - y
         distance = math.hypot(px, py)
         ahead = px * cos + py * sin
         is_inside = ahead >= distance * cos_half
-        if is_skipped(distance, is_inside, ahead < distance * cos_fringe, best, beside):
+        if is_skipped(distance, is_inside, ahead < distance * cos_fringe, found):
             continue
-        if faces(corner, px, py, distance) and not is_surface_hidden(s, x, y, px, py):
-            if is_inside:
-                best, best_x, best_y = distance, px, py
-            else:
-                beside, beside_x, beside_y = distance, px, py
+        if faces(corner, px, py, distance):
+            found = with_point(s, x, y, px, py, distance, is_inside, found)
     for k in range(near.circle_count):
-        if near.circle_m[k] - off > best:
+        if near.circle_m[k] - off > found[0]:
             break
         circle = s.circles[near.circles[k]]
         cx, cy = circle.x - x, circle.y - y
         centre = math.hypot(cx, cy)
         gap, ahead = centre - circle.radius, cx * cos + cy * sin
         is_inside = ahead >= centre * cos_half
-        if gap <= 0.0 or is_skipped(gap, is_inside, ahead < centre * cos_fringe, best, beside):
+        if gap <= 0.0 or is_skipped(gap, is_inside, ahead < centre * cos_fringe, found):
             continue
         px, py = cx * gap / centre, cy * gap / centre
-        if not is_surface_hidden(s, x, y, px, py):
-            if is_inside:
-                best, best_x, best_y = gap, px, py
-            else:
-                beside, beside_x, beside_y = gap, px, py
+        found = with_point(s, x, y, px, py, gap, is_inside, found)
+    best, best_x, best_y, beside, beside_x, beside_y = found
     if beside >= best:
         beside = math.inf
     return mirror(best, best_x, best_y), mirror(beside, beside_x, beside_y)

@@ -9,7 +9,7 @@ it belongs to no snapshot: after a snapshot was restored, what is missing of it 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from perception.localization.known_room.surroundings import Surroundings, expect
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
-from perception.records import Record, Records, Structured, records, zeros
+from perception.records import Record, Records, records, zeros
 
 GRID_CELL_M: Final = 0.2
 GRID_DIRECTIONS: Final = 60
@@ -351,7 +351,7 @@ class PoseGrid:
         codes = self._table[("cone", "specular").index(reflection)]
         return np.where(codes == SILENT_CODE, np.inf, codes * (self._window_m / 254.0))
 
-    def places(self, i: Structured, j: Structured) -> Floats:
+    def places(self, i: NDArray[Any], j: NDArray[Any]) -> Floats:
         """Return the middles of cells, m, shape (n, 2)."""
         return np.asarray(self._origin + GRID_CELL_M * np.column_stack([i, j]))
 

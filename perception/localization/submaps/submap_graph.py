@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.messages import Firing, Pose, wrap_angle
+from drivers.messages import IDENTITY, Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.localized_pose import LocalizedPose, Moment, Status
@@ -251,7 +251,7 @@ class SubmapGraph:
     def odometry_from_filter(self) -> Pose:
         """Return the pose of the filter's frame in odometry's frame, at the last firing."""
         if not self.held.is_moved:
-            return Pose(0.0, 0.0, 0.0)
+            return IDENTITY
         return Pose(*self.moment().odometry.tolist()).compose(Pose(*self.in_filter().tolist()).inverse())
 
     def _renew_spread(self) -> None:
@@ -292,7 +292,7 @@ class SubmapGraph:
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
         if not self.is_applied:
-            return Pose(0.0, 0.0, 0.0)
+            return IDENTITY
         moment = self.moment()
         return Pose(*moment.odometry.tolist()).compose(Pose(*self.placed(moment).tolist()).inverse())
 

@@ -108,7 +108,7 @@ def is_covered(rows: Structured, by: Structured) -> NDArray[np.bool_]:
 
 
 class SurfaceList:
-    """Structured of surfaces.
+    """Rows of surfaces.
 
     Attributes
     ----------

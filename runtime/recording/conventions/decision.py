@@ -234,9 +234,8 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
     if len(left) > 1 and options.heading == "auto":
         _check_aim(table, robot, units, motion, default)
     forward = [one for one in near if one not in backward]
-    shift = Shift(default, 0, 0.0)
-    if motion.is_related:
-        shift = _checked_order(table, robot, options, units, forward, [default, *near], echoes)
+    ways, unshifted = [default, *near], Shift(default, 0, 0.0)
+    shift = _checked_order(table, robot, options, units, forward, ways, echoes) if motion.is_related else unshifted
     fits = [one for one in left if one in near]
     if default in left and (default in near or not fits):
         doubts = [one for one in left if sureness(echoes[one], echoes[default]) > 0.5 * SURE]

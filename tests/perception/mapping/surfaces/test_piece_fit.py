@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from perception.kernel import Floats
 from perception.mapping.surfaces.parameters import READINGS_MAX
 from perception.mapping.surfaces.piece_fit import group_echoes, judge
 from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
@@ -16,7 +17,7 @@ pytestmark = pytest.mark.compiled
 RADII = np.array([0.107, 0.29, 0.671])
 
 
-def judged(points: Structured, sensors: Structured, sigma_m: float) -> Structured:
+def judged(points: Floats, sensors: Floats, sigma_m: float) -> Structured:
     """Return a piece after its echoes came from some places, with errors."""
     local = zeros(LocalMap, 1)
     count = len(points)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from perception.kernel import Floats
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, WHOLE
 from perception.mapping.surfaces.pieces import (
     ROW_PARTS,
@@ -25,7 +26,7 @@ from perception.records import Records, Structured, records, zeros
 pytestmark = pytest.mark.compiled
 
 
-def mapped(points: Structured, echoes: float = 3.0) -> tuple[Records[LocalMap], Structured, Structured]:
+def mapped(points: Floats, echoes: float = 3.0) -> tuple[Records[LocalMap], Structured, Structured]:
     """Return a map, in two views, whose cells at some places (m from the centre) have been heard, and its counts."""
     counts, local = zeros(CellCounts, 1), zeros(LocalMap, 1)
     for x, y in points:
@@ -40,7 +41,7 @@ def mapped(points: Structured, echoes: float = 3.0) -> tuple[Records[LocalMap], 
     return room, local, counts
 
 
-def grown(points: Structured) -> Structured:
+def grown(points: Floats) -> Structured:
     """Return the pieces in such a map, the longest first."""
     room, local, counts = mapped(points)
     assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
@@ -49,7 +50,7 @@ def grown(points: Structured) -> Structured:
     return longest
 
 
-def line(x1: float, y1: float, x2: float, y2: float) -> Structured:
+def line(x1: float, y1: float, x2: float, y2: float) -> Floats:
     shares = np.linspace(0.0, 1.0, 1 + int(math.hypot(x2 - x1, y2 - y1) / 0.02))[:, None]
     return np.asarray(np.array([x1, y1]) + shares * (np.array([x2, y2]) - np.array([x1, y1])))
 
