@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -202,7 +201,8 @@ def write_plugin(name: str, kind: str) -> int:
     taken = {*known_drivers(), *list_shipped("robots")} if kind == "robot" else {*SHIPPED_USES, *plugged(SCHEMAS)}
     if name in taken:
         raise UserError(f"{name}: is taken; choose another name than {', '.join(sorted(taken))}", WRONG_CALL)
-    if find_spec(name) is not None:
+    # Not importlib's own search: for that a module that was imported before is there, wherever it came from.
+    if any(finder.find_spec(name, None) for finder in sys.meta_path):
         raise UserError(f"{name}: a module of this name is here already; choose another name", WRONG_CALL)
     folder = Path(name)
     try:

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -52,9 +53,24 @@ def test_a_robot_and_a_schema_are_known_by_their_names(tmp_path: Path, monkeypat
         write_plugin("orbit", "schema")
 
 
+def test_a_module_that_was_imported_and_is_no_longer_there_takes_no_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "gone", ModuleType("gone"))
+    assert write_plugin("gone", "schema") == DONE
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("Skippy", "small letters"), ("denning", "is taken"), ("here", "exists"), ("numpy", "module of this name")],
+    [
+        ("Skippy", "small letters"),
+        ("denning", "is taken"),
+        ("here", "exists"),
+        ("numpy", "module of this name"),
+        ("time", "module of this name"),
+        ("drivers", "module of this name"),
+    ],
 )
 def test_a_name_that_does_not_do_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, said: str
