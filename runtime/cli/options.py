@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from cyclopts import Parameter, Token
@@ -41,18 +40,6 @@ ModelFiles = Annotated[
         help="Object model to look for: file, or the name of a shipped one; may be repeated.",
     ),
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class ReplayOptions:
-    """What `echolocate replay` is given of a recording and of a ring log alike."""
-
-    sets: tuple[str, ...]
-    robot: str | None
-    models: tuple[str, ...]
-    json_file: str | None
-    force: bool
-    units: Literal["m", "ft"]
 
 
 def parse_whole_number(_type: type, tokens: Sequence[Token]) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -10,7 +11,7 @@ from cyclopts import Parameter
 
 from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.commands.output_files import check_outputs
-from runtime.cli.options import ConfigFile, Count, Flag, Force, RobotFile, Sets, WorldFile
+from runtime.cli.options import Count, Flag, Force, RobotFile, Sets, WorldFile
 from runtime.timing.memory_policy import no_collection
 
 if TYPE_CHECKING:
@@ -24,55 +25,80 @@ CLOCK_WRAP_S: Final = 2**32 * 1e-6
 """The robot's counter has 32 bits of microseconds."""
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class SettingsOptions:
+    """Where the emulated robot and its world are described."""
+
+    config: Annotated[str | None, Parameter(help="Run file that names robot and world.")] = None
+    world: WorldFile = None
+    robot: RobotFile = None
+    sets: Sets = ()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class LineOptions:
+    """The line on which the robot answers; by default a pseudo-terminal whose path is printed."""
+
+    link: Annotated[str | None, Parameter(help="Create a symbolic link to the pseudo-terminal at this path.")] = None
+    tcp: Annotated[
+        str | None,
+        Parameter(
+            help="Listen on this TCP port of this machine, not on a pseudo-terminal; HOST:PORT to serve a network."
+        ),
+    ] = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class TraceOptions:
+    """Files that the emulator writes."""
+
+    trace: Annotated[str | None, Parameter(help="Write the true poses to this file (CSV), 100 rows a second.")] = None
+    latency: Annotated[
+        str | None,
+        Parameter(help="Write to this file (CSV) when each echo was sent and when each drive command arrived."),
+    ] = None
+    force: Force = False
+
+
+RUN_FILE: Final = SettingsOptions()
+PSEUDO_TERMINAL: Final = LineOptions()
+NO_TRACE: Final = TraceOptions()
+
+
 def emulate(
     *,
-    world: WorldFile = None,
-    link: str | None = None,
-    tcp: str | None = None,
+    described: SettingsOptions = RUN_FILE,
+    line: LineOptions = PSEUDO_TERMINAL,
+    traces: TraceOptions = NO_TRACE,
     faults: str | None = None,
     seed: Count = 0,
-    robot: RobotFile = None,
-    trace: str | None = None,
-    latency: str | None = None,
-    force: Force = False,
     clock: float = 0.0,
     control: Annotated[bool, Flag] = False,
-    config: ConfigFile = None,
-    sets: Sets = (),
     end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
 ) -> int:
     """Emulate a robot on a pseudo-terminal or a TCP port until interrupted.
 
     Parameters
     ----------
-    link
-        Create a symbolic link to the pseudo-terminal at this path.
-    tcp
-        Listen on this TCP port of this machine in place of a pseudo-terminal; HOST:PORT to serve a network.
+    described
+        Where robot and world are described.
+    line
+        Where the robot answers.
+    traces
+        What is written.
     faults
         Fault script.
     seed
         Seed of everything random.
-    trace
-        Write the true poses to this file (CSV), 100 rows a second.
-    latency
-        Write to this file (CSV) when each echo was sent and when each drive command arrived.
-    force
-        Overwrite files that exist already.
     clock
         Initial value of the robot's own clock, s; it wraps at 4294.967296.
     control
         Take time control from standard input, one line per request: time_scale NUMBER HOST_S RUN_S FACTOR UNTIL_S.
         From the host's monotonic time HOST_S on, the robot's time starts at RUN_S and runs FACTOR times as fast until
         UNTIL_S. The time reached is reported on standard output: acknowledged NUMBER RUN_S.
-    config
-        Run file that names robot and world.
-    world
-        World file, or the name of a shipped one; None for that of the run file.
-    robot
-        Robot file, or the name of a shipped one; None for that of the run file.
-    sets
-        Single settings, each `path=value`, that override the files'.
     end_with_parent
         End when the process that started the emulator has ended; for use by `run`.
 
@@ -86,7 +112,7 @@ def emulate(
 
         from config.load import load_settings
 
-        settings = load_settings(config, sets, world=world, robot=robot)
+        settings = load_settings(described.config, described.sets, world=described.world, robot=described.robot)
         from drivers.emulator.faults import load_faults
         from drivers.emulator.server import Service, serve
 
@@ -95,7 +121,7 @@ def emulate(
     if not 0.0 <= clock < CLOCK_WRAP_S:
         raise UserError(f"--clock {clock:g}: must be from 0 to below {CLOCK_WRAP_S} s, where it wraps", WRONG_CALL)
     script = () if faults is None else load_faults(faults)
-    check_outputs({"--trace": trace, "--latency": latency}, (faults, link), force=force)
+    check_outputs({"--trace": traces.trace, "--latency": traces.latency}, (faults, line.link), force=traces.force)
 
     def ready(path: str) -> None:
         sys.stdout.write(f"ready on {path}\n")
@@ -105,13 +131,13 @@ def emulate(
         serve(
             settings,
             settings.world,
-            make_port=_port_maker(link, tcp),
+            make_port=_port_maker(line),
             faults=script,
             seed=seed,
             ready=ready,
             service=Service(
-                trace_path=trace,
-                latency_path=latency,
+                trace_path=traces.trace,
+                latency_path=traces.latency,
                 exit_with_parent=end_with_parent,
                 clock_start_us=round(1e6 * clock),
                 control=PIPES if control else None,
@@ -121,13 +147,13 @@ def emulate(
     return DONE
 
 
-def _port_maker(link: str | None, tcp: str | None) -> Callable[[], EmulatorPort]:
-    if tcp is None:
+def _port_maker(line: LineOptions) -> Callable[[], EmulatorPort]:
+    if line.tcp is None:
         from drivers.emulator.pty_transport import PtyPort
 
-        return partial(PtyPort, link)
+        return partial(PtyPort, line.link)
     from drivers.emulator.tcp_transport import TcpServerPort, parse_address
 
-    if link is not None:
+    if line.link is not None:
         raise UserError("--link and --tcp: give one of them, there is one line", WRONG_CALL)
-    return partial(TcpServerPort, *parse_address(tcp))
+    return partial(TcpServerPort, *parse_address(line.tcp))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import asdict, dataclass
+from typing import Annotated, Final, Literal
 
 from cyclopts import App, Parameter
 
@@ -13,75 +14,60 @@ Yes = Annotated[bool, Parameter(negative="", show_default=False, help="Ask nothi
 app = App(name="init")
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class RobotOptions:
+    """Answers to the questions of `init robot`; what is None is asked."""
+
+    driver: Annotated[
+        str | None,
+        Parameter(
+            help="The robot's protocol: denning (also rings that you build), arcos (Pioneer), rflex (B21r, "
+            "Magellan), ros2, or that of an installed package."
+        ),
+    ] = None
+    name: Annotated[str | None, Parameter(help="What the robot is called.")] = None
+    layout: Annotated[
+        Literal["all-round", "in-front", "one-by-one"] | None,
+        Parameter(
+            help="Where the sensors look: all round, equally spaced, the first one forward; in front; or one by one, "
+            "which is asked for each."
+        ),
+    ] = None
+    sensors: Annotated[int | None, Parameter(help="Number of sensors.")] = None
+    spacing: Annotated[float | None, Parameter(help="Of sensors in front, degrees from one to the next.")] = None
+    ring_radius: Annotated[float | None, Parameter(help="Distance of the sensors from the middle, m.")] = None
+    beam_half_angle: Annotated[float | None, Parameter(help="Half the width of a sensor's beam, degrees.")] = None
+    range_min: Annotated[float | None, Parameter(help="Least range that a sensor reports, m.")] = None
+    range_max: Annotated[float | None, Parameter(help="Greatest range that a sensor reports, m.")] = None
+    resolution: Annotated[float | None, Parameter(help="Step of the reported ranges, m; 0 if they have none.")] = None
+    body_radius: Annotated[float | None, Parameter(help="Radius of the body, m.")] = None
+    speed_max: Annotated[float | None, Parameter(help="Largest speed, m/s.")] = None
+    turn_max: Annotated[float | None, Parameter(help="Largest turning rate, rad/s.")] = None
+    synchro: Annotated[bool, Flag, Parameter(help="The wheels turn, the body with its ring does not.")] = False
+    baud: Annotated[int | None, Parameter(help="Speed of the line, bits per second.")] = None
+    port: Annotated[
+        str | None, Parameter(help="Serial port of the robot, as /dev/ttyUSB0; by default a run names it.")
+    ] = None
+
+
+ASK_ALL: Final = RobotOptions()
+
+
 @app.command
-def robot(
-    file: str,
-    /,
-    *,
-    driver: str | None = None,
-    name: str | None = None,
-    layout: Literal["all-round", "in-front", "one-by-one"] | None = None,
-    sensors: int | None = None,
-    spacing: float | None = None,
-    ring_radius: float | None = None,
-    beam_half_angle: float | None = None,
-    range_min: float | None = None,
-    range_max: float | None = None,
-    resolution: float | None = None,
-    body_radius: float | None = None,
-    speed_max: float | None = None,
-    turn_max: float | None = None,
-    synchro: Annotated[bool, Flag] = False,
-    baud: int | None = None,
-    port: str | None = None,
-    yes: Yes = False,
-    force: Force = False,
-) -> int:
+def robot(file: str, /, *, options: RobotOptions = ASK_ALL, yes: Yes = False, force: Force = False) -> int:
     """Write a robot file: where the sensors look, the body, the line and the driver.
 
     Parameters
     ----------
     file
         The file to write, as my-robot.toml.
-    driver
-        The robot's protocol: denning (also rings that you build), arcos (Pioneer), rflex (B21r, Magellan), ros2, or
-        that of an installed package.
-    name
-        What the robot is called.
-    layout
-        Where the sensors look: all round, equally spaced, the first one forward; in front; or one by one, which is
-        asked for each.
-    sensors
-        Number of sensors.
-    spacing
-        Of sensors in front, degrees from one to the next.
-    ring_radius
-        Distance of the sensors from the middle, m.
-    beam_half_angle
-        Half the width of a sensor's beam, degrees.
-    range_min
-        Least range that a sensor reports, m.
-    range_max
-        Greatest range that a sensor reports, m.
-    resolution
-        Step of the reported ranges, m; 0 if they have none.
-    body_radius
-        Radius of the body, m.
-    speed_max
-        Largest speed, m/s.
-    turn_max
-        Largest turning rate, rad/s.
-    synchro
-        The wheels turn, the body with its ring does not.
-    baud
-        Speed of the line, bits per second.
-    port
-        Serial port of the robot, as /dev/ttyUSB0; by default a run names it.
+    options
+        What is not asked.
     """
-    given = locals()  # the options by their names, as the questions have them
     from runtime.cli.commands.init_files import write_robot
 
-    return write_robot(file, given, yes=yes, force=force)
+    return write_robot(file, asdict(options), yes=yes, force=force)
 
 
 @app.command

@@ -27,12 +27,12 @@ def run_budgets(common: Experiment, budgets_ms: Sequence[float], quanta: Sequenc
     UserError
         A budget is not a number ≥ 0.
     """
-    sets, models, seeds, json_file, force, units = common
+    models, seeds, json_file = common.models, common.seeds, common.json_file
     if not all(0.0 <= budget < math.inf for budget in (*budgets_ms, *quanta)):
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
-    settings = load_settings("irregular", sets, models=models)
+    settings = load_settings("irregular", common.sets, models=models)
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file}, force=force)
+    check_outputs({"--json": json_file}, force=common.force)
     prepare_kernels(settings, console)
     from runtime.cli.tables import budget_table
     from runtime.cycle.summary import write_json
@@ -53,5 +53,5 @@ def run_budgets(common: Experiment, budgets_ms: Sequence[float], quanta: Sequenc
     unit = "quanta" if quanta else "ms"
     if json_file is not None:
         write_json(json_file, {"unit": unit, "budgets": rows})
-    EscapingConsole().print(budget_table(rows, unit, units))
+    EscapingConsole().print(budget_table(rows, unit, common.units))
     return DONE

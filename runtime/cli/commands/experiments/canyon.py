@@ -36,10 +36,10 @@ SCHEMAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 
 def run_canyons(common: Experiment) -> int:
     """Drive in so many worlds with each set of schemas, print a table and return the exit code."""
-    sets, models, seeds, json_file, force, _ = common
-    chosen = {name: load_settings("hallway", (*own, *sets), models=models) for name, own in SCHEMAS.items()}
+    models, seeds, json_file = common.models, common.seeds, common.json_file
+    chosen = {name: load_settings("hallway", (*own, *common.sets), models=models) for name, own in SCHEMAS.items()}
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file}, force=force)
+    check_outputs({"--json": json_file}, force=common.force)
     prepare_kernels(chosen["leave-canyon"], console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.canyon_trials import CanyonRow, drive, summarise

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 def run_drift(common: Experiment) -> int:
     """Drive the rounds at each level of errors, print a table and return the exit code."""
-    sets, models, seeds, json_file, force, units = common
-    settings = load_settings("hallway", sets, models=models)
+    models, seeds, json_file = common.models, common.seeds, common.json_file
+    settings = load_settings("hallway", common.sets, models=models)
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file}, force=force)
+    check_outputs({"--json": json_file}, force=common.force)
     prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
     from runtime.cli.tables import drift_table
     from runtime.cycle.summary import write_json
@@ -38,5 +38,5 @@ def run_drift(common: Experiment) -> int:
                 rows.append(summarise_drives(errors, outcomes))
     if json_file is not None:
         write_json(json_file, {"levels": rows})
-    EscapingConsole().print(drift_table(rows, units))
+    EscapingConsole().print(drift_table(rows, common.units))
     return DONE

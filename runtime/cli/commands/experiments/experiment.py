@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
+from cyclopts import Parameter
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
@@ -29,33 +31,41 @@ ROWS_SHOWN: Final = 24
 """Longer tables are not printed."""
 
 
-class Experiment(NamedTuple):
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Experiment:
     """What all experiments have in common."""
 
-    sets: tuple[str, ...]
-    models: tuple[str, ...]
-    seeds: int
-    json_file: str | None
-    force: bool
-    units: Units
+    method: Annotated[Literal["paper", "bayes"], Parameter(help="How objects are recognised.")] = "bayes"
+    models: Annotated[
+        ModelFiles,
+        Parameter(name="--model", help="Object models to recognise; by default those of the experiment."),
+    ] = ()
+    seeds: Annotated[Count, Parameter(help="Repeat with this many seeds, starting at 0.")] = 1
+    json_file: JsonFile = None
+    force: Force = False
+    units: UnitsOption = "ft"
+    overrides: Sets = ()
+
+    @property
+    def sets(self) -> tuple[str, ...]:
+        """Settings that override the experiment's, its method among them."""
+        return (*self.overrides, f"perception.method={self.method}")
+
+
+ONE_SEED: Final = Experiment()
 
 
 def experiment(
     name: Literal["hallway", "irregular", "budget", "drift", "canyon"],
     /,
     *,
-    method: Literal["paper", "bayes"] = "bayes",
     scene: SceneName | None = None,
     world: WorldFile = None,
-    model: ModelFiles = (),
     budget_ms: Annotated[tuple[float, ...], Several] = (0.2, 0.5, 1.0, 2.0, 5.0),
     quanta: Annotated[tuple[float, ...], Several] = (),
-    seeds: Count = 1,
     out: str | None = None,
-    json: JsonFile = None,
-    force: Force = False,
-    units: UnitsOption = "ft",
-    sets: Sets = (),
+    common: Experiment = ONE_SEED,
 ) -> int:
     """Repeat an experiment of the paper in virtual time, and print its Table 2.
 
@@ -65,40 +75,27 @@ def experiment(
         The simulated hallway, the irregular hallway of the real run, the effect of smaller time budgets for
         perception in a hall of 40 drums, rounds among drums with drifting odometry, or drives to a goal behind a box
         canyon by several sets of schemas.
-    method
-        How objects are recognised.
     scene
         Instead of driving, give perception the readings of this scene at exact poses.
+    world
+        World file to drive in instead of the experiment's own hall.
     budget_ms
         For `budget`: processor time of perception per cycle, ms.
     quanta
         For `budget`: refinement quanta per cycle instead of a time, which makes the table repeatable; 0.1 is one in
         ten cycles.
-    seeds
-        Repeat with this many seeds, starting at 0.
     out
         Folder for recording, figures and report of the run with seed 0.
-    world
-        World file to drive in instead of the experiment's own hall.
-    model
-        Object models to recognise; empty for those of the experiment.
-    json
-        File for a summary (JSON); None for no file.
-    force
-        Overwrite files that exist already.
-    units
-        Units of the printed tables.
-    sets
-        Single settings, each `path=value`, that override the experiment's.
+    common
+        What all experiments are given.
 
     Raises
     ------
     UserError
         The options exclude one another, or there are no seeds.
     """
-    common = Experiment((*sets, f"perception.method={method}"), model, seeds, json, force, units)
-    if seeds < 1:
-        raise UserError(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
+    if common.seeds < 1:
+        raise UserError(f"--seeds {common.seeds}: must be at least 1", WRONG_CALL)
     if scene is not None and out is not None:
         raise UserError(
             "--scene gives perception readings without a run: there is nothing to record in --out", WRONG_CALL
@@ -147,14 +144,16 @@ def run_experiment(common: Experiment, name: str, world: str | None, out: str | 
     from runtime.simulation.evaluation import run_seed, stop_at_leg_end, summarise
     from runtime.support.pattern_check import refuse_undrivable
 
-    sets, models, seeds, json_file, force, units = common
-    settings = stop_at_leg_end(load_settings(name, sets, world=world, models=models))
+    models, seeds, json_file, units = common.models, common.seeds, common.json_file, common.units
+    settings = stop_at_leg_end(load_settings(name, common.sets, world=world, models=models))
     if settings.world is None or not settings.world.drum:
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
     refuse_undrivable(settings)
     console, output = EscapingConsole(stderr=True), plain_console()
     folder = None if out is None else make_output_folder(out)
-    check_outputs({"--out": [] if folder is None else run_files(folder, name), "--json": json_file}, force=force)
+    check_outputs(
+        {"--out": [] if folder is None else run_files(folder, name), "--json": json_file}, force=common.force
+    )
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
 
@@ -260,10 +259,10 @@ def run_scenes(common: Experiment, scene: SceneName) -> int:
     from config.load import load_settings
     from runtime.cli.tables import boxes_table, scene_line, table_2
 
-    sets, models, seeds, json_file, force, units = common
-    settings = load_settings("hallway", sets, models=models)
+    models, seeds, json_file, units = common.models, common.seeds, common.json_file, common.units
+    settings = load_settings("hallway", common.sets, models=models)
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file}, force=force)
+    check_outputs({"--json": json_file}, force=common.force)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.open_loop import run_scene, summarise_scene

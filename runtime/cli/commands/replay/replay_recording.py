@@ -6,9 +6,8 @@ import contextlib
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -16,7 +15,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
-from runtime.cli.options import ReplayOptions
+from runtime.cli.commands.replay.replay_options import RecordingOptions, ReplayOptions
 from runtime.cli.tables import objects_table, polylines_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
@@ -32,53 +31,14 @@ if TYPE_CHECKING:
     from runtime.recording.replayer import Replayer, ReplayStep
     from runtime.recording.verification import OnStep, ReplayResult
 
-SPEED_MIN: Final = 0.001
-"""Slowest replay: a cycle is shown for a minute."""
 
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """The part of a recording that is replayed, in seconds after its first cycle, and how fast it is shown."""
-
-    since_s: float
-    until_s: float | None
-    speed: float | None
-
-    def validate(self) -> None:
-        """Check the options.
-
-        Raises
-        ------
-        UserError
-            A number is negative or infinite, or the end is not after the start.
-        """
-        for option, value in (("--from", self.since_s), ("--to", self.until_s), ("--speed", self.speed)):
-            if value is not None and not (value >= 0.0 and math.isfinite(value)):
-                raise UserError(f"{option} {value}: must be a number, 0 or above", WRONG_CALL)
-        if self.speed is not None and self.speed < SPEED_MIN:
-            raise UserError(f"--speed {self.speed:g}: must be {SPEED_MIN} or above", WRONG_CALL)
-        if self.until_s is not None and self.until_s <= self.since_s:
-            raise UserError(f"--to {self.until_s}: must be after --from {self.since_s}", WRONG_CALL)
-
-
-def replay_recording(
-    log: str,
-    common: ReplayOptions,
-    *,
-    span: Span,
-    verify: bool,
-    other: str | None,
-) -> int:
+def replay_recording(log: str, both: ReplayOptions, recorded: RecordingOptions, *, force: bool) -> int:
     """Replay a recording, print the outcome and return the exit code.
 
     Parameters
     ----------
-    log, verify, other
+    log, both, recorded, force
         As of `runtime.cli.commands.replay.replay.replay`.
-    common
-        What a ring log is given, too.
-    span : Span
-        The part to replay.
 
     Raises
     ------
@@ -87,14 +47,12 @@ def replay_recording(
     """
     from runtime.recording.reader import open_recording
 
-    span.validate()
-    sets, robot, models, json_file = common.sets, common.robot, common.models, common.json_file
-    has_other_settings = other is not None or bool(sets) or bool(models) or robot is not None
-    is_part = span != Span(0.0, None, None)
+    recorded.validate()
+    has_other_settings = recorded.other is not None or bool(both.sets or both.model) or both.robot is not None
     for option, is_given in (
-        ("--verify", verify),
-        ("--json", json_file is not None),
-        ("--from, --to, --speed", is_part),
+        ("--verify", recorded.verify),
+        ("--json", both.json is not None),
+        ("--from, --to, --speed", recorded.is_part or recorded.speed is not None),
     ):
         if is_given and has_other_settings:
             raise UserError(
@@ -103,10 +61,10 @@ def replay_recording(
     console = plain_console(stderr=True)
     with open_recording(Path(log)) as recording:
         if has_other_settings:
-            settings = other_settings(recording, other, sets, robot=robot, models=models)
-            return compare_with_settings(recording, settings, console, common.units)
-        check_outputs({"--json": json_file}, (log,), force=common.force)
-        return replay_again(recording, console, span=span, verify=verify, json_file=json_file, units=common.units)
+            settings = other_settings(recording, recorded.other, both.sets, robot=both.robot, models=both.model)
+            return compare_with_settings(recording, settings, console, both.units)
+        check_outputs({"--json": both.json}, (log,), force=force)
+        return replay_again(recording, console, recorded, json_file=both.json, units=both.units)
 
 
 def other_settings(
@@ -127,7 +85,7 @@ def other_settings(
 
 
 def replay_again(
-    recording: Recording, console: Console, *, span: Span, verify: bool, json_file: str | None, units: Units
+    recording: Recording, console: Console, part: RecordingOptions, *, json_file: str | None, units: Units
 ) -> int:
     """Replay with the recorded settings, print what differs and return the exit code.
 
@@ -137,7 +95,9 @@ def replay_again(
         The recording.
     console : Console
         Where progress and notes are shown.
-    span, verify, json_file, units
+    part : RecordingOptions
+        What is replayed.
+    json_file, units
         As of `replay_recording`.
 
     Raises
@@ -153,19 +113,19 @@ def replay_again(
     others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]
     if others:
         console.print(f"recorded by another version or machine: {', '.join(others)}; results may differ")
-    until_s = math.inf if span.until_s is None else span.until_s
+    until_s = math.inf if part.until_s is None else part.until_s
     with contextlib.ExitStack() as stack:
-        if span.speed is not None:
-            on_step = stack.enter_context(live_view(recording, span.speed, units))
+        if part.speed is not None:
+            on_step = stack.enter_context(live_view(recording, part.speed, units))
         else:
             advance = stack.enter_context(progress(console, "replaying"))
 
             def on_step(_step: ReplayStep, _replayer: Replayer) -> None:
                 advance()
 
-        result = verify_recording(recording, since_s=span.since_s, until_s=until_s, on_step=on_step)
+        result = verify_recording(recording, since_s=part.since_s, until_s=until_s, on_step=on_step)
     if result.cycles == 0:
-        if result.skipped or span != Span(0.0, None, span.speed):
+        if result.skipped or part.is_part:
             raise UserError(f"{recording.path}: this part of it holds no cycle that can be replayed", FAILED)
         console.print(f"{recording.path}: holds no cycle yet: the run ended before its first one; nothing differs")
         if json_file is not None:
@@ -194,7 +154,7 @@ def replay_again(
         f"{result.times_real_time:.0f} times real time"
     )
     if result.first_difference is not None:
-        if verify:
+        if part.verify:
             raise UserError(f"{recording.path}: the replay differs, first in {result.first_difference}", FAILED)
         console.print(f"the replay differs, first in {result.first_difference}")
     return DONE

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Final
 from config.errors import DONE
 from config.load import load_settings, with_known_room
 from runtime.cli.commands.output_files import check_outputs, writing
-from runtime.cli.options import ReplayOptions
+from runtime.cli.commands.replay.replay_options import LocalizeOptions, ReplayOptions
 from runtime.cli.tables import objects_table, polylines_line, pose_line, walls_table
 from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import write_json
-from runtime.recording.conventions.options import AUTO, RingLogOptions
+from runtime.recording.conventions.options import RingLogOptions
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts
 from runtime.support.kernel_warmup import prepare_kernels
 from runtime.support.progress import progress
@@ -26,31 +26,22 @@ if TYPE_CHECKING:
 
 
 def replay_log(
-    log: str,
-    common: ReplayOptions,
-    *,
-    localize: bool = False,
-    trajectory: str | None = None,
-    path: str | None = None,
-    map_file: str | None = None,
-    options: RingLogOptions = AUTO,
+    log: str, both: ReplayOptions, localized: LocalizeOptions, options: RingLogOptions, *, force: bool
 ) -> int:
     """Run perception over a ring log, print the objects and return the exit code.
 
     Parameters
     ----------
-    log, localize, trajectory, path, map_file, options
+    log, both, localized, options, force
         As of `runtime.cli.commands.replay.replay.replay`.
-    common
-        What a recording is given, too.
     """
-    json_file, units = common.json_file, common.units
-    settings = load_settings(None, common.sets, robot=common.robot, models=common.models).of_log()
+    trajectory, path, map_file = localized.trajectory, localized.path, localized.map_file
+    settings = load_settings(None, both.sets, robot=both.robot, models=both.model).of_log()
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     console = EscapingConsole(stderr=True)
-    check_outputs({"--json": json_file, "--trajectory": trajectory, "--path": path}, (log,), force=common.force)
-    corrects_drift = localize and map_file is None
+    check_outputs({"--json": both.json, "--trajectory": trajectory, "--path": path}, (log,), force=force)
+    corrects_drift = localized.localize and map_file is None
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
@@ -79,9 +70,9 @@ def replay_log(
         if file is not None:
             with writing(option, file):
                 Path(file).write_text("\n".join([TRAJECTORY_HEADER, *poses, ""]), "utf-8")
-    if json_file is not None:
-        write_json(json_file, summary)
-    output = EscapingConsole()
+    if both.json is not None:
+        write_json(both.json, summary)
+    output, units = EscapingConsole(), both.units
     output.print(objects_table(summary["objects"], units, frame=summary.get("frame", "odometry")))
     if summary["walls"]:
         output.print(walls_table(summary["walls"], units, frame=summary.get("frame", "odometry")))

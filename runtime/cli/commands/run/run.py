@@ -6,12 +6,13 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from runtime.cli.options import ConfigFile, Count, Flag, Force, JsonFile, RobotFile, Sets, UnitsOption
+from runtime.cli.commands.run.run_settings import SettingsFiles
+from runtime.cli.options import ConfigFile, Count, Flag, Force, JsonFile, UnitsOption
 from runtime.timing.memory_policy import no_collection
 
 if TYPE_CHECKING:
@@ -29,6 +30,60 @@ if TYPE_CHECKING:
     from runtime.timing.time_control import TimeControl
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class EmulatorOptions:
+    """Options of the emulator that a run without a port starts."""
+
+    seed: Annotated[Count, Parameter(help="Emulated robot: seed of everything random.")] = 0
+    trace: Annotated[str | None, Parameter(help="Emulated robot: write its true poses to this file (CSV).")] = None
+    faults: Annotated[str | None, Parameter(help="Emulated robot: fault script.")] = None
+
+    def arguments(self, files: SettingsFiles, *, force: bool) -> list[str]:
+        """Return the command line of ``echolocate emulate`` with these options.
+
+        Parameters
+        ----------
+        files : SettingsFiles
+            Where robot and world are described.
+        force : bool
+            Whether the trace may overwrite an existing file.
+        """
+        named = {
+            "--config": files.config,
+            "--robot": files.robot,
+            "--world": files.world,
+            "--seed": str(self.seed),
+            "--trace": self.trace,
+            "--faults": self.faults,
+        }
+        words = [word for option, value in named.items() if value is not None for word in (option, value)]
+        overrides = [word for text in files.sets for word in ("--set", text)]
+        return [*words, *(["--force"] if force else []), *overrides]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class OutputOptions:
+    """What a run writes and prints."""
+
+    record: Annotated[
+        str | None,
+        Parameter(
+            help="Record into this file, not the folder of recordings; a name that ends in .csv gives a ring log."
+        ),
+    ] = None
+    no_record: Annotated[bool, Flag, Parameter(help="Record nothing.")] = False
+    json: JsonFile = None
+    force: Force = False
+    units: UnitsOption = "m"
+
+
+SHIPPED: Final = SettingsFiles()
+UNDISTURBED: Final = EmulatorOptions()
+RECORDED: Final = OutputOptions()
+
+
 @no_collection()
 def run(
     config: ConfigFile = None,
@@ -38,22 +93,10 @@ def run(
     arm: Annotated[bool, Flag] = False,
     seconds: float | None = None,
     headless: Annotated[bool, Flag] = False,
-    record: str | None = None,
-    no_record: Annotated[bool, Flag] = False,
-    no_console: Annotated[bool, Flag] = False,
     foxglove: Annotated[bool, Flag] = False,
-    json: JsonFile = None,
-    force: Force = False,
-    map_file: Annotated[str | None, Parameter(name="--map")] = None,
-    robot: RobotFile = None,
-    world: str | None = None,
-    mission: str | None = None,
-    goal: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    seed: Count = 0,
-    trace: str | None = None,
-    faults: str | None = None,
-    units: UnitsOption = "m",
-    sets: Sets = (),
+    files: SettingsFiles = SHIPPED,
+    emulator: EmulatorOptions = UNDISTURBED,
+    outputs: OutputOptions = RECORDED,
 ) -> int:
     """Run the robot's main process; without a port, on an emulated robot.
 
@@ -69,41 +112,16 @@ def run(
         End the run this long after recognition began.
     headless
         Print log lines instead of the live view.
-    record
-        Record into this file instead of the folder of recordings; a name that ends in .csv gives a ring log.
-    no_record
-        Record nothing.
-    no_console
-        Do not serve the operator console.
     foxglove
         Serve the run to Foxglove as well, from a process of its own; see `echolocate foxglove`.
-    map_file
-        The known room in which the robot finds itself: a world file, or the name of a shipped one.
-    robot
-        Robot file, or the name of a shipped one; None for that of the run file.
-    world
-        Emulated robot: world file, or the name of a shipped one; without CONFIG its shipped run is driven.
-    mission
-        What to do once armed: a mission file, or the name of a shipped one; None for that of the run file.
-    goal
-        Where to drive once armed: X,Y in metres, or X,Y,HEADING with the final heading in degrees, or the name of a
-        place. A place in the map with --map, otherwise in odometry's frame, from where the run begins.
-    seed
-        Emulated robot: seed of everything random.
-    trace
-        Emulated robot: write its true poses to this file (CSV).
-    faults
-        Emulated robot: fault script.
     config
         Run file, or the name of a shipped one; None for the default settings.
-    json
-        File for a summary at the end of the run (JSON); None for no file.
-    force
-        Overwrite files that exist already.
-    units
-        Units of the printed tables.
-    sets
-        Single settings, each `path=value`, that override the files'.
+    files
+        What describes robot, world and mission.
+    emulator
+        How the emulated robot behaves.
+    outputs
+        What is written and printed.
 
     Raises
     ------
@@ -117,16 +135,15 @@ def run(
     from runtime.cli.commands.output_files import check_outputs, refuse_existing
     from runtime.cli.commands.run.offer import Offered, ask_for_robot, plugged_in
     from runtime.cli.commands.run.run_plan import RunPlan
-    from runtime.cli.commands.run.run_settings import SettingsFiles, with_port
+    from runtime.cli.commands.run.run_settings import with_port
     from runtime.cli.terminal.escaping_console import EscapingConsole
     from runtime.support.file_lock import file_lock
     from runtime.support.logs import LogStatus, log_path
     from runtime.support.restart import Restart, restart_refusal
     from runtime.timing.run_clock import RunClock, ScaledClock
 
-    check_options(seconds, foxglove=foxglove, no_console=no_console)
-    emulator = EmulatorOptions(world, seed, trace, faults, force=force)
-    files = SettingsFiles(config, sets, robot, world, map_file, mission, goal, no_console=no_console)
+    check_options(seconds, foxglove=foxglove, no_console=files.no_console)
+    files, json, force = replace(files, config=config), outputs.json, outputs.force
     settings = files.read_unchecked()
     console = EscapingConsole(stderr=True)
     live = not headless and console.can_draw
@@ -134,19 +151,21 @@ def run(
         console.print(f"echolocate {VERSION} is starting", highlight=False)
     plugged = [] if (port or settings.link.port) is not None else plugged_in()
     found: Offered | None = None
-    if plugged and live and sys.stdin.isatty() and not emulator.is_chosen:
+    if plugged and live and sys.stdin.isatty() and (files.world, emulator) == (None, UNDISTURBED):
         found = ask_for_robot(plugged, settings if files.name_a_robot else None, console, sys.stdin)
     if found is not None:
-        port, arm, files = found.port, False, replace(files, robot=found.robot or robot)
+        port, arm, files = found.port, False, replace(files, robot=found.robot or files.robot)
         settings = files.read_unchecked()
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = with_port(settings, port)
-    own_files = {"--record": record, "--json": json}
-    restart = Restart(restart_refusal({**own_files, "--trace": trace}, force=force, was_chosen=found is not None))
+    own_files = {"--record": outputs.record, "--json": json}
+    restart = Restart(
+        restart_refusal({**own_files, "--trace": emulator.trace}, force=force, was_chosen=found is not None)
+    )
     check_outputs(
-        {**own_files, "--trace": trace},
-        (faults, port),
+        {**own_files, "--trace": emulator.trace},
+        (emulator.faults, port),
         force=force,
         appended={"log.file": log_path(settings.log)},
     )
@@ -157,19 +176,19 @@ def run(
         clock=ScaledClock() if port is None else RunClock(),
         log_status=LogStatus(),
         restart=restart,
-        units=units,
+        units=outputs.units,
         emulated=port is None,
         arm=arm,
         seconds=seconds,
         foxglove=foxglove,
-        record=record,
-        no_record=no_record,
+        record=outputs.record,
+        no_record=outputs.no_record,
     )
     with contextlib.ExitStack() as stack:
         for option, path in _given(own_files):
             stack.enter_context(file_lock(Path(path), f"{option} {path}"))
         refuse_existing(own_files, force=force)  # another run may have written them while kernels were prepared
-        arguments = emulator.arguments(config, sets, files.robot)
+        arguments = emulator.arguments(files, force=force)
         try:
             summary, recording = asyncio.run(_whole_run(plan, arguments, plugged, console if live else None, stack))
         except UserError as error:
@@ -182,7 +201,7 @@ def run(
         summary["recording"] = recording.summary_row
     summary["log"] = {"lost": plan.log_status.lost, "last_error": plan.log_status.last_error}
     _write_json(json, summary)
-    _print_summary(summary, units)
+    _print_summary(summary, outputs.units)
     restart.if_requested()
     if summary["mode"] == "FAULT":
         raise UserError(summary["stop_reasons"][-1], FAILED)
@@ -339,34 +358,3 @@ async def _end_task(task: asyncio.Task[EmulatorHandle]) -> None:
 
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
-
-
-@dataclass(frozen=True, slots=True)
-class EmulatorOptions:
-    """Options of the emulator that a run without a port starts."""
-
-    world: str | None
-    seed: int
-    trace: str | None
-    faults: str | None
-    force: bool = False
-    """Whether the trace may overwrite an existing file."""
-
-    @property
-    def is_chosen(self) -> bool:
-        """Whether an option was given that has a meaning for the emulator only."""
-        return any(option is not None for option in (self.world, self.trace, self.faults))
-
-    def arguments(self, config: str | None, sets: Sequence[str], robot: str | None = None) -> list[str]:
-        """Return the command line of ``echolocate emulate`` with these options."""
-        named = {
-            "--config": config,
-            "--robot": robot,
-            "--world": self.world,
-            "--seed": str(self.seed),
-            "--trace": self.trace,
-            "--faults": self.faults,
-        }
-        words = [word for option, value in named.items() if value is not None for word in (option, value)]
-        overrides = [word for text in sets for word in ("--set", text)]
-        return [*words, *(["--force"] if self.force else []), *overrides]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from config.errors import WRONG_CALL, UserError
 from config.files import is_utf8, one_line, utf8
@@ -12,21 +14,47 @@ from config.mission_step import Frame
 from config.places import check_places, no_such_place
 from config.robot import NO_BODY
 from config.settings import GoalConfig, Settings
+from runtime.cli.options import Flag, RobotFile, Sets
 from runtime.support.user_folders import kept_places
 
 
-@dataclass(frozen=True, slots=True)
+@Parameter(name="*")
+@dataclass(frozen=True)
 class SettingsFiles:
-    """What the command line says of a run's settings, as of `runtime.cli.commands.run.run.run`."""
+    """What the command line says of a run's settings."""
 
-    config: str | None = None
-    sets: Sequence[str] = ()
-    robot: str | None = None
-    world: str | None = None
-    map_file: str | None = None
-    mission: str | None = None
-    goal: str | None = None
-    no_console: bool = False
+    config: Annotated[str | None, Parameter(parse=False)] = None
+    """Run file, or the name of a shipped one; the argument of the command."""
+    no_console: Annotated[bool, Flag, Parameter(help="Do not serve the operator console.")] = False
+    map_file: Annotated[
+        str | None,
+        Parameter(
+            name="--map",
+            help="The known room in which the robot finds itself: a world file, or the name of a shipped one.",
+        ),
+    ] = None
+    robot: RobotFile = None
+    world: Annotated[
+        str | None,
+        Parameter(
+            help="Emulated robot: world file, or the name of a shipped one; without CONFIG its shipped run is driven."
+        ),
+    ] = None
+    mission: Annotated[
+        str | None,
+        Parameter(
+            help="What to do once armed: a mission file, or the name of a shipped one; None for that of the run file."
+        ),
+    ] = None
+    goal: Annotated[
+        str | None,
+        Parameter(
+            allow_leading_hyphen=True,
+            help="Where to drive once armed: X,Y in metres, or X,Y,HEADING with the final heading in degrees, or the "
+            "name of a place; in the map with --map, otherwise in odometry's frame, from where the run begins.",
+        ),
+    ] = None
+    sets: Sets = ()
 
     @property
     def name_a_robot(self) -> bool:

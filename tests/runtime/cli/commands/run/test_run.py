@@ -13,6 +13,7 @@ from config.errors import FAILED, WRONG_CALL
 from drivers.link import Link
 from runtime.cli.app import run_command
 from runtime.cli.commands.run.run import EmulatorOptions
+from runtime.cli.commands.run.run_settings import SettingsFiles
 from runtime.support.file_lock import file_lock
 from tests.drivers.stranger import Stranger
 
@@ -121,8 +122,8 @@ def test_the_robot_named_on_the_command_line_is_that_of_the_emulator(
 ) -> None:
     assert run_command(["run", "--robot", "p3xd", *HEADLESS]) == WRONG_CALL
     assert "p3dx" in error_line(capfd)
-    emulator = EmulatorOptions(world=None, seed=1, trace=None, faults=None)
-    assert emulator.arguments(None, [], "p3dx")[:2] == ["--robot", "p3dx"]
+    arguments = EmulatorOptions(seed=1).arguments(SettingsFiles(robot="p3dx"), force=False)
+    assert arguments == ["--robot", "p3dx", "--seed", "1"]
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "127.0.0.1", "no.such.host.invalid:8101"])

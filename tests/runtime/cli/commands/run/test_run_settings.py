@@ -20,9 +20,9 @@ BACKWARDS = "ring.firing={sets=[[10, 12, 14]]}"
 @pytest.mark.promise("P24")
 def test_a_pattern_with_which_it_could_not_drive_is_refused_in_a_reload_too() -> None:
     with pytest.raises(UserError, match="the pattern does not look ahead"):
-        SettingsFiles(sets=[BACKWARDS]).read()
+        SettingsFiles(sets=(BACKWARDS,)).read()
     with pytest.raises(ConfigError, match="the pattern does not look ahead"):
-        SettingsFiles(sets=[BACKWARDS]).read_again(None, None)
+        SettingsFiles(sets=(BACKWARDS,)).read_again(None, None)
     with pytest.raises(ConfigError, match="p3xd"):
         SettingsFiles(robot="p3xd").read_again(None, None)
 
@@ -30,7 +30,7 @@ def test_a_pattern_with_which_it_could_not_drive_is_refused_in_a_reload_too() ->
 def test_a_reload_keeps_robot_room_and_port_of_the_command_line() -> None:
     settings = SettingsFiles(robot="p3dx").read_again("socket://localhost:8101", None)
     assert (settings.robot.driver, settings.link.port) == ("arcos", "socket://localhost:8101")
-    assert settings == SettingsFiles(sets=["link.port=socket://localhost:8101"], robot="p3dx").read()
+    assert settings == SettingsFiles(sets=("link.port=socket://localhost:8101",), robot="p3dx").read()
     emulated = SettingsFiles(map_file="hallway", no_console=True).read_again(None, "/dev/pts/7")
     assert emulated.link.port == "/dev/pts/7"
     assert emulated.perception.localization.known_room
