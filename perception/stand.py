@@ -117,7 +117,7 @@ def surfaces_of_stand(ring: RingConfig, firings: Sequence[Firing]) -> tuple[Stan
         surfaces = (StandSurface(*one) for one in constant_depths(ring, firings))
         return tuple(sorted(surfaces, key=lambda one: one.echo.range_m))
     mounts = mounts_at(firings[-1], mounts_array(ring.mounts), ring.turning)
-    readings, noise_m = _steady(_heard(firings))
+    readings, noise_m = _without_outliers(_heard(firings))
     left, found = np.ones(len(readings), dtype=np.bool_), list[StandSurface]()
     while (own := left & (readings[:, 0] == readings[:, 1])).any():
         start = int(np.flatnonzero(own)[np.argmin(readings[own, 2])])
@@ -153,8 +153,12 @@ def _heard(firings: Sequence[Firing]) -> Floats:
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def _steady(readings: Floats) -> tuple[Floats, float]:
-    """Return the readings without those that differ from the others of their path, and the noise of one, m."""
+def _without_outliers(readings: Floats) -> tuple[Floats, float]:
+    """Return the readings without those far from the median of their path, and the noise of a single one, m.
+
+    Readings are rows as of `_heard`. The noise is one standard deviation for all paths, from those heard `REPEATS_MIN`
+    times or more. Far is beyond five of it, but never closer than half of `HALF_PATH_GATE_M`.
+    """
     _, path = np.unique(readings[:, :2], axis=0, return_inverse=True)
     path = path.ravel()
     middle = np.array([np.median(readings[path == k, 2]) for k in range(path.max(initial=-1) + 1)])

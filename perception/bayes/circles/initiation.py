@@ -183,6 +183,9 @@ def gather_relevant(
 ) -> int:  # fmt: skip
     """Copy the remembered readings that bear on a new circle to the scratch; return their number.
 
+    They are the first of the scratch's `readings`; `predicted` and `others` are overwritten, too. The circle is heard
+    by the rays that `assume_rays` set last: call that first. It has no track yet, so any track may explain a reading.
+
     Parameters
     ----------
     s, tracks, p

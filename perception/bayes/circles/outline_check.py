@@ -85,8 +85,13 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
 
 
 @kernel
-def average(bearing: BearingErrors) -> None:
-    """Write the mean of a bearing's errors and its accuracy; an error far from their median counts as less far."""
+def average_errors(bearing: BearingErrors) -> None:
+    """Write the mean of a bearing's errors (m) and its accuracy, the inverse of that mean's standard deviation (1/m).
+
+    It needs the errors and the sum of their variances, of `sort_errors`. An error farther from the median than
+    `OUTLINE_CLIP_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and the
+    mean is not written.
+    """
     n = bearing.count
     bearing.accuracy = 0.0
     if n < OUTLINE_READINGS_MIN:
@@ -124,7 +129,7 @@ def outline_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     lead = 0.0
     for b in range(BEARING_BINS):
         here = bearings[b]
-        average(here)
+        average_errors(here)
         if here.accuracy == 0.0:
             continue
         heard += 1

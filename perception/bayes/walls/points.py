@@ -181,7 +181,7 @@ def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float,
     found.ended = found.echoes
     found.is_edge = 1 if is_near else 0
     found.first = k
-    found.second = side_of(wall, along) if is_near else int(along > wall.spans[wall.span_count - 1].high)
+    found.second = end_of_edge(wall, along) if is_near else int(along > wall.spans[wall.span_count - 1].high)
     if not is_shown or spread < SPREAD_MIN_RAD or not displaces(room, found, is_near):
         return False
     found.is_used = KEPT
@@ -266,8 +266,12 @@ def step_along(found: RoomCorner, wall: Wall) -> float:
 
 
 @kernel
-def side_of(wall: Wall, along: float) -> int:
-    """Return which end of a span a point is, 1 for a high one: of the nearest, else of one that begins beyond it."""
+def end_of_edge(wall: Wall, along: float) -> int:
+    """Return of which end of a span a post at `along` (m) is the edge, as `RoomCorner.second`: 1 high, 0 low.
+
+    That is the end nearest to it. But `EDGE_SAME_M` beyond that end or farther, the post is taken for the other side of
+    an opening, where a span begins that is not known yet: then it is the opposite end. 0 for a wall without spans.
+    """
     nearest = math.inf
     side = 0
     for k in range(2 * wall.span_count):

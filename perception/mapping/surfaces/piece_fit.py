@@ -22,8 +22,12 @@ ECHOES_A_PLACE: Final = 4.0
 
 
 @kernel
-def locate(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
-    """Write from which piece a reading's echo came, and where on it: the mean of its places there."""
+def place_echo(room: LocalMap, counts: CellCounts, k: int, half: float) -> None:
+    """Write to `room.points[k]` from which piece the echo of reading k came, `FREE` if from none, and where on it.
+
+    Where: the mean of the echo's places on that piece, weighted by their shares, m. It needs the owners of the cells,
+    as of the end of the phase GROW, and overwrites `counts.arc`. `half` is half of the beam's opening, rad.
+    """
     q, point = room.readings[k], room.points[k]
     point.piece = FREE
     if q.range_m > REACH_M:
@@ -59,10 +63,10 @@ def owner_at(room: LocalMap, counts: CellCounts, n: int) -> int:
 
 
 @kernel
-def locate_all(room: LocalMap, counts: CellCounts, begin: int, end: int, half: float) -> None:
-    """Write of some readings from which piece their echoes came, and where on it."""
+def place_echoes(room: LocalMap, counts: CellCounts, begin: int, end: int, half: float) -> None:
+    """Do what `place_echo` does for the readings from `begin` up to `end`, which does not count."""
     for k in range(begin, end):
-        locate(room, counts, k, half)
+        place_echo(room, counts, k, half)
 
 
 @kernel

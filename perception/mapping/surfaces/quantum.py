@@ -20,7 +20,7 @@ from perception.mapping.surfaces.parameters import (
     SPACING_M,
     SPACING_RAD,
 )
-from perception.mapping.surfaces.piece_fit import group_echoes, judge, locate_all
+from perception.mapping.surfaces.piece_fit import group_echoes, judge, place_echoes
 from perception.mapping.surfaces.pieces import ROW_PARTS, capture, grow_all, order_cells
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes
 from perception.mapping.surfaces.records import BLOCK, CellCounts, LocalMap
@@ -152,7 +152,7 @@ def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float
         if grow_all(room, counts, STEPS):
             room.phase, room.at = LOCATE, 0
     elif room.phase == LOCATE:
-        locate_all(room, counts, at, min(at + LOCATED, room.swept), half)
+        place_echoes(room, counts, at, min(at + LOCATED, room.swept), half)
         if advance(room, LOCATED, room.swept):
             group_echoes(rooms, every)
     elif room.phase == JUDGE:
