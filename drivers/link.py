@@ -384,11 +384,14 @@ class _Connection(asyncio.Protocol):
         self.transport.abort()
 
     async def flush(self, timeout_s: float) -> bool:
-        """Wait until all bytes have left the machine, at most for `timeout_s`; return whether they have."""
+        """Wait until all bytes have left the machine; return whether they have.
+
+        False after `timeout_s`, or if the line was lost.
+        """
         with contextlib.suppress(TimeoutError, OSError, termios.error):
             async with asyncio.timeout(timeout_s):
                 await self._drained.wait()
                 while self.is_open and self._port.out_waiting:
                     await asyncio.sleep(_FLUSH_POLL_S)
-                return True
+                return self.is_open
         return False

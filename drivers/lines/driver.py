@@ -23,7 +23,9 @@ STILL: Final = Twist(0.0, 0.0)
 
 
 class LineDriver(Session[LineStamper]):
-    """The driver.
+    """A `drivers.driver.RobotDriver` for robots that speak lines.
+
+    A new driver is latched: a robot that is found stands until `release`.
 
     Parameters
     ----------
@@ -38,15 +40,27 @@ class LineDriver(Session[LineStamper]):
         self._config, self._wire = config, wire
         self._pattern = firing_pattern(config.ring)
         self.stamper.set_pattern(self._pattern)
-        self._reader, self._is_first_line, self._received = LineReader(), True, LinkCounts()
+        self._reader = LineReader()
+        self._is_first_line = True
+        """The next line is the first: it may be the rest of a cut one, which is not counted as bad."""
+        self._counts = LinkCounts()
+        """Of this line."""
         self._heard_s = 0.0
-        self._is_latched, self._asks_still, self._asks_pattern = True, False, False
+        """When the last sample of the odometry came, or the line was opened."""
+        self._bad_at_sample = 0
+        """Bad lines before that sample."""
+        self._is_latched = True
+        self._asks_still = False
+        """Whether a standstill is sent, again and again until the odometry shows it."""
         self._still_s = -math.inf
+        """When it was last sent."""
+        self._asks_pattern = False
+        """Whether the firing pattern is still to be sent."""
         self._boots = 0
 
     @property
     def _line_counts(self) -> LinkCounts:
-        return self._received
+        return self._counts
 
     def line_opened(self, run_s: float) -> None:
         """Set the pattern, and let a base that is latched stand, at once."""
@@ -57,7 +71,7 @@ class LineDriver(Session[LineStamper]):
 
     def line_closed(self) -> None:
         """Forget what was asked; a latch stays."""
-        self._earlier_counts, self._received = self.counts, LinkCounts()
+        self._earlier_counts, self._counts, self._bad_at_sample = self.counts, LinkCounts(), 0
         self._state, self._drive = LineState.CLOSED, None
         self._reader, self._is_first_line, self._still_s = LineReader(), True, -math.inf
         self.stamper.break_off()
@@ -72,10 +86,9 @@ class LineDriver(Session[LineStamper]):
                 said = self._wire.read(line)
                 self._take(said)
             except NOISE:  # the rest of a line, or noise
-                bad = self._received.bad + (not self._is_first_line)
-                self._received = replace(self._received, bad=bad)
+                self._counts = replace(self._counts, bad=self._counts.bad + (not self._is_first_line))
             else:
-                self._received = replace(self._received, frames=self._received.frames + 1)
+                self._counts = replace(self._counts, frames=self._counts.frames + 1)
             self._is_first_line = False
 
     def tick(self, run_s: float) -> None:
@@ -83,7 +96,8 @@ class LineDriver(Session[LineStamper]):
         self._run_s, link = run_s, self._config.link
         silent_s = run_s - self._heard_s
         if self._state is LineState.READY and silent_s > link.silence_max_s:
-            self._state, self._problem = LineState.DOWN, line_diagnostics.silence(silent_s, others=False, bad=0)
+            bad = self._counts.bad - self._bad_at_sample
+            self._state, self._problem = LineState.DOWN, line_diagnostics.silence(silent_s, others=False, bad=bad)
         elif self._state is LineState.HANDSHAKE and silent_s > link.answer_max_s:
             text = "no line of the robot can be read; check its power, its cable, link.port and link.baud"
             self._state, self._problem = LineState.DOWN, text
@@ -105,7 +119,7 @@ class LineDriver(Session[LineStamper]):
             self.stamper.set_pattern(pattern)
 
     def end_session(self) -> None:
-        """There is no session."""
+        """Do nothing: this protocol has no end of a session."""
 
     def outgoing(self, *, writable: bool) -> bytes:
         """Return the bytes to send now: a standstill before all else, and nothing else on a line that is full."""
@@ -128,6 +142,7 @@ class LineDriver(Session[LineStamper]):
         return data
 
     def _take(self, said: Sample | Ranges) -> None:
+        """Take in a line; one without the robot's time counts as of now. Raises a `NOISE` error if it is none."""
         robot_s = self._run_s if said.robot_s is None else said.robot_s
         if isinstance(said, Sample):
             self._moved(said, robot_s)
@@ -135,6 +150,13 @@ class LineDriver(Session[LineStamper]):
             self.stamper.fired(robot_s, said)
 
     def _moved(self, said: Sample, robot_s: float) -> None:
+        """Take in a sample of the odometry: the first makes the line READY; one with an earlier time is a restart.
+
+        Raises
+        ------
+        ValueError
+            A number is not finite.
+        """
         numbers = (robot_s, said.pose.x, said.pose.y, said.pose.theta, said.twist.v, said.twist.w)
         if not all(math.isfinite(number) for number in numbers):
             raise ValueError("no finite number")
@@ -152,12 +174,12 @@ class LineDriver(Session[LineStamper]):
         self._odometry, firings = self.stamper.moved(sample, self._run_s)
         self._firings += firings
         self._flags |= flags
-        self._heard_s = self._run_s
+        self._heard_s, self._bad_at_sample = self._run_s, self._counts.bad
         if said.twist == STILL and self._run_s > self._still_s:
             self._asks_still = False
 
     def _meet(self) -> None:
-        """Take the robot as READY; it names itself by its robot file, and has the deadman of its lines."""
+        """Make the line READY, with the identity of the robot file; DOWN if its deadman is beyond the limits."""
         link, wire, mounts = self._config.link, self._wire, self._config.ring.mounts
         deadman_s = link.deadman_max_s if wire.deadman_s is None else wire.deadman_s
         wrong = line_diagnostics.deadman_refused(wire.name, deadman_s, link)

@@ -48,7 +48,7 @@ _INPUT_REQUEST_S: Final = 2.0
 _CALLING_S: Final = 1.0
 """Time for which the robot is called before the line counts as down, s."""
 _OTHERS_S: Final = 0.2
-"""Longest time for which nothing but velocities is sent, s: a status is asked for twice as often."""
+"""Longest time for which nothing but velocities is sent, s. Without them a status is asked for twice as often."""
 _SILENT_ECHO_S: Final = 0.5
 """Time without a range after which the sonars are started again, s, besides two steps of their pattern."""
 _DRIVEN_S: Final = 0.5
@@ -88,16 +88,46 @@ class RflexDriver(Session[Measurements]):
         self.stamper.set_pattern(self._pattern)
         self._decoder = Decoder()
         self._boots = 0
-        self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
-        self._sample_s = self._echo_s = self._answer_s = self._driven_s = self._input_s = 0.0
+        # Readings of the run's clock, s:
+        self._sent_s = 0.0
+        """Last command of any kind."""
+        self._called_s = 0.0
+        """Begin of the present attempt to reach the robot."""
+        self._setup_s = 0.0
+        """Last time that the commands of `_set_up` were queued."""
+        self._report_s = 0.0
+        """Last frame of any kind."""
+        self._sample_s = 0.0
+        """Last sample of the odometry."""
+        self._echo_s = 0.0
+        """Last ranges, or the last attempt to start the sonars."""
+        self._answer_s = 0.0
+        """Last status: the only report that comes on request alone."""
+        self._driven_s = 0.0
+        """Last velocity; `_DRIVEN_S` after it the base is stopped."""
+        self._input_s = 0.0
+        """Last request for the bumpers' reports."""
         self._others_s = 0.0
+        """Last time that a command other than a velocity could be sent."""
         self._bad_at_sample = 0
+        """Corrupt frames of this line before that sample."""
         self._brake, self._stall = Brake(config), StallMonitor(config)
         self._queue: deque[Frame] = deque()
-        self._axes, self._axes_left, self._axis_turn = drive_commands(Twist(0.0, 0.0), config), 0, 0
-        self._is_ending = self._is_moving = False
+        """Commands that can wait, in the order in which they are sent."""
+        self._axes = drive_commands(Twist(0.0, 0.0), config)
+        """The newest velocity, as a command for each axis …"""
+        self._axes_left = 0
+        """… of which so many are still to be sent …"""
+        self._axis_turn = 0
+        """… beginning with this one."""
+        self._is_ending = False
+        """Whether the next `outgoing` ends the session."""
+        self._is_moving = False
+        """Whether the last velocity was not zero."""
         self._pressed: dict[int, int] = {}
+        """Contacts that are closed, by the address of their panel."""
         self._volts = math.inf
+        """The battery's voltage; inf before the first status."""
 
     @property
     def problem(self) -> str | None:
@@ -114,9 +144,8 @@ class RflexDriver(Session[Measurements]):
 
     @property
     def _line_counts(self) -> LinkCounts:
-        return LinkCounts(
-            self._decoder.frames, self._decoder.bad, 0
-        )  # not all numbers are used: lost ones are not known
+        # Not all numbers are used, so lost frames are not known.
+        return LinkCounts(self._decoder.frames, self._decoder.bad, 0)
 
     def line_opened(self, run_s: float) -> None:
         """Stop the base and request reports, on a line that has just been opened."""
@@ -199,14 +228,14 @@ class RflexDriver(Session[Measurements]):
             return b"".join(map(encode, (*stop, *ends)))
         is_halting = self._brake.mode is Mode.HALTING
         has_gap = self._run_s - self._sent_s >= _GAP_S
-        # A velocity does not wait either: if it is lost, the next one comes within a cycle.
+        # A velocity does not wait for a gap: if it is lost, the next one comes within a cycle.
         is_driven = writable and self._drive is not None and self._brake.may_drive
         is_urgent = is_driven or (is_halting and self._brake.halting_s(self._run_s) == 0.0)
         if not is_urgent and not (has_gap and (writable or is_halting)):
             return b""
         frame = self._brake.due(self._run_s) if is_halting else None
         if frame is None and writable:
-            frame = self._next_command()
+            frame = self._take_next_command(has_gap=has_gap)
         if frame is None:
             return b""
         self._sent_s = self._run_s
@@ -215,27 +244,34 @@ class RflexDriver(Session[Measurements]):
             self.heard.sent(data)
         return data
 
-    def _next_command(self) -> Frame | None:
-        """Return the next command that is due: a velocity's axes in turn, and in time all that can wait."""
+    def _take_next_command(self, *, has_gap: bool) -> Frame | None:
+        """Remove and return the next command that is due; None if there is none. The line must be writable.
+
+        A requested velocity replaces what is left of the last one and goes to the stall monitor; it is dropped unless
+        READY with the brake off. It is two commands, one for each axis; the axis that comes first alternates. While
+        some are left, another command gets its turn every `_OTHERS_S`, but none without a gap.
+        """
         drive, self._drive = self._drive, None
         if drive is not None and self._state is LineState.READY and self._brake.may_drive:
             self._axes, self._axes_left = drive_commands(drive, self._config), 2
             self._stall.command(drive, self._run_s)
             self._driven_s, self._is_moving = self._run_s, drive != Twist(0.0, 0.0)
-        if self._axes_left and self._run_s - self._others_s < _OTHERS_S:
-            return self._axis()
+        if self._axes_left and (not has_gap or self._run_s - self._others_s < _OTHERS_S):
+            return self._take_axis_command()
+        if not has_gap:
+            return None
         self._others_s = self._run_s
         frame = self._queue.popleft() if self._queue else self._brake.due(self._run_s)
-        return self._axis() if frame is None and self._axes_left else frame
+        return self._take_axis_command() if frame is None and self._axes_left else frame
 
-    def _axis(self) -> Frame:
-        """Return the command of the axis whose turn it is, of the newest velocity."""
+    def _take_axis_command(self) -> Frame:
+        """Return the newest velocity's command for the axis whose turn it is; at least one must be left."""
         frame = self._axes[self._axis_turn]
         self._axis_turn, self._axes_left = 1 - self._axis_turn, self._axes_left - 1
         return frame
 
     def _begin(self, state: LineState, problem: str | None) -> None:
-        """Give up what there was and call the robot: stop the base, whether it hears that or not."""
+        """Give up what there was, stop the base, whether it hears that or not, and call the robot again."""
         self._state, self._problem = state, problem
         self._abandon()
         self.halt()
@@ -243,6 +279,7 @@ class RflexDriver(Session[Measurements]):
         self._set_up()
 
     def _set_up(self) -> None:
+        """Queue what makes the robot report and fire, in place of all that was queued."""
         self._setup_s = self._run_s
         self._queue.clear()
         self._queue += (
@@ -289,6 +326,7 @@ class RflexDriver(Session[Measurements]):
             self._note_once(diagnostics.NO_SONAR)
 
     def _take(self, frame: Frame) -> None:
+        """Take in a frame; ranges that come before READY are dropped."""
         self._report_s = self._run_s
         match report_of(frame):
             case AxisReport() as axis:
@@ -330,7 +368,7 @@ class RflexDriver(Session[Measurements]):
             self._firings += self.stamper.firings(self._run_s)
 
     def _meet(self) -> None:
-        """Adopt what the robot file says of a robot that answers, unless it may not be driven."""
+        """Make the line READY, with the identity of the robot file; DOWN if its fail-safe is beyond the limits."""
         config = self._config
         wrong = line_diagnostics.deadman_refused(config.rflex.name, config.rflex.fail_safe_s, config.link)
         if wrong is not None:
@@ -345,6 +383,7 @@ class RflexDriver(Session[Measurements]):
         self._state, self._problem, self._echo_s = LineState.READY, None, self._run_s
 
     def _restarted(self) -> None:
+        """Begin anew with a robot whose clock went back; what it sent before is dropped."""
         self._boots += 1
         self._forget_received()
         self.stamper.note(diagnostics.RESTARTED)

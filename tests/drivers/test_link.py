@@ -273,6 +273,22 @@ async def test_unplugged_while_bytes_wait_is_reported_at_once_and_without_a_trac
         assert not link.is_open
 
 
+async def test_bytes_of_a_line_that_is_lost_while_they_wait_have_not_left(pty: PtyPair) -> None:
+    host = Host()
+    link = host.link(pty.path)
+    async with running(link):
+        await soon(host.opened)
+        line = link._line
+        assert line is not None
+        while link.send(b"x" * 64):
+            await asyncio.sleep(0)
+        flushed = asyncio.create_task(line.flush(TIMEOUT_S))
+        await asyncio.sleep(0)
+        pty.unplug()
+        await soon(host.closed)
+        assert not await flushed
+
+
 async def test_a_full_line_still_has_room_for_a_halt(pty: PtyPair) -> None:
     host = Host()
     link = host.link(pty.path)

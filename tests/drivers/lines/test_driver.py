@@ -72,6 +72,17 @@ def test_a_robot_that_says_nothing_readable_is_down_with_a_reason() -> None:
     assert recovered == (LineState.READY, None)
 
 
+def test_noise_in_place_of_odometry_is_named() -> None:
+    for bad in (0, 4):
+        driver = ready()
+        driver.receive(b"\xff\xfe\n" * 5, 0.15)
+        driver.receive(said(0.2), 0.2)
+        driver.receive(b"\xff\xfe\n" * bad, 0.3)
+        driver.tick(0.21 + ROBOT.link.silence_max_s)
+        assert driver.state is LineState.DOWN
+        assert ("4 corrupt frames" in (driver.problem or "")) == (bad == 4)
+
+
 def test_numbers_that_are_none_are_noise() -> None:
     driver = ready()
     driver.receive(b'{"t":NaN,"at":[0,0,0],"does":[0,0]}\n{"t":1,"at":[0,0,1e999],"does":[0,0]}\n', 0.2)

@@ -25,6 +25,7 @@ from drivers.rflex.codec import (
     report_request,
     sonar_run,
 )
+from drivers.rflex.wire_units import drive_commands
 from tests.drivers.contract.families import RFLEX
 from tests.drivers.device_host import script
 
@@ -61,6 +62,26 @@ def test_a_driver_that_is_asked_once_a_cycle_sends_both_axes_and_asks_for_the_st
     assert driver.state is LineState.READY
     assert (cable.robot.truth.twist.v, cable.robot.truth.twist.w) == pytest.approx((0.1, 0.08), abs=0.002)
     assert sent.count(STATUS_REQUEST) >= 6
+
+
+def test_only_a_velocity_is_sent_without_a_gap() -> None:
+    """The controller would lose a status request or a sonar command that comes too soon; a velocity is repeated."""
+    cable = RFLEX.driving()
+    driver, decoder, sent = cable.driver, Decoder(), list[tuple[float, Frame]]()
+    for cycle in range(200):
+        for later_s in (0.0, 0.01):
+            now_s = cable.now_s + 0.015 * (cycle + 1) + later_s
+            driver.receive(cable.robot.advance(now_s), now_s)
+            driver.tick(now_s)
+            if later_s == 0.0:
+                driver.drive(Twist(0.1, 0.08))
+            data = driver.outgoing(writable=True)
+            cable.robot.receive(data)
+            sent += [(now_s, frame) for frame in decoder.feed(data)]
+    velocities = drive_commands(Twist(0.1, 0.08), RFLEX.robot)
+    gaps = [b_s - a_s for (a_s, _), (b_s, frame) in itertools.pairwise(sent) if frame not in velocities]
+    assert len(gaps) >= 10
+    assert min(gaps) >= 0.0099
 
 
 def test_sonars_that_stop_are_started_again() -> None:
