@@ -35,7 +35,7 @@ class Timer(Protocol):
     """A timer that calls back once after a delay; setting it again cancels the earlier call."""
 
     def set(self, delay_s: float) -> None:
-        """Call back after `delay_s`."""
+        """Call back after `delay_s`; never if it is inf."""
 
     def close(self) -> None:
         """Release the timer; it never calls again."""
@@ -70,10 +70,11 @@ class TimerFd:
         self._loop.add_reader(self._fd, self._on_readable)
 
     def set(self, delay_s: float) -> None:
-        """Call back after `delay_s`; at once where that is negative."""
+        """Call back after `delay_s`: at once if it is negative, never if it is inf."""
         value = self._spec.value
-        # Zero would switch the timer off.
-        value.seconds, value.nanoseconds = divmod(max(1, math.ceil(delay_s * 1e9)), 1_000_000_000)
+        # Zero switches the timer off.
+        delay_ns = 0 if delay_s == math.inf else max(1, math.ceil(delay_s * 1e9))
+        value.seconds, value.nanoseconds = divmod(delay_ns, 1_000_000_000)
         self._settime(self._fd, 0, ctypes.byref(self._spec), None)
 
     def close(self) -> None:
@@ -98,9 +99,10 @@ class LoopTimer:
         self._handle: asyncio.TimerHandle | None = None
 
     def set(self, delay_s: float) -> None:
-        """Call back after `delay_s`."""
+        """Call back after `delay_s`; never if it is inf."""
         self.close()
-        self._handle = self._loop.call_later(delay_s, self._callback)
+        if delay_s < math.inf:
+            self._handle = self._loop.call_later(delay_s, self._callback)
 
     def close(self) -> None:
         """Release the timer."""
@@ -117,7 +119,8 @@ class Waker:
     Parameters
     ----------
     clock : callable
-        The clock of the deadlines, s; the run's clock may be paused before one.
+        The clock of the deadlines, s. A `RunClock` may be paused: a sleep then lasts until `wake`, so the owner
+        registers `clock.on_change(waker.wake)`.
     make_timer : callable, optional
         Makes the timer for a callback, in the loop of the first sleep; by default a timerfd where there is one.
     """
@@ -130,8 +133,11 @@ class Waker:
         self._clock = run_clock(clock)
         self._make_timer = best_timer if make_timer is None else make_timer
         self._timer: Timer | None = None
+        """None before the first sleep that needs one."""
         self._sleep: asyncio.Future[None] | None = None
+        """What the sleeping task waits for; None outside a sleep."""
         self._woken = False
+        """Whether `wake` was called since the last sleep ended."""
 
     def wake(self) -> None:
         """End the sleep, or the next one outside a sleep."""
@@ -152,8 +158,7 @@ class Waker:
             if self._timer is None:
                 self._timer = self._make_timer(self._end)
             self._sleep = asyncio.get_running_loop().create_future()
-            if delay_s < math.inf:
-                self._timer.set(delay_s)
+            self._timer.set(delay_s)
             try:
                 await self._sleep
             finally:

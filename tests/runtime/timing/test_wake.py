@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
+import math
 import os
 import time
 from collections.abc import AsyncIterator, Callable
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from runtime.timing.run_clock import RunClock
 from runtime.timing.wake import LoopTimer, Timer, TimerFd, Waker, best_timer
 
 MakeTimer = Callable[[Callable[[], None]], Timer]
@@ -58,6 +60,23 @@ async def test_the_timer_of_a_sleep_that_was_ended_early_does_not_end_the_next_o
     deadline_s = time.monotonic() + 0.15
     assert not await waker.until(deadline_s)
     assert time.monotonic() >= deadline_s - 1e-6
+
+
+async def test_the_timer_of_a_sleep_that_was_ended_early_does_not_end_one_without_a_deadline() -> None:
+    """The clock is paused meanwhile: the sleep lasts until the next wake."""
+
+    class Paused(RunClock):
+        def expect(self, due_s: float) -> float:
+            return due_s
+
+    for make_timer in (TimerFd, LoopTimer):
+        waker, loop = Waker(Paused(), make_timer), asyncio.get_running_loop()
+        loop.call_soon(waker.wake)
+        assert await waker.until(0.05)
+        loop.call_later(0.15, waker.wake)
+        assert await waker.until(math.inf)
+        assert not await waker.until(0.001)
+        waker.close()
 
 
 async def test_pending_input_is_processed_at_a_deadline_long_past(waker: Waker) -> None:
