@@ -29,6 +29,8 @@ WORKERS_MAX: Final = 3
 """Recordings open at a time: each worker holds the whole of perception in memory."""
 OPEN_MAX_S: Final = 30.0
 """Longest time without progress while a recording is indexed."""
+ERRORS_KEPT_BYTES: Final = 4096
+"""Most of a worker's standard error that is kept: it ends with the reason why the worker ended."""
 STEP_MAX: Final = 100_000
 """Cycles of one step: more than an hour of a run."""
 
@@ -60,38 +62,45 @@ class ReplayProcess:
         self._on_frame = on_frame
         self._on_answer = on_answer
         self._reader: asyncio.Task[None] | None = None
+        """Passes on frames and answers; None before the recording is open."""
+        self._errors: asyncio.Task[bytes] | None = None
+        """Reads the process's standard error; None before `begin`."""
 
     async def begin(self) -> RecordingDescription:
-        """Wait until the recording is open and return its description.
+        """Wait until the recording is open and return its description; call it once.
+
+        Progress of opening goes to `on_answer`, and so do all later answers.
 
         Raises
         ------
         ReplayError
             It cannot be opened; the process has ended then.
         """
+        self._errors = asyncio.create_task(self._read_errors(), name="replay errors")
         try:
             async with asyncio.timeout(OPEN_MAX_S) as limit:
-                description = await self._description()
-                while description.get("type") == PROGRESS:
+                answer = await self._next_answer()
+                while answer.get("type") == PROGRESS:
                     limit.reschedule(asyncio.get_running_loop().time() + OPEN_MAX_S)
-                    self._on_answer(description)
-                    description = await self._description()
+                    self._on_answer(answer)
+                    answer = await self._next_answer()
         except TimeoutError:
             await self.close()
             raise ReplayError(
                 f"opening made no progress for {OPEN_MAX_S:.0f} s, likely because the machine is busy: try again"
             ) from None
         except (asyncio.IncompleteReadError, OSError):
-            output = b"" if self._process.stderr is None else await self._process.stderr.read()
+            output = await self._errors
             await self.close()
             raise ReplayError(f"cannot replay the recording: {_last_line(output) or 'its process ended'}") from None
-        if "error" in description:
+        if "error" in answer:
             await self.close()
-            raise ReplayError(str(description["error"]))
+            raise ReplayError(str(answer["error"]))
         self._reader = asyncio.create_task(self._read_all(), name="replay reader")
-        return cast("RecordingDescription", description)
+        return cast("RecordingDescription", answer)
 
-    async def _description(self) -> dict[str, Any]:
+    async def _next_answer(self) -> dict[str, Any]:
+        """Return the next message, which must be an answer: before the description there are no frames."""
         _, _, (body, _, _) = await self._read()
         found: dict[str, Any] = orjson.loads(body)
         return found
@@ -115,11 +124,18 @@ class ReplayProcess:
 
     async def close(self) -> None:
         """End the process. It is killed at once, also where the caller is cancelled meanwhile."""
-        if self._reader is not None:
-            self._reader.cancel()
+        tasks = [task for task in (self._reader, self._errors) if task is not None]
+        for task in tasks:
+            task.cancel()
         await kill_child(self._process)
-        if self._reader is not None:
-            await asyncio.gather(self._reader, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _read_errors(self) -> bytes:
+        """Read the process's standard error until it ends, as a full pipe would hold it up; return the last of it."""
+        last = b""
+        while self._process.stderr is not None and (output := await self._process.stderr.read(ERRORS_KEPT_BYTES)):
+            last = (last + output)[-ERRORS_KEPT_BYTES:]
+        return last
 
     async def _read_all(self) -> None:
         with contextlib.suppress(asyncio.IncompleteReadError, OSError):
@@ -159,9 +175,11 @@ class ReplayClient:
         self._program = program
         self._current = current
         self._open: dict[int, ReplayProcess] = {}
+        """By the `id` of the client that watches it."""
         self._workers = 0
         """Processes that run, from before their start until after their end."""
         self._closing: set[asyncio.Task[None]] = set()
+        """Tasks that end the workers of clients which are gone."""
 
     async def recordings(self) -> list[ListedRecording]:
         """Return the recordings that can be opened, newest first; `live` marks the one in progress."""
@@ -309,6 +327,7 @@ class ReplayClient:
             await self._end(replay)
 
     async def _end(self, replay: ReplayProcess) -> None:
+        """End a worker and count it as ended, also where the caller is cancelled meanwhile."""
         try:
             await replay.close()
         finally:

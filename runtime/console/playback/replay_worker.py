@@ -87,7 +87,7 @@ class MakeFrameMaker(Protocol):
 
 
 class ReplayWorker:
-    """Plays a recording under the control of commands.
+    """Plays a recording under the control of commands: `execute` begins one, `advance` does the work, cycle by cycle.
 
     Parameters
     ----------
@@ -116,16 +116,29 @@ class ReplayWorker:
         self._show = show
         self._answer = answer
         self._clock = clock
-        self._source = self._number = self._jumps = self._target = 0
-        self._last: ReplayedCycle | None = None
-        self._newest: ReplayedCycle | None = None
+        self._source = 0
+        """Number of the present source of frames …"""
+        self._number = 0
+        """… and how many frames it has made."""
+        self._jumps = 0
+        """The cursor's jumps, and …"""
         self._settings: dict[str, Any] | None = None
+        """… its settings, for which that source was made."""
         self._frames: FrameMaker | None = None
+        """That source; None before the first cycle."""
+        self._newest: ReplayedCycle | None = None
+        """The last cycle replayed; None before the first."""
         self._seek: Iterator[ReplayedCycle] | None = None
+        """The cycles that the seek still has to replay; None while there is none."""
+        self._target = 0
+        """The position to which it goes."""
+        self._last: ReplayedCycle | None = None
+        """The cycle at that position; None until it is reached."""
         self._playing_from: tuple[float, float] | None = None
         """Host time and position, s, from which it plays; None while it does not."""
         self._speed = 1.0
         self._shown_s = -math.inf
+        """Host time of the last frame while playing."""
 
     def execute(self, command: dict[str, Any]) -> None:
         """Begin to execute a command: seek to `s`, play at `speed` (0 pauses), step `cycles`, or show the `grid`.
@@ -248,8 +261,12 @@ def problem(text: object) -> ReplayProblemMessage:
     return {"type": "replay_problem", "error": str(text)}
 
 
-def describe(cursor: ReplayCursor, about: SessionInfo, started: str) -> RecordingDescription:
-    """Return what the page shows of a recording before it is played."""
+def description_of(cursor: ReplayCursor, about: SessionInfo, started: str) -> RecordingDescription:
+    """Return the description of a recording: the worker's first answer that is no progress.
+
+    Times are in s after the first cycle; `started` is in ISO 8601, UTC. It must have no key `type` or `error`: by
+    these `ReplayProcess.begin` knows the other answers.
+    """
     return {
         "duration_s": round(cursor.duration_s, 3),
         "cycles": cursor.cycles,
@@ -279,7 +296,7 @@ def run_worker(file: str, make: MakeFrameMaker) -> int:
                 return make(parse_settings(settings), emulated=emulated)
 
             session = make_frames(recording.info.settings).session()
-            _write_answer(describe(cursor, session, recording.info.started))
+            _write_answer(description_of(cursor, session, recording.info.started))
             worker = ReplayWorker(cursor, make_frames, _write_frame, _write_answer, time.monotonic)
             worker.execute({"do": "seek", "s": 0.0})
             _serve(worker)

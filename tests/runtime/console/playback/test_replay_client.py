@@ -16,7 +16,7 @@ import pytest
 
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
-from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError
+from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, ReplayProcess
 from runtime.console.playback.replay_worker import ANSWER, HEADER
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
@@ -168,6 +168,24 @@ async def test_workers_are_limited_their_death_is_reported_and_none_outlives_the
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+async def test_a_worker_that_complains_at_length_is_not_held_up(tmp_path: Path) -> None:
+    """Its errors must be read while it plays: it would wait for ever once their pipe is full."""
+    answer = tmp_path / "answer"
+    answer.write_bytes(HEADER.pack(ANSWER, 0, 0, 2, 0, 0) + b"{}")
+    program = f"cat {answer}; head -c 1000000 /dev/zero >&2; cat {answer}; exec sleep 600"
+    pipe = asyncio.subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(
+        "/bin/sh", "-c", program, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+    )
+    answers: list[Mapping[str, Any]] = []
+    replay = ReplayProcess(process, lambda _: None, answers.append)
+    try:
+        assert await replay.begin() == {}
+        await until(lambda: answers == [{}])
+    finally:
+        await replay.close()
 
 
 @asynccontextmanager
