@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -27,6 +27,8 @@ SURE_NAT: Final = 12.0
 between its firings, is a few nats less likely than one in feet."""
 APART_NAT: Final = 4.0
 """By how much the second best units must be less likely than the best."""
+PROOF_NAT: Final = SURE_NAT + APART_NAT
+"""Of a fact that decides alone: it outweighs metres, and every rival."""
 METRES_NAT: Final = 6.0
 """Odds on positions and ranges in metres, as most logs have them, where t is in another unit."""
 RIVAL_NAT: Final = 20.0
@@ -41,8 +43,20 @@ PERIOD_LN, SPEED_LN, REACH_LN = 1.5, 1.0, 0.8
 """Spreads of the logarithms of the row's period, the speed and the farthest echo, over the robot's."""
 FAST, TURNS_FAST = 3.0, 5.0
 """A median speed or turning rate over the robot's greatest by this is impossible: odometry leaps, but not always."""
+USUAL_SPEED, USUAL_REACH = 0.4, 0.6
+"""The most likely median speed and farthest echo, over the robot's greatest ones."""
+FARTHEST: Final = 0.95
+"""The farthest echo is this quantile of the ranges."""
 FAR, FAR_SHARE = 1.2, 0.1
 """Ranges beyond the ring's by this factor are impossible; so many may be glitches."""
+FAR_NAT: Final = 20.0
+"""Evidence against units in which all ranges would be such; in proportion where only some are."""
+CEILING_SAME: Final = 0.01
+"""A limit of the ranges is the ring's greatest one if it differs by less, as a share of it."""
+RESOLUTION_MIN_M: Final = 0.01
+"""Finer resolutions of a ring are lost among the file's decimals."""
+MULTIPLES_OFF: Final = 0.1
+"""Ranges are multiples of the resolution if they are off by less of it in the mean square; any would be by 0.29."""
 EDGE: Final = 0.02
 EDGE_NAT: Final = 4.3
 """Width in which ranges end at the ring's greatest one, as a share of it, and the log of how rarely they do by
@@ -60,6 +74,10 @@ PAIRS_BIAS_LN: Final = 0.14
 drives it was between -0.30 and 0.26."""
 PAIRS_BIASES: Final = np.linspace(-3.0, 3.0, 61)
 """Where this bias is looked at, in its standard deviations."""
+STEPS_MIN: Final = 30
+"""Steps on which a speed or a rate rests."""
+ECHOES_MIN: Final = 50
+"""Echoes on which what is said of ranges rests."""
 
 
 class Units(NamedTuple):
@@ -127,19 +145,21 @@ def find_units(
             )
         )
     )
-    if options.angle_unit == "auto" and facts.rate > TURNS_FAST * robot.body.turn_max_rad_s * TIMES[best.time]:
+    rate_rad_s = facts.rate / TIMES[best.time]
+    if options.angle_unit == "auto" and rate_rad_s > TURNS_FAST * robot.body.turn_max_rad_s:
         raise RingLogError(
-            f"{_too_fast(facts, robot)}: say --angle-unit deg if it is in degrees, or give it in radians"
+            f"{_too_fast(rate_rad_s, robot)}: say --angle-unit deg if it is in degrees, or give it in radians"
         )
     if scores[default] > scores[best] - SURE_NAT:
         return default, scores
+    reason = _reason(default, best, facts, robot)
     if _contradictions(best, facts, robot):
-        raise RingLogError(_impossible(facts, robot))
+        raise RingLogError(reason)
     rivals = [units for units in choices if units != best and scores[units] > scores[best] - APART_NAT]
     rivals = [units for units in rivals if not _is_same(units, best, facts)]
     if rivals:
         names = " or ".join(f"{units.words} ({units.options})" for units in [best, *rivals[:2]])
-        raise RingLogError(f"cannot be in metres and seconds ({_impossible(facts, robot)}); it may have {names}")
+        raise RingLogError(f"cannot have {default.words} ({reason}); it may have {names}")
     return best, scores
 
 
@@ -179,11 +199,13 @@ def check_scale(units: Units, scores: dict[Units, float], echoes: Callable[[Unit
         raise RingLogError(f"is in other conventions than a ring log's, and its units are open: it may have {names}")
 
 
-def _choice(given: str, known: object) -> list[str]:
-    return [given] if given != "auto" else list(known)  # type: ignore[call-overload]  # a mapping's names
+def _choice(given: str, known: Iterable[str]) -> list[str]:
+    return [given] if given != "auto" else list(known)
 
 
 class _Facts(NamedTuple):
+    """What the file's numbers show, in its own units of time and length."""
+
     period: float
     """Median time between rows."""
     speed: float
@@ -191,7 +213,9 @@ class _Facts(NamedTuple):
     rate: float
     """Median turning rate where it turned, rad per unit of time."""
     echoes: Floats
+    """(k,): all ranges that are echoes."""
     ceiling: float | None
+    """The one range that stands for silence, if it is the most that the ring reports; None otherwise."""
 
     @staticmethod
     def of(table: Table, silence: Silence, angle: str) -> _Facts:
@@ -210,11 +234,6 @@ class _Facts(NamedTuple):
         return _Facts(period, speed, rate, table.ranges[np.isfinite(table.ranges)], ceiling)
 
 
-STEPS_MIN: Final = 30
-"""Steps on which a speed or a rate rests."""
-ECHOES_MIN: Final = 50
-
-
 def _way_score(ratios: Floats, expected: float) -> float:
     """Return the log-likelihood of ratios of range to way, all of them with one unknown bias."""
     if not len(ratios):
@@ -231,42 +250,62 @@ def _score(units: Units, facts: _Facts, robot: RobotConfig) -> float:
     """Return the log-likelihood of units but for the ratios of range to way."""
     body, ring = robot.body, robot.ring
     t, length, range_ = TIMES[units.time], LENGTHS[units.length], LENGTHS[units.range_]
-    score = METRES_NAT * (units.length == units.range_ == "m") + IMPOSSIBLE_NAT * _contradictions(units, facts, robot)
+    score = METRES_NAT * (units.length == units.range_ == "m")
+    score += IMPOSSIBLE_NAT * len(_contradictions(units, facts, robot))
     if facts.period > 0.0:
         score += _ln_normal(facts.period * t / ring.firing.step_period_s, PERIOD_LN)
     if facts.speed > 0.0:
         speed = facts.speed * length / t / body.speed_max_m_s
-        score += _ln_normal(speed / 0.4, SPEED_LN)
+        score += _ln_normal(speed / USUAL_SPEED, SPEED_LN)
     if len(facts.echoes) >= ECHOES_MIN:
         score += _range_score(facts, range_, robot)
     return score
 
 
-def _contradictions(units: Units, facts: _Facts, robot: RobotConfig) -> int:
-    """Return how many of speed, turning rate and ranges the robot cannot have in these units."""
+def _contradictions(units: Units, facts: _Facts, robot: RobotConfig) -> list[str]:
+    """Return what this robot cannot have in these units, a clause each: ranges, speed, turning rate."""
     body, ring = robot.body, robot.ring
     t, echoes = TIMES[units.time], LENGTHS[units.range_] * facts.echoes
-    count = int(facts.speed * LENGTHS[units.length] / t > FAST * body.speed_max_m_s)
-    count += facts.rate / t > TURNS_FAST * body.turn_max_rad_s
+    found = list[str]()
     if len(echoes) >= ECHOES_MIN:
-        count += float((echoes > FAR * ring.range_max_m).mean()) > FAR_SHARE
-        count += float((echoes < 0.5 * ring.range_min_m).mean()) > 0.5
-    return int(count)
+        far = float((echoes > FAR * ring.range_max_m).mean())
+        if far > FAR_SHARE:
+            found.append(
+                f"{100 * far:.0f} % of the ranges are beyond ring.range_max_m {ring.range_max_m:g}, the greatest is "
+                f"{float(echoes.max()):g}"
+            )
+        near = float((echoes < 0.5 * ring.range_min_m).mean())
+        if near > 0.5:
+            found.append(f"{100 * near:.0f} % of the ranges are below half of ring.range_min_m {ring.range_min_m:g}")
+    speed_m_s, rate_rad_s = facts.speed * LENGTHS[units.length] / t, facts.rate / t
+    if speed_m_s > FAST * body.speed_max_m_s:
+        found.append(
+            f"x and y move at {speed_m_s:.3g} m/s, and this robot's body.speed_max_m_s is {body.speed_max_m_s:g}"
+        )
+    if rate_rad_s > TURNS_FAST * body.turn_max_rad_s:
+        found.append(_too_fast(rate_rad_s, robot))
+    return found
 
 
 def _range_score(facts: _Facts, unit: float, robot: RobotConfig) -> float:
+    """Return the log-likelihood (nat) of the echoes if one unit of the file's ranges is `unit` metres.
+
+    It adds up how many lie beyond the ring's reach, how far the farthest lie, whether they end at the ring's greatest
+    range, and whether they are multiples of its resolution, from the first on. There must be an echo.
+    """
     ring = robot.ring
     echoes = unit * facts.echoes
     far = float((echoes > FAR * ring.range_max_m).mean())
-    score = -20.0 * far + _ln_normal(float(np.quantile(echoes, 0.95)) / (0.6 * ring.range_max_m), REACH_LN)
-    if facts.ceiling is not None and abs(unit * facts.ceiling / ring.range_max_m - 1.0) < 0.01:
-        score += SURE_NAT + APART_NAT
+    farthest = float(np.quantile(echoes, FARTHEST)) / ring.range_max_m
+    score = -FAR_NAT * far + _ln_normal(farthest / USUAL_REACH, REACH_LN)
+    if facts.ceiling is not None and abs(unit * facts.ceiling / ring.range_max_m - 1.0) < CEILING_SAME:
+        score += PROOF_NAT
     else:
         score += _edge_score(echoes / ring.range_max_m)
-    if ring.resolution_m >= 0.01:  # finer ones are lost among the file's decimals
+    if ring.resolution_m >= RESOLUTION_MIN_M:
         steps = echoes / ring.resolution_m
-        off = float(np.sqrt(np.mean((steps - np.round(steps)) ** 2)))
-        score += (SURE_NAT + APART_NAT) * (off < 0.1)
+        off = float(np.sqrt(np.mean((steps - np.maximum(np.round(steps), 1.0)) ** 2)))
+        score += PROOF_NAT * (off < MULTIPLES_OFF)
     return score
 
 
@@ -279,6 +318,7 @@ def _edge_score(shares: Floats) -> float:
 
 
 def _ln_normal(ratio: float, spread: float) -> float:
+    """Return the log of a normal density of the ratio's logarithm, over that at a ratio of 1; 0 for a ratio of 0."""
     return -0.5 * (math.log(ratio) / spread) ** 2 if ratio > 0.0 else 0.0
 
 
@@ -291,25 +331,19 @@ def _is_same(one: Units, other: Units, facts: _Facts) -> bool:
     )
 
 
-def _impossible(facts: _Facts, robot: RobotConfig) -> str:
-    """Return the first fact that contradicts the robot in metres and seconds."""
-    body, ring = robot.body, robot.ring
-    share = float((facts.echoes > FAR * ring.range_max_m).mean()) if len(facts.echoes) else 0.0
-    if share > FAR_SHARE:
-        return (
-            f"{100 * share:.0f} % of the ranges are beyond ring.range_max_m {ring.range_max_m:g}, the greatest is "
-            f"{float(facts.echoes.max()):g}"
-        )
-    if facts.speed > FAST * body.speed_max_m_s:
-        return f"x and y move at {facts.speed:.3g} m/s, and this robot's body.speed_max_m_s is {body.speed_max_m_s:g}"
-    if facts.rate > TURNS_FAST * body.turn_max_rad_s:
-        return _too_fast(facts, robot)
-    return f"the firings are {facts.period:.3g} s apart, and this robot's are {ring.firing.step_period_s:g}"
+def _reason(default: Units, best: Units, facts: _Facts, robot: RobotConfig) -> str:
+    """Return in a clause why a file is in the best units and not in the default ones."""
+    if contradictions := _contradictions(default, facts, robot):
+        return contradictions[0]
+    if best.time != default.time:
+        period_s, usual_s = facts.period * TIMES[default.time], robot.ring.firing.step_period_s
+        return f"the firings are {period_s:.3g} s apart, and this robot's are {usual_s:g}"
+    return "the ranges fit this robot's ring, or the way that it drove, far better in other units"
 
 
-def _too_fast(facts: _Facts, robot: RobotConfig) -> str:
+def _too_fast(rate_rad_s: float, robot: RobotConfig) -> str:
     limit = robot.body.turn_max_rad_s
-    return f"theta turns at {facts.rate:.3g} rad/s, and this robot's body.turn_max_rad_s is {limit:g}"
+    return f"theta turns at {rate_rad_s:.3g} rad/s, and this robot's body.turn_max_rad_s is {limit:g}"
 
 
 def way_ratios(table: Table, robot: RobotConfig, yaw: Floats, hand: int) -> Floats:

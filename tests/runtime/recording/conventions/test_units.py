@@ -15,7 +15,18 @@ from drivers.messages import Firing, Pose
 from runtime.recording.conventions.options import AUTO
 from runtime.recording.conventions.reading import converted_firings
 from runtime.recording.conventions.table import LENGTHS, TIMES, Table
-from runtime.recording.conventions.units import APART_NAT, EDGE_NAT, Units, _edge_score, _way_score, way_ratios
+from runtime.recording.conventions.units import (
+    APART_NAT,
+    EDGE_NAT,
+    PROOF_NAT,
+    Units,
+    _edge_score,
+    _Facts,
+    _range_score,
+    _reason,
+    _way_score,
+    way_ratios,
+)
 from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import Drive, make_drive
 
@@ -65,6 +76,32 @@ def test_options_say_what_units_are() -> None:
 ROBOT = load_settings("hallway")
 LOG = Path("log.csv")
 HALF_S = 3.0
+
+
+def test_ranges_far_below_the_resolution_are_no_multiples_of_it() -> None:
+    """In units that are too small every range is nearly zero steps: that is no evidence for them."""
+    ring = ROBOT.ring.model_copy(update={"resolution_m": 0.0})
+    fine = ROBOT.model_copy(update={"ring": ring})
+    echoes = ROBOT.ring.resolution_m * np.random.default_rng(5).integers(10, 200, 100).astype(float)
+    facts = _Facts(0.05, 0.2, 0.1, echoes, None)
+    bonus = [_range_score(facts, unit, ROBOT) - _range_score(facts, unit, fine) for unit in (1.0, 1e-3)]
+    assert bonus == pytest.approx([PROOF_NAT, 0.0])
+
+
+def test_the_reason_for_other_units_is_a_fact() -> None:
+    echoes = np.linspace(0.3, 7.0, 100)
+    facts = _Facts(0.05, 0.2, 0.1, echoes, None)
+    near, slow = facts._replace(echoes=0.01 * echoes), facts._replace(period=50.0)
+    cases = (
+        (facts._replace(echoes=100.0 * echoes), Units(range_="cm"), "beyond ring.range_max_m"),
+        (near, Units(range_="ft"), "below half of ring.range_min_m"),
+        (facts._replace(speed=20.0), Units(length="cm"), "move at 20 m/s"),
+        (facts._replace(rate=90.0), Units(time="ms"), "turns at 90 rad/s"),
+        (slow, Units(time="ms"), "the firings are 50 s apart"),
+        (facts, Units(range_="ft"), "far better in other units"),
+    )
+    for found, best, text in cases:
+        assert text in _reason(Units(), best, found, ROBOT)
 
 
 def drive_along(count: int = 300, turn: float = 0.2, heading: float = 0.4) -> Iterator[Firing]:
