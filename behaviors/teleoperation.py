@@ -57,7 +57,8 @@ def is_expired(requested: Teleoperate, age_s: float, config: TeleoperationConfig
     requested
         The operator's velocity.
     age_s
-        Time since it arrived, s; negative if the clock went back.
+        Its age at the time that counts, s: a cycle asks for that of the next one. Negative if the clock went
+        back.
     config
         Its `message_age_max_s` limits the validity.
     """

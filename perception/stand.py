@@ -156,8 +156,8 @@ def _heard(firings: Sequence[Firing]) -> Floats:
 def _without_outliers(readings: Floats) -> tuple[Floats, float]:
     """Return the readings without those far from the median of their path, and the noise of a single one, m.
 
-    Readings are rows as of `_heard`. The noise is one standard deviation for all paths, from those heard `REPEATS_MIN`
-    times or more. Far is beyond five of it, but never closer than half of `HALF_PATH_GATE_M`.
+    Readings are rows as of `_heard`. The noise is one standard deviation for all paths, from those heard
+    `REPEATS_MIN` times or more. Far is beyond five of it, but never closer than half of `HALF_PATH_GATE_M`.
     """
     _, path = np.unique(readings[:, :2], axis=0, return_inverse=True)
     path = path.ravel()

@@ -128,7 +128,11 @@ class ArcosDevice(EventDevice):
         return WireFrameCounter()
 
     def receive(self, data: bytes) -> None:
-        """Take bytes from the host, at the time to which the robot has advanced."""
+        """Take bytes from the host, at the time to which the robot has advanced.
+
+        Every command resets the watchdog, a SYNC, too. The body is moved to the present before it, so that what it
+        sets acts from now on.
+        """
         if not (data := self._hear(data)):
             return
         # The rest of a packet does not come after a pause: a false length would swallow the next client's SYNCs.
@@ -160,6 +164,7 @@ class ArcosDevice(EventDevice):
             self._send(RobotName(self._firmware.name, self._firmware.class_name, self._firmware.subclass))
 
     def _open(self) -> None:
+        """Begin a session: the odometry and the arrays start anew, and the first SIP comes after one cycle."""
         self._session = Session.OPENED
         self._body.reset_odometry()
         self._arrays = SonarArrays(self._firmware.sensor_numbers, self._arrays.cycle_us // 1000)
@@ -169,6 +174,7 @@ class ArcosDevice(EventDevice):
         self._sip_us = self._now_us + 1000 * self._firmware.sip_cycle_ms
 
     def _close(self) -> None:
+        """End the session: motors off, no more packets, and the speed of the line as after power-on."""
         self._session = Session.WAIT
         self._sip_us = None
         self._servo.enable(on=False)
@@ -176,6 +182,7 @@ class ArcosDevice(EventDevice):
         self._line.set_baud(self._firmware.baud, self._now_us)
 
     def _obey(self, command: Command) -> None:
+        """Carry out a command of an open session; unknown ones are ignored, and ENABLE while motors cannot go on."""
         heading = self._body.odometry_pose.theta
         refused = command.number == CommandNumber.ENABLE and self._is_off()
         if refused or self._servo.obey(command, heading) or self._requested.obey(command):
@@ -209,6 +216,7 @@ class ArcosDevice(EventDevice):
     # Events.
 
     def _next_us(self) -> int:
+        """Return the time of the next event, µs: a step of the body, a fault, a SIP, a firing or the watchdog."""
         next_us = self._moved_us // TICK_US * TICK_US + TICK_US
         others = [self._faults.next_us]
         if self._session is Session.OPENED and not self._faults.has(Reboot):

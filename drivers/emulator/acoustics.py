@@ -180,6 +180,7 @@ def _look_beside(
 
 @kernel
 def _keep_nearer(distance: float, px: float, py: float, best: np.record) -> None:
+    """Write a point (m) and its distance from the sensor to `best` if it is nearer."""
     if distance < best.distance:
         best.distance = distance
         best.x = px
@@ -207,6 +208,11 @@ def _keep_hit(
 def _nearest_in_cone(
     sx: float, sy: float, axis: float, half_angle: float, circles: Records, segments: Records, best: np.record
 ) -> None:
+    """Keep the nearest point of all surfaces in the beam, if it is nearer than `best`.
+
+    Only for a scene in which every surface answers as a cone: then nothing in the beam can hide that point, and it is
+    not asked what is in sight, as by `_nearest_in_sight`.
+    """
     rx, ry = math.cos(axis - half_angle), math.sin(axis - half_angle)
     lx, ly = math.cos(axis + half_angle), math.sin(axis + half_angle)
     for k in range(circles.shape[0]):
@@ -259,6 +265,7 @@ def _first_mirror(
     scene: Scene,
     best: np.record,
 ) -> None:
+    """Keep the nearest corner, or point whose surface's normal looks back at the sensor, in the beam and in sight."""
     circles, segments, corners = scene
     ux, uy = math.cos(axis), math.sin(axis)
     cos_half = math.cos(half_angle)

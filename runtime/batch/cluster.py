@@ -51,7 +51,7 @@ SETTINGS: Final = (
 
 
 class DaskPool:
-    """A client of a scheduler, as a pool of workers.
+    """A `runtime.batch.dispatch.Pool` of the workers of a Dask scheduler.
 
     Parameters
     ----------
@@ -68,11 +68,14 @@ class DaskPool:
         self._completed = completed
         self._make = make
         self._under_way: dict[str, tuple[Run, int]] = {}
+        """Each run and its attempt, by the key of its future."""
         self._capacity = 1
+        """Runs that should be under way, by the last count of the workers …"""
         self._counted_s = -COUNT_PERIOD_S
+        """… at this host time."""
 
     def capacity(self) -> int:
-        """Return how many runs should be under way."""
+        """Return how many runs should be under way; it asks the scheduler every `COUNT_PERIOD_S`."""
         if time.monotonic() - self._counted_s >= COUNT_PERIOD_S:
             with contextlib.suppress(OSError):
                 self._capacity = max(1, AHEAD * sum(self._client.nthreads().values()))
@@ -86,7 +89,9 @@ class DaskPool:
         self._completed.add(self._client.submit(self._make, run, key=key))
 
     def next_done(self) -> Done:
-        """Wait for the next run that ends.
+        """Wait for the next run that ends, and return it with its row, or with the error that it raised.
+
+        That error is returned, not raised. There must be a run under way.
 
         Raises
         ------

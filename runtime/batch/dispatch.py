@@ -21,7 +21,7 @@ class Done(NamedTuple):
 
 
 class Pool(Protocol):
-    """Workers."""
+    """Workers that make runs, several at a time."""
 
     def capacity(self) -> int:
         """Return how many runs should be under way, so that no worker waits for one; at least 1."""
@@ -32,7 +32,7 @@ class Pool(Protocol):
         ...
 
     def next_done(self) -> Done:
-        """Wait for the next run that ends."""
+        """Wait for the next run that ends, and return it with what came of it; there must be one under way."""
         ...
 
 

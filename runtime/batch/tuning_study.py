@@ -25,10 +25,16 @@ SENSORS: Final = (
 """What recordings show of the sensors, searched where a study names no settings."""
 
 
-def tuned_study(name: str) -> tuple[StudyConfig, Path]:
-    """Return the study of a name, a file, or a folder of recordings, and the folder that its paths refer to.
+def study_to_tune(name: str) -> tuple[StudyConfig, Path]:
+    """Return the study to tune, and the folder that its relative paths refer to.
 
-    Settings to search among and objectives that the study leaves out are added.
+    Settings to search among and objectives that the study leaves out are added: `THRESHOLDS` where the truth is
+    known, `SENSORS` where there are recordings.
+
+    Parameters
+    ----------
+    name : str
+        A shipped study, a study file, or a folder of recordings.
 
     Raises
     ------
@@ -40,9 +46,9 @@ def tuned_study(name: str) -> tuple[StudyConfig, Path]:
     else:
         study, base = load_study(name), Path(name).parent
     of_recordings = study.recordings is not None
-    is_true = not of_recordings or study.truth is not None
+    has_truth = not of_recordings or study.truth is not None
     if "objectives" not in study.model_fields_set:
-        study = study.model_copy(update={"objectives": ("f1", "mean_error_m") if is_true else ("predicted_nat",)})
+        study = study.model_copy(update={"objectives": ("f1", "mean_error_m") if has_truth else ("predicted_nat",)})
     if not study.vary:
         judged = "predicted_nat" not in study.objectives
         vary = (*(SENSORS if of_recordings else ()), *(THRESHOLDS if judged else ()))

@@ -269,8 +269,8 @@ def step_along(found: RoomCorner, wall: Wall) -> float:
 def end_of_edge(wall: Wall, along: float) -> int:
     """Return of which end of a span a post at `along` (m) is the edge, as `RoomCorner.second`: 1 high, 0 low.
 
-    That is the end nearest to it. But `EDGE_SAME_M` beyond that end or farther, the post is taken for the other side of
-    an opening, where a span begins that is not known yet: then it is the opposite end. 0 for a wall without spans.
+    That is the end nearest to it. But `EDGE_SAME_M` beyond that end or farther, the post is taken for the other side
+    of an opening, where a span begins that is not known yet: then it is the opposite end. 0 for a wall without spans.
     """
     nearest = math.inf
     side = 0

@@ -82,12 +82,12 @@ def tune(
     """
     from runtime.batch.search import OptunaSearch
     from runtime.batch.tuning import Tuner, trial_runs
-    from runtime.batch.tuning_study import present_values, tuned_study
+    from runtime.batch.tuning_study import present_values, study_to_tune
 
     if trials == 0:
         raise UserError("--trials 0: must be at least 1", WRONG_CALL)
     processes = worker_processes(workers, scheduler)
-    chosen, base = tuned_study(study)
+    chosen, base = study_to_tune(study)
     for module, package in PACKAGES:
         require_package(module, package, EXTRA)
     present = present_values(chosen, base)

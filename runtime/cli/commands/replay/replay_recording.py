@@ -129,9 +129,9 @@ def replay_again(
             raise UserError(f"{recording.path}: this part of it holds no cycle that can be replayed", FAILED)
         console.print(f"{recording.path}: holds no cycle yet: the run ended before its first one; nothing differs")
         if json_file is not None:
-            write_json(json_file, summarise(recording, result))
+            write_json(json_file, replay_summary(recording, result))
         return DONE
-    summary = summarise(recording, result)
+    summary = replay_summary(recording, result)
     if json_file is not None:
         write_json(json_file, summary)
     output = plain_console()
@@ -160,8 +160,12 @@ def replay_again(
     return DONE
 
 
-def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
-    """Return the summary of a replay."""
+def replay_summary(recording: Recording, result: ReplayResult) -> ReplaySummary:
+    """Return what `--json` writes of a replay: what was perceived at its end, and what was compared.
+
+    The keys are public: users' programs read them. `segments` counts all since the start, `clusters` the present
+    hypotheses of either method. Without a cycle there are empty lists and zeros.
+    """
     perception = result.state.perception if result.state is not None else None
     perceived: PerceivedRows = {"objects": [], "walls": [], "corners": [], "canyons": [], "polylines": []}
     if perception is not None:

@@ -170,7 +170,7 @@ async def test_workers_are_limited_their_death_is_reported_and_none_outlives_the
             os.kill(pid, 0)
 
 
-async def test_a_worker_that_complains_at_length_is_not_held_up(tmp_path: Path) -> None:
+async def test_a_worker_that_writes_many_errors_is_not_held_up(tmp_path: Path) -> None:
     """Its errors must be read while it plays: it would wait for ever once their pipe is full."""
     answer = tmp_path / "answer"
     answer.write_bytes(HEADER.pack(ANSWER, 0, 0, 2, 0, 0) + b"{}")
@@ -182,7 +182,7 @@ async def test_a_worker_that_complains_at_length_is_not_held_up(tmp_path: Path) 
     answers: list[Mapping[str, Any]] = []
     replay = ReplayProcess(process, lambda _: None, answers.append)
     try:
-        assert await replay.begin() == {}
+        await replay.begin()
         await until(lambda: answers == [{}])
     finally:
         await replay.close()
