@@ -54,10 +54,11 @@ LEAST_VARIANCE: Final = 1e-5
 USUAL_LOG: Final = -0.7
 USUAL_READINGS: Final = 100.0
 """Log likelihood of a known reading where maps fit, and how many readings that is worth at the start."""
-REFUTED: Final = 6.0
-REFUTED_A_MAP: Final = 0.5
+REFUTED: Final = 3.0
+REFUTED_A_MAP: Final = 0.6
 """Log likelihood by which matches refute odometry: what is fitted to noise gains ½ nat for each number that it
-determines, about one a map (drives with exact poses: 0.2 to 0.45)."""
+determines, about one a map. Drives with exact poses, 16 real ones and 9 in buildings, gain 0.12 to 0.52 a map, and
+stay 3 nat below after one map, 8 after 80. A drive with drift among mirrors is refuted after 8 maps, not after 20."""
 
 
 class SubmapGraph:
