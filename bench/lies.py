@@ -31,16 +31,17 @@ from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
 from drivers.registry import make_device, make_driver
 from runtime.cycle.drive_requests import first_request, needs_recognition
+from runtime.cycle.echo_watch import NOTHING_NEW, NOTHING_YET
 from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
-from runtime.cycle.unheard_limit import LOST, NOTHING_YET, UNHEARD
+from runtime.cycle.unheard_limit import LOST, UNHEARD
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
 ROBOTS: Final = (
-    "amigo", "atrvjr", "b21r", "b21r-base", "b21r-both", "denning", "ears", "magellan", "p3at", "p3dx", "p3dx-sh",
-    "peoplebot", "powerbot",
+    "amigo", "atrvjr", "b21r", "b21r-base", "b21r-both", "denning", "ears", "hobby3", "hobby8", "magellan", "p3at",
+    "p3dx", "p3dx-sh", "parking12", "peoplebot", "powerbot", "servo1",
 )  # fmt: skip
 ROOMS: Final = ("room", "office", "hallway", "furnished", "goal", "corridor")
 AHEAD, ALL_BUT_ONE = "ahead", "all but one"
@@ -310,7 +311,7 @@ def run_trial(
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
             held = held if state.hold_reason == held else None
-            if kind is not None and held is None and state.hold_reason in {LOST, NOTHING_YET, UNHEARD}:
+            if kind is not None and held is None and state.hold_reason in {LOST, NOTHING_NEW, NOTHING_YET, UNHEARD}:
                 texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]

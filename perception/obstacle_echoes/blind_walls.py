@@ -16,6 +16,7 @@ import math
 from typing import Annotated, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
 from perception.angles import wrapped
@@ -215,10 +216,49 @@ class BlindWalls:
             walls["is_known"], self.has_looked_round = 0, True
         walls["is_known"] &= np.hypot(walls["x"] - x, walls["y"] - y) <= SILENT_WAY_M
 
+    def offsets(self, x: float, y: float) -> Floats:
+        """Return the distance of each direction's wall from the odometry's origin, m; infinite without one.
+
+        An echo stands for a wall in each direction of its beam: of neighbours at one distance those in the middle
+        count.
+
+        Parameters
+        ----------
+        x, y
+            Place of the ring, m.
+        """
+        offsets, directions = self._walls["offset"], WIDTH_RAD * np.arange(TURN_DIRECTIONS)
+        away = offsets - x * np.cos(directions) - y * np.sin(directions)
+        return middle_walls((self._walls["odds"] > 0.0) & (away > self._radius_m), offsets)
+
     def clear(self) -> None:
         """Forget everything."""
         self._walls["is_known"] = 0
         self._walls["odds"] = 0.0
+
+
+def middle_walls(is_wall: NDArray[np.bool_], offsets_m: Floats) -> Floats:
+    """Return the offsets of the walls in the middle of each run of neighbours that are one wall; others infinite, m.
+
+    Parameters
+    ----------
+    is_wall : (`TURN_DIRECTIONS`,) bool
+        Whether there is a wall in each direction.
+    offsets_m : (`TURN_DIRECTIONS`,) float
+        Its distance from the odometry's origin, m.
+    """
+    middles = np.full(TURN_DIRECTIONS, math.inf)
+    joins = is_wall & np.roll(is_wall, 1) & (np.abs(offsets_m - np.roll(offsets_m, 1)) <= WALL_ECHO_M)
+    if joins.all():
+        return offsets_m.copy()
+    for first in np.flatnonzero(is_wall & ~joins).tolist():
+        last = first
+        while joins[(last + 1) % TURN_DIRECTIONS]:
+            last += 1
+        middle = np.arange(max(first, (first + last) // 2 - 1), min(last, (first + last + 1) // 2 + 1) + 1)
+        middle %= TURN_DIRECTIONS
+        middles[middle] = offsets_m[middle]
+    return middles
 
 
 def has_blind_sides(mounts: Floats, half_angle: float) -> bool:

@@ -333,6 +333,7 @@ class FreshEchoes:
             elif not self.unheard.has_been_silent:
                 self._blind_walls.has_looked_round = False
             self._blind_walls.update(firing)
+            self.unheard.presume_walls(pose[0], pose[1], self._blind_walls)
 
     def _in_beams(self, pose: RingPose, mounts: Floats) -> NDArray[np.bool_]:
         """Return which echoes lie in a beam now, shape (n, looks): a turn takes few sensors away from all others."""

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Pose
-from perception.bounds import COUNT, Flag, Place, bounds, index_of
+from perception.bounds import COUNT, PLACE, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
+from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose
 
@@ -38,6 +39,9 @@ SILENT_ROUNDS: Final = 4
 
 SUDDEN_MIN: Final = 3
 """So many sensors do not lose their echoes between two echoes of the whole ring, unless it has failed."""
+
+CLOSING_MIN: Final = 0.05
+"""A robot that comes nearer to a wall by less than this share of its way drives along it."""
 
 NOT_KEPT, LEFT, KEPT, ALONE = range(4)
 """Of a sensor's echo: none is kept; one was lost that was random or before which the robot stood, and the ring has
@@ -243,7 +247,7 @@ class UnheardEchoes:
 
     SCRATCH: Final = ("records", "_places", "_are_steady")
     """Not part of a snapshot: views of an array that is."""
-    BOUNDS: Final = bounds(_echoes=UnheardEcho.BOUNDS, silences=COUNT)
+    BOUNDS: Final = bounds(_echoes=UnheardEcho.BOUNDS, silences=COUNT, _walls_m=PLACE._replace(infinite=True))
 
     def __init__(self, mounts: Floats) -> None:
         self._echoes = zeros(UnheardEcho, len(mounts))
@@ -251,10 +255,43 @@ class UnheardEchoes:
         self._places = self._echoes[["state", "x", "y"]]
         self._are_steady = self._echoes["is_steady"]
         self.silences = np.zeros(2, np.int64)
+        self._walls_m = np.full(TURN_DIRECTIONS, math.inf)
 
     def falls_silent(self, which: int) -> bool:
         """Return whether half of the ring's sensors have looked since it heard anything (new), and not all twice."""
         return len(self._echoes) <= 2 * int(self.silences[which]) <= 4 * len(self._echoes)
+
+    @property
+    def hears_nothing_new(self) -> bool:
+        """Whether half of the ring's sensors have looked since it heard anything new."""
+        return 2 * int(self.silences[UNCHANGED]) >= len(self._echoes)
+
+    def presume_walls(self, x: float, y: float, blind_walls: BlindWalls) -> None:
+        """Keep the walls that a ring at a place (m) has heard, if it has just heard anything new."""
+        if not self.silences[UNCHANGED]:
+            self._walls_m[:] = blind_walls.offsets(x, y)
+
+    def presumed_way_m(self, pose: Pose, radius_m: float) -> float:
+        """Return how far a disc can drive straight ahead to where a wall goes on that the ring heard last, m.
+
+        Infinite where there is none, and while the ring hears anything new. The direction of a wall is known to that
+        of its neighbours in `TURN_DIRECTIONS`, so the wall may be crossed and still count.
+
+        Parameters
+        ----------
+        pose
+            Of the disc, m and rad.
+        radius_m
+            The disc's, m.
+        """
+        if not self.hears_nothing_new:
+            return math.inf
+        directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
+        c, s = np.cos(directions), np.sin(directions)
+        closing = math.cos(pose.theta) * c + math.sin(pose.theta) * s
+        away = self._walls_m - pose.x * c - pose.y * s
+        is_ahead = (closing > CLOSING_MIN) & np.isfinite(away)
+        return float((np.maximum(away - radius_m, 0.0)[is_ahead] / closing[is_ahead]).min(initial=math.inf))
 
     @property
     def is_ring_silent(self) -> bool:
@@ -262,9 +299,9 @@ class UnheardEchoes:
 
         Of a ring that repeats what it hears, several must have been lost.
         """
-        count = len(self._echoes)
-        if 2 * int(self.silences[UNCHANGED]) < count:
+        if not self.hears_nothing_new:
             return False
+        count = len(self._echoes)
         least = 1 if 2 * int(self.silences[SILENT]) >= count else SUDDEN_MIN
         alone = [state for state, _, _ in self._places.tolist() if state == ALONE]
         return len(alone) >= least
@@ -304,5 +341,6 @@ class UnheardEchoes:
         return float(near.min())
 
     def clear(self) -> None:
-        """Forget all echoes."""
+        """Forget all echoes and walls."""
         self._echoes["state"] = NOT_KEPT
+        self._walls_m[:] = math.inf

@@ -101,6 +101,32 @@ def is_parallel_wall(
 
 
 @kernel
+def turns_beside_wall(r: float, bearing: float, turned: float, reception: Reception) -> bool:
+    """Return whether a sensor that has turned may hear a rough wall along the path in one range before and after.
+
+    Parameters
+    ----------
+    r : float
+        The range, m.
+    bearing : float
+        Angle from the path to the sensor's axis now, rad.
+    turned : float
+        By how much it has turned, rad.
+    reception : Reception
+        What the ring hears.
+    """
+    half_angle, tolerance, _ = reception
+    for turn in range(2):
+        side = 1.0 - 2.0 * turn
+        now, then = side * wrapped(bearing), side * wrapped(bearing - turned)
+        now = math.sin(min(max(0.5 * math.pi, now - half_angle), now + half_angle))
+        then = math.sin(min(max(0.5 * math.pi, then - half_angle), then + half_angle))
+        if min(now, then) >= 1e-3 and r * abs(now / then - 1.0) <= tolerance + NOISE_SHARE * r:
+            return True
+    return False
+
+
+@kernel
 def changes_due(
     i: int,
     look: Look,
@@ -136,14 +162,15 @@ def changes_due(
     r = echoes[i].latest.range_m
     dx, dy, turned = x - then.x, y - then.y, axis - then.axis
     if abs(turned) <= 2.0 * half_angle:  # it may still hear the same surface
-        beam = half_angle + abs(turned)
-        along = abs(dx * math.cos(axis) + dy * math.sin(axis))
-        across = abs(dy * math.cos(axis) - dx * math.sin(axis))
-        due = math.floor((along * math.cos(beam) - across * math.sin(beam)) / max(STEP_MIN_M, 3.0 * tolerance))
+        both, middle = half_angle - 0.5 * abs(turned), axis - 0.5 * turned  # what lies in the beam of either look
+        along = abs(dx * math.cos(middle) + dy * math.sin(middle))
+        across = abs(dy * math.cos(middle) - dx * math.sin(middle))
+        due = math.floor((along * math.cos(both) - across * math.sin(both)) / max(STEP_MIN_M, 3.0 * tolerance))
         if due < 1:
             return 0.0
         lean = min(1.0, tolerance / math.hypot(dx, dy))  # the range stays within the tolerance for so long
-        if is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, lean, echoes, path_m):
+        is_along = turns_beside_wall(r, axis - math.atan2(dy, dx), turned, reception)
+        if is_along and is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, lean, echoes, path_m):
             return 0.0
         return float(due)
     return math.floor(abs(turned) / (2.0 * half_angle))

@@ -3,7 +3,11 @@
 A pin that a 5 V echo destroyed, a ring without its supply, a ring under a cover: each firing reports silence. So
 does open ground. A robot that has never heard an echo is stopped once, after a short way, with what to try; armed
 again it drives on. If its ring reaches far, so that it would hear any room, it drives slowly until then
-(`runtime.cycle.unheard_limit`). Later a long way without an echo is a line of the log, and no stop.
+(`runtime.cycle.unheard_limit`).
+
+Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once
+that has lasted for longer than ever before in this run. What the ring heard last holds for as far as it reached then:
+after such a way the robot drives slowly until the next echo. It does not stop.
 """
 
 from __future__ import annotations
@@ -18,45 +22,84 @@ from drivers.messages import Firing, Odometry, Pose
 
 WAY_MIN_M: Final = 1.0
 """Way without an echo since the start after which a robot stops whose ring reaches far, m."""
+LONGER: Final = 2.0
+LINE_MIN_M: Final = 0.5
+"""A way without anything new is worth a line if it is so many times as long as any before, and this long, m: an
+honest run gives at most four, as each doubles what the next one needs."""
 OPEN_M: Final = 4.0
 """Way and reach together at which a ring that hears nothing stops the robot, m: from the middle of a room 8 m wide it
 has come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m. After
-the first echo, the way alone is worth a line."""
+the first echo, this is the way without anything new after which it drives slowly: honest rings of 17 robots heard
+something new after 2.0 m at most in rooms, and none drives farther than it can have heard."""
+NOTHING_YET: Final = (
+    "no sensor has heard an echo since the start: the robot drives slowly until one does; in the open that is right, "
+    "else check the ring's power and cables"
+)
+NOTHING_NEW: Final = (
+    f"no sensor has heard anything new over the last {OPEN_M:g} m: the robot drives slowly until one does; in the "
+    f"open that is right, and it drives on as before once it is halted and re-armed; if anything stands within "
+    f"range, check the ring's power and cables (`echolocate ring-test --hand`)"
+)
 
 
 @dataclass(frozen=True, slots=True)
 class EchoWatch:
-    """How far the robot has driven without an echo; immutable, as keyframes hold it."""
+    """How far the robot has driven without a new echo; immutable, as keyframes hold it."""
 
     is_over: bool = False
     """An echo was heard, or the robot was stopped for want of one."""
     way_m: Coordinate = 0.0
-    """Driven since the start or the last echo, at most `OPEN_M`, m."""
+    """Driven since the start or since the ring heard anything new, at most `OPEN_M`, m."""
+    longest_m: Coordinate = 0.0
+    """The longest such way that an echo has ended, m."""
+    is_open: bool = False
+    """The operator has armed the robot although the ring hears nothing: it is in the open until the next echo."""
     at: Pose | None = None
     """Where the robot was by its newest odometry in this silence."""
 
-    def observe(self, odometry: Odometry | None, firings: Sequence[Firing]) -> EchoWatch:
-        """Return the watch after a cycle, given what arrived in it."""
-        if any(math.isfinite(r) for firing in firings for r in firing.ranges_m.tolist()):
-            return self if self.is_over and self.at is None else EchoWatch(is_over=True)
+    def observe(self, odometry: Odometry | None, firings: Sequence[Firing], *, hears_new: bool = True) -> EchoWatch:
+        """Return the watch after a cycle.
+
+        Parameters
+        ----------
+        odometry, firings
+            What arrived in it.
+        hears_new
+            Whether an echo among them may be new: a frozen ring repeats old ones.
+        """
+        hears = any(math.isfinite(r) for firing in firings for r in firing.ranges_m.tolist())
+        if hears and hears_new:
+            return EchoWatch(is_over=True, longest_m=max(self.longest_m, self.way_m if self.is_over else 0.0))
         if odometry is None or not firings:
             return self
         pose = odometry.pose
         way = 0.0 if self.at is None else math.dist((pose.x, pose.y), (self.at.x, self.at.y))
-        return replace(self, way_m=min(self.way_m + way, OPEN_M), at=pose)
+        return replace(self, is_over=self.is_over or hears, way_m=min(self.way_m + way, OPEN_M), at=pose)
 
-    def may_be_deaf(self, reach_m: float) -> bool:
-        """Return whether a ring that reaches so far, m, would have heard any room; a short one hears it late."""
-        return not self.is_over and reach_m >= OPEN_M - WAY_MIN_M
+    def armed(self) -> EchoWatch:
+        """Return the watch after the robot was armed, by an operator who has seen where it stands."""
+        return replace(self, is_open=self.is_open or self.way_m >= OPEN_M) if self.is_over else self
+
+    def slow_reason(self, reach_m: float) -> str | None:
+        """Return why a robot whose ring reaches so far, m, must drive slowly; None if it need not.
+
+        Before its first echo only a ring that would hear any room is slow: a short one hears it late.
+        """
+        if not self.is_over:
+            return NOTHING_YET if reach_m >= OPEN_M - WAY_MIN_M else None
+        return NOTHING_NEW if self.way_m >= OPEN_M and not self.is_open else None
 
     @property
     def silence(self) -> str | None:
-        """What to check where the ring has long heard nothing, after its first echo or that stop; None elsewhere."""
-        if not self.is_over or self.way_m < OPEN_M:
+        """What to check where the ring has long heard nothing new, after its first echo or that stop; or None."""
+        least_m = max(LINE_MIN_M, LONGER * self.longest_m)
+        if not self.is_over or self.way_m < min(least_m, OPEN_M):
             return None
+        if self.way_m >= OPEN_M:
+            return NOTHING_NEW
         return (
-            f"no sensor has heard an echo over the last {OPEN_M:g} m: in the open that is right; if anything stands "
-            f"within range, halt the robot and check the ring's power and cables (`echolocate ring-test --hand`)"
+            f"no sensor has heard anything new over the last {least_m:.1f} m, in this run never before for so long: "
+            f"if anything stands within range, halt the robot and check the ring's power and cables"
         )
 
     def stopped(self, reach_m: float, problem: str | None = None) -> tuple[EchoWatch, str | None]:
@@ -66,7 +109,7 @@ class EchoWatch:
         """
         if problem is not None or self.is_over or self.way_m < max(WAY_MIN_M, OPEN_M - reach_m):
             return self, problem
-        return EchoWatch(is_over=True), (
+        return EchoWatch(is_over=True, is_open=True), (
             f"no sensor has heard an echo since the start, over {self.way_m:.1f} m: if anything stands within range, "
             f"check the sensors' supply, the wires of trigger and echo, and what covers the ring (`echolocate "
             f"ring-test --hand` shows which), then re-arm; in the open re-arm and it drives on"

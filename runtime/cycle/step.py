@@ -233,7 +233,8 @@ def _perceive(state: State, inputs: Inputs, settings: Settings) -> int:
     new_segments = sum(map(state.perception.observe, inputs.received.firings))
     for firing in inputs.received.firings[-1:]:
         state.last_firing_robot_s = firing.robot_s
-    state.echo_watch = state.echo_watch.observe(inputs.received.odometry, inputs.received.firings)
+    hears_new, received = not state.perception.unheard.hears_nothing_new, inputs.received
+    state.echo_watch = state.echo_watch.observe(received.odometry, received.firings, hears_new=hears_new)
     state.ring_problem = state.perception.ring_monitor.take_problem()
     return new_segments
 
@@ -297,6 +298,7 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     arming_max_s = max(ARMING_MAX_S, settings.link.answer_max_s)
     state.mode = advance(before, inputs, flags, gap_s, movement, state.clock_monitor.clock, arming_max_s)
     if state.mode.mode is Mode.DRIVE:
+        state.echo_watch = state.echo_watch.armed() if before.mode is not Mode.DRIVE else state.echo_watch
         decision = _drive(state, inputs, settings, map_frame, gap_s)
         if isinstance(decision, Drive):
             return decision.twist
@@ -359,8 +361,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
             reason, decision = decision.reason, Drive(STANDSTILL)
     if isinstance(decision, Drive):
-        may_be_deaf = state.echo_watch.may_be_deaf(settings.ring.range_max_m)
-        twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, may_be_deaf=may_be_deaf)
+        slow_reason = state.echo_watch.slow_reason(settings.ring.range_max_m)
+        twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, slow_reason)
         if zones is not None:
             commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
             last = commands[-1].twist if commands else STANDSTILL

@@ -7,6 +7,7 @@ from typing import Final
 
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from behaviors.teleoperation import Teleoperate
+from config.robot import PASSAGE_M
 from config.settings import Settings
 from drivers.messages import Pose, Twist
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
@@ -15,10 +16,6 @@ from runtime.cycle.drive_requests import DriveRequest
 
 CREEP_M_S: Final = 0.04
 """Speed that is always left, m/s: most of what falls silent is a mirror that left the beam, and a bumper bears it."""
-NOTHING_YET: Final = (
-    "no sensor has heard an echo since the start: the robot drives slowly until one does; in the open that is right, "
-    "else check the ring's power and cables"
-)
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
 LOST: Final = (
@@ -64,11 +61,12 @@ def lost_ahead(
 
 
 def limit_unheard(
-    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings, *, may_be_deaf: bool
+    twist: Twist, percept: Percept, unheard: UnheardEchoes, settings: Settings, slow_reason: str | None
 ) -> tuple[Twist, str | None]:
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
 
-    Until the first echo of a ring that may be deaf it is slow everywhere.
+    So it is where a wall goes on that a ring with blind sides heard before it heard nothing, and everywhere for a
+    reason that `EchoWatch` gives.
 
     Parameters
     ----------
@@ -81,20 +79,26 @@ def limit_unheard(
         last echo.
     settings
         The base's limits and the arbiter's clearance.
-    may_be_deaf
-        As of `EchoWatch.may_be_deaf`.
+    slow_reason
+        As of `EchoWatch`.
     """
-    if may_be_deaf:
-        limit, reason = CREEP_M_S, NOTHING_YET
-    elif abs(twist.v) <= CREEP_M_S or not len(points := unheard.points()):
+    if abs(twist.v) <= CREEP_M_S:
         return twist, None
-    elif unheard.is_ring_silent:
-        limit, reason = CREEP_M_S, LOST
+    if slow_reason is not None or unheard.is_ring_silent:
+        limit, reason = CREEP_M_S, slow_reason or LOST
     else:
-        pose, arbiter = percept.pose, settings.behaviors.arbiter
-        heading = pose.theta if twist.v > 0.0 else pose.theta + math.pi
-        ahead = Percept(Pose(pose.x, pose.y, heading), points, percept.field_of_view)
-        stoppable = stoppable_speed_m_s(ahead, settings.body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
-        limit, reason = max(CREEP_M_S, stoppable), UNHEARD
-    slow = twist.at_most(limit)
+        pose = percept.pose if twist.v > 0.0 else percept.pose.compose(Pose(0.0, 0.0, math.pi))
+        limit, reason = _limit_ahead(pose, percept, unheard, settings)
+    slow = twist.at_most(max(CREEP_M_S, limit))
     return slow, None if slow == twist else reason
+
+
+def _limit_ahead(pose: Pose, percept: Percept, unheard: UnheardEchoes, settings: Settings) -> tuple[float, str]:
+    """Return the speed from which a robot stops before what was lost in the direction of a pose, m/s, and why."""
+    body, arbiter, limit, reason = settings.body, settings.behaviors.arbiter, math.inf, UNHEARD
+    if len(points := unheard.points()):
+        ahead = Percept(pose, points, percept.field_of_view)
+        limit = stoppable_speed_m_s(ahead, body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
+    to_wall_m = unheard.presumed_way_m(pose, body.radius_m + PASSAGE_M)
+    at_wall = math.sqrt(2.0 * body.acceleration_max_m_s2 * to_wall_m)
+    return (at_wall, LOST) if at_wall < limit else (limit, reason)

@@ -9,7 +9,16 @@ import pytest
 
 from config.load import load_robot
 from drivers.messages import Firing, Floats, Pose
-from perception.obstacle_echoes.blind_walls import KEPT_M, SILENT_WAY_M, BlindWalls, has_blind_sides
+from perception.obstacle_echoes.blind_walls import (
+    KEPT_M,
+    SILENT_WAY_M,
+    TURN_DIRECTIONS,
+    WALL_ECHO_M,
+    WIDTH_RAD,
+    BlindWalls,
+    has_blind_sides,
+    middle_walls,
+)
 from perception.sensor_mounts import mounts_array
 
 HALF = math.radians(15.0)
@@ -85,6 +94,32 @@ def test_a_direction_is_unknown_until_the_ring_looks_there_and_again_some_metres
     assert set(np.rint(unknown)) == {50.0, 60.0, 70.0, 80.0}, "the beams reach 45°, where that of 50° begins"
     walls.clear()
     assert len(sides(walls, there)[1]) >= 6
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_mirror_is_one_wall_of_its_own_direction_and_those_beside_it(seed: int) -> None:
+    """Each echo stands for a wall in all directions of its beam; a look round leaves the middle of them."""
+    rng = np.random.default_rng([seed, 3])
+    normal, offset = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(1.0, 2.0))
+    walls = BlindWalls(MOUNTS, HALF)
+    look_round(walls, 0.0, 0.0, normal, offset)
+    offsets = walls.offsets(0.0, 0.0)
+    off = np.remainder(WIDTH_RAD * np.arange(TURN_DIRECTIONS) - normal + math.pi, math.tau) - math.pi
+    found = np.isfinite(offsets)
+    assert 2 <= found.sum() <= 4
+    assert np.abs(off[found]).max() < 2.5 * WIDTH_RAD
+    assert abs(off[found].mean()) < WIDTH_RAD
+    assert offsets[found] == pytest.approx(offset, abs=0.02)
+    beyond = 1.5 * offset
+    assert not np.isfinite(walls.offsets(beyond * math.cos(normal), beyond * math.sin(normal))[found]).any()
+
+
+def test_neighbours_at_one_distance_are_one_wall_across_the_first_direction_too() -> None:
+    is_wall, offsets = np.zeros(TURN_DIRECTIONS, np.bool_), np.full(TURN_DIRECTIONS, 2.0)
+    is_wall[[34, 35, 0, 1, 2]] = is_wall[[10, 11]] = True
+    offsets[11] += 2.0 * WALL_ECHO_M
+    assert set(np.flatnonzero(np.isfinite(middle_walls(is_wall, offsets))).tolist()) == {35, 0, 1, 10, 11}
+    assert np.isfinite(middle_walls(np.ones(TURN_DIRECTIONS, np.bool_), offsets * 0.0 + 1.0)).any(), "all round"
 
 
 def test_shipped_robots_have_no_gap_as_wide_as_a_beam() -> None:

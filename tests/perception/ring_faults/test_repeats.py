@@ -17,6 +17,7 @@ from perception.ring_faults.repeats import (
     REPEAT_NAT,
     REPEATS_MAX,
     SENSOR_NAT,
+    STEP_MIN_M,
     WINDING_NAT,
     changes_due,
     is_parallel_wall,
@@ -63,6 +64,32 @@ def test_a_sensor_that_looks_ahead_should_change_with_the_way() -> None:
     echoes = heard((0, 2.0))
     assert [due(echoes, 0, x) for x in (0.05, 0.07, 0.13, 1.0)] == [0.0, 1.0, 2.0, 16.0]
     assert due(heard((6, 2.0)), 6, 1.0) == 0.0, "what is beside the path does not come nearer"
+
+
+def test_no_mirror_that_both_looks_can_hear_changes_less_than_is_due() -> None:
+    """Random motions, and mirrors whose normals lie in the beam before and after."""
+    rng, most = np.random.default_rng(7), 0.0
+    for _ in range(2000):
+        turned, way = float(rng.uniform(-2.0 * HALF, 2.0 * HALF)), float(rng.uniform(0.05, 1.5))
+        course = float(rng.uniform(-math.pi, math.pi))
+        echoes = heard((0, 1.0))
+        look = (1.0, way * math.cos(course), way * math.sin(course), turned)
+        times = changes_due(0, look, echoes[0].repeated, turned, MOUNTS, RECEPTION, echoes, way)
+        normal = float(rng.uniform(max(0.0, turned) - HALF, min(0.0, turned) + HALF))
+        assert abs(way * math.cos(normal - course)) >= times * STEP_MIN_M
+        most = max(most, times)
+    assert most > 10.0
+
+
+def test_a_wall_along_the_path_explains_no_range_that_the_turn_should_have_changed() -> None:
+    """A robot that turned towards a wall, and drives at it with its old ranges."""
+    square, oblique = 6, 8
+    echoes = heard((square, 0.8), (oblique, 0.82))
+    for sensor, turned, is_explained in ((square, 0.0, True), (oblique, 0.0, True), (oblique, 0.35, False)):
+        course = MOUNTS[square, 2] - 0.5 * math.pi if turned == 0.0 else turned + MOUNTS[square, 2] - 0.5 * math.pi
+        look = (echoes[sensor].latest.range_m, math.cos(course), math.sin(course), MOUNTS[sensor, 2] + turned)
+        times = changes_due(sensor, look, echoes[sensor].repeated, turned, MOUNTS, RECEPTION, echoes, 1.0)
+        assert (times == 0.0) is is_explained
 
 
 @pytest.mark.parametrize(("turned_deg", "times"), [(20.0, 0.0), (30.0, 1.0), (-75.0, 3.0), (150.0, 6.0)])

@@ -11,11 +11,14 @@ from behaviors.move_to_goal import Goal
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from behaviors.teleoperation import Teleoperate
 from config.load import load_settings
+from config.robot import PASSAGE_M
 from drivers.messages import Twist
+from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, BlindWalls
 from perception.obstacle_echoes.unheard_echoes import ALONE, UnheardEchoes
 from perception.percept import Percept, Pose
 from runtime.cycle.drive_requests import DriveRequest
-from runtime.cycle.unheard_limit import CREEP_M_S, LOST, NOTHING_YET, UNHEARD, limit_unheard, lost_ahead
+from runtime.cycle.echo_watch import NOTHING_YET
+from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard, lost_ahead
 from tests.behaviors.views import EVERYWHERE
 
 SETTINGS = load_settings("room", robot="denning")
@@ -23,14 +26,14 @@ RIM_M = SETTINGS.body.radius_m
 
 
 def limited(
-    twist: Twist, *places: tuple[float, float], silent: bool = False, may_be_deaf: bool = False
+    twist: Twist, *places: tuple[float, float], silent: bool = False, slow_reason: str | None = None
 ) -> tuple[Twist, str | None]:
     percept = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
     unheard = UnheardEchoes(np.zeros((max(1, len(places)), 3)))
     for echo, (x, y) in zip(unheard.records, places, strict=False):
         echo.state, echo.x, echo.y = ALONE, 1.0 + x, y
     unheard.silences[:] = len(unheard.records) if silent else 0
-    return limit_unheard(twist, percept, unheard, SETTINGS, may_be_deaf=may_be_deaf)
+    return limit_unheard(twist, percept, unheard, SETTINGS, slow_reason)
 
 
 @pytest.mark.parametrize("v", [0.3, -0.3])
@@ -58,8 +61,8 @@ def test_farther_away_it_can_still_stop() -> None:
 
 def test_before_its_first_echo_a_robot_creeps_and_turns_freely() -> None:
     """A deaf ring and open ground are alike until then."""
-    assert limited(Twist(0.3, 0.0), may_be_deaf=True) == (Twist(CREEP_M_S, 0.0), NOTHING_YET)
-    assert limited(Twist(0.0, 1.0), may_be_deaf=True) == (Twist(0.0, 1.0), None)
+    assert limited(Twist(0.3, 0.0), slow_reason=NOTHING_YET) == (Twist(CREEP_M_S, 0.0), NOTHING_YET)
+    assert limited(Twist(0.0, 1.0), slow_reason=NOTHING_YET) == (Twist(0.0, 1.0), None)
 
 
 def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() -> None:
@@ -67,6 +70,25 @@ def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() ->
     assert twist.v == pytest.approx(CREEP_M_S)
     assert reason == LOST
     assert limited(Twist(0.0, 1.0), (0.5, 0.0), silent=True) == (Twist(0.0, 1.0), None)
+
+
+@pytest.mark.parametrize("v", [0.3, -0.3])
+def test_it_slows_down_before_a_wall_that_a_silent_ring_presumes(v: float) -> None:
+    """Until it creeps, also where the wall's line is less exact than that and was crossed."""
+    percept, unheard = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE), UnheardEchoes(np.zeros((3, 3)))
+    walls = BlindWalls(np.array([[0.4, 0.0, 0.0]]), 0.1)
+    walls.records[0 if v > 0.0 else TURN_DIRECTIONS // 2].odds = 1.0
+    speeds = []
+    for away_m in (3.0, RIM_M + PASSAGE_M + 0.05, RIM_M - 0.02, -0.1):
+        walls.records[0].offset, walls.records[TURN_DIRECTIONS // 2].offset = 1.0 + away_m, away_m - 1.0
+        unheard.silences[:] = 0
+        unheard.presume_walls(-10.0 * math.copysign(1.0, v), 0.0, walls)
+        unheard.silences[:] = 3
+        twist, reason = limit_unheard(Twist(v, 0.0), percept, unheard, SETTINGS, None)
+        speeds.append(abs(twist.v))
+        assert reason == (None if twist.v == v else LOST)
+    braking = math.sqrt(2.0 * SETTINGS.body.acceleration_max_m_s2 * 0.05)
+    assert speeds == pytest.approx([0.3, min(0.3, braking), CREEP_M_S, CREEP_M_S])
 
 
 @pytest.mark.parametrize("robot", ["hobby3", "denning"])

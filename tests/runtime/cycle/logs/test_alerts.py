@@ -51,7 +51,7 @@ def test_a_long_silence_is_a_line_once_until_the_ring_hears_again() -> None:
     alerts, perception = Alerts(), StubPerception()
     lines = [alerts.update(NOTHING, state(perception, way_m=way_m), 0.0) for way_m in (0.0, OPEN_M, OPEN_M)]
     assert [len(line) for line in lines] == [0, 1, 0]
-    assert lines[1][0].startswith("no sensor has heard an echo over the last 4 m")
+    assert lines[1][0].startswith("no sensor has heard anything new over the last 4 m")
     assert alerts.update(NOTHING, state(perception), 0.0) == []
     assert alerts.recovered == ["the ring hears echoes again"]
 
