@@ -204,10 +204,18 @@ def pattern_pairs(ring: RingConfig) -> tuple[tuple[int, int], ...]:
 
 
 def _mask(numbers: Iterable[int]) -> int:
+    """Return the mask with these bits."""
     return sum(1 << i for i in set(numbers))
 
 
 def _preset_masks(preset: Preset, count: int) -> tuple[int, ...]:
+    """Return the masks of a preset's steps.
+
+    Raises
+    ------
+    FiringError
+        The sensors cannot be divided so.
+    """
     sizes = _AT_A_TIME[preset]
     if any(count % together for together in sizes):
         possible = ", ".join(name for name, ways in _AT_A_TIME.items() if not any(count % size for size in ways))
@@ -222,6 +230,13 @@ def _preset_masks(preset: Preset, count: int) -> tuple[int, ...]:
 
 
 def _rotated_masks(field: str, sets: tuple[tuple[int, ...], ...], rotations: int, count: int) -> tuple[int, ...]:
+    """Return the masks of sets that are fired in turn, and then so many times again, each a sensor further.
+
+    Raises
+    ------
+    FiringError
+        The ring has no such sensor.
+    """
     missing = sorted({i for numbers in sets for i in numbers if i >= count})
     if missing:
         raise FiringError(
@@ -232,6 +247,13 @@ def _rotated_masks(field: str, sets: tuple[tuple[int, ...], ...], rotations: int
 
 
 def _check_step(step_period_s: float, window_m: float) -> None:
+    """Check that echoes of a firing arrive before the next one.
+
+    Raises
+    ------
+    FiringError
+        They may not.
+    """
     needed_s = time_of_flight_s(window_m)
     if step_period_s >= needed_s - _TOLERANCE_S:
         return

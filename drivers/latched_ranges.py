@@ -151,6 +151,7 @@ class FreshDriver:
         self._detector = RepeatDetector(sensors)
         self._filter = RepeatFilter(sensors, cycle_s)
         self._is_latched = False
+        """Whether repeats have been found, and are removed from now on."""
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - all other members are the driver's, as they are
         return getattr(self._driver, name)

@@ -96,6 +96,7 @@ class ReceiveBudget:
             RATE_SHARE * link.baud / BITS_PER_BYTE if is_serial else NETWORK_BYTES_S, BURST_BYTES
         )
         self._dropped_s = -math.inf
+        """When bytes were dropped last."""
 
     def accepts(self, data: bytes, run_s: float) -> bool:
         """Return whether these bytes, received at `run_s`, may be read; count them as dropped if not."""

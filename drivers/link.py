@@ -287,6 +287,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
             self._abort(OSError("its other end is closed"))
 
     def write(self, data: bytes) -> None:
+        """Send bytes at once as far as the line accepts them; the rest waits in the buffer of the library."""
         if self._closing:
             return
         if not self.get_write_buffer_size():
@@ -317,6 +318,7 @@ class _Connection(asyncio.Protocol):
         self.lost = asyncio.Event()
         self._link = link
         self._drained = asyncio.Event()
+        """Set while no byte waits in this process."""
         self._drained.set()
         self._reason: str | None = None
         self._port = port
@@ -355,6 +357,7 @@ class _Connection(asyncio.Protocol):
         self._drained.set()
 
     def connection_lost(self, exc: BaseException | None) -> None:
+        """Wake all who wait for this connection, and report why it was lost."""
         text = " ".join(str(exc).split()) if exc is not None else "no reason given"
         reason = self._reason or (
             f"the line {self._link.config.port} was lost ({text}); likely it was unplugged or the robot's side "
@@ -384,10 +387,7 @@ class _Connection(asyncio.Protocol):
         self.transport.abort()
 
     async def flush(self, timeout_s: float) -> bool:
-        """Wait until all bytes have left the machine; return whether they have.
-
-        False after `timeout_s`, or if the line was lost.
-        """
+        """Wait up to `timeout_s` until all bytes have left the machine; return whether they have on an open line."""
         with contextlib.suppress(TimeoutError, OSError, termios.error):
             async with asyncio.timeout(timeout_s):
                 await self._drained.wait()

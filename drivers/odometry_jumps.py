@@ -43,8 +43,11 @@ class OdometryJumps:
         self.origin = _IDENTITY
         self._body = body
         self._ring_offset = 0.0
+        """The same of the ring's direction, rad."""
         self._last: Odometry | None = None
+        """The last sample, after the removal of jumps."""
         self._steady = 0
+        """Samples in a row that moved as the wheels said."""
 
     def restart(self) -> None:
         """Forget all samples: the odometry restarted at zero."""
@@ -96,6 +99,7 @@ class OdometryJumps:
         return self._last, _message(off_m, wrap_angle(turned), wrap_angle(sample.ring_yaw - ring_yaw))
 
     def _from_origin(self, reported: Odometry) -> Odometry:
+        """Return a sample in the frame of those before."""
         if self.origin == _IDENTITY and self._ring_offset == 0.0:
             return reported
         pose = self.origin.inverse().compose(reported.pose)

@@ -211,6 +211,13 @@ def _names_frames(family: DriverFamily) -> bool:
 
 
 def _family(name: str) -> DriverFamily:
+    """Return the family of a driver's name, imported.
+
+    Raises
+    ------
+    DriverError
+        There is none, or it cannot be imported.
+    """
     entry = SHIPPED.get(name) or known_drivers().get(name)
     if entry is None:
         raise DriverError(

@@ -39,6 +39,7 @@ class _ClockRate:
     """
 
     def __init__(self, ahead_s: float, run_s: float) -> None:
+        # The least late readings, of the period before and of this one: how far the clock is ahead, and when.
         self._before = self._least_late = (ahead_s, run_s)
         self._is_first, self._was_slow = True, False
         self._end_s = run_s + _FIRST_PERIOD_S
@@ -53,6 +54,7 @@ class _ClockRate:
         return self._end_period(ahead_s, run_s) if run_s >= self._end_s else None
 
     def _end_period(self, ahead_s: float, run_s: float) -> float | None:
+        """Begin another period, and return the error of the one that ends if it and the one before were slow."""
         was_slow, error = self._was_slow, 0.0
         if not self._is_first:
             passed_s = self._least_late[1] - self._before[1]
@@ -76,9 +78,13 @@ class RobotClock:
     def __init__(self) -> None:
         self.rate_error: float | None = None
         self._rate: _ClockRate | None = None
+        """None while the clocks are not compared."""
         self._t_us: int | None = None
+        """The last reading, unwrapped; None before the first …"""
         self._read_s = 0.0
+        """… and when it came, by the run's clock."""
         self._trusting = False
+        """Whether the next reading is accepted however far ahead."""
 
     def read(self, t_us: int, run_s: float) -> int | Jump:
         """Return the unwrapped time of a reading that arrived at `run_s`, µs, or the direction in which it jumped.

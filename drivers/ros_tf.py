@@ -69,6 +69,13 @@ def decode(message: bytes) -> list[Frame]:
 
 
 def _decode(message: bytes) -> Iterator[Frame]:
+    """Yield the frames of a serialized message.
+
+    Raises
+    ------
+    ValueError, struct.error, UnicodeDecodeError
+        It is malformed.
+    """
     data, order = message[4:], {b"\x00\x00": ">", b"\x00\x01": "<"}.get(message[:2])
     if order is None:
         raise ValueError(f"encoding {message[:2].hex()} is not plain CDR")

@@ -41,12 +41,17 @@ class Session(ABC, Generic[S]):
         """What is wrong; a function where that follows what is received."""
         self._identity: Identity | None = None
         self._earlier_counts = LinkCounts()
+        """Frames of the lines before this one."""
         self._run_s = 0.0
+        """The run's time of the last call that had one."""
         self._drive: Twist | None = None
+        """The requested velocity, until it is sent; None without one."""
         self._firings: deque[Firing] = deque(maxlen=FIRINGS_MAX)
+        """What `take_received` returns next …"""
         self._odometry: Odometry | None = None
         self._flags, self._rebooted = Flags.NONE, False
         self._noted = set[str]()
+        """Messages of `_note_once` so far."""
         self.heard = HeardBytes()
 
     @property
@@ -115,6 +120,7 @@ class Session(ABC, Generic[S]):
         """Frames received on the present line."""
 
     def _note_once(self, text: str) -> None:
+        """Add a message for the operator, unless it has been added in this run."""
         if text not in self._noted:
             self._noted.add(text)
             self.stamper.note(text)

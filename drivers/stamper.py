@@ -50,8 +50,10 @@ class Stamper:
         self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
         self.excess_echoes = 0
         self._excess_noted_s = -math.inf
+        """When that was noted last."""
         self._jumps = OdometryJumps(body)
         self._firing_limit = TokenBucket(math.inf, math.inf)
+        """Has no limit before `_limit_firings`."""
         self._notes: deque[str] = deque(maxlen=NOTES_MAX)
 
     @property

@@ -144,6 +144,7 @@ def _make(make: Callable[..., P], layout: Layout, data: bytes) -> P:
 
 
 def _decode_sip(body: bytes) -> Sip | Other:
+    """Return the SIP of a body; an `Other` if it ends before the count of its ranges."""
     head, rest = unpack(SIP_START, body)
     if len(head) < len(SIP_START) or not rest:
         return Other(body[0], body[1:])
@@ -170,6 +171,13 @@ def _io_blocks(data: bytes) -> tuple[bytes, bytes, tuple[int, ...], bytes] | Non
 
 
 def _command_body(command: Command) -> bytes:
+    """Return the body of a command.
+
+    Raises
+    ------
+    ValueError
+        A field does not fit its bytes.
+    """
     number = pack_integer(command, "number", "B", command.number)
     match command.argument:
         case None:
@@ -186,6 +194,13 @@ def _command_body(command: Command) -> bytes:
 
 
 def _packet_body(packet: Packet) -> bytes:
+    """Return the body of a packet.
+
+    Raises
+    ------
+    ValueError
+        A field does not fit its bytes.
+    """
     match packet:
         case SyncEcho():
             return pack_integer(packet, "number", "B", packet.number)
@@ -225,6 +240,7 @@ def _packet_body(packet: Packet) -> bytes:
 
 
 def _sip_body(sip: Sip) -> bytes:
+    """Return the body of a SIP; one with `missing` ranges announces them and has none."""
     count = sip.missing or len(sip.sonar)
     readings = (
         pack_integer(sip, "sonar", "B", reading.number) + pack_integer(sip, "sonar", "H", reading.range_raw)
@@ -253,6 +269,7 @@ class Decoder(Generic[F]):
         self.bad = 0
         self._decode = decode
         self._pending = bytearray()
+        """Bytes from the first incomplete frame on."""
 
     @property
     def pending(self) -> int:

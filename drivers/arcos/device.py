@@ -88,9 +88,13 @@ class ArcosDevice(EventDevice):
     _arrays: SonarArrays
     _requested: RequestedPackets
     _sip_us: int | None
+    """When the next SIP is due; None outside a session."""
     _watchdog_us: int
+    """When the watchdog stops the base, unless a command comes before."""
     _tripped: bool
+    """Whether it has stopped it, and no command has come since."""
     _battery: int
+    """Voltage, 0.1 V."""
 
     def __init__(
         self, robot: RobotConfig, world: WorldConfig, firmware: Firmware, seed: int, faults: Sequence[Fault] = ()
@@ -103,10 +107,13 @@ class ArcosDevice(EventDevice):
         super().__init__(robot, world, faults, firmware.baud, sonar_rng, drift_rng, line_rngs)
         self._touch = Touch(firmware, self._scene, robot.body.radius_m)
         self._heard_us = 0
+        """When the host's last bytes came, µs."""
         faulty = FaultySonar(self._true_sonar, len(robot.ring.mounts), self._faults, outlier_rng)
         self._readings = SonarReadings(firmware, faulty, robot.ring.window_m)
         self._watchdog_ms = firmware.watchdog_ms
+        """Time without a command after which the base stops; 0: never."""
         self._driven = STILL
+        """The last velocity that the wheels went for by command."""
         self._stalled_until_us = 0
         self._boot()
 
@@ -262,6 +269,7 @@ class ArcosDevice(EventDevice):
         return target, rates
 
     def _handle_events(self) -> None:
+        """Carry out what is due now: the watchdog, firings, a SIP, garbage on the line."""
         now = self._now_us
         if self._session is Session.OPENED:
             if self._watchdog_ms and now >= self._watchdog_us:
@@ -310,6 +318,7 @@ class ArcosDevice(EventDevice):
         return self._faults.has(MotorFault) or self._faults.has(StopButton)
 
     def _start_fault(self, fault: Fault) -> None:
+        """Carry out what a fault does at its start; most act while `_faults` has them."""
         match fault:
             case Reboot():
                 self._boot()

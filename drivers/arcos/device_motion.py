@@ -54,9 +54,12 @@ class MotionServo:
         )
         self.speed_mm_s, self.turn_deg_s = firmware.speed_top_mm_s, firmware.turn_top_deg_s
         self._v = self._w = 0.0
+        """Velocities asked for, m/s and rad/s, where there is no goal."""
         self._way_left_m: float | None = None
+        """What is left of a MOVE; None without one."""
         self.heading_goal: float | None = None
         self._braking = False
+        """An ESTOP is under way: until the base stands, other commands of motion are ignored."""
 
     def obey(self, command: Command, heading: float) -> bool:
         """Carry out a command of motion; return False if it is none.
@@ -172,6 +175,7 @@ class MotionServo:
         )
 
     def _move(self, command: Command, heading: float) -> None:
+        """Take the set-point of a command of motion; motors must be on. `heading`: by odometry, rad."""
         value = command.value
         match command.number:
             case CommandNumber.VEL:

@@ -47,6 +47,7 @@ class RequestedPackets:
 
     def __init__(self) -> None:
         self._asked: dict[int, int] = {}
+        """For each request: 0 none, 1 a single packet, above that one with each SIP."""
         self.analog_port = 0
         self.digital_out = 0
 
@@ -71,6 +72,7 @@ class RequestedPackets:
         return packets
 
     def _packet(self, number: int, body: Body, firmware: Firmware, front: int, rear: int) -> Packet:
+        """Return the packet that a command of this number asks for."""
         if number == CommandNumber.ENCODER:
             way, half = 1e3 * body.odometry_m, body.odometry_pose.theta / firmware.rad_s_per_mm_s
             left, right = (_signed(round(_TICKS_PER_MM * (way + side * half)), 32) for side in (-1, 1))

@@ -31,11 +31,16 @@ class SonarArrays:
 
     def __init__(self, numbers: Sequence[int], cycle_ms: int) -> None:
         self._sensor_of = {number: sensor for sensor, number in enumerate(numbers)}
+        """Index in the ring of each number."""
         self._cycle_us = 1000 * cycle_ms
         self._due_us: int | None = None
+        """When discs fire next; None before `start`."""
         self._on = [True] * ARRAYS
+        """Whether each array fires."""
         self._sequences = self._by_array(sorted(self._sensor_of))
+        """The numbers that each array fires in turn."""
         self._at = [0] * ARRAYS
+        """How many each has fired so far."""
 
     @property
     def next_us(self) -> int | None:
@@ -86,6 +91,7 @@ class SonarArrays:
         return fired
 
     def _by_array(self, numbers: Sequence[int]) -> list[list[int]]:
+        """Return the numbers of each array, in order, without those that the ring does not have."""
         known = [number for number in numbers if number in self._sensor_of]
         return [[number for number in known if number // DISCS == array] for array in range(ARRAYS)]
 
@@ -108,6 +114,7 @@ class SonarReadings:
         self._sonar = sonar
         self._window_m = min(window_m, 1e-3 * NO_ECHO_MM)
         self._pending: list[tuple[int, SonarReading]] = []
+        """Readings, and when each is known, µs."""
 
     def fire(self, sensors: Sequence[int], now_us: int, cycle_us: int, body: Body) -> None:
         """Fire sensors together; they listen until the cycle ends."""

@@ -37,9 +37,11 @@ class Touch:
 
     def __init__(self, firmware: Firmware, scene: Scene, radius_m: float) -> None:
         self._front, self._rear = firmware.front_bumpers, firmware.rear_bumpers
+        """Numbers of segments."""
         self._scene = scene
         self._radius_m = radius_m
         self._last: tuple[Pose, tuple[int, int]] | None = None
+        """The last pose asked for, and its answer."""
         self.stalls_at = 0
 
     @property
@@ -61,6 +63,7 @@ class Touch:
         return bool(ahead or (v < 0.0 and rear and self.stalls_at & _REAR))
 
     def _find(self, pose: Pose) -> tuple[int, int]:
+        """Return what `pressed` does: the segment that looks down the gradient of the distance to surfaces."""
         if self._room(pose.x, pose.y) > _PRESSED_M:
             return 0, 0
         step = _PROBE_M
@@ -73,6 +76,7 @@ class Touch:
         return 0, _segment(0.5 + back / math.pi, self._rear)
 
     def _room(self, x: float, y: float) -> float:
+        """Return the distance from the edge of a base at (x, y) to the nearest surface, m; below zero inside it."""
         return clearance(x, y, self._scene.circles, self._scene.segments) - self._radius_m
 
 

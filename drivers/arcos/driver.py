@@ -85,14 +85,15 @@ class ArcosDriver(Session[PoseStamper]):
         self._moving_max_s = stop_s(fastest, config.body) + _MOVING_MORE_S
         self._decoder = Decoder(decode_packet)
         self._boots = 0
+        # Of the last command sent, and of the last bytes, packet and SIP received:
         self._sent_s = self._data_s = self._packet_s = self._sip_s = 0.0
         self._called_s = self._refused_until_s = self._sonar_on_s = -math.inf
-        self._queue: deque[Command] = deque()
-        self._is_set_up = self._is_first_sip = False
-        self._has_session = self._was_reset = self._is_ending = False
+        self._queue: deque[Command] = deque()  # commands that can wait, one a call of `outgoing`
+        self._is_set_up = self._is_first_sip = False  # is_first_sip: the next one will be the session's first
+        self._has_session = self._was_reset = self._is_ending = False  # was_reset: since the session began
         self._halting, self._enabling, self._receiver = Halting(), Enabling(), ReceiverMonitor()
         self._bad_at_sip = self._battery = self._failures = 0
-        self._heard_baud = 0
+        self._heard_baud = 0  # the line's speed when bytes came last
         self.stamper.set_polling(self._polling)
 
     @property
@@ -110,9 +111,7 @@ class ArcosDriver(Session[PoseStamper]):
 
     @property
     def _line_counts(self) -> LinkCounts:
-        return LinkCounts(
-            self._decoder.frames, self._decoder.bad, 0
-        )  # frames have no numbers: lost ones are not known
+        return LinkCounts(self._decoder.frames, self._decoder.bad, 0)  # frames have no numbers to show lost ones
 
     @property
     def line_baud(self) -> int | None:

@@ -70,6 +70,8 @@ class Handshake:
     ----------
     stage
         Of the present attempt.
+    bauds
+        The speeds that are tried, the likeliest first; none on a line without one.
     baud
         The line's present speed.
     sweeps
@@ -97,12 +99,21 @@ class Handshake:
         self.was_open = self.keeps_baud = False
         self._link = link
         self._run_s = self._since_s = 0.0
+        """Now, and when the stage was entered or its last command sent."""
         self._tries = 0
-        self._is_due = self._is_wary = False
+        """How often it was sent in this stage."""
+        self._is_due = False
+        """Whether it is to be sent."""
+        self._is_wary = False
+        """Whether the base may move, so that a stop goes before the first SYNC."""
         self._reply_s = link.reply_timeout_s if has_speed else max(link.reply_timeout_s, _SOCKET_REPLY_S)
+        """Time after which a SYNC counts as unanswered."""
         self._slow_baud = link.baud
+        """The speed before HOSTBAUD, to return to."""
         self._is_sending = False
+        """Whether the robot sends already, so that it needs no OPEN."""
         self._order = self.bauds
+        """The speeds in the order of this attempt."""
 
     @property
     def is_syncing(self) -> bool:

@@ -46,7 +46,9 @@ class PoseStamper(Stamper):
         self._sonar = SonarRing(discs, config.arcos.range_factor)
         self._clock = SipClock(SIP_PERIOD_S)
         self._epoch_s: float | None = None
+        """The run's time when the robot's clock was zero; None before the first SIP after a restart."""
         self._is_set_to_zero = False
+        """Whether the robot set its odometry to zero for this session, whose first sample is still to come."""
 
     def set_polling(self, polling: Polling) -> None:
         """Set the firing pattern that the robot carries out."""
@@ -122,6 +124,10 @@ class PoseStamper(Stamper):
         return sample, self._firings(sip, sample.robot_s, arrived_s)
 
     def _firings(self, sip: Sip, sip_s: float, arrived_s: float) -> list[Firing]:
+        """Return the firings whose ranges a SIP lists, without those of unknown pose and those beyond the limit.
+
+        `sip_s` is the SIP's time by the robot's clock, `arrived_s` by the run's.
+        """
         firings, period_s = [], self._clock.period_s
         for fired_s, ranges in self._sonar.firings(sip.sonar, sip_s, period_s):
             place = self._history.at(fired_s, _GAP_PERIODS * period_s)

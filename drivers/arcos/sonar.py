@@ -39,6 +39,7 @@ class SonarTimes:
     def __init__(self, cycle_s: float) -> None:
         self.cycle_s = cycle_s
         self._low_s, self._high_s = -math.inf, math.inf
+        """Bounds of the end of the last cycle."""
 
     def last_end_s(self, sip_s: float, count: int) -> float:
         """Return when the last cycle ended whose range is in the SIP measured at `sip_s`.
@@ -77,7 +78,9 @@ class SonarRing:
         self._range_factor = range_factor
         self._times = SonarTimes(0.04)
         self._window_m = NO_ECHO_MM * 1e-3
+        """A range from here on is silence."""
         self._fired_s = -math.inf
+        """Time of the last firing."""
 
     def set_cycle(self, cycle_s: float, window_m: float) -> None:
         """Set the time from one firing to the next, and the range beyond which a firing hears nothing."""

@@ -38,8 +38,11 @@ class Halting:
     def __init__(self) -> None:
         self.is_active = False
         self._began_s: float | None = None
+        """When the first stop of this halt was sent; None before."""
         self._sent_s: float | None = None
+        """When the last one was sent; None before, −inf if the next is due at once."""
         self._has_stood = False
+        """Whether the last SIP after a stop reported a base that stands."""
 
     def start(self) -> None:
         """Stop the base at once."""
@@ -52,7 +55,7 @@ class Halting:
         self.is_active = False
 
     def observe(self, sip: Sip) -> None:
-        """Take what the robot reports."""
+        """Take what the robot reports; before a stop has been sent it says nothing about it."""
         if self.is_active and self._sent_s is not None:
             had_stood, self._has_stood = self._has_stood, sip.left == sip.right == 0
             self.is_active = not self._has_stood or bool(sip.flags & SipFlags.MOTORS_ENABLED)
@@ -60,7 +63,7 @@ class Halting:
                 self._sent_s = -math.inf  # the motors go off at once
 
     def commands(self, run_s: float) -> tuple[Command, ...]:
-        """Return the commands to send now."""
+        """Return the commands to send now, and consider them sent; none until `_REPEAT_S` after the last."""
         if not self.is_active or (self._sent_s is not None and run_s - self._sent_s < _REPEAT_S):
             return ()
         self._sent_s = run_s
@@ -71,7 +74,7 @@ class Halting:
         return STOP
 
     def moving_s(self, run_s: float) -> float:
-        """Return for how long the base has been moving on."""
+        """Return how long after the first stop the base still moves, s; 0 if it stands or none was sent."""
         return run_s - self._began_s if self.is_active and self._began_s is not None and not self._has_stood else 0.0
 
 
@@ -90,6 +93,7 @@ class Enabling:
         self.are_on = self.is_waiting = False
         self._is_released = False
         self._tries, self._sent_s = 0, 0.0
+        """How often they were switched on since the release, and when last."""
 
     @property
     def may_drive(self) -> bool:
@@ -119,7 +123,7 @@ class Enabling:
             self.withdraw()
 
     def commands(self, run_s: float) -> tuple[Command, ...]:
-        """Return the command to switch them on, if it is due."""
+        """Return the command to switch them on if it is due, and consider it sent."""
         if not self.is_waiting or (self._tries > 0 and run_s - self._sent_s < _ENABLE_S):
             return ()
         self._tries, self._sent_s = self._tries + 1, run_s
@@ -134,9 +138,13 @@ class ReceiverMonitor:
 
     def __init__(self) -> None:
         self._is_supported = False
+        """Whether the robot has ever answered."""
         self._unanswered = 0
+        """Requests since the last answer."""
         self._first_s = 0.0
+        """When the first of these was sent."""
         self._sent_s: float | None = None
+        """When the last request was sent; None before."""
 
     def answered(self) -> None:
         """Take an answer."""
@@ -144,7 +152,7 @@ class ReceiverMonitor:
         self._unanswered = 0
 
     def commands(self, run_s: float) -> tuple[Command, ...]:
-        """Return the request, if it is due."""
+        """Return the request if it is due, and consider it sent."""
         if not self._is_supported and self._unanswered >= _UNSUPPORTED:
             return ()
         if self._sent_s is not None and run_s - self._sent_s < _REQUEST_S:

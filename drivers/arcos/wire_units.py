@@ -86,6 +86,13 @@ def polling_of(config: RobotConfig, discs: tuple[int, ...]) -> Polling:
 
 
 def _check_arrays(steps: list[tuple[int, ...]]) -> None:
+    """Check that each firing has one disc of each array, all of the same arrays.
+
+    Raises
+    ------
+    FiringError
+        One does not.
+    """
     arrays = [sorted(disc // DISCS_PER_ARRAY for disc in step) for step in steps]
     if any(step != arrays[0] or len(set(step)) != len(step) for step in arrays):
         raise FiringError(
@@ -96,6 +103,13 @@ def _check_arrays(steps: list[tuple[int, ...]]) -> None:
 
 
 def _cycle_ms(pattern: FiringPattern) -> int:
+    """Return the time from one firing to the next as the robot counts it.
+
+    Raises
+    ------
+    FiringError
+        It is too short or too long for the robot.
+    """
     cycle_ms = math.ceil(1e3 * pattern.step_period_s - _ROUNDING)
     if not _CYCLE_MIN_MS <= cycle_ms <= _CYCLE_MAX_MS:
         raise FiringError(

@@ -253,6 +253,7 @@ def _decode_tail(layout: _Layout, version: int, tail: bytes) -> tuple[object, ..
 
 
 def _decode_echo2_tail(tail: bytes) -> tuple[object, ...] | NakCode:
+    """Return the fields of an ECHO2 after its fixed ones: fired, heard, counts; or what is wrong with them."""
     if len(tail) < 2 * _MASK_BYTES:
         return NakCode.WRONG_LENGTH
     fired, heard = _masks(tail[: 2 * _MASK_BYTES])
@@ -268,6 +269,7 @@ _TAILS = MappingProxyType[Callable[..., Frame], Callable[[bytes], tuple[object, 
 
 
 def _decode_ident_tail(version: int, tail: bytes) -> tuple[object, ...] | NakCode:
+    """Return the fields of an IDENT after its fixed ones: name, unit, abilities; or what is wrong with them."""
     if len(tail) != _NAME_BYTES + (3 if version == _IDENT_LONGER else 0):
         return NakCode.WRONG_LENGTH
     try:
@@ -305,9 +307,12 @@ class Decoder:
         self.lost = 0
         self._layouts = _BY_TYPE[direction]
         self._pending = bytearray()
+        """The stuffed bytes of the frame that is incomplete."""
         self._skipping = False
+        """Whether that frame is too long, so that its rest is dropped."""
         self._midway = midway
         self._seq: int | None = None
+        """Number of the last frame; None before the first."""
         self._rejected: deque[tuple[int, NakCode]] = deque(maxlen=_REJECTED_MAX)
 
     @property
@@ -343,6 +348,7 @@ class Decoder:
         return found
 
     def _gather(self, data: bytes, start: int, end: int) -> None:
+        """Keep a piece of a frame; count one that is too long as bad, once, and drop it to its end."""
         if self._skipping:
             return
         if len(self._pending) + end - start > _STUFFED_MAX:
@@ -353,6 +359,7 @@ class Decoder:
         self._pending += data[start:end]
 
     def _decode(self, stuffed: bytes) -> Frame | None:
+        """Return the frame of stuffed bytes; None if it is invalid, which is counted."""
         try:
             body = cobs.decode(stuffed)
         except cobs.DecodeError:
@@ -371,11 +378,13 @@ class Decoder:
         return frame
 
     def _count_gap(self, seq: int) -> None:
+        """Count the frames that are missing before this number."""
         if self._seq is not None and seq != self._seq:
             self.lost += (seq - self._seq - 1) % 256
         self._seq = seq
 
     def _parse(self, kind: int, seq: int, payload: bytes) -> Frame | NakCode:
+        """Return the frame of a payload with a valid checksum, or what is wrong with it."""
         layout = self._layouts.get(kind)
         if layout is None:
             return NakCode.UNKNOWN_TYPE

@@ -77,12 +77,17 @@ class DenningDevice(EventDevice):
     _seq: int
     _version: int
     _echoes: deque[tuple[int, frames.Echo | frames.Echo2 | frames.Echo3]]
+    """Echoes to send, and when, µs: as their windows close."""
     _rotation: Rotation
     _flags: Flags
     _target: Twist
+    """The velocity of the last DRIVE, or zero."""
     _drive_seq: int
+    """Number of the last DRIVE that was obeyed."""
     _deadman_us: int
+    """When the deadman stops the base, unless a DRIVE comes before."""
     _odometry_us: int
+    """When the next ODOM is due."""
 
     def __init__(
         self,
@@ -134,6 +139,7 @@ class DenningDevice(EventDevice):
     # Commands of the host.
 
     def _obey(self, frame: frames.Frame) -> None:
+        """Carry out a frame of the host and answer it; a DRIVE is answered only if it is refused."""
         match frame:
             case Hello() if not 1 <= frame.version <= self._newest:
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
@@ -178,6 +184,7 @@ class DenningDevice(EventDevice):
                 self._send(frames.Ack(0, frame.seq))
 
     def _is_possible(self, pattern: Pattern) -> bool:
+        """Return whether the ring can carry out a pattern; one without masks stops it."""
         long_enough = 1000 * pattern.step_period_ms >= window_us(pattern)
         return not pattern.masks or (self._within_ring(pattern) and long_enough)
 
@@ -188,10 +195,12 @@ class DenningDevice(EventDevice):
         return all(mask >> self._sensors == 0 for mask in frame.masks)
 
     def _latch(self, reason: Flags) -> None:
+        """Latch the base for a reason, and let it brake."""
         self._flags |= Flags.LATCHED | reason
         self._end_drive()
 
     def _end_drive(self) -> None:
+        """Let the base stand, unless it ignores halts."""
         if not self._faults.has(IgnoredHalt):
             self._target = _STILL
 
@@ -207,6 +216,7 @@ class DenningDevice(EventDevice):
     # Events.
 
     def _next_us(self) -> int:
+        """Return the time of the next event, µs; called at every event, so it allocates nothing."""
         next_us = self._moved_us // TICK_US * TICK_US + TICK_US
         fault_us = self._faults.next_us
         if fault_us is not None and fault_us < next_us:
@@ -245,6 +255,7 @@ class DenningDevice(EventDevice):
         return (_STILL, RAMP_S) if flags & _DEADMAN and not faults.has(IgnoredHalt) else (self._target, None)
 
     def _handle_events(self) -> None:
+        """Carry out what is due now: the deadman, echoes whose window is over, a firing, odometry, garbage."""
         now = self._now_us
         if now >= self._deadman_us and not self._flags.value & _DEADMAN:
             self._flags |= Flags.DEADMAN
@@ -280,11 +291,13 @@ class DenningDevice(EventDevice):
     # Faults.
 
     def _restart(self) -> None:
+        """Start again with another boot number and the odometry at zero."""
         self._boot_id = self._new_boot_id()
         self._body.reset_odometry()
         self._boot(0)
 
     def _start_fault(self, fault: Fault) -> None:
+        """Carry out what a fault does at its start; most act while `_faults` has them."""
         match fault:
             case Reboot():
                 self._boot(0)
@@ -323,6 +336,7 @@ class DenningDevice(EventDevice):
     # The line.
 
     def _clock_us(self, at_us: int) -> int:
+        """Return what the robot's counter shows at an emulated time, µs; it wraps."""
         return (self._faults.clock_us(at_us) + self._clock_offset_us) % 2**32
 
     def _send(self, frame: RobotFrame) -> None:

@@ -62,20 +62,20 @@ class DenningDriver(Session[PoseStamper]):
         self._newest = self._version = version  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
         self._ident: Ident | None = None
-        self._jump: Jump | None = None
+        self._jump: Jump | None = None  # of the clock, for which the robot is being identified
         self._decoder = Decoder("robot", midway=True)
-        self._odometry_s = self._last_frame_s = 0.0
-        self._bad_at_odometry = 0
+        self._odometry_s = self._last_frame_s = 0.0  # when the last one came
+        self._bad_at_odometry = 0  # corrupt frames of this line before it
         self._seq = 0
-        self._flush_first = False
-        self._commands: dict[str, PendingCommand] = {}
+        self._flush_first = False  # whether the next write is the first on this line
+        self._commands: dict[str, PendingCommand] = {}  # those without an answer, by name
         self._drive_acks = CommandAckMonitor()
         self._echo_timeout = EchoTimeout(
             config.link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * self._pattern.step_period_ms
         )
         self._pattern_acked_s = 0.0
-        self._settling_s = 0.0
-        self._must_identify = False
+        self._settling_s = 0.0  # for so long after it echoes may belong to the pattern before
+        self._must_identify = False  # whether a HELLO is sent that needs no answer
 
     @property
     def problem(self) -> str | None:
@@ -132,6 +132,7 @@ class DenningDriver(Session[PoseStamper]):
                 self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
 
     def _no_answer(self, name: str, command: PendingCommand) -> str:
+        """Return the message for a command that was given up."""
         since_s = max(command.first_s, self._run_s - line_diagnostics.RECENT_S)
         frames = self._decoder.frames if self._last_frame_s > since_s else 0
         return diagnostics.no_answer(name, command.tries, frames, self.heard)
@@ -224,6 +225,7 @@ class DenningDriver(Session[PoseStamper]):
             self._must_identify = True
 
     def _next_seq(self) -> int:
+        """Return the next sequence number, and consider it used."""
         seq = self._seq
         self._seq = (seq + 1) % 256
         return seq
@@ -243,6 +245,7 @@ class DenningDriver(Session[PoseStamper]):
         )
 
     def _queue_hello(self) -> None:
+        """Queue a HELLO that asks for the newest version."""
         self._version = self._newest
         self._queue("HELLO")
 
@@ -262,6 +265,7 @@ class DenningDriver(Session[PoseStamper]):
             self._queue("HALT")
 
     def _go_down(self, problem: str | Callable[[], str]) -> None:
+        """Go DOWN with a problem; HELLO follows after the usual wait for an answer, not at once."""
         self._state = LineState.DOWN
         self._problem = problem
         self._abandon()
@@ -270,6 +274,7 @@ class DenningDriver(Session[PoseStamper]):
         hello.due, hello.sent_s = False, self._run_s
 
     def _take_frame(self, frame: Frame) -> None:
+        """Take in a frame; echoes before READY, or of another version than that agreed on, are dropped."""
         match frame:
             case Ident():
                 self._take_ident(frame)
@@ -289,6 +294,10 @@ class DenningDriver(Session[PoseStamper]):
                 pass  # an echo of a pattern that this driver has not set, or of another version
 
     def _take_ident(self, ident: Ident) -> None:
+        """Take in what the robot says of itself: go DOWN if it is the wrong one, else queue its pattern if need be.
+
+        It has restarted if its boot number is another one, or if its clock went back.
+        """
         ident = replace(ident, name=one_line(ident.name))  # it goes to terminals and logs
         wrong = diagnostics.wrong_robot(ident, self._config)
         if wrong is None:
@@ -319,6 +328,7 @@ class DenningDriver(Session[PoseStamper]):
             self._queue("PATTERN")
 
     def _take_ack(self, ack: Ack) -> None:
+        """Go on after a command that was obeyed: that of the PATTERN makes the line READY."""
         name = self._answered(ack.of)
         if name is None or name == "HELLO":  # the answer to HELLO is IDENT
             return
@@ -340,6 +350,7 @@ class DenningDriver(Session[PoseStamper]):
             self._problem = None
 
     def _take_nak(self, nak: Nak) -> None:
+        """Go DOWN after a command that was refused, but for a RELEASE, a DRIVE, and a HELLO of a newer version."""
         name = self._answered(nak.of)
         if name == "HELLO" and nak.code == NakCode.VALUE_OUT_OF_RANGE and self._version > 1:
             self._version = 1  # the robot does not know the newer one
@@ -363,6 +374,7 @@ class DenningDriver(Session[PoseStamper]):
         )
 
     def _take_odometry(self, odom: Odom) -> None:
+        """Take in a sample; if its clock jumped, the robot is asked who it is. Dropped until it has answered that."""
         if "HELLO" in self._commands:
             return  # until it has identified itself, its clock and odometry may be those of before a restart
         sample = self.stamper.odometry(odom, self._run_s)

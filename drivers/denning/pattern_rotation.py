@@ -27,10 +27,14 @@ class Rotation:
 
     def __init__(self) -> None:
         self._pattern: Pattern | None = None
+        """The present one; None if nothing fires."""
         self._next_pattern: Pattern | None = None
+        """What replaces it at the end of the step."""
         self._listeners: tuple[int, ...] = ()
         self._number = 0
+        """Number of the next step …"""
         self._at_us = 0
+        """… and when it starts."""
 
     @property
     def next_us(self) -> int | None:

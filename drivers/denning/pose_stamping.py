@@ -61,8 +61,11 @@ class PoseStamper(Stamper):
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY_MIN)
         self._gap_max_s = _GAP_MIN_S
+        """Longest gap between samples in which the pose of a firing counts as known."""
         self._held: deque[tuple[int, Floats, CrossPaths | None]] = deque()
+        """Firings whose pose is not known yet: time by the robot, µs, ranges, cross paths."""
         self._last_firing_us: int | None = None
+        """Time of the last one that was passed on; None before."""
         self._window = WINDOW_MAX
         self._step_period_ms: int | None = None
 

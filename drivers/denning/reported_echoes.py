@@ -41,7 +41,9 @@ class EchoReporter:
         self._sonar = FaultySonar(sonar, len(ring.mounts), faults, rng)
         self._views = ServoViews(ring)
         self._sweeps: dict[int, Sweep] = {}
+        """Of each sensor whose servo scans."""
         self._turned: dict[int, int] = {}
+        """How many bearings each of these has taken so far."""
 
     @property
     def has_servo(self) -> bool:
@@ -69,6 +71,7 @@ class EchoReporter:
         return reachable
 
     def _mount(self, sweep: Sweep, turned: int) -> int | None:
+        """Return the mount of a sweep after so many turns; None if the servo does not go there."""
         return self._views.mount(sweep.sensor, sweep_bearing(sweep, turned) * BEARING_RAD)
 
     def fire(self, step: Step, t_us: int, pose: Pose, ring_yaw: float, version: int) -> Echo | Echo2 | Echo3:

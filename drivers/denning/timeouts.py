@@ -21,8 +21,11 @@ class CommandAckMonitor:
 
     def __init__(self) -> None:
         self._sent: deque[tuple[int, float]] = deque(maxlen=_KEPT)
+        """Number and time of the DRIVEs that are not acknowledged."""
         self._last_seq: int | None = None
+        """The one that the odometry named last."""
         self._is_supported = False
+        """Whether it has ever named another one than before."""
 
     def __contains__(self, seq: int) -> bool:
         return any(seq == sent for sent, _ in self._sent)
@@ -61,7 +64,9 @@ class EchoTimeout:
     def __init__(self, timeout_s: float) -> None:
         self._timeout_s = timeout_s
         self._since_s = self._echo_s = 0.0
+        """When the timeout started, and when the last echo came."""
         self._bad = 0
+        """Corrupt frames before the last echo."""
 
     def restart(self, run_s: float, bad: int) -> None:
         """Start anew: an echo has come, or a pattern was set; `bad` corrupt frames have come so far."""

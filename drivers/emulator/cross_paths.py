@@ -171,6 +171,7 @@ def _on_chord(from_t: float, from_l: float, turn: float, angle: float) -> float:
 
 @kernel
 def _is_on_side(px: float, py: float, segments: Records) -> bool:
+    """Return whether a point lies on one of these segments."""
     for k in range(segments.shape[0]):
         ax, ay = segments[k].x1 - px, segments[k].y1 - py
         dx, dy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1

@@ -53,6 +53,7 @@ class EventDevice(ABC):
         self._true_sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._line = FaultyLine(baud, schedule, *line_rngs)
         self._now_us = self._moved_us = 0
+        """The present, and the time up to which the body has been moved."""
         self._next_event_us: int | None = None  # None once something may have changed it
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)

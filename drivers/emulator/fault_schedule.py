@@ -24,7 +24,9 @@ class FaultSchedule:
             begin = round(fault.at_s * 1e6)
             edges += [(begin, True, fault), (begin + round(fault.duration_s * 1e6), False, fault)]
         self._edges = deque(sorted(edges, key=lambda edge: edge[0]))
+        """What is still to come: time, µs, whether it begins, fault."""
         self._active: list[Fault] = []
+        """The faults that `set_active` switched on."""
 
     @property
     def next_us(self) -> int | None:

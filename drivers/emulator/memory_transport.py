@@ -55,6 +55,7 @@ class MemoryLine:
         self._exchange_at(run_s - self._start_s)
 
     def _exchange_at(self, emulated_s: float) -> None:
+        """Advance the robot to an emulated time, s, and move what it sent to the driver and the answer back."""
         run_s = self._start_s + emulated_s
         data = self._robot.advance(emulated_s)
         plugged = self._robot.plugged

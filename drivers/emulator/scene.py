@@ -144,6 +144,7 @@ def _meeting_points(sides: list[_Side], boxes: _Boxes) -> list[_Point]:
 
 
 def _crossing(first: _Side, second: _Side) -> _Point | None:
+    """Return the point that two sides have in common; None if they are parallel or do not meet."""
     (ax, ay), (bx, by), _ = first
     (cx, cy), (dx, dy), _ = second
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy

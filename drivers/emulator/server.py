@@ -248,6 +248,13 @@ def _exchange(
 
 
 def _open_channel(control: tuple[int, int], stack: contextlib.ExitStack) -> TimeChannel:
+    """Return the channel of two pipes; `stack` closes it.
+
+    Raises
+    ------
+    EmulatorError
+        They are no pipes.
+    """
     try:
         channel = TimeChannel(*control)
     except OSError as error:
@@ -259,6 +266,13 @@ def _open_channel(control: tuple[int, int], stack: contextlib.ExitStack) -> Time
 
 
 def _open_trace(trace_path: str, stack: contextlib.ExitStack) -> TextIO:
+    """Return the file of the trace, emptied; `stack` closes it.
+
+    Raises
+    ------
+    EmulatorError
+        It cannot be written.
+    """
     try:
         return stack.enter_context(Path(trace_path).open("w", encoding="ascii"))
     except OSError as error:

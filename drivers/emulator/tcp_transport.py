@@ -63,7 +63,9 @@ class TcpServerPort:
         self._connection: socket.socket | None = None
         self.dropped = 0
         self._packet = bytearray()
+        """Bytes to send in one packet …"""
         self._is_growing = False
+        """… and whether some were added since the last `read`: it is sent at a pause."""
         self.open()
 
     @property
@@ -138,6 +140,7 @@ class TcpServerPort:
             self._flush()
 
     def _flush(self) -> None:
+        """Send the packed bytes; those that do not fit, or all without a host, count as dropped."""
         if not self._packet:
             return
         written = 0
@@ -148,6 +151,7 @@ class TcpServerPort:
         self._packet.clear()
 
     def _accept(self) -> None:
+        """Take the host that waits, if there is one, and listen no longer."""
         if self._listener is None:
             return
         try:

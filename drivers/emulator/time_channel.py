@@ -34,11 +34,17 @@ class TimeScaleFollower:
     def __init__(self) -> None:
         self.scale: TimeScale = REAL_TIME
         self._number = 0
+        """Number of the time scale in force."""
         self._simulated_s = -math.inf
+        """The run's time up to which the robot has been simulated …"""
         self._acknowledged_s = -math.inf
+        """… and up to which that has been sent."""
         self._must_acknowledge = False
+        """Whether the time scale in force has not been acknowledged yet."""
         self._rest = b""
+        """An incomplete line."""
         self._out = bytearray()
+        """Messages to send."""
 
     def run_at(self, host_s: float) -> float:
         """Return the run's time at a reading of the host's clock, s; never less than what has been simulated."""
@@ -100,6 +106,7 @@ class TimeChannel:
         self.follower = TimeScaleFollower()
         self._read_fd, self._write_fd = read_fd, write_fd
         self._was_blocking = {fd: os.get_blocking(fd) for fd in (read_fd, write_fd)}
+        """The mode of each pipe, to restore."""
         for fd in self._was_blocking:
             os.set_blocking(fd, False)
         self._is_open = True

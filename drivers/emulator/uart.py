@@ -25,8 +25,11 @@ class Uart:
     def __init__(self, baud: int) -> None:
         self._baud = baud
         self._queue = bytearray()
+        """Bytes that have not left completely."""
         self._start_us = 0
+        """Since then bytes leave without a pause at this speed …"""
         self._left_bytes = 0
+        """… and so many have left."""
         self.dropped = 0
 
     def send(self, frame: bytes, now_us: int) -> None:
@@ -69,4 +72,5 @@ class Uart:
         return self._leaves_us(self._left_bytes + len(self._queue)) if self._queue else None
 
     def _leaves_us(self, count: int) -> int:
+        """Return when so many bytes since `_start_us` will have left, µs."""
         return self._start_us - (-count * BITS_PER_BYTE * _US_PER_S // self._baud)

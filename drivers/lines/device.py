@@ -62,6 +62,7 @@ class LineDevice(EventDevice):
         self._boot()
 
     def _boot(self) -> None:
+        """Start as after power-on, except for the body, which stays where it is."""
         self._booted_us = self._driven_us = self._step_us = self._next_report_us = self._now_us
         self._reader, self._target, self._pattern, self._step = LineReader(), STILL, self._own_pattern, 0
         self._heard = deque()
@@ -90,6 +91,7 @@ class LineDevice(EventDevice):
         return self._moved_us + TICK_US
 
     def _move(self) -> None:
+        """Move the body up to the present event; a base without commands for its deadman, or with a fault, stops."""
         deadman_s, is_off = self._wire.deadman_s, self._faults.has(Reboot)
         is_late = deadman_s is not None and self._moved_us - self._driven_us >= 1e6 * deadman_s
         if is_late or is_off or self.flags & STOPPING:
@@ -98,6 +100,7 @@ class LineDevice(EventDevice):
         self._body.step(1e-6 * took_us, self._target, within_s=RAMP_S if is_late or is_off else None)
 
     def _start_fault(self, fault: Fault) -> None:
+        """Carry out what a fault does at its start; most act while `_faults` has them."""
         if isinstance(fault, OdometryJump):
             self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
         elif isinstance(fault, Reboot):
@@ -108,6 +111,7 @@ class LineDevice(EventDevice):
         self._boot()
 
     def _handle_events(self) -> None:
+        """Carry out what is due now: ranges whose window is over, a firing, odometry, garbage."""
         while self._heard and self._heard[0][0] <= self._now_us:
             self._line.send(self._heard.popleft()[1], self._now_us)
         if self._now_us >= self._step_us:
@@ -119,6 +123,7 @@ class LineDevice(EventDevice):
         self._line.add_garbage(self._now_us, TICK_US)
 
     def _fire(self) -> None:
+        """Fire the next step of the pattern; its ranges are sent when the window is over."""
         pattern = self._pattern
         fired = list(sensors(pattern.masks[self._step % len(pattern.masks)]))
         self._step, self._step_us = self._step + 1, self._step_us + round(1e6 * pattern.step_period_s)

@@ -38,9 +38,12 @@ class LineStamper(Stamper):
         super().__init__(config.body)
         self._sensors = config.ring.sensor_count
         self._gap_s = _GAP_PERIODS * period_s + config.link.silence_max_s
+        """Longest gap between samples in which the pose of a firing counts as known."""
         self._history = OdometryHistory(_HISTORY)
         self._waiting: deque[tuple[float, Ranges]] = deque(maxlen=_WAITING_MAX)
+        """Firings for which no later sample has come."""
         self._fired_s = -math.inf
+        """Time of the last firing passed on."""
 
     @property
     def newest_s(self) -> float:

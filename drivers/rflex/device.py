@@ -89,18 +89,28 @@ class RflexDevice(EventDevice):
     _decoder: Decoder
     _brake: bool
     _tripped: bool
+    """Whether the fail-safe has stopped the base."""
     _target: Twist
     _driven: Twist
+    """The last velocity that the wheels went for by command."""
     _rates: tuple[float, float]
+    """Accelerations commanded, m/s² and rad/s²."""
     _commanded_us: int
+    """When the last motion command came."""
     _zero_m: float
+    """Way by odometry at which the count of the translation is zero."""
     _offsets: list[int]
+    """What is added to the counts of each axis."""
     _report_us: int | None
+    """When axes, bumpers and sonars are due next; None for never."""
     _input_us: int | None
     _fire_us: int | None
     _heard: tuple[tuple[int, int], ...] | None
+    """What the last firing heard: reported at the next."""
     _was_touched: bool
+    """What the last report of the bumpers said …"""
     _has_touched: bool
+    """… and whether there was one."""
     _number: int
 
     def __init__(
@@ -115,6 +125,7 @@ class RflexDevice(EventDevice):
         self._clock_start_us, self._booted_us = clock_start_us, 0
         self._fail_safe_us = round(1e6 * self._rflex.fail_safe_s)
         self._touched_at: tuple[Pose, bool] | None = None
+        """The last pose that was tested, and whether a surface touches the base there."""
         self._boot()
 
     @property
@@ -144,6 +155,7 @@ class RflexDevice(EventDevice):
     # Commands of the host.
 
     def _obey(self, frame: Frame) -> None:
+        """Carry out a command; unknown ones are ignored. None is acknowledged."""
         match frame.port, frame.opcode, len(frame.data):
             case 2, 7, 14:
                 self._set_speed(*direction_of(frame))
@@ -195,15 +207,18 @@ class RflexDevice(EventDevice):
 
     @staticmethod
     def _period(data: bytes) -> int:
+        """Return the period that a command asks for, µs, not below the least; 0 for never."""
         period_us = int.from_bytes(data, "big")
         return max(PERIOD_MIN_US, period_us) if period_us else 0
 
     def _start(self, period_us: int) -> int | None:
+        """Return when something with this period is due first; None for a period of 0."""
         return self._now_us + period_us if period_us else None
 
     # Events.
 
     def _next_us(self) -> int:
+        """Return the time of the next event, µs."""
         others = [self._moved_us // TICK_US * TICK_US + TICK_US, self._faults.next_us]
         if not self._faults.has(Reboot):
             others += [self._report_us, self._input_us, self._fire_us]
@@ -235,6 +250,7 @@ class RflexDevice(EventDevice):
         return self._target, None
 
     def _handle_events(self) -> None:
+        """Carry out what is due now: the fail-safe, a firing, reports of axes and bumpers, garbage."""
         now = self._now_us
         if now >= self._commanded_us + self._fail_safe_us:
             self._tripped, self._target = True, STILL
@@ -260,6 +276,7 @@ class RflexDevice(EventDevice):
         self._fire_us = self._now_us + self._step_us
 
     def _readings(self, sensors: list[int]) -> tuple[tuple[int, int], ...]:
+        """Fire sonars together and return what they will report: number and raw range of each."""
         body = self._body
         window_m = min(self._config.ring.window_m, 0.5e-6 * self._step_us * SOUND_SPEED_M_S)
         ranges = self._sonar.fire(self._now_us, body.pose, body.ring_yaw, sensors, window_m)
@@ -278,6 +295,7 @@ class RflexDevice(EventDevice):
         return round(way_m * rflex.distance_factor), round(body.odometry_pose.theta * rflex.angle_factor)
 
     def _report_axes(self) -> None:
+        """Report the axes that the host asked for."""
         twist, rflex, clock = self._body.odometry_twist, self._rflex, self._clock()
         speeds = (round(twist.v * rflex.distance_factor), round(twist.w * rflex.angle_factor))
         factors = (rflex.distance_factor, rflex.angle_factor)
@@ -296,6 +314,7 @@ class RflexDevice(EventDevice):
             self._send(Input(self._clock(), self._rflex.bumpers[0], int(is_touched)))
 
     def _is_touched(self) -> bool:
+        """Return whether a surface touches the base, or a fault presses its bumper."""
         pose = self._body.pose
         if self._touched_at is None or self._touched_at[0] is not pose:
             room_m = clearance(pose.x, pose.y, self._scene.circles, self._scene.segments)
@@ -305,6 +324,7 @@ class RflexDevice(EventDevice):
     # Faults.
 
     def _start_fault(self, fault: Fault) -> None:
+        """Carry out what a fault does at its start; most act while `_faults` has them."""
         match fault:
             case Reboot():
                 self._restart()
@@ -322,6 +342,7 @@ class RflexDevice(EventDevice):
                 pass
 
     def _restart(self) -> None:
+        """Start again with the odometry at zero."""
         self._body.reset_odometry()
         self._boot()
 

@@ -59,13 +59,20 @@ class Measurements(Stamper):
 
     # Set by a restart; see `_reset` and `break_off`.
     _last: tuple[int, int, float] | None
+    """The last reading: counts of both axes, and time by the robot, s."""
     _pose: Pose
     _fired_s: float
+    """Time of the last firing passed on."""
     _axes: dict[int, AxisReport]
+    """Reports that wait for the other axis."""
     _suspect: tuple[int, int, float] | None
+    """A reading that was impossible after the last one."""
     _backs: int
+    """Readings in a row whose clock jumped back …"""
     _aheads: int
+    """… or ahead."""
     _is_new: bool
+    """Whether this is the first reading of a line."""
 
     def __init__(self, config: RobotConfig, ids: tuple[int, ...]) -> None:
         super().__init__(config.body)
@@ -74,6 +81,7 @@ class Measurements(Stamper):
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY)
         self._held: deque[tuple[float, Floats]] = deque(maxlen=_HELD_MAX)
+        """Firings whose pose is not known yet: time by the robot, s, and ranges."""
         self._step_s, self._window_m = 0.0, math.inf
         self._is_clock_noted = False
         self._reset()
@@ -111,6 +119,10 @@ class Measurements(Stamper):
         return self._sample(v.position, w.position, 1e-6 * t_us, twist, flags)
 
     def _read_clock(self, t_us: int, run_s: float) -> int | Jump | None:
+        """Return the unwrapped time of a report, µs; None if it is to be dropped, `Jump.BACK` after a restart.
+
+        A jump ahead is accepted after `_AHEAD_MAX` in a row; one back is a restart after `_BACK_MAX`.
+        """
         read = self._clock.read(t_us, run_s)
         self._backs = self._backs + 1 if read is Jump.BACK else 0
         self._aheads = self._aheads + 1 if read is Jump.AHEAD else 0
@@ -124,6 +136,10 @@ class Measurements(Stamper):
         return read
 
     def _sample(self, way: int, turn: int, robot_s: float, twist: Twist, flags: Flags) -> Odometry | Jump | None:
+        """Return the sample of two counts at a time, s; None if it is impossible, `Jump.BACK` after a restart.
+
+        A reading is possible if the base can have moved so since the last one, or since one dropped just before.
+        """
         here, last = (way, turn, robot_s), self._last
         if last is None:
             last = here
@@ -172,12 +188,14 @@ class Measurements(Stamper):
         return ready
 
     def _reset(self) -> None:
+        """Forget the pose and all readings."""
         self._last = None
         self._pose = Pose(0.0, 0.0, 0.0)
         self._fired_s = -math.inf
         self.break_off()
 
     def _restarted(self) -> Jump:
+        """Begin anew with a robot that has restarted."""
         self._clock.restart()
         self._jumps.restart()
         self._reset()
@@ -189,11 +207,13 @@ class Measurements(Stamper):
         return _difference(b[0], a[0]) / rflex.distance_factor, _difference(b[1], a[1]) / rflex.angle_factor
 
     def _is_possible(self, a: tuple[int, int, float], b: tuple[int, int, float]) -> bool:
+        """Return whether the base can have moved from one reading of the counts to another."""
         way_m, turn = self._way(a, b)
         body, dt_s = self._config.body, max(0.0, b[2] - a[2])
         near = abs(way_m) <= _SLACK_M + 2.0 * body.speed_max_m_s * dt_s
         return near and abs(turn) <= _SLACK_RAD + 2.0 * body.turn_max_rad_s * dt_s
 
     def _is_zero(self, reading: tuple[int, int, float]) -> bool:
+        """Return whether the counts are nearly those after a restart."""
         way_m, turn = self._way((0, 0, 0.0), reading)
         return abs(way_m) <= _ZERO_M and abs(turn) <= _ZERO_RAD

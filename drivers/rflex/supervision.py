@@ -66,10 +66,15 @@ class Brake:
         self.tries = 0
         self._config = config
         self._round: list[Frame] = []
+        """Commands of this round that are still to be sent."""
         self._rounds = 0
+        """Rounds since another state was wanted."""
         self._began_s: float | None = None
+        """When the first round of a halt began; None before."""
         self._round_s = self._set_s = -math.inf
+        """When this round began, and when the brake was first set or released for that; inf before."""
         self._stands = False
+        """Whether the base has reported that it stands."""
 
     @property
     def may_drive(self) -> bool:
@@ -115,7 +120,7 @@ class Brake:
                 pass
 
     def due(self, run_s: float) -> Frame | None:
-        """Return the command to send now."""
+        """Return the command to send now, and consider it sent; None if there is none."""
         if not self._round and run_s - self._round_s >= ROUND_S:
             self._begin_round(run_s)
         if not self._round:
@@ -130,12 +135,14 @@ class Brake:
         return run_s - self._began_s if self.mode is Mode.HALTING and self._began_s is not None else 0.0
 
     def _start(self, mode: Mode) -> None:
+        """Want another state of the brake, from a first round of commands on, at once."""
         if self.mode is not mode:
             self.mode, self._began_s, self._rounds, self._stands = mode, None, 0, False
             self._set_s = math.inf
         self._round, self._round_s = [], -math.inf
 
     def _begin_round(self, run_s: float) -> None:
+        """Choose the commands of the next round: what the state wanted needs, and a request for the status."""
         if self.mode is Mode.HALTING:
             if self._began_s is None:
                 self._began_s = run_s
@@ -172,8 +179,11 @@ class StallMonitor:
         self.is_stalled = False
         self._body = config.body
         self._wanted = self._modelled = Twist(0.0, 0.0)
+        """The velocity commanded, and that of the model …"""
         self._run_s = 0.0
+        """… at this time."""
         self._history: deque[tuple[float, Twist]] = deque()
+        """Times and velocities of the model, of the last `_PUSHED_S` and one before."""
 
     def command(self, twist: Twist, run_s: float) -> None:
         """Take a velocity that is commanded."""

@@ -59,8 +59,10 @@ class Gateway:
         self._node = rclpy.create_node("echolocate_robot")
         self._side = RobotSide(config, secrets.randbelow(2**31) + 1)
         self._lock = threading.Lock()
+        """Guards `_side`, which the thread of ROS uses, too."""
         self._base, self._odometry, self._is_stamped = ros.base_frame, ros.odometry, ros.cmd_vel_stamped
         self._is_open = False
+        """Whether frames go to the host: from the first odometry on."""
         self._message = TwistStamped if ros.cmd_vel_stamped else TwistMessage
         sensor_data = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches every publisher
         for topic in dict.fromkeys(ros.ranges):
@@ -131,12 +133,14 @@ class Gateway:
         return True
 
     def _on_range(self, message: Any) -> None:  # noqa: ANN401 - a message of ROS
+        """Take a range; called by the thread of ROS."""
         with self._lock:
             limits = Limits(message.min_range, message.max_range)
             self._side.reading(message.header.frame_id, message.range, _seconds(message.header.stamp), limits)
             self._pass_on()
 
     def _on_odometry(self, message: Any) -> None:  # noqa: ANN401 - a message of ROS
+        """Take a sample; called by the thread of ROS."""
         where, turn, twist = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
         yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
         with self._lock:
@@ -150,7 +154,7 @@ class Gateway:
             self._pass_on()
 
     def _pass_on(self) -> None:
-        """Send what the robot's side has for the host, the base and the operator."""
+        """Send what the robot's side has for the host, the base and the operator. `_lock` must be held."""
         for note in self._side.take_notes():
             self._warn(note)
         velocity = self._side.take_velocity()
@@ -161,6 +165,7 @@ class Gateway:
                 self._line.send(output, socket.MSG_DONTWAIT)
 
     def _publish(self, velocity: Twist) -> None:
+        """Send a velocity to the base."""
         message = self._message()
         twist = message
         if self._is_stamped:

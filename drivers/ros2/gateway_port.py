@@ -60,6 +60,13 @@ class GatewayPort(TcpPort):
         self._socket.settimeout(0.0)
 
     def _await_ready(self) -> None:
+        """Wait until the process says that the robot is there.
+
+        Raises
+        ------
+        GatewayError
+            It says why not, or nothing.
+        """
         self._socket.settimeout(_ANSWER_MAX_S)
         line = b""
         try:

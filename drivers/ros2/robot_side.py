@@ -49,14 +49,20 @@ class RobotSide:
         self._radius_mm = round(1e3 * max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts))
         self._decoder, self._seq = Decoder("host"), 0
         self._out = bytearray()
+        """Frames for the host."""
         self._velocities: deque[Twist] = deque(maxlen=1)
+        """The newest velocity for the base, until it is taken."""
         self._flags, self._drive_seq, self._drive_s = Flags.NONE, 0, -math.inf
         self._fires = False
+        """Whether the host asked for echoes."""
         self._first_s: float | None = None
+        """Stamp of the first odometry, the zero of the host's clock; None before it."""
         self._last_s = self._last_host_s = 0.0
         self._heading: float | None = None
         self._group: dict[int, int] = {}
+        """Counts of the ranges that make up the next echo, by sensor …"""
         self._group_s = 0.0
+        """… and the stamp of the first of them."""
         self._noted: set[str] = set()
         self._notes: list[str] = []
 
@@ -96,6 +102,7 @@ class RobotSide:
             self._velocities.append(STILL)
 
     def _obey(self, frame: frames.Frame, host_s: float) -> None:
+        """Carry out a frame of the host and answer it; a DRIVE is answered only if it is refused."""
         match frame:
             case Hello() if frame.version != frames.VERSION:
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
