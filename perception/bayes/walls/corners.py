@@ -213,6 +213,8 @@ def find_corners(s: StateRecord) -> None:
                 continue
             corner = room.corners[at]
             corner.is_used = KEPT
+            if corner.is_kept == 1:
+                continue
             corner.is_edge = 1 if is_edge(a, b, x, y) else 0
             corner.first = k
             corner.second = j
@@ -221,7 +223,7 @@ def find_corners(s: StateRecord) -> None:
             locate(corner, lines)
     for c in range(CORNERS_MAX):
         if room.corners[c].is_used == PENDING:
-            room.corners[c].is_used = 0
+            room.corners[c].is_used = KEPT if room.corners[c].is_kept == 1 else 0
     find_edges(room)
 
 
@@ -250,6 +252,8 @@ def find_edges(room: WallMap) -> None:
                 continue
             edge = room.edges[at]
             edge.is_used = KEPT
+            if edge.is_kept == 1:
+                continue
             edge.is_edge = 1
             edge.first = k
             edge.second = e % 2
@@ -264,6 +268,9 @@ def find_edges(room: WallMap) -> None:
             edge.passes *= max(0.0, 1.0 - math.hypot(edge.x - old_x, edge.y - old_y) / EDGE_MOVED_M)
     for c in range(EDGES_MAX):
         edge = room.edges[c]
+        if edge.is_kept == 1 and edge.is_used == PENDING:
+            edge.is_used = KEPT
+            continue
         keep_heard(room, edge)
         if edge.is_used == PENDING or (edge.is_used == KEPT and is_near_corner(room, edge.first, edge.x, edge.y)):
             edge.is_used = 0

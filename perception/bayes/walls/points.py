@@ -306,7 +306,7 @@ def displaces(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
         edge = room.edges[c]
         if edge.is_used == KEPT and math.hypot(edge.x - found.x, edge.y - found.y) < KNOWN_POINT_M:
             echoes = edge.echoes - edge.far_echoes if is_near else edge.echoes
-            if echoes >= found.echoes or (is_near and edge.is_edge == 0):
+            if echoes >= found.echoes or (is_near and edge.is_edge == 0) or edge.is_kept == 1:
                 return False
             edge.is_used = 0
     return True

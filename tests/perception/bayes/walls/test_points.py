@@ -22,6 +22,7 @@ from perception.bayes.walls.points import (
     LINE_CELLS,
     SLANT_MIN,
     count_cuts,
+    displaces,
     find_heard_points,
 )
 from perception.bayes.walls.report import room_report
@@ -81,6 +82,18 @@ def test_a_corner_that_is_heard_beyond_the_end_of_a_wall_is_found_kept_and_repor
     room.walls[3].offset += 0.5
     find_corners(memory.s)
     assert used(room) == [], "it lies on no wall's line"
+
+
+@pytest.mark.parametrize("is_kept", [False, True])
+def test_a_point_displaces_one_of_fewer_echoes_but_none_that_was_sure_at_the_stop(*, is_kept: bool) -> None:
+    _, room = mirrors()
+    room.edges[0].is_used, room.edges[0].echoes, room.edges[0].is_kept = KEPT, 3.0, int(is_kept)
+    room.edges[0].x, room.edges[0].y = (CORNER + 0.5 * KNOWN_POINT_M).tolist()
+    found = room.edges[1]
+    found.x, found.y = CORNER.tolist()
+    found.echoes = 12.0
+    assert displaces(room, found, is_near=False) != is_kept
+    assert room.edges[0].is_used == int(is_kept)
 
 
 def test_a_corner_that_ranges_passed_or_that_a_wall_would_be_or_that_is_known_is_none() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from perception.bayes.memory.state import Memory
 from perception.bayes.memory.wall_records import WallMap
-from perception.bayes.walls.bins import bin_of, enter_pass
+from perception.bayes.walls.bins import bin_of, clear_wall, enter_pass
 from perception.bayes.walls.corners import find_corners
 from perception.bayes.walls.merging import drop_explained
 from perception.bayes.walls.report import room_report, wall_ends
@@ -94,6 +94,30 @@ def test_another_explanation_ends_a_wall_before_the_stop_and_a_misfit_after_it_t
         room.walls[1].misfit = 4.0
         drop_explained(memory.s, memory.tracks, P, 1)
         assert room.walls[1].weight == 0.0
+
+
+def test_points_that_were_sure_stay_where_they_were_although_walls_end_elsewhere_or_are_gone() -> None:
+    memory, room = stopped()
+    place_wall(room.walls[2], np.zeros(2), np.pi, 3.0)
+    fill(memory, room.walls[2], -1.0, 1.0)
+    find_corners(memory.s)
+    edge = next(edge for edge in room.edges if edge.is_used == 1 and edge.first == 2)
+    edge.echoes, edge.covariance_xx, edge.covariance_yy = 9.0, 1e-4, 1e-4
+    for x in (0.2, 0.2):  # stops a second time
+        keep_while_standing(memory, (x, 0.0, 0.0))
+    before = room_report(memory)[1]
+    assert len(before) >= 2
+    fill(memory, room.walls[2], -1.6, 1.6)  # every wall goes on beyond, …
+    find_corners(memory.s)
+    for wall in room.walls:  # … or ends
+        clear_wall(wall)
+    find_corners(memory.s)
+    after = room_report(memory)[1]
+    for x, y in before[["x", "y"]].tolist():
+        assert np.hypot(after["x"] - x, after["y"] - y).min() < 0.05
+    keep_while_standing(memory, (0.3, 0.0, 0.0))
+    find_corners(memory.s)
+    assert len(room_report(memory)[1]) == 0
 
 
 def test_an_invalid_place_is_no_stop() -> None:
