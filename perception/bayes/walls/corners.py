@@ -173,14 +173,13 @@ def edge_at(room: WallMap, wall: Wall, end: float, side: int, reach: float) -> i
     reach : float
         Greatest distance beyond the end, m: what lies beyond the wall's next span is another end.
     """
-    at = -1
+    at, free = -1, -1
     nearest = reach
-    free = -1
     for c in range(EDGES_MAX):
         edge = room.edges[c]
         if edge.is_used == 0 and free < 0:
             free = c
-        if edge.is_used != PENDING or edge.second != side:
+        if (edge.is_used != PENDING and edge.is_kept == 0) or edge.second != side:
             continue
         distance, along = distance_and_foot(wall, edge.x, edge.y)
         beyond = along - end if side == 1 else end - along
@@ -195,13 +194,19 @@ def edge_at(room: WallMap, wall: Wall, end: float, side: int, reach: float) -> i
 
 
 @kernel
+def set_pending(corners: Records[RoomCorner], count: int) -> None:
+    """Let corners or edges be found again, but those that were sure when the robot stopped."""
+    for c in range(count):
+        if corners[c].is_used == KEPT and corners[c].is_kept == 0:
+            corners[c].is_used = PENDING
+
+
+@kernel
 def find_corners(s: StateRecord) -> None:
     """Find the corners and edges of the present walls again, with the echoes that they had; too many are left out."""
     room = s[0].room
     lines = room.lines
-    for c in range(CORNERS_MAX):
-        if room.corners[c].is_used == KEPT:
-            room.corners[c].is_used = PENDING
+    set_pending(room.corners, CORNERS_MAX)
     for j in range(MAX_WALLS):
         for k in range(j):
             a, b = room.walls[k], room.walls[j]
@@ -209,12 +214,10 @@ def find_corners(s: StateRecord) -> None:
                 continue
             is_corner, x, y = crossing(a, b)
             at = corner_at(room, x, y) if is_corner else -1
-            if at < 0:
+            if at < 0 or room.corners[at].is_kept == 1:
                 continue
             corner = room.corners[at]
             corner.is_used = KEPT
-            if corner.is_kept == 1:
-                continue
             corner.is_edge = 1 if is_edge(a, b, x, y) else 0
             corner.first = k
             corner.second = j
@@ -223,16 +226,14 @@ def find_corners(s: StateRecord) -> None:
             locate(corner, lines)
     for c in range(CORNERS_MAX):
         if room.corners[c].is_used == PENDING:
-            room.corners[c].is_used = KEPT if room.corners[c].is_kept == 1 else 0
+            room.corners[c].is_used = 0
     find_edges(room)
 
 
 @kernel
 def find_edges(room: WallMap) -> None:
     """Find the edges again: the ends of the walls' spans that no corner is near."""
-    for c in range(EDGES_MAX):
-        if room.edges[c].is_used == KEPT:
-            room.edges[c].is_used = PENDING
+    set_pending(room.edges, EDGES_MAX)
     for k in range(MAX_WALLS):
         wall = room.walls[k]
         if wall.weight < EDGE_WALL_WEIGHT_MIN:
@@ -248,12 +249,10 @@ def find_edges(room: WallMap) -> None:
             elif e % 2 == 0 and e > 0:
                 reach = min(reach, end - wall.spans[e // 2 - 1].high)
             at = edge_at(room, wall, end, e % 2, reach)
-            if at < 0:
+            if at < 0 or room.edges[at].is_kept == 1:
                 continue
             edge = room.edges[at]
             edge.is_used = KEPT
-            if edge.is_kept == 1:
-                continue
             edge.is_edge = 1
             edge.first = k
             edge.second = e % 2
@@ -268,11 +267,8 @@ def find_edges(room: WallMap) -> None:
             edge.passes *= max(0.0, 1.0 - math.hypot(edge.x - old_x, edge.y - old_y) / EDGE_MOVED_M)
     for c in range(EDGES_MAX):
         edge = room.edges[c]
-        if edge.is_kept == 1 and edge.is_used == PENDING:
-            edge.is_used = KEPT
-            continue
         keep_heard(room, edge)
-        if edge.is_used == PENDING or (edge.is_used == KEPT and is_near_corner(room, edge.first, edge.x, edge.y)):
+        if edge.is_kept == 0 and (edge.is_used == PENDING or is_near_corner(room, edge.first, edge.x, edge.y)):
             edge.is_used = 0
 
 
