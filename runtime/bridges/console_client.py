@@ -86,11 +86,17 @@ class ConsoleClient:
         self.dropped = 0
         self._socket = socket
         self._challenge: int | None = None
+        """The newest challenge; None before the first."""
         self._id = 0
+        """Number of the last command."""
         self._answers: dict[int, asyncio.Future[Any]] = {}
+        """Commands that wait for their answer, by number."""
         self._kept: deque[Message] = deque()
+        """Messages that `messages` has yet to yield."""
         self._arrived = asyncio.Event()
+        """Set when one is kept, or the connection has ended."""
         self._end: ConsoleError | None = None
+        """Why the connection ended; None while it lasts."""
 
     async def messages(self) -> AsyncIterator[Message]:
         """Yield every message but answers and challenges, in order, until the connection ends.
@@ -160,6 +166,7 @@ class ConsoleClient:
             self._finish(ConsoleError(reason))
 
     def _take(self, message: Message) -> None:
+        """Take in a message: update what this client knows by it, and keep it for `messages`."""
         match message["type"]:
             case "answer":
                 self._answer(message)
@@ -180,6 +187,7 @@ class ConsoleClient:
         self._keep(message)
 
     def _take_map(self, state: Message) -> None:
+        """Update segments, archived objects and polylines by what a state changes."""
         changes = state["segments"]
         if changes["whole"]:
             self.segments.clear()
@@ -191,6 +199,7 @@ class ConsoleClient:
         self.polylines = state.get("polylines", self.polylines)
 
     def _answer(self, message: Message) -> None:
+        """Give an answer to the command that waits for it; one that no longer waits gets none."""
         waiting = self._answers.get(message["id"])
         if waiting is None or waiting.done():
             return
@@ -200,6 +209,7 @@ class ConsoleClient:
             waiting.set_exception(ConsoleError(str(message["error"])))
 
     def _keep(self, message: Message) -> None:
+        """Keep a message until it is taken; if there are too many, drop the oldest state, or else the oldest."""
         if len(self._kept) >= KEPT_MAX:
             oldest = next((one for one in self._kept if one["type"] == "state"), self._kept[0])
             self._kept.remove(oldest)
@@ -208,6 +218,7 @@ class ConsoleClient:
         self._arrived.set()
 
     def _finish(self, reason: ConsoleError) -> None:
+        """End the connection for a reason: whatever waits for a message or an answer gets it as its error."""
         self._end = reason
         for waiting in self._answers.values():
             if not waiting.done():

@@ -149,6 +149,7 @@ class Fleet:
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def _send_halt(self, run: FleetRun) -> None:
+        """Begin to send a run HALT, in place of an attempt that still waits."""
         if run.halting is not None:
             run.halting.cancel()
         run.halting = asyncio.get_running_loop().create_task(self._halt(run), name=f"halt {run.address}")
@@ -193,6 +194,7 @@ def _judge_halt(run: FleetRun, now_s: float) -> None:
 
 
 def _row(run: FleetRun, now_s: float) -> FleetRow:
+    """Return what the page shows of a run, at a time of the fleet's clock, s."""
     state, session = run.state, {} if run.client is None else run.client.session
     age_s = now_s - run.state_s
     silent = f"nothing has come for {age_s:.0f} s" if state and age_s > SILENT_S else ""

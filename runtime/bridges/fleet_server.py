@@ -67,6 +67,8 @@ async def serve_fleet(fleet: Fleet, host: str, port: int, urls: Sequence[str], t
 
 
 class _Handler:
+    """Answers the requests of the fleet page."""
+
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
         self._files = page_files()
@@ -83,6 +85,7 @@ class _Handler:
         return response
 
     async def _respond(self, request: web.BaseRequest, host: str) -> web.Response:
+        """Return the response to a request whose Host is right; all but the page's files need the token."""
         path = PAGE if request.path == "/" else request.path
         if request.method == "GET" and (file := self._files.get(path)) is not None:
             return web.Response(body=file.body, headers={"Content-Type": file.content_type})

@@ -77,7 +77,9 @@ class _Bridge(ServerListener):
     def __init__(self, loop: asyncio.AbstractEventLoop, report: Callable[[str], None], *, allow_set: bool) -> None:
         self._loop, self._report, self._allow_set = loop, report, allow_set
         self._client: ConsoleClient | None = None
+        """The connection to the run; None without one."""
         self._settings: dict[str, Message] = {}
+        """Settings of the run that a page can change, by path."""
 
     async def serve(self, client: ConsoleClient) -> None:
         """Serve one connection until it ends."""
@@ -133,6 +135,13 @@ class _Bridge(ServerListener):
         return None
 
     async def _request(self, known: Message, value: Any) -> None:  # noqa: ANN401 - a setting's value
+        """Change a setting of the run, with control for as long as that takes.
+
+        Raises
+        ------
+        UserError
+            There is no run, or it refuses.
+        """
         client = self._client
         if client is None:
             raise UserError("there is no connection to the run")
@@ -147,10 +156,12 @@ class _Bridge(ServerListener):
             await client.request("release_control")
 
     def _keep(self, settings: list[Message]) -> None:
+        """Take in the settings of the run, and show them in Foxglove."""
         self._settings = {setting["path"]: setting for setting in settings}
         self.server.publish_parameter_values(self._parameters([]))
 
     def _parameters(self, names: list[str]) -> list[Parameter]:
+        """Return settings as parameters, all if none is named; unknown names are left out."""
         known = self._settings
         return [
             Parameter(name, value="" if known[name]["value"] is None else known[name]["value"])

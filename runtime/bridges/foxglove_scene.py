@@ -60,7 +60,9 @@ class SceneChannels:
         self._run = RunChannels(context)
         self._state = foxglove.Channel("/state", schema={"type": "object"}, message_encoding="json", context=context)
         self._session: Mapping[str, Any] = {}
+        """The newest session; empty before the first."""
         self._states = 0
+        """Number of states written."""
 
     def begin(self, session: Mapping[str, Any], at: int) -> None:
         """Take in a session at a time, ns since 1970."""
@@ -87,6 +89,7 @@ class SceneChannels:
         self._run.write_log(entry["level"], sentence(entry["event"], entry["fields"]), at)
 
     def _write_frames(self, state: Message, at: int) -> None:
+        """Write the pose in `odom`, and that of `odom` in the map while it is known."""
         x, y, theta = state["pose"]
         localized, rows = state["localized"], [("odom", "base", Pose(x, y, theta))]
         if localized is not None and localized["status"] == "tracking":
@@ -112,6 +115,7 @@ class SceneChannels:
             self._run.write_arc(turned.compose(Pose(*mounts[sensor])), half, ranges[sensor], at)
 
     def _write_map(self, objects: list[Message], client: ConsoleClient, at: int) -> None:
+        """Write segments, objects, walls and polylines."""
         ends = [point for row in client.segments.values() for point in (row[:2], row[2:4])]
         self._run.write_segments(ends, at)
         models = {model["name"]: model for model in self._session["models"]}

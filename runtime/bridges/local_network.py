@@ -75,6 +75,7 @@ class Finder:
         self.changed = asyncio.Event()
         self._network, self._own = network, own
         self._tasks: set[asyncio.Task[None]] = set()
+        """Look-ups under way."""
         self._browser = AsyncServiceBrowser(network.zeroconf, SERVICE, handlers=[self._on_change])
 
     async def close(self) -> None:
@@ -85,6 +86,7 @@ class Finder:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _on_change(self, zeroconf: Zeroconf, service_type: str, name: str, state_change: ServiceStateChange) -> None:
+        """Look up a service that is new or changed; drop one that has gone. zeroconf calls it in the loop."""
         from zeroconf import ServiceStateChange
 
         del zeroconf, service_type
@@ -99,6 +101,7 @@ class Finder:
             task.add_done_callback(self._tasks.discard)
 
     async def _look_up(self, name: str) -> None:
+        """Ask for what a service says of itself, and list the run if it can be reached."""
         from zeroconf.asyncio import AsyncServiceInfo
 
         info = AsyncServiceInfo(SERVICE, name)

@@ -106,6 +106,7 @@ class Console:
         self._limits = default if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
         self._shown, self._places = _in_session(settings), settings.places
+        """What pages were sent last of these settings."""
         self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
@@ -117,7 +118,9 @@ class Console:
         self._issue_challenge = run.timing_monitor.timed(CONSOLE_SEND, self._challenge)
         self._challenge_timer: asyncio.TimerHandle | None = None
         self._mode = run.state.mode
+        """Of the last cycle."""
         self._tasks: set[asyncio.Task[None]] = set()
+        """Asynchronous commands under way."""
         self._server: Server | None = None
         self.url, self.token = "", ""
         self.listening: tuple[str, int] | None = None
@@ -217,6 +220,7 @@ class Console:
         self.hub.broadcast({"type": "robots", "robots": self._others()})
 
     def _others(self) -> list[Mapping[str, Any]]:
+        """Return the other runs that pages list, this machine's first."""
         return [*self._local_runs, *self._robots]
 
     def hints(self) -> list[str]:
@@ -241,6 +245,7 @@ class Console:
             return new_token()
 
     def _server_context(self, auth: Auth, files: dict[str, StaticFile]) -> ServerContext:
+        """Return what the server serves."""
         return ServerContext(
             auth=auth,
             hub=self.hub,
@@ -258,6 +263,7 @@ class Console:
         )
 
     async def _close(self, server: Server) -> None:
+        """End frames, challenges, commands under way, connections and replays, in this order."""
         self._publisher.close()
         if self._challenge_timer is not None:
             self._challenge_timer.cancel()
@@ -288,9 +294,11 @@ class Console:
         }
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:
+        """Note in the log what pages changed."""
         self._console_log.note("configuration changed from the console", changed=[str(one) for one in changed])
 
     def _show_settings(self, settings: Settings) -> None:
+        """Send pages the settings that have come into force: a new session only if that has what changed."""
         before, self._shown = self._shown, _in_session(settings)
         self._publisher.adopt(settings)
         if self._shown != before:
@@ -314,6 +322,7 @@ class Console:
                 self._run.request(Request.DISARM)  # it would begin to drive for an operator who did not arm it
 
     def _on_leave(self, client: Client) -> None:
+        """End the command and the replay of a client that has gone."""
         if client.task is not None:
             client.task.cancel()
         if self._commands.replay is not None:

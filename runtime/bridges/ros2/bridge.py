@@ -62,6 +62,7 @@ class _Bridge:
         self._loop = loop
         self._operator: Operator | None = None
         self._topics: Topics | None = None
+        """Both of the connection; None without one."""
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def serve(self, client: ConsoleClient) -> None:
@@ -131,12 +132,20 @@ class _Bridge:
         self._begin(self._reporting("initialpose", lambda operator: operator.place(x, y, theta)))
 
     async def _reporting(self, topic: str, work: Callable[[Operator], Coroutine[Any, Any, None]]) -> None:
+        """Carry out what a topic asks; if it is refused, warn."""
         try:
             await work(self._connected())
         except UserError as error:
             self.node.warn(f"{topic} is not carried out: {error}")
 
     def _connected(self) -> Operator:
+        """Return the operator of the connection.
+
+        Raises
+        ------
+        ConsoleError
+            There is none.
+        """
         if self._operator is None:
             raise ConsoleError(NO_RUN)
         return self._operator
@@ -146,6 +155,8 @@ class _Bridge:
             self._operator.velocity(v, w)
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run a coroutine in the loop; called in any thread."""
+
         def start() -> None:
             task = self._loop.create_task(work)
             self._tasks.add(task)

@@ -94,7 +94,9 @@ class BridgeNode:
         self._node = rclpy.create_node("echolocate", context=self._context)
         self._commands = commands
         self._publishers: dict[str, Any] = {}
+        """By topic; each is created with the first message for it."""
         self._warned: set[str] = set()
+        """Lines of `warn_once` so far."""
 
         names = Frames()
         values = {name: self._parameter(f"{name}_frame", getattr(names, name)) for name in ("map", "odom", "base")}
@@ -106,12 +108,14 @@ class BridgeNode:
         self._without = {
             parent for parent, name in switches.items() if not (self._switch(name, default=True) and both)
         }
+        """Parents of the transforms that are not published."""
         self.publishes_grid = self._switch("publish_grid", default=True)
         self.max_range_for_silence = self._switch("no_echo_as_max_range", default=False)
         self.publishes_scan = self._switch("publish_scan", default=False)
         self._tf = ros_tf.create_publisher(self._node, "/tf", FRAMES)
         self._tf_static = ros_tf.create_publisher(self._node, "/tf_static", PROFILES[Qos.LATCHED])
         self._looked_s = -math.inf
+        """When `look_around` looked last."""
         self._subscribe()
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -119,12 +123,15 @@ class BridgeNode:
         self._thread.start()
 
     def _parameter(self, name: str, default: Any) -> Any:  # noqa: ANN401 - the value of any parameter
+        """Declare a parameter of the node and return its value."""
         return self._node.declare_parameter(name, default).value
 
     def _switch(self, name: str, *, default: bool) -> bool:
+        """Declare a parameter that is true or false and return its value."""
         return bool(self._parameter(name, default))
 
     def _subscribe(self) -> None:
+        """Create the subscriptions and services: what ROS may ask for."""
         node, reliable = self._node, PROFILES[Qos.RELIABLE]
         stamped = self._switch("cmd_vel_stamped", default=True)
         self._velocity_hint = f"start the bridge with -p cmd_vel_stamped:={str(not stamped).lower()}"
@@ -204,6 +211,7 @@ class BridgeNode:
             self._executor.spin()
 
     def _create_publisher(self, topic: str, kind: str) -> Any:  # noqa: ANN401 - a publisher of ROS
+        """Return a publisher that warns once of subscribers whose QoS it does not meet."""
         qos = QOS[kind]
 
         def incompatible(_: object) -> None:
@@ -217,6 +225,7 @@ class BridgeNode:
         return self._node.create_publisher(TYPES[kind], topic, PROFILES[qos], event_callbacks=events)
 
     def _on_stamped(self, message: Any) -> None:  # noqa: ANN401 - a message of ROS
+        """Pass on a velocity, unless it is in another frame than the base, or too old."""
         frame, stamp = message.header.frame_id.lstrip("/"), message.header.stamp
         base = self.frames.prefix + self.frames.base
         if frame not in {"", base}:
@@ -234,6 +243,7 @@ class BridgeNode:
         self._on_velocity(message.twist)
 
     def _on_velocity(self, twist: Any) -> None:  # noqa: ANN401 - a message of ROS
+        """Pass on a velocity, unless it is not finite. Called in the thread of ROS, as are all of these."""
         v, w = twist.linear.x, twist.angular.z
         if not (math.isfinite(v) and math.isfinite(w)):
             self.warn_once("cmd_vel holds a number that is not finite and is not carried out; its sender is faulty")
@@ -260,6 +270,8 @@ class BridgeNode:
         return frame
 
     def _service(self, name: str) -> Callable[[Any, Any], Awaitable[Any]]:
+        """Return the handler of a service: it waits for the answer without holding up the thread of ROS."""
+
         async def answer(_request: object, response: Any) -> Any:  # noqa: ANN401 - messages of ROS
             future = Future(executor=self._executor)
 

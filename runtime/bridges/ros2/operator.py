@@ -44,10 +44,15 @@ class Operator:
         self._report = report
         self._clock = clock
         self._velocity: tuple[float, float] | None = None
+        """The newest velocity; None once it has ended."""
         self._arrived_s = -math.inf
+        """When it arrived."""
         self._arrived = asyncio.Event()
+        """Set when one has arrived that `drive` has not sent."""
         self._refusal = ""
+        """The last reason reported; empty after a velocity that was sent."""
         self._has_asked = False
+        """Whether ROS has ever asked for what needs control."""
 
     @property
     def is_driving(self) -> bool:
@@ -95,6 +100,7 @@ class Operator:
         await self.yield_control()
 
     def _refuse(self, reason: str) -> None:
+        """Report a refusal of a velocity, unless it is the same as the last."""
         if reason != self._refusal:
             self._refusal = reason
             self._report(f"cmd_vel is not carried out: {reason}")
@@ -152,6 +158,13 @@ class Operator:
         await self._client.request("place_robot", x=x, y=y, theta=theta)
 
     async def _take_control(self) -> None:
+        """Get control, unless this client has it.
+
+        Raises
+        ------
+        ConsoleError
+            Another client has it.
+        """
         self._has_asked = True
         if not self._client.has_control:
             await self._client.request("take_control")

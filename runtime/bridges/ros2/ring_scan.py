@@ -36,7 +36,9 @@ class RingScan:
         self._frame = frame
         self._ring: Message = {}
         self._poses: deque[tuple[float, Pose, float]] = deque(maxlen=HISTORY)
+        """Time by the robot's clock (s), pose of the base, and the ring's yaw (rad) of the last states."""
         self._done_s = -math.inf
+        """Time of the newest firing in the last scan."""
 
     def begin(self, ring: Message) -> None:
         """Begin with a ring, as a session has it."""

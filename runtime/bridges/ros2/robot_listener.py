@@ -60,6 +60,8 @@ def _take_frames(heard: Heard, message: bytes) -> None:
 
 
 def _subscribe_range(node: Any, heard: Heard, topic: str) -> None:  # noqa: ANN401 - a node of ROS
+    """Note in `heard` the frame, limits and stamps of the ranges on a topic."""
+
     def take(message: Any) -> None:  # noqa: ANN401 - a message of ROS
         name = message.header.frame_id.lstrip("/")
         heard.topics[name] = topic
@@ -70,6 +72,8 @@ def _subscribe_range(node: Any, heard: Heard, topic: str) -> None:  # noqa: ANN4
 
 
 def _subscribe_odometry(node: Any, heard: Heard, topic: str) -> None:  # noqa: ANN401 - a node of ROS
+    """Note in `heard` the frame and stamps of the odometry on a topic."""
+
     def take(message: Any) -> None:  # noqa: ANN401 - a message of ROS
         heard.odometry = topic
         heard.base = message.child_frame_id.lstrip("/") or heard.base

@@ -51,11 +51,17 @@ class Topics:
         self._scan = RingScan(self._say.base) if with_scan else None
         self._clock = StampClock()
         self._session: Mapping[str, Any] = {}
+        """The newest session; empty before the first."""
         self._published_s: list[float] = []
+        """When each sensor fired whose range was published last, by the robot's clock."""
         self._odometry_s = math.nan
+        """The robot's time of the odometry that was published last; NaN before."""
         self._markers: set[tuple[str, int]] = set()
+        """Name space and number of the markers that receivers show."""
         self._mode: str | None = None
+        """The mode that was published last."""
         self._done_s = {"markers": -math.inf, "diagnostics": -math.inf}
+        """ROS time when each was published last."""
         self.note: str | None = None
         """A message about the last state, as of a clock that jumped; None if there is none."""
         self.place: str | None = None
@@ -68,6 +74,7 @@ class Topics:
         self._mode = None
 
     def _forget(self) -> None:
+        """Forget what was published of the robot: its clock has jumped, or it is another one."""
         self._published_s = [-math.inf] * len(self._session["ring"]["mounts"])
         self._odometry_s = math.nan
         if self._scan is not None:
@@ -137,6 +144,7 @@ class Topics:
         return True
 
     def _ranges(self, state: Message) -> Iterator[Output]:
+        """Yield the range of each sensor that has fired since the last state."""
         ring, robot_s = self._session["ring"], state["robot_s"]
         for sensor, (range_m, age_s) in enumerate(zip(state["ranges"], state["age"], strict=True)):
             if age_s is None or range_m is None:
@@ -161,6 +169,7 @@ class Topics:
         return [Output("objects", "visualization_msgs/MarkerArray", {"markers": [*gone, *markers]}), *poses]
 
     def _diagnostics(self, state: Message, at: int) -> Output:
+        """Return mode, ring, place and line as diagnostics, at a time of ROS, ns."""
         name_of_mode, reason = state["mode"], state["reason"] or state["hold_reason"] or ""
         name = self._session["name"] or "robot"
         timing = {key: state[key] for key in ("cycle", "cycle_us", "late_us", "missed", "late", "quanta")}

@@ -99,19 +99,28 @@ class Client:
         self.is_live = True
         self.is_gone = False
         self.message_bucket = TokenBucket(limits.messages_per_s, limits.messages_per_s)
+        """Limits what it may send."""
         self.task: asyncio.Task[None] | None = None
         self._transport = transport
         self._limits = limits
         self._clock = clock
         self._challenge: int | None = None
+        """The newest challenge that is still to be sent."""
         self._frame: Frame | None = None
+        """The newest frame that is still to be sent."""
         self._last_sent: tuple[object, int] = (None, 0)
+        """Source and number of the last frame sent: the next has only changes if it follows that one."""
         self._dropped = 0
+        """Frames replaced before they were sent, in all."""
         self._queue: deque[bytes] = deque()
         self._queue_bytes = 0
+        """Of all messages in the queue."""
         self._newest: dict[str, bytes] = {}
+        """The last message of each kind of `send_newest`."""
         self._wake = asyncio.Event()
+        """Set when there is something to send, or the client has gone."""
         self._sending_since_s: float | None = None
+        """Since when a message waits for the system to take it; None while none does."""
 
     @property
     def is_busy(self) -> bool:

@@ -55,9 +55,12 @@ class ClientHub:
         self._limits = limits
         self._clock = clock
         self._log_lines: deque[bytes] = deque(maxlen=LOG_LINES_KEPT)
+        """The newest, in JSON, for pages that are opened later."""
         self._number = 0
+        """Number of the last client."""
         self._loop: AbstractEventLoop | None = None
         self._thread = threading.get_ident()
+        """The thread of the loop; lines of the log from others are passed on to it."""
 
     def bind(self, loop: AbstractEventLoop) -> None:
         """Use this loop for log lines that come from other threads."""
@@ -174,11 +177,13 @@ class ClientHub:
             client.send_challenge(number)
 
     def _begin_session(self, client: Client, session: Mapping[str, Any]) -> None:
+        """Send a client the session information, with its own part of it; its next frame has everything."""
         client.forget_frames()
         own: ClientRow = {"role": role_of(client), "client": client.number, "has_token": client.has_token}
         client.send({**session, **own})
 
     def _send_role(self, holder: Holder, requester: Holder | None) -> None:
+        """Send the client that a holder stands for its role, and who asks it for control."""
         client = self.clients.get(holder.number)
         if client is None:
             return

@@ -45,8 +45,11 @@ class Control:
         self._notify = notify
         self._on_lost = on_lost
         self._holder: Holder | None = None
+        """The client that has control; None if it is free."""
         self._requester: Holder | None = None
+        """The client that asks the holder for it."""
         self._expires_s = 0.0
+        """When it gets control unless the holder uses it."""
 
     def is_held_by(self, client: Holder) -> bool:
         """Return whether this client has control."""
@@ -109,6 +112,7 @@ class Control:
             self._pass_to(self._requester)
 
     def _pass_to(self, client: Holder | None) -> None:
+        """Give control to a client, or free it, and end the request; the one that loses it is reported first."""
         before, self._holder, self._requester = self._holder, client, None
         if before is not None and before is not client:
             self._on_lost(before)

@@ -91,6 +91,13 @@ class CommandDispatcher:
             self._context.robot.drive_request(TELEOPERATION_ENDED)
 
     def _run(self, client: Client, message: Message) -> Any:  # noqa: ANN401 - the data of any answer
+        """Carry out a command and return the data of its answer; `ANSWERED_LATER` if it goes on as a task.
+
+        Raises
+        ------
+        CommandError
+            It is refused.
+        """
         command = COMMANDS[message.name]
         self._check_permission(client, command)
         if command.can_begin_motion(message.arguments):
@@ -108,6 +115,13 @@ class CommandDispatcher:
         return data
 
     def _check_permission(self, client: Client, command: Command[Any]) -> None:
+        """Check that a client may give a command; one that needs control counts as a use of it.
+
+        Raises
+        ------
+        CommandError
+            It may not.
+        """
         if not client.has_token:
             raise CommandError(NO_TOKEN)
         if command.permission is Permission.CONTROL:
@@ -141,6 +155,7 @@ def _answer(client: Client, number: int, data: object) -> None:
 
 
 def _send_answer(client: Client, number: int | None, data: object, error: CommandError | None) -> None:
+    """Send the answer to the command of this number: its data, or the error for which it was refused."""
     answer: AnswerMessage = {
         "type": "answer",
         "id": number,

@@ -52,6 +52,7 @@ def parameters(settings: Settings) -> list[Parameter]:
 
 
 def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
+    """Yield the parameters of a model at a place in the settings, those within it, too."""
     for name, field in type(model).model_fields.items():
         location, value = (*at, name), getattr(model, name)
         if isinstance(value, BaseModel):

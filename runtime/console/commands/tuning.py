@@ -132,6 +132,7 @@ class Tuning:
             return with_room(self.current.model_copy(update={"places": places}), room, "map")
 
         def result() -> Settings:
+            """Return the settings with the room; raises `CommandError` where they are refused."""
             why = refusal()
             if why is not None:
                 raise CommandError(why, "toml")

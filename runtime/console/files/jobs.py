@@ -81,9 +81,13 @@ class Jobs:
         self._units: Units = units
         self._program = program
         self._jobs: dict[int, Job] = {}
+        """By number, the oldest first; those that are over as long as their files are kept."""
         self._number = 0
+        """Of the last job."""
         self._folder: Path | None = None
+        """Has a folder for the files of each job; None before the first one."""
         self._resources = contextlib.ExitStack()
+        """Deletes that folder."""
         self.tell: Callable[[JobMessage], None] = lambda _: None
         """Sends a message to every page."""
 
@@ -154,6 +158,7 @@ class Jobs:
         self._resources.close()
 
     async def _run(self, job: Job, path: Path, folder: Path) -> None:
+        """Do a job's work in a child process; its end, however it comes, is written to the job and sent to pages."""
         targets = [folder / f"{path.stem}{suffix}" for suffix in SUFFIXES[job.kind]]
         options = ("--out",) if job.kind == "report" else ("--out", "--grid", "", "--geojson")
         words = [

@@ -120,6 +120,15 @@ class SettingsFiles:
             raise CommandError(why)
 
     def _keep_places(self, settings: Settings) -> None:
+        """Write the places in force to the file of the known room; those of a shipped room go to a file of their own.
+
+        Without a known room, or where no file has it, nothing is written. It blocks: call it in a thread.
+
+        Raises
+        ------
+        CommandError
+            The file cannot be read or written.
+        """
         room = settings.perception.localization.known_room
         for document in reversed(self._documents):  # the map is read after the emulator's world
             if room is None or document.kind != "worlds":
@@ -139,11 +148,25 @@ class SettingsFiles:
                 return
 
     def _document(self, number: int) -> DocumentRead:
+        """Return the file with this number in the list of pages.
+
+        Raises
+        ------
+        CommandError
+            There is none.
+        """
         if number >= len(self._documents):
             raise CommandError(f"there is no settings file {number}")
         return self._documents[number]
 
     def _read(self, document: DocumentRead) -> SettingsText:
+        """Return a file's text, the digest of its bytes, and its form.
+
+        Raises
+        ------
+        CommandError
+            It cannot be read.
+        """
         try:
             data = read_shipped(document) if document.path is None else read_file(document.path)
             text = data.decode("utf-8-sig")
@@ -152,6 +175,10 @@ class SettingsFiles:
         return {"text": text, "digest": hashlib.sha256(data).hexdigest(), "form": form_of(document.kind, text)}
 
     def _check(self, document: DocumentRead, text: str) -> SettingsCheck:
+        """Return what would be wrong with the settings if a file had this text, and how that differs from its own.
+
+        A shipped file cannot be changed, and is not checked.
+        """
         before = self._read(document)["text"]
         diff = difflib.unified_diff(
             before.splitlines(), text.splitlines(), document.name, f"{document.name}, changed", lineterm=""
@@ -171,6 +198,13 @@ class SettingsFiles:
         return {"problems": problems, "warnings": warnings, "difference": "\n".join(diff), "form": form}
 
     def _save(self, document: DocumentRead, text: str, digest: str) -> SettingsText:
+        """Write a file and return it as it is then.
+
+        Raises
+        ------
+        CommandError
+            It is a shipped one, no longer has the bytes of `digest`, or would be wrong.
+        """
         if document.path is None:
             raise CommandError(f"{document.name} comes with the program: download a copy, and name it in the command")
         before = self._read(document)
@@ -184,6 +218,13 @@ class SettingsFiles:
         return self._read(document)
 
     def _put(self, document: DocumentRead, path: Path, text: str) -> None:
+        """Write a file in place of what is there.
+
+        Raises
+        ------
+        CommandError
+            It cannot be written.
+        """
         try:
             _write(path.resolve(), text)
         except OSError as error:

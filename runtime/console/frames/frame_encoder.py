@@ -134,7 +134,9 @@ class FrameEncoder:
         count = len(settings.ring.mounts)
         self._ranges_m = [math.nan] * count
         self._fired_s = [math.nan] * count
+        """Last range of each sensor, and when it was fired, by the robot's clock; NaN before the first."""
         self._fired: set[int] = set()
+        """Sensors that fired since the last frame."""
         self._cross_paths = CrossPathRows()
         self._segments = SegmentDelta()
         self._mission = MissionRows()
@@ -143,6 +145,7 @@ class FrameEncoder:
         self._objects: list[ObjectRow] = []
         self._segment_counts: tuple[int, int] | None = None
         self._is_stale = True
+        """The counts of the segments last encoded: equal counts mean equal segments, unless this is set."""
         self._number = 0
         self._archived = ChangingRows(_object)
         self._polylines = ChangingRows(_polyline)
@@ -306,6 +309,7 @@ def _json_numbers(values: Iterable[float], places: int) -> list[float | None]:
 
 
 def _object(detected: DetectedObject) -> ObjectRow:
+    """Return an object in the wire's form, m and rad, in the frame of `detected`."""
     ends = detected.ends
     x1, y1, x2, y2 = ends or (0.0, 0.0, 0.0, 0.0)
     return {

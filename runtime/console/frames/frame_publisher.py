@@ -82,9 +82,13 @@ class FramePublisher:
         """Encodes a frame now; measured."""
         self._timed_tick = run.timing_monitor.timed(CONSOLE_FRAME, self._tick)
         self._last: tuple[CycleRecord, State, CycleStats, RobotDriver] | None = None
+        """Of the last cycle; None before the first."""
         self._is_scheduled = False
+        """Whether the loop will call `publish` soon."""
         self._due_s = 0.0
+        """Host time from which the next frame is due."""
         self._published_s = 0.0
+        """Host time of the last frame."""
         self._ticker: asyncio.TimerHandle | None = None
         self.failure: str | None = None
 
@@ -148,6 +152,7 @@ class FramePublisher:
         self._log.error("the console cannot show the run any more", exc_info=error)
 
     def _publish(self) -> None:
+        """Encode a frame now; an error ends all frames, see `failure`."""
         self._is_scheduled = False
         if self.failure is not None:
             return
@@ -157,6 +162,7 @@ class FramePublisher:
             self.fail(error)
 
     def _encode(self) -> None:
+        """Disconnect stalled clients, then encode a frame of the last cycle and give it to all others."""
         host_s = self._clock()
         self._published_s = host_s
         for client in self._hub.disconnect_stalled(host_s):

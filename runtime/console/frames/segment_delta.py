@@ -27,8 +27,11 @@ class SegmentDelta:
         self._numbers: Ints = np.zeros(0, dtype=np.int64)
         self._rows: Floats = np.zeros((0, COLUMNS))
         self._shown: set[int] = set()
+        """The numbers, as a set."""
         self._pinned = b"[]"
+        """Numbers of the pinned ones, JSON."""
         self._whole: bytes | None = None
+        """What `whole` returns; None until it is asked for."""
 
     def update(self, numbers: Ints, rows: Floats, pinned: Ints) -> bytes:
         """Replace the segments and return what changed, as JSON.

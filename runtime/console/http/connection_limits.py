@@ -106,7 +106,9 @@ class TimedProtocol(asyncio.Protocol):
         self._accepts = accepts
         self._on_lost = on_lost
         self._transport: asyncio.Transport | None = None
+        """None before the connection is made."""
         self._is_aborted = False
+        """Whether the connection was dropped, and what comes from it is ignored."""
         # asyncio looks its callbacks up on the object, so attributes can take the place of methods.
         self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]  # as said above
         self.data_received = timed(CONSOLE_RECEIVE, self._received)  # type: ignore[method-assign]  # as said above

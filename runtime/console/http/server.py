@@ -105,6 +105,7 @@ class Server:
     def __init__(self, context: ServerContext) -> None:
         self._context = context
         self._websockets: dict[Client, web.WebSocketResponse] = {}
+        """Of each client that is connected."""
         self._web: web.Server | None = None
         self._server: asyncio.Server | None = None
         self._limiter: ConnectionLimiter | None = None
@@ -180,6 +181,7 @@ class Server:
         return response
 
     async def _respond(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
+        """Return the response to a request whose Host is right: a page's file, a websocket, the log or a download."""
         context, path = self._context, request.path
         if request.method != "GET":
             return self._refuse(request, HTTPStatus.METHOD_NOT_ALLOWED, f"the method {request.method[:20]!a}")

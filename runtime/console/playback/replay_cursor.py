@@ -96,8 +96,10 @@ class ReplayCursor:
         self._refused: dict[str, bool] = {}
         """What is wrong with which keyframe, and whether that was taken."""
         self._kept: OrderedDict[int, Checkpoint] = OrderedDict()
+        """States of positions that were passed, the one used last at the end."""
         self._kept_bytes = 0
         self._next = self.jumps = 0
+        """_next: index of the cycle after the last one replayed."""
         self._begin_at(0)
 
     @property

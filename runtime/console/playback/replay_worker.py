@@ -196,6 +196,13 @@ class ReplayWorker:
             self._answer(problem(text))
 
     def _play(self, speed: float) -> None:
+        """Play at a speed, from the beginning if at the end; 0 pauses. A seek under way goes on.
+
+        Raises
+        ------
+        ValueError
+            The speed is out of range.
+        """
         if speed and not SPEED_MIN <= speed <= SPEED_MAX:
             raise ValueError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
         if speed:
@@ -206,10 +213,12 @@ class ReplayWorker:
         self._shown_s = -math.inf
 
     def _seek_to(self, position: int) -> None:
+        """Begin to go to a position, limited to those that there are."""
         self._target = min(max(1, position), self._cursor.cycles)
         self._seek, self._last = self._cursor.seek(self._target), None
 
     def _advance_seek(self, seek: Iterator[ReplayedCycle]) -> None:
+        """Replay one cycle of a seek; at its end show the cycle at the position, or say that there is none."""
         replayed = next(seek, None)
         if replayed is not None:
             if self._cursor.position >= self._target:
@@ -225,6 +234,10 @@ class ReplayWorker:
             self._report("this moment cannot be replayed: cycles before it are missing; go to another one")
 
     def _advance_playing(self, since_s: float, from_s: float) -> None:
+        """Replay the next cycle while playing, and show it if a frame is due; at the end show the last one and pause.
+
+        `since_s`, `from_s`: host time and position from which it plays, s.
+        """
         replayed = self._cursor.next_cycle()
         if replayed is None:
             self._playing_from = None
