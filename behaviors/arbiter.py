@@ -17,7 +17,13 @@ from typing import Final, TypeAlias
 from behaviors.memory.commitment import Commitment
 from behaviors.response import Response, summed
 from behaviors.surroundings.clearance import stoppable_speed_m_s
-from behaviors.surroundings.field_of_view import UnseenWay, angle_to_look, seen_speed_m_s, unseen_way
+from behaviors.surroundings.field_of_view import (
+    UnseenWay,
+    angle_to_look,
+    presumed_ahead_rad,
+    seen_speed_m_s,
+    unseen_way,
+)
 from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
 from perception.percept import Percept, Twist, wrap_angle
@@ -105,7 +111,9 @@ def arbitrate(
         return Drive(Twist(0.0, 0.0))
     course = math.atan2(y, x)
     angle = wrap_angle(course - percept.pose.theta)
-    look = None if body.synchro else angle_to_look(percept, course)
+    look = None
+    if not body.synchro:
+        look = angle_to_look(percept, course, presumed_ahead_rad(percept, body, config.clearance_m))
     if look is not None:
         return Drive(Twist(0.0, max(-body.turn_max_rad_s, min(body.turn_max_rad_s, config.turn_gain_per_s * look))))
     speed = magnitude * _course_speed_m_s(abs(angle), config)

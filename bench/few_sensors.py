@@ -63,7 +63,7 @@ class RoomResult:
     contacts: int = 0
     goals: int = 0
     arrived: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
+    reasons: dict[str, int] = field(default_factory=dict)
     """Why it did not arrive."""
     way_m: float = 0.0
     drums: int = 0
@@ -169,7 +169,8 @@ def run_room(
                 looked[k, int((math.atan2(off[1], off[0]) % math.tau) / math.tau * SECTORS) % SECTORS] = True
         if goal_set and request is None and (outcome := _outcome(state, run_s > until_s)) is not None:
             result.arrived += outcome == "arrived"
-            result.reasons[outcome] += outcome != "arrived"
+            if outcome != "arrived":
+                result.reasons[outcome] = result.reasons.get(outcome, 0) + 1
             goal_set = False
     result.goals -= goal_set  # the last one was under way
     result.contacts = before.contacts
@@ -219,7 +220,7 @@ def few_sensors_table(results: Sequence[RoomResult]) -> Table:
         table.add_column(heading)
     for robot, reflection in dict.fromkeys((one.robot, one.reflection) for one in results):
         of = [one for one in results if (one.robot, one.reflection) == (robot, reflection)]
-        reasons: Counter[str] = sum((one.reasons for one in of), Counter())
+        reasons: Counter[str] = sum((Counter(one.reasons) for one in of), Counter())
         table.add_row(
             robot,
             reflection,

@@ -49,6 +49,8 @@ class FieldOfView:
         Longest age at which a direction counts as seen, s.
     unknown_rad : (u,) float
         Directions on the ring's blind sides of which nothing is known, in the odometry's frame, rad.
+    presumed : (p, 2) float
+        Those of the obstacles that the ring heard from elsewhere as walls and presumes to go on, m.
     """
 
     bearings_rad: Floats
@@ -59,6 +61,7 @@ class FieldOfView:
     reach_m: float
     age_max_s: float
     unknown_rad: Floats = field(default_factory=lambda: np.zeros(0))
+    presumed: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -319,8 +319,8 @@ class Perception:
         axes = ring_yaw + self._axes
         if self._turning:
             axes[self._turning] += pose.theta - ring_yaw
-        points, unknown = self._echoes.with_blind_sides(points, pose, axes)
-        view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s, unknown)
+        points, *sides = self._echoes.with_blind_sides(points, pose, axes)
+        view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s, *sides)
         return view, points
 
     def canyons(self) -> tuple[Canyon, ...]:

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from config.robot import BodyConfig
+from config.robot import PASSAGE_M, BodyConfig
 from perception.percept import FieldOfView, Floats, Percept, wrap_angle
 
 ROUNDING_RAD: Final = 1e-6
@@ -141,7 +141,7 @@ def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearan
     return UnseenWay(f"the ring has not looked {where} {lasting}: {cause}", age_s, tuple(missing))
 
 
-def angle_to_look(percept: Percept, course_rad: float) -> float | None:
+def angle_to_look(percept: Percept, course_rad: float, presumed_rad: Floats | None = None) -> float | None:
     """Return the angle to the nearest direction in which the robot must look before it drives, None if there is none.
 
     On a course the robot comes nearer to walls that face it from anywhere within 90°, and a mirror answers only beams
@@ -153,14 +153,41 @@ def angle_to_look(percept: Percept, course_rad: float) -> float | None:
         Pose and field of view of this cycle.
     course_rad
         The direction of the way, in the odometry's frame.
+    presumed_rad
+        As of `presumed_ahead_rad`: the robot looks there as well.
     """
     unknown = percept.field_of_view.unknown_rad
+    if presumed_rad is not None:
+        unknown = np.concatenate([unknown, presumed_rad])
     if not len(unknown):
         return None
     angles: list[float] = turn(percept.pose.theta, unknown)[
         np.abs(turn(course_rad, unknown)) < 0.5 * math.pi
     ].tolist()
     return min(angles, key=abs, default=None)
+
+
+def presumed_ahead_rad(percept: Percept, body: BodyConfig, clearance_m: float) -> Floats:
+    """Return the directions of presumed walls that stop the robot where it stands, in the odometry's frame, rad.
+
+    A wall that was heard from elsewhere and need not go on is looked at before it keeps a robot standing.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    body, clearance_m
+        As for `behaviors.surroundings.clearance.stoppable_speed_m_s`.
+    """
+    feet, pose = percept.field_of_view.presumed, percept.pose
+    if not len(feet):
+        return np.zeros(0)
+    dx, dy = feet[:, 0] - pose.x, feet[:, 1] - pose.y
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    stops = (np.hypot(dx, dy) < body.radius_m + clearance_m) & (c * dx + s * dy > 0.0)
+    stops &= np.abs(c * dy - s * dx) < body.radius_m + PASSAGE_M
+    directions: Floats = np.arctan2(dy[stops], dx[stops])
+    return directions
 
 
 def listed(sensors: Sequence[int]) -> str:

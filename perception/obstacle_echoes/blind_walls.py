@@ -44,7 +44,8 @@ AGAIN_SHARE: Final = 0.5
 `KEPT_M`: so the robot looks round in one place."""
 
 SILENT_WAY_M: Final = 0.25
-"""A look counts only within this while the ring hears nothing and has lost what it heard, m."""
+"""A look counts only within this while the ring hears nothing and has lost what it heard, and before a robot that a
+remembered wall stops, m."""
 
 
 class BlindWall(Record):
@@ -165,7 +166,7 @@ class BlindWalls:
             self.records,
         )
 
-    def sides(self, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats]:
+    def sides(self, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats, Floats]:
         """Return what is known of the directions in which no sensor looks now, and what is not, within 90° of ahead.
 
         Walls behind count, too: one that no longer counted once it was abeam made a robot beside it turn to and fro.
@@ -183,6 +184,9 @@ class BlindWalls:
             The feet of the perpendiculars on the walls there, m.
         (u,) float
             The directions of which nothing is known, in the odometry's frame, rad.
+        (p, 2) float
+            Those of the feet that are presumed: the robot has driven on since it heard the wall, m. Of a rough thing
+            or the end of a wall the ring heard something else.
         """
         directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         off = np.abs(np.remainder(directions[:, None] - axes_rad + math.pi, math.tau) - math.pi)
@@ -199,7 +203,9 @@ class BlindWalls:
         is_edge = (nearest > self._half_angle - 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
         is_edge &= np.roll(is_unseen, 1) | np.roll(is_unseen, -1)
         is_unknown = is_ahead & (is_unseen | is_edge)
-        return np.stack([pose.x + away * c, pose.y + away * s], axis=1)[stands], directions[is_unknown]
+        feet = np.stack([pose.x + away * c, pose.y + away * s], axis=1)
+        is_presumed = stands & (np.hypot(self._walls["x"] - pose.x, self._walls["y"] - pose.y) > SILENT_WAY_M)
+        return feet[stands], directions[is_unknown], feet[is_presumed]
 
     def look_again(self, x: float, y: float, is_lasting: bool) -> None:
         """Have the robot look where it last looked from farther than `SILENT_WAY_M` away; walls stay remembered.

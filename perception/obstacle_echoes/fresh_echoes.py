@@ -371,8 +371,8 @@ class FreshEchoes:
             echoes = np.concatenate([echoes, self.unheard.points(ALONE)])
         return Looks(fresh[:k], ages[:k], sensor_ages, echoes)
 
-    def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats]:
-        """Return echoes with those of remembered walls, and the directions of which nothing is known.
+    def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return echoes with those of remembered walls, the directions of which nothing is known, and presumed feet.
 
         Parameters
         ----------
@@ -382,9 +382,9 @@ class FreshEchoes:
             As of `BlindWalls.sides`.
         """
         if self._blind_walls is None:
-            return points, np.zeros(0)
-        walls, unknown = self._blind_walls.sides(pose, axes_rad)
-        return np.concatenate([points, walls]), unknown
+            return points, np.zeros(0), np.zeros((0, 2))
+        walls, unknown, presumed = self._blind_walls.sides(pose, axes_rad)
+        return np.concatenate([points, walls]), unknown, presumed
 
     def clear(self) -> None:
         """Remove all readings."""

@@ -16,6 +16,7 @@ from behaviors.surroundings.field_of_view import (
     listed,
     oldest_look_s,
     path_half_angle_rad,
+    presumed_ahead_rad,
     seen_for_s,
     seen_speed_m_s,
     unseen_way,
@@ -257,6 +258,25 @@ def test_it_looks_at_the_nearest_unknown_direction_within_a_right_angle_of_its_c
     assert angle_to_look(unknown(80.0, -60.0, 170.0), 0.0) == pytest.approx(math.radians(-60.0))
     assert angle_to_look(unknown(80.0, -60.0, theta=math.radians(30.0)), 0.0) == pytest.approx(math.radians(50.0))
     assert angle_to_look(unknown(120.0, -95.0), 0.0) is None
+
+
+def presuming(*feet: tuple[float, float]) -> Percept:
+    return percept(replace(EVERYWHERE, presumed=np.array(feet)), 0.0, *feet)
+
+
+def test_it_looks_at_a_presumed_wall_that_stops_it_and_at_no_other() -> None:
+    """A robot with three sensors stood for ever before a box that it had passed, as if that were a wall."""
+    beside, ahead = (0.38, 0.3), (0.6, 0.0)  # .484 m away, and beyond the clearance
+    assert presumed_ahead_rad(presuming(beside, ahead, (-0.3, 0.3), (0.1, 0.5)), BODY, CLEARANCE_M) == pytest.approx(
+        [math.atan2(0.3, 0.38)]
+    )
+    assert len(presumed_ahead_rad(percept(EVERYWHERE, 0.0, beside), BODY, CLEARANCE_M)) == 0
+    config, request = ArbiterConfig(clearance_m=CLEARANCE_M), (Response("s", 1.0, 0.0),)
+    turning = arbitrate(request, presuming(beside), BODY, config, ["s"])
+    assert isinstance(turning, Drive)
+    assert turning.twist.v == 0.0
+    assert turning.twist.w > 0.5
+    assert arbitrate(request, percept(EVERYWHERE, 0.0, beside), BODY, config, ["s"]) == Drive(Twist(0.0, 0.0))
 
 
 def test_the_arbiter_turns_there_before_it_drives_and_an_operator_drives_cautiously() -> None:

@@ -43,7 +43,7 @@ def look_round(walls: BlindWalls, x: float, y: float, normal_rad: float, offset_
 
 
 def sides(walls: BlindWalls, pose: Pose) -> tuple[Floats, Floats]:
-    return walls.sides(pose, pose.theta + MOUNTS[:, 2])
+    return walls.sides(pose, pose.theta + MOUNTS[:, 2])[:2]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -136,7 +136,7 @@ def test_beams_that_touch_leave_nothing_unknown() -> None:
     mounts = mounts_array(ring.mounts)
     assert has_blind_sides(mounts, math.radians(ring.beam_half_angle_deg))
     walls = BlindWalls(mounts, math.radians(ring.beam_half_angle_deg))
-    _, unknown = walls.sides(Pose(0.0, 0.0, 0.0), mounts[:, 2])
+    _, unknown, _ = walls.sides(Pose(0.0, 0.0, 0.0), mounts[:, 2])
     assert len(unknown) == 0
 
 
@@ -150,7 +150,7 @@ def test_a_robot_that_hears_nothing_and_turns_to_what_is_unknown_soon_knows_all(
         turns += 1
         pose = Pose(0.0, 0.0, theta)
         walls.update(Firing(0.0, pose, theta, np.full(3, math.inf)))
-        _, unknown = walls.sides(pose, theta + mounts[:, 2])
+        _, unknown, _ = walls.sides(pose, theta + mounts[:, 2])
         towards = np.remainder(unknown - theta + math.pi, math.tau) - math.pi
         towards = towards[np.cos(unknown - course) > 0.0]
         if not len(towards):
@@ -166,6 +166,21 @@ def test_a_wall_abeam_stays_as_the_robot_turns_past_it() -> None:
     for turned_deg in (60.0, 89.0, 91.0, 120.0, 180.0):
         points, _ = sides(walls, Pose(0.0, 0.0, math.radians(turned_deg)))
         assert np.abs(points - (1.0, 0.0)).max(axis=1).min() < 0.06
+
+
+def test_a_wall_is_presumed_from_elsewhere_until_it_is_looked_at() -> None:
+    walls = BlindWalls(MOUNTS, HALF)
+    look_round(walls, 0.0, 0.0, 0.0, 1.0)
+    away = math.radians(70.0)
+    here, on = Pose(0.0, 0.0, away), Pose(0.0, 1.5 * SILENT_WAY_M, away)
+    assert not len(walls.sides(here, here.theta + MOUNTS[:, 2])[2])
+    points, _, presumed = walls.sides(on, on.theta + MOUNTS[:, 2])
+    assert len(points)
+    assert presumed == pytest.approx(points)
+    look_round(walls, on.x, on.y, 0.0, 1.0)
+    points, _, presumed = walls.sides(on, on.theta + MOUNTS[:, 2])
+    assert len(points)
+    assert not len(presumed)
 
 
 def test_a_ring_that_fell_silent_looks_again_and_once_everywhere_if_that_lasts() -> None:
