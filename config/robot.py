@@ -263,6 +263,8 @@ class BodyConfig(Strict):
     """Largest angular acceleration, rad/s²."""
     synchro: bool = False
     """Synchro drive: the wheels turn, the body with its ring does not, but for sensors with `turns_with_wheels`."""
+    turns_at_start: bool = False
+    """Turn once on the spot before the first drive: sensors that are exchanged, backwards or deaf show then."""
 
 
 NO_BODY: Final = BodyConfig(radius_m=0.3, speed_max_m_s=10.0, turn_max_rad_s=20.0)

@@ -202,8 +202,15 @@ class CoarseRanges(_Lie):
     step_m: float = Field(default=0.25, gt=0.0)
 
 
-class TurnedRing(_Timed):
-    """The ring is mounted turned by this angle, counter-clockwise."""
+class ReportedSilence(_Lie):
+    """Sensors report this range where they hear nothing: 0, as some libraries do, or their greatest."""
+
+    kind: Literal["reported_silence"]
+    range_m: float = Field(default=0.0, ge=0.0)
+
+
+class TurnedRing(_Lie):
+    """The ring, or some of its sensors, each in its place, are mounted turned by this angle, counter-clockwise."""
 
     kind: Literal["turned_ring"]
     angle_deg: float = Field(default=90.0, ge=-360.0, le=360.0)
@@ -285,6 +292,7 @@ Fault: TypeAlias = (
     | ReplayedEchoes
     | DelayedEchoes
     | CoarseRanges
+    | ReportedSilence
     | TurnedRing
     | SwappedSensors
     | ClockError

@@ -22,6 +22,7 @@ from drivers.emulator.faults import (
     Outliers,
     RangeOffset,
     ReplayedEchoes,
+    ReportedSilence,
     SilentRing,
     StuckSensor,
     SwappedSensors,
@@ -40,6 +41,7 @@ KINDS: tuple[type[Fault], ...] = (
     Outliers,
     RangeOffset,
     ReplayedEchoes,
+    ReportedSilence,
     SilentRing,
     StuckSensor,
     SwappedSensors,
@@ -99,7 +101,8 @@ class FaultySonar:
         """
         faults = self._faults
         wired, active = self._wiring(), (*fired, *listeners)
-        turned = math.radians(sum(fault.angle_deg for fault in faults.all(TurnedRing)))
+        turned = math.radians(sum(fault.angle_deg for fault in faults.all(TurnedRing) if not fault.sensors))
+        self._sonar.turn_each(self._turns())
         mounted = Pose(pose.x, pose.y, pose.theta + turned) if turned else pose
         ranges = self._sonar.fire(
             mounted, ring_yaw + turned, [wired[i] for i in fired], window_m, [wired[i] for i in listeners]
@@ -119,6 +122,8 @@ class FaultySonar:
         self._fired[list(active)] += 1
         for silent in faults.all(SilentRing):
             ranges[self._those(silent.sensors) & (self._fired % silent.every == 0)] = math.inf
+        for reported in faults.all(ReportedSilence):
+            ranges[self._those(reported.sensors) & np.isinf(ranges)] = reported.range_m
         for coarse in faults.all(CoarseRanges):
             which = self._those(coarse.sensors)
             ranges[which] = coarse.step_m * np.round(ranges[which] / coarse.step_m)
@@ -139,6 +144,11 @@ class FaultySonar:
             if max(swap.first, swap.second) < self._sensors:
                 wired[[swap.first, swap.second]] = wired[[swap.second, swap.first]]
         return wired
+
+    def _turns(self) -> dict[int, float]:
+        """Return by how much each sensor that is turned by itself is, rad."""
+        turned = [fault for fault in self._faults.all(TurnedRing) if fault.sensors]
+        return {i: math.radians(fault.angle_deg) for fault in turned for i in fault.sensors if i < self._sensors}
 
     def _those(self, sensors: Iterable[int]) -> NDArray[np.bool_]:
         """Return a mask of these sensors, of all if there is none."""

@@ -7,7 +7,7 @@ same number of random numbers in the same order, so that the same seed gives the
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ class Sonar:
         self._acoustics = acoustics
         self._rng = rng
         self._mounts: Records = np.array(list(ring.mounts), dtype=MOUNT)
+        self._straight = self._mounts["angle"].copy()
         self._turning = ring.turning
         self._turning_poses = [Pose(*ring.mounts[i]) for i in ring.turning]
         self._half_angle = math.radians(ring.beam_half_angle_deg)
@@ -111,6 +112,12 @@ class Sonar:
         np.maximum(ranges, self._ring.range_min_m, out=ranges)
         ranges[~active] = math.nan
         return ranges
+
+    def turn_each(self, turns: Mapping[int, float]) -> None:
+        """Turn sensors, each in its place, by angles against the robot file, rad; the others look as it says."""
+        self._mounts["angle"] = self._straight
+        for sensor, angle in turns.items():
+            self._mounts["angle"][sensor] += angle
 
     @property
     def echoes(self) -> Records:

@@ -306,7 +306,8 @@ def weigh_own_repeat(
         return
     way = (x - c.own.x, y - c.own.y)
     is_turned = abs(axis - c.own.axis) > 2.0 * reception[0]
-    if not is_turned and may_be_wall(i, r, way, yaw, mounts, reception, echoes, path_m):
+    has_moved = path_m - c.own.path_m > reception[1]  # on the spot there is no path that a wall may go along
+    if has_moved and not is_turned and may_be_wall(i, r, way, yaw, mounts, reception, echoes, path_m):
         mark(c.own, c.own.range_m, x, y, axis, path_m)
     due = REPEAT_NAT * changes_due(i, look, c.own, yaw, mounts, reception, echoes, path_m)
     is_equal = r == c.own.range_m and winds(c, reception[1])

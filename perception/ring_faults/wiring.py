@@ -51,6 +51,10 @@ class Wiring(NamedTuple):
     """(n, n): evidence that sensors i < j are exchanged, and for i = j that the sensor looks backwards, nat."""
 
 
+DEAF: Final = 0.97
+"""Share of a deaf sensor's looks that are silent; others are strays."""
+
+
 @kernel
 def density(r: float, heard: float, reach: float) -> float:
     """Return the density of a reading where another sensor heard an echo, 1/m; of a silence the probability.
@@ -111,6 +115,94 @@ def beyond(r: float, offset: float) -> float:
 
 
 @kernel
+def find_near(i: int, judged: Floats, mounts: Floats, wiring: Wiring, near: Floats) -> int:
+    """Enter the looks of the other sensors from about the place of a look of sensor `i`; return how many there are.
+
+    A sensor that heard nothing in any of its looks may be deaf: it is no witness.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    judged : (LOOK_FIELDS,) float
+        Its look.
+    mounts, wiring, near
+        As for `weigh_wiring`.
+    """
+    count, size = 0, wiring.looks.shape[1]
+    for k in range(wiring.looks.shape[0]):
+        offset, seen = along_axis(mounts, k), min(wiring.counts[k], size)
+        hears = False
+        for m in range(seen):
+            hears = hears or (k != i and wiring.looks[k, m, 3] >= 0.0)
+        for m in range(seen):
+            look = wiring.looks[k, m]
+            if hears and math.hypot(look[1] - judged[1], look[2] - judged[2]) <= PLACE_M:
+                near[count, 0], near[count, 1] = k, (look[0] + mounts[k, 2]) % math.tau
+                near[count, 2] = beyond(look[3], offset)
+                count += 1
+    return count
+
+
+@kernel
+def weigh_place(
+    i: int, j: int, judged: Floats, mounts: Floats, reception: Reception, count: int, near: Floats
+) -> float:
+    """Return the evidence of a look that sensor `i` is in the place of `j`, or looks backwards if it is `j`, nat.
+
+    It is 0 unless others looked in both directions.
+
+    Parameters
+    ----------
+    i, j, judged, count, near
+        As of `find_near` and `heard_there`.
+    mounts, reception
+        As for `motion_tests.check_motion`.
+    """
+    half_angle, _, reach = reception
+    off, own, towards, r = AXIS_SHARE * half_angle, along_axis(mounts, i), judged[0], judged[3]
+    mounted = heard_there(i, j, (towards + mounts[i, 2]) % math.tau, off, count, near)
+    other, axis = -own, towards + mounts[i, 2] + math.pi
+    if i != j:
+        other, axis = along_axis(mounts, j), towards + mounts[j, 2]
+    there = heard_there(i, j, axis % math.tau, off, count, near)
+    if math.isnan(mounted + there):
+        return 0.0
+    return math.log(density(beyond(r, other), there, reach) / density(beyond(r, own), mounted, reach))
+
+
+@kernel
+def weigh_turn(mounts: Floats, reception: Reception, wiring: Wiring, near: Floats, nats: Floats) -> None:
+    """Weigh the looks of a whole turn in place, each against all the others.
+
+    Parameters
+    ----------
+    mounts, reception
+        As for `motion_tests.check_motion`.
+    wiring, near
+        As for `weigh_wiring`.
+    nats : (n, n + 1) float
+        Out: evidence that sensors i < j are exchanged, for i = j that the sensor looks backwards, and for j = n that
+        it is deaf, nat.
+    """
+    half_angle, _, reach = reception
+    n, size = wiring.looks.shape[0], wiring.looks.shape[1]
+    nats[:] = 0.0
+    for i in range(n):
+        own = along_axis(mounts, i)
+        for m in range(min(wiring.counts[i], size)):
+            judged = wiring.looks[i, m]
+            count = find_near(i, judged, mounts, wiring, near)
+            for j in range(n):
+                nats[min(i, j), max(i, j)] += weigh_place(i, j, judged, mounts, reception, count, near)
+            axis = (judged[0] + mounts[i, 2]) % math.tau
+            mounted = heard_there(i, i, axis, AXIS_SHARE * half_angle, count, near)
+            if mounted >= 0.0 or (judged[3] >= 0.0 and not math.isnan(mounted)):  # where all are silent, it may hear
+                deaf = DEAF if judged[3] < 0.0 else (1.0 - DEAF) / reach
+                nats[i, n] += math.log(deaf / density(beyond(judged[3], own), mounted, reach))
+
+
+@kernel
 def weigh_wiring(
     ranges: Floats, pose: RingPose, mounts: Floats, reception: Reception, wiring: Wiring, near: Floats, most: float
 ) -> int:
@@ -146,29 +238,10 @@ def weigh_wiring(
         if counts[i] <= LATER:
             continue
         judged = looks[i, (counts[i] - 1 - LATER) % size]
-        towards, r = judged[0], judged[3]
-        count = 0
-        for k in range(n):
-            offset = along_axis(mounts, k)
-            for m in range(min(counts[k], size)):
-                look = looks[k, m]
-                if k != i and math.hypot(look[1] - judged[1], look[2] - judged[2]) <= PLACE_M:
-                    near[count, 0], near[count, 1] = k, (look[0] + mounts[k, 2]) % math.tau
-                    near[count, 2] = beyond(look[3], offset)
-                    count += 1
-        off = AXIS_SHARE * half_angle
-        own = along_axis(mounts, i)
+        count = find_near(i, judged, mounts, wiring, near)
         for j in range(n):
-            mounted = heard_there(i, j, (towards + mounts[i, 2]) % math.tau, off, count, near)
-            other, axis = -own, towards + mounts[i, 2] + math.pi
-            if i != j:
-                other, axis = along_axis(mounts, j), towards + mounts[j, 2]
-            there = heard_there(i, j, axis % math.tau, off, count, near)
-            if math.isnan(mounted + there):
-                continue
-            honest = density(beyond(r, own), mounted, reach)
-            nats = math.log(density(beyond(r, other), there, reach) / honest)
             first, second = min(i, j), max(i, j)
+            nats = weigh_place(i, j, judged, mounts, reception, count, near)
             exchanged_nat[first, second] = max(-most, exchanged_nat[first, second] + nats)
             if exchanged_nat[first, second] >= most:
                 found = first * n + second

@@ -52,6 +52,7 @@ from runtime.cycle.line_messages import blind_reason
 from runtime.cycle.modes import ARMING_MAX_S, Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.stalled_drives import DriveMemory
+from runtime.cycle.start_turn import StartTurn
 from runtime.cycle.unheard_limit import limit_unheard, lost_ahead
 from runtime.cycle.velocity_limits import ZoneLimits, wants_map, way_refused, zone_limits
 from runtime.timing.phases import Phase, ignore_phase
@@ -117,6 +118,7 @@ class State(DriveState):
     motion_monitor: Annotated[MotionMonitor, CONSISTENT] = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
     echo_watch: EchoWatch = field(default_factory=EchoWatch)
+    start_turn: StartTurn = field(default_factory=StartTurn)
     clock_monitor: ClockMonitor = field(default_factory=ClockMonitor)
     """Whether the robot's clock keeps time."""
     ring_problem: str | None = None
@@ -222,9 +224,8 @@ def _perceive(state: State, inputs: Inputs, settings: Settings) -> int:
     """Return how many segments the received firings gave: the part of perception that always runs."""
     if inputs.received.rebooted:
         state.perception.reset()
-        state.odometry = None
+        state.odometry = state.leg = None
         state.motion_monitor, state.clock_monitor, state.echo_watch = MotionMonitor(), ClockMonitor(), EchoWatch()
-        state.leg = None
         state.drive_request = after_reboot(state.drive_request)  # a goal is a place in the odometry before the reboot
         state.last_firing_robot_s = 0.0
         state.void_places = settings.places if settings.places_frame == "odom" else None
@@ -368,8 +369,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             last = commands[-1].twist if commands else STANDSTILL
             twist, by_zone = zones.applied(twist, last, result.state.drive_request, odometry, age_s, settings)
             slowed = slowed or by_zone
+        state.start_turn, twist, turns = state.start_turn.apply(
+            twist, odometry.pose, state.drive_request, settings, state.perception.ring_monitor.judge_turn
+        )
         twist, waits = commit(result.state, twist, state.requested_run_s, inputs.run_s)
-        decision, reason = Drive(twist), reason or slowed or waits
+        decision, reason = Drive(twist), turns or reason or slowed or waits
     state.vectors, state.hold_reason = result.vectors, reason
     state.take_over(result.state)
     return decision

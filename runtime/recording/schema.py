@@ -25,6 +25,7 @@ from runtime.cycle.echo_watch import EchoWatch
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import MotionMonitor
 from runtime.cycle.stalled_drives import DriveMemory
+from runtime.cycle.start_turn import StartTurn
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import ObjectRow
 
@@ -217,6 +218,7 @@ _ADDED: Final = MappingProxyType(
         "motion_monitor": MotionMonitor(),
         "clock_monitor": ClockMonitor(),
         "echo_watch": EchoWatch(is_over=True),
+        "start_turn": StartTurn(is_over=True),
         "goal_place": None,
         "goal_drive": None,
         "trail": (),

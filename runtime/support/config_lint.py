@@ -9,7 +9,7 @@ from config.settings import Settings
 from drivers.capabilities import missing
 from drivers.registry import capabilities
 from runtime.support.blind_sides import blind_notes
-from runtime.support.pattern_check import gap_note, pattern_speed_m_s
+from runtime.support.pattern_check import crosstalk_note, gap_note, pattern_speed_m_s
 
 
 def lint_settings(settings: Settings) -> list[str]:
@@ -60,5 +60,7 @@ def lint_settings(settings: Settings) -> list[str]:
             f"behaviors.avoid_static_obstacle.echo_age_max_s = {avoid.echo_age_max_s:g}: the robot stops until that "
             "sensor answers again; fire more sensors at a time, or let beams overlap"
         )
+    if (crosstalk := crosstalk_note(settings.ring)) is not None:
+        warnings.append(crosstalk)
     lacks = missing(capabilities(settings)).values()
     return [*warnings, *(f"robot.driver = {settings.robot.driver}: {text}" for text in lacks), *blind_notes(settings)]

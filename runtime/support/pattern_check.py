@@ -7,6 +7,7 @@ that it ever leaves: those of sensors that are just about to report again.
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -18,15 +19,20 @@ from behaviors.surroundings.field_of_view import (
     seen_speed_m_s,
     unseen_way,
 )
-from config.robot import NO_BODY
+from config.robot import NO_BODY, RingConfig
 from config.settings import Settings
-from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensors, time_of_flight_s
+from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensor_masks, sensors, time_of_flight_s
 from drivers.registry import make_driver
 from perception.percept import FieldOfView, Floats, Percept, Pose
 from perception.sensor_mounts import mounts_array, reach_m
 
 CRAWL_SHARE: Final = 0.1
 """Least share of the base velocity that a pattern must allow; a robot that is slower stands more than it drives."""
+HEARING_LOBE: Final = 2.0
+"""How far off its axis a sensor hears another one's pulse, in beam half angles: as the emulator's
+(`drivers.emulator.sonar.LISTENING_LOBE`), since reception alone is off axis."""
+ROUNDING_RAD: Final = 1e-6
+PAIRS_NAMED_MAX: Final = 4
 
 
 def refuse_undrivable(settings: Settings) -> None:
@@ -127,6 +133,35 @@ def _gap_note(settings: Settings, course_rad: float) -> str:
         f"ring: no beam covers {' and '.join(gaps)} (counter-clockwise from the ring's front), and the path needs "
         f"every direction within {path_deg:.0f}° of the way: the robot may turn, but never drives there; "
         f"{ring_that_drives(beam_deg, path_deg)}, or correct ring.beam_half_angle_deg or body.radius_m"
+    )
+
+
+def crosstalk_note(ring: RingConfig) -> str | None:
+    """Return which sensors that fire together look so nearly the same way that one hears the other's pulse, or None.
+
+    Of a wall far away the pulse leaves in the direction in which it returns: within the beam of the one, and within
+    `HEARING_LOBE` of the other's.
+    """
+    if ring.has_servo:
+        return None
+    apart_rad = (1.0 + HEARING_LOBE) * math.radians(ring.beam_half_angle_deg)
+    axes = [mount.angle_rad for mount in ring.mounts]
+    pairs = sorted(
+        {
+            (first, second)
+            for mask in sensor_masks(ring)
+            for first, second in combinations(sensors(mask), 2)
+            if abs(math.remainder(axes[first] - axes[second], math.tau)) < apart_rad - ROUNDING_RAD
+        }
+    )
+    if not pairs:
+        return None
+    shown = ", ".join(f"{first} and {second}" for first, second in pairs[:PAIRS_NAMED_MAX])
+    more = " …" if len(pairs) > PAIRS_NAMED_MAX else ""
+    return (
+        f"ring.firing: sensors {shown}{more} fire together and look less than {math.degrees(apart_rad):.0f}° apart, "
+        "so that one hears the other's pulse as an echo that is too short (crosstalk): put them into different sets, "
+        'or fire one at a time, preset = "single"; `echolocate ring-test` measures it'
     )
 
 

@@ -116,6 +116,7 @@ def test_an_offset_keeps_to_the_window(offset_m: float, ranges: list[float]) -> 
 def test_a_share_of_the_readings_is_dropped() -> None:
     missing = lies("dropped_readings", 5, share=0.5)
     assert {ranges[1] for ranges in missing} == {None, 1.0}
+    assert lies("reported_silence", 1, range_m=4.0) == [[1.98, 1.0, 3.02, 4.0]]
     silent = lies("dropped_readings", 5, share=0.5, silent=True)
     assert {ranges[1] for ranges in silent} == {math.inf, 1.0}
     assert lies("dropped_readings", 1, share=1.0) == [4 * [None]]
@@ -124,6 +125,7 @@ def test_a_share_of_the_readings_is_dropped() -> None:
 
 def test_a_turned_ring_and_swapped_sensors_hear_what_others_should() -> None:
     assert lies("turned_ring", 1, angle_deg=90.0) == [[1.0, 3.02, math.inf, 1.98]]
+    assert lies("turned_ring", 1, sensors=[3], angle_deg=180.0) == [[1.98, 1.0, 3.02, 1.2]]
     assert lies("swapped_sensors", 1, first=0, second=2) == [[3.02, 1.0, 1.98, math.inf]]
     bench = Bench(lie("swapped_sensors", at_s=0.0, first=0, second=2))
     assert bench.fire([2, 1]) == [2.0, 1.0]

@@ -12,8 +12,9 @@ from config.robot import RingConfig
 from config.world import AcousticsConfig, DrumConfig, WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
+from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Pose
-from perception.ring_faults.monitor import RingMonitor, wiring_reason
+from perception.ring_faults.monitor import RingMonitor, deaf_reason, wiring_reason
 from perception.ring_faults.wiring import AGREES, SENSORS_MAX, SILENT, SILENT_TOO, density
 
 pytestmark = pytest.mark.compiled
@@ -80,6 +81,50 @@ def test_an_honest_ring_is_not_said_to_be_wired_wrongly(robot: str, model: str) 
     assert [problem(robot, model, None, seed, turns=6.0) for seed in range(4)] == [None] * 4
 
 
+def turned_once(robot: str, model: str, fault: tuple[int, int] | None, seed: int) -> str | None:
+    """Return what is found in one turn on the spot; a fault (i, −1) is a deaf sensor."""
+    nominal, rng = load_robot(robot).ring, np.random.default_rng(seed)
+    true = nominal if fault is None or fault[1] < 0 else rewired(nominal, *fault)
+    acoustics = AcousticsConfig.model_validate({"model": model, "noise_relative": 0.01, "dropout": 0.05})
+    sonar, monitor = Sonar(true, compile_scene(ROOM), acoustics, rng), RingMonitor(nominal)
+    masks, begin, agrees = firing_pattern(nominal).masks, float(rng.uniform(-3.0, 3.0)), True
+    step = math.radians(nominal.beam_half_angle_deg) / len(masks)
+    for k in range(round(math.tau / step)):
+        pose = Pose(0.3, -0.2, begin + k * step)
+        ranges = sonar.fire(pose, pose.theta, sensors(masks[k % len(masks)]), nominal.window_m)
+        if fault is not None and fault[1] < 0 and not math.isnan(ranges[fault[0]]):
+            ranges[fault[0]] = math.inf
+        monitor.observe(Firing(0.05 * (k + 1), pose, pose.theta, ranges))
+        if (found := monitor.take_problem()) is not None:
+            return found
+    agrees = monitor.judge_turn()
+    found = monitor.take_problem()
+    assert agrees is (found is None)
+    return found
+
+
+@pytest.mark.parametrize("model", ["specular", "cone"])
+@pytest.mark.parametrize("robot", ["hobby3", "hobby8", "parking12"])
+def test_a_turn_on_the_spot_names_each_fault_of_the_wiring(robot: str, model: str) -> None:
+    assert [turned_once(robot, model, None, seed) for seed in range(4)] == [None] * 4
+    for i in range(3):
+        assert turned_once(robot, model, (i, -1), i) == deaf_reason(i)
+        assert turned_once(robot, model, (i, i), i) == wiring_reason(i, i)
+        first, second = sorted((i, (i + 1) % 3))
+        assert turned_once(robot, model, (first, second), i) == wiring_reason(first, second)
+
+
+def test_where_nothing_echoes_a_turn_names_nothing() -> None:
+    monitor = RingMonitor(load_robot("hobby3").ring)
+    for k in range(80):
+        yaw = 0.08 * k
+        ranges = np.full(3, math.nan)
+        ranges[k % 3] = math.inf
+        monitor.observe(Firing(0.05 * k, Pose(0.0, 0.0, yaw), yaw, ranges))
+    assert monitor.judge_turn()
+    assert monitor.take_problem() is None
+
+
 @pytest.mark.parametrize("heard", [2.0, -1.0])
 def test_a_density_of_readings_sums_to_one(heard: float) -> None:
     at = (np.arange(5000) + 0.5) * REACH_M / 5000
@@ -93,5 +138,6 @@ def test_large_rings_are_not_tested() -> None:
     ring = load_robot("denning").ring
     assert len(ring.mounts) > SENSORS_MAX
     monitor = RingMonitor(ring)
+    assert monitor.judge_turn()
     assert monitor.observe(Firing(0.05, Pose(0.0, 0.0, 1.0), 1.0, np.full(len(ring.mounts), 2.0))) is None
     assert monitor.take_problem() is None
