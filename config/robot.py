@@ -267,6 +267,8 @@ class BodyConfig(Strict):
     """Turn once on the spot before the first drive: sensors that are exchanged, backwards or deaf show then."""
 
 
+BY_HAND_MAX: Final = 16
+"""Greatest ring that counts as wired by hand: its sensors may be exchanged, or fire together as they should not."""
 NO_BODY: Final = BodyConfig(radius_m=0.3, speed_max_m_s=10.0, turn_max_rad_s=20.0)
 """Of a robot file without a body, which is good for replays and stands; a run refuses it. A replay takes what moves a
 ring for wrong units only beyond these speeds."""

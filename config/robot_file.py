@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Final
 
-from config.robot import SOUND_SPEED_M_S
+from config.robot import BY_HAND_MAX, SOUND_SPEED_M_S
 
 ARRAY: Final = 8
 """Sensors of an array of a Pioneer, and of a bank that is written for an rFLEX controller; of each, one fires."""
@@ -71,11 +71,18 @@ radius_m = {draft.body_radius_m:g}
 speed_max_m_s = {draft.speed_max_m_s:g}
 turn_max_rad_s = {draft.turn_max_rad_s:g}
 synchro = {str(draft.synchro).lower()}  # true: the wheels turn, body and ring do not
-
+{start_turn(_count(draft)) if draft.driver == "denning" and not draft.synchro else ""}
 [link]
 {f"port = {_quoted(port)}" if port else '# port = "/dev/ttyUSB0"  # or name it at the start: echolocate run --port'}
 baud = {baud}
 {ARCOS_LINK if draft.driver == "arcos" else ""}"""  # noqa: E501 - the file's own lines
+
+
+def start_turn(sensors: int) -> str:
+    """Return the line of a body whose sensors are wired by hand; none where a turn on the spot would show nothing."""
+    if not 2 <= sensors <= BY_HAND_MAX:
+        return ""
+    return "turns_at_start = true  # once, on the spot: a sensor that is deaf, exchanged or backwards shows then\n"
 
 
 def _mounting(draft: RobotDraft) -> str:
@@ -88,9 +95,13 @@ def _mounting(draft: RobotDraft) -> str:
     )
 
 
+def _count(draft: RobotDraft) -> int:
+    return len(draft.sensors) if draft.sensors is not None else draft.count or 0
+
+
 def _own_section(draft: RobotDraft) -> str:
     """Return the section of the driver's own, with values to be measured."""
-    count = len(draft.sensors) if draft.sensors is not None else draft.count or 0
+    count = _count(draft)
     match draft.driver:
         case "arcos":
             return (

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from config.errors import WRONG_CALL, UserError
 from config.robot import RobotConfig
+from config.robot_file import start_turn
 from drivers.firing_pattern import firing_pattern, sensor_masks, sensors
 
 Board: TypeAlias = Literal["pico", "esp32"]
@@ -173,7 +174,7 @@ speed_max_m_s = {_SPEED_SHARE * values["SPEED_MAX_MM_S"] / 1e3:g}
 turn_max_rad_s = {_SPEED_SHARE * values["TURN_MAX_MRAD_S"] / 1e3:g}
 acceleration_max_m_s2 = {values["ACCELERATION_MM_S2"] / 1e3:g}
 turn_acceleration_max_rad_s2 = {values["TURN_ACCELERATION_MRAD_S2"] / 1e3:g}
-
+{"" if values["SERVOS"] else start_turn(count)}
 [link]
 baud = {115200 if values["LINE"] is None else values["LINE"][3]}
 """

@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from config.robot import BY_HAND_MAX
 from perception.kernel import Floats, Ints, kernel
 from perception.ring_faults.memory import NO_ECHO_M, Reception
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
 
-SENSORS_MAX: Final = 16
-"""Greatest ring that is tested: the work grows with the third power of its sensors, and larger rings are not wired by
-hand."""
+SENSORS_MAX: Final = BY_HAND_MAX
+"""Greatest ring that is tested: the work grows with the third power of its sensors."""
 LOOKS: Final = 32
 """Looks of each sensor that are kept, a quarter of the beam apart or more: a turn by 240° of beams of 30°."""
 LATER: Final = 8

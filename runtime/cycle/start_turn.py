@@ -33,14 +33,20 @@ class StartTurn:
     """Direction of the robot in the cycle before, rad; None before the first one."""
 
     def apply(
-        self, twist: Twist, pose: Pose, request: DriveRequest, settings: Settings, judge: Callable[[], bool]
+        self,
+        twist: Twist,
+        why: str | None,
+        pose: Pose,
+        request: DriveRequest,
+        settings: Settings,
+        judge: Callable[[], bool],
     ) -> tuple[StartTurn, Twist, str | None]:
         """Return the turn after a cycle, the velocity, and why it is another one than was decided.
 
         Parameters
         ----------
-        twist
-            What was decided on. The turn begins once the robot is to move.
+        twist, why
+            What was decided on, and why it is slow, if it is. The turn begins once the robot is to move.
         pose
             The robot's by its odometry.
         request
@@ -53,9 +59,9 @@ class StartTurn:
         """
         body = settings.body
         if self.is_over or not body.turns_at_start or body.synchro or isinstance(request, Teleoperate):
-            return self, twist, None
+            return self, twist, why
         if self.yaw_rad is None and twist == STANDSTILL:
-            return self, twist, None
+            return self, twist, why
         step_rad = 0.0 if self.yaw_rad is None else abs(math.remainder(pose.theta - self.yaw_rad, math.tau))
         turned = replace(self, turned_rad=self.turned_rad + step_rad, yaw_rad=pose.theta)
         if turned.turned_rad >= math.tau:

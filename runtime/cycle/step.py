@@ -369,11 +369,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             last = commands[-1].twist if commands else STANDSTILL
             twist, by_zone = zones.applied(twist, last, result.state.drive_request, odometry, age_s, settings)
             slowed = slowed or by_zone
-        state.start_turn, twist, turns = state.start_turn.apply(
-            twist, odometry.pose, state.drive_request, settings, state.perception.ring_monitor.judge_turn
+        state.start_turn, twist, slowed = state.start_turn.apply(
+            twist, slowed, odometry.pose, state.drive_request, settings, state.perception.ring_monitor.judge_turn
         )
         twist, waits = commit(result.state, twist, state.requested_run_s, inputs.run_s)
-        decision, reason = Drive(twist), turns or reason or slowed or waits
+        decision, reason = Drive(twist), reason or slowed or waits
     state.vectors, state.hold_reason = result.vectors, reason
     state.take_over(result.state)
     return decision

@@ -19,7 +19,7 @@ from behaviors.surroundings.field_of_view import (
     seen_speed_m_s,
     unseen_way,
 )
-from config.robot import NO_BODY, RingConfig
+from config.robot import BY_HAND_MAX, NO_BODY, RingConfig
 from config.settings import Settings
 from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensor_masks, sensors, time_of_flight_s
 from drivers.registry import make_driver
@@ -142,7 +142,7 @@ def crosstalk_note(ring: RingConfig) -> str | None:
     Of a wall far away the pulse leaves in the direction in which it returns: within the beam of the one, and within
     `HEARING_LOBE` of the other's.
     """
-    if ring.has_servo:
+    if ring.has_servo or ring.sensor_count > BY_HAND_MAX:
         return None
     apart_rad = (1.0 + HEARING_LOBE) * math.radians(ring.beam_half_angle_deg)
     axes = [mount.angle_rad for mount in ring.mounts]

@@ -37,7 +37,7 @@ def applied(
     *,
     agrees: bool = True,
 ) -> tuple[StartTurn, Twist, str | None]:
-    return turn.apply(twist, Pose(0.0, 0.0, theta), request or Legs(), settings, lambda: agrees)
+    return turn.apply(twist, None, Pose(0.0, 0.0, theta), request or Legs(), settings, lambda: agrees)
 
 
 @pytest.mark.parametrize("agrees", [True, False])

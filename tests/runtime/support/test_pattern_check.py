@@ -13,6 +13,7 @@ from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError, firing_pattern
 from runtime.support.pattern_check import (
     courses_rad,
+    crosstalk_note,
     gap_note,
     longest_gaps_s,
     pattern_speed_m_s,
@@ -121,3 +122,12 @@ def test_beams_that_just_touch_are_no_gap_of_a_ring_that_has_one() -> None:
     note = gap_note(load_settings("hallway", [f"ring.sensors={sensors}"], robot="hobby3"))
     assert note is not None
     assert "no beam covers -180° to -15° (" in note
+
+
+@pytest.mark.parametrize(("sets", "pairs"), [("[[0, 1], [2]]", "0 and 1"), ("[[0, 2, 1]]", "0 and 1, 1 and 2")])
+def test_neighbours_that_fire_together_are_named(sets: str, pairs: str) -> None:
+    """By itself ring-test hears it only where a surface returns the other's pulse."""
+    note = crosstalk_note(load_settings("hallway", [f"ring.firing={{sets={sets}}}"], robot="hobby3").ring)
+    assert note is not None
+    assert f"sensors {pairs} fire together and look less than 45° apart" in note
+    assert crosstalk_note(load_settings("hallway", ["ring.firing={sets=[[0, 2], [1]]}"], robot="hobby3").ring) is None
