@@ -185,7 +185,7 @@ class BlindWalls:
         (u,) float
             The directions of which nothing is known, in the odometry's frame, rad.
         (p, 2) float
-            Those of the feet that are presumed: the robot has driven on since it heard the wall, m. Of a rough thing
+            Those of the feet that are presumed: the robot has driven on since it heard the wall, m. Of a rough object
             or the end of a wall the ring heard something else.
         """
         directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
