@@ -354,8 +354,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             state.goal_drive, state.drive_memory = None, DriveMemory()  # standing here is no lack of progress
             return Drive(STANDSTILL)
     result = drive(state, percept, settings, Moment(inputs.run_s, gap_s, map_frame, zones))
-    state.percept = percept
-    decision, reason = result.decision, result.hold_reason
+    state.percept, decision, reason = percept, result.decision, result.hold_reason
     if isinstance(decision, Unseen):
         driven_s = inputs.run_s - state.mode.entered_run_s
         if min(decision.age_s - age_max_s, driven_s) <= age_max_s:
