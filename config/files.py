@@ -278,12 +278,14 @@ def await_data(file: FileIO) -> None:
 
 @contextlib.contextmanager
 def in_place_of(path: Path, data: bytes) -> Iterator[None]:
-    """Read other bytes in place of a settings file during the block, to find out what a change would mean.
+    """Let `read_file` return other bytes than a file holds, to find out what a change of it would mean.
+
+    The file itself is not changed. One file at a time: an inner block hides the outer one.
 
     Parameters
     ----------
     path : Path
-        Absolute.
+        Absolute; compared as it is written, without following links.
     data : bytes
         What the file is taken to hold.
     """

@@ -358,9 +358,9 @@ def _robot_layer(names: Layers) -> tuple[Layers, list[str]]:
 def _lay_named(kind: Kind, key: str, names: Layers, settings: Layers) -> list[str]:
     """Lay the table of a world or a mission, and return its problems."""
     named_by, name = names.source_of((key,)), names.tree[key]
-    table, source, problems = _named_table(kind, key, name, named_by)
+    table, source, problems = _named_table(kind, (key,), name, named_by)
     if not problems:
-        settings.put((key,), table, source if source is named_by else source.mounted((key,)))
+        settings.put((key,), table, source)
     return problems
 
 
@@ -376,24 +376,38 @@ def _lay_models(names: Layers, settings: Layers) -> list[str]:
     problems = []
     for i, model in enumerate(models):
         named_by = names.source_of(("models", i))
-        table, source, more = _named_table("models", f"models.{i}", model, named_by)
+        table, source, more = _named_table("models", ("models", i), model, named_by)
         if not more:
-            settings.put(("models", i), table, source if source is named_by else source.mounted(("models", i)))
+            settings.put(("models", i), table, source)
         problems += more
     return problems
 
 
-def _named_table(kind: Kind, key: str, value: object, named_by: Source) -> tuple[dict[str, Any], Source, list[str]]:
-    """Return the table that `value` is or names, its source, and its problems."""
+def _named_table(
+    kind: Kind, at: Location, value: object, named_by: Source
+) -> tuple[dict[str, Any], Source, list[str]]:
+    """Return the table that `value` is or names, its source, and why it cannot be had; then the table is empty.
+
+    Parameters
+    ----------
+    kind
+        What the table describes.
+    at
+        Where the value stands in the tree of all settings; there a named file's table is mounted.
+    value
+        A table, or the name of a file.
+    named_by
+        Where the value stands, and so the source of a table that is given there.
+    """
     if isinstance(value, dict):
         return value, named_by, []
     if not isinstance(value, str):
-        return {}, named_by, [_not_a_name(key, value, named_by)]
+        return {}, named_by, [_not_a_name(dotted(at), value, named_by)]
     try:
         document = read_document(kind, value, named_by)
     except ConfigError as error:
         return {}, named_by, list(error.problems)
-    return document.table, document.source, []
+    return document.table, document.source.mounted(at), []
 
 
 def _not_a_name(key: str, value: object, source: Source) -> str:

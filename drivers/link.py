@@ -50,6 +50,8 @@ _FLUSH_POLL_S = 0.002
 class Link:
     """A serial line that is kept open.
 
+    Nothing is opened before `open_once` or `run`. A failed opening calls no handler: see `last_error`.
+
     Parameters
     ----------
     config
@@ -58,9 +60,9 @@ class Link:
         Called in the loop: the line is open; bytes arrived; the line is lost, with the reason. An exception in one of
         them ends the line, not the program; the line is opened again after a wait.
     opener
-        Opens the port, in a thread; tests replace it.
+        Opens the port, in a thread. A family with a line of its own replaces it (`drivers.registry.line_options`).
     open_timeout_s
-        Longest time to open the port.
+        Longest time to open the port, s.
     """
 
     def __init__(

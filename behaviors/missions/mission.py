@@ -121,7 +121,9 @@ def held(mission: Mission, reason: str) -> Mission:
 
 
 def after_stop(mission: Mission, *, bumper: bool) -> Mission:
-    """Return what remains of a mission when the robot leaves DRIVE: it is held, at the step that a contact leads to.
+    """Return a mission after the robot has left DRIVE: held, at the step that its condition on a contact names.
+
+    Where that condition leads to no further step, the mission ends. One that does not run is returned unchanged.
 
     Parameters
     ----------

@@ -229,7 +229,9 @@ def ranges_of(echo: Echo | Echo2 | Echo3, views: ServoViews, unit_m: float = TEN
 
 
 def cross_paths_of(echo: Echo | Echo2 | Echo3, axes: tuple[float, ...], unit_m: float) -> CrossPaths | None:
-    """Return what the listeners of a firing heard; None if no sensor listened.
+    """Return what the listeners of a firing heard: half paths, m, inf where no echo came.
+
+    None if no listener that works is left, and for an ECHO or ECHO3, which have none.
 
     Parameters
     ----------

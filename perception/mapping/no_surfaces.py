@@ -74,10 +74,7 @@ class NoSurfaces:
         archived: tuple[DetectedObject, ...],
         known: Callable[[], tuple[DetectedObject, ...]],  # noqa: ARG002 - other maps need it
     ) -> tuple[DetectedObject, ...]:
-        """Return what is shown of the objects left behind, which may be many; the same tuple until it changes.
-
-        `known` as for `report`.
-        """
+        """Return all archived objects: no surface replaces or refutes one."""
         return archived
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:

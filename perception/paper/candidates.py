@@ -243,8 +243,12 @@ class Candidates:
         self.rows["number"] = 0
 
     def _place(self, j: int, clusters: Clusters, outline: OutlineMap, first: int = 0) -> None:
-        """Put each model from `first` on at a cluster: its centroid at the centre, its bulge towards the sensors."""
-        normals = outline.segments[clusters.members(j), 4]
+        """Overwrite the candidates of cluster `j`, of the models from index `first` on, with new ones.
+
+        The centroid is at the cluster's centre; an open outline bulges towards the sensors, a closed one lies along
+        the segments. Each gets a new number and all its iterations.
+        """
+        normals = outline.segments[clusters.members(j), 4]  # directions away from the sensors
         towards_sensors = math.atan2(-np.sin(normals).sum(), -np.cos(normals).sum())
         along_sides = 0.5 * math.atan2(np.sin(2.0 * normals).sum(), np.cos(2.0 * normals).sum())
         for m, model in list(enumerate(self._models))[first:]:

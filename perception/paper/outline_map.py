@@ -112,7 +112,7 @@ class OutlineMap:
     Attributes
     ----------
     segments : (capacity, 5) float
-        End points x1, y1, x2, y2 (m) and direction of the normal (rad).
+        End points x1, y1, x2, y2 (m) and direction of the normal (rad), away from the sensors.
     times : (capacity,) float
         When each segment was completed, s.
     status : (capacity,) int

@@ -291,7 +291,7 @@ def weigh_own_repeat(
     echoes: Records[EchoTrace],
     path_m: float,
 ) -> None:
-    """Test whether a sensor repeats its own reading, whatever the others hear.
+    """Update the evidence that a sensor repeats its own reading, whatever the others hear: `own`, `stuck_nat`.
 
     Parameters
     ----------
@@ -325,20 +325,30 @@ def weigh_repeat(
     echoes: Records[EchoTrace],
     ring: Records[RingTrace],
 ) -> None:
-    """Test whether all readings of the ring repeat; a reading ahead that differs from the last one ends that.
+    """Update the evidence that the ring repeats old readings by a sensor's reading: `echoes[i]` and `ring[0]`.
+
+    A *standstill* is a stretch in which no reading ahead changes, not one of the robot. A reading ahead that has
+    changed begins a new one, which clears the ring's evidence; one elsewhere takes its sensor's share back. Called
+    once for each reading, after it was entered in `echoes` as the latest, and before `weigh_look`.
 
     Parameters
     ----------
     i : int
         The sensor.
     look : Look
-        Its reading, entered in `echoes`, its place and direction.
-    yaw, mounts, echoes, ring
-        As for `check_motion`.
+        Its reading, its place and direction.
+    yaw : float
+        The ring's direction, rad.
+    is_ahead : bool
+        Whether the sensor looks in the direction of travel.
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
     reception : Reception
         What the ring hears.
-    is_ahead : bool
-        Whether it looks in the direction of travel.
+    echoes : (n,) record of `EchoTrace`
+        What each sensor has heard.
+    ring : (1,) record of `RingTrace`
+        What the ring has heard.
     """
     c, all_of = echoes[i], ring[0]
     r, x, y, axis = look

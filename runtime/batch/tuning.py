@@ -133,7 +133,7 @@ class Tuner:
         UserError
             The present settings give no figure to compare with.
         """
-        (present,) = self._try([{}])
+        (present,) = self._run_trials([{}])
         if not math.isfinite(present.cost):
             raise UserError(
                 f"the present settings have no result for {self._study.objectives[0]} in every run: "
@@ -143,7 +143,7 @@ class Tuner:
         tried: list[Trial] = []
         while len(tried) < trials:
             asked = [search.ask() for _ in range(min(BATCH, trials - len(tried)))]
-            found = self._try([one.values for one in asked])
+            found = self._run_trials([one.values for one in asked])
             for one, trial in zip(asked, found, strict=True):
                 search.tell(one.number, trial.cost)
             tried += found
@@ -157,8 +157,11 @@ class Tuner:
     def _runs(self, *values: Values, held_out: bool = False) -> list[Run]:
         return trial_runs(self._study, self._base, values, held_out=held_out)
 
-    def _try(self, values: Sequence[Values]) -> list[Trial]:
-        """Run all values and return the trials in their order."""
+    def _run_trials(self, values: Sequence[Values]) -> list[Trial]:
+        """Run a trial for each set of values, all in one call of `make`, and return them in order.
+
+        A trial of which any run is missing costs inf and has no figures.
+        """
         each = [self._runs(one) for one in values]
         rows = self._make([run for runs in each for run in runs])
         trials = []
@@ -182,7 +185,7 @@ class Tuner:
         """
         kept = best
         for name in best.values:
-            (without,) = self._try([{other: value for other, value in kept.values.items() if other != name}])
+            (without,) = self._run_trials([{other: value for other, value in kept.values.items() if other != name}])
             if without.cost <= best.cost or self._is_as_good(without, best):
                 kept = without
         return kept

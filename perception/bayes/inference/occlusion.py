@@ -198,16 +198,28 @@ def is_relevant(
     var0: float,
     rel2: float,
 ) -> bool:
-    """Return whether a reading bears on a circle: it is not hidden, and no other circle explains it better.
+    """Return whether a reading is evidence for or against a circle.
+
+    A range that is too long by more than the gate counts, as a miss, unless another body hides the circle; any other
+    range counts unless another circle explains it better. A cross path counts only within the gate, and only if no
+    named circle must have answered sooner.
 
     Parameters
     ----------
-    others, p, q, var0, rel2
-        As for `is_explained_elsewhere`.
+    others : record of `OtherCircle`
+        The other circles near the reading, from `find_others`.
+    p : record of `Settings`
+        The ring's.
+    q : Reading
+        The reading.
     circle : (float, float, float)
         Centre x, y and radius of the circle, m.
-    d, e : float
-        Distance of the centre from the sensor, and the reading's error, m.
+    d : float
+        Distance of its centre from the sensor, m.
+    e : float
+        Measured less predicted range, m: above 0, the echo came from beyond the circle.
+    var0, rel2 : float
+        As for `is_explained_elsewhere`.
     """
     cx, cy, radius = circle
     if is_crossed(q) and (abs(e) > p[0].gate_m or answers_before(others, p, q)):

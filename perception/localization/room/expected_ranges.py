@@ -111,7 +111,7 @@ def _way_into(circles: Floats, x: Floats, y: Floats, ux: Floats, uy: Floats) -> 
 
 
 def _cone(room: Room, beams: Beams, half_angle: float) -> Expected:
-    """Return the distance of the nearest point of a wall inside each beam; see `expected_ranges`."""
+    """Return range and gradient of the nearest point of a wall inside each of (n,) beams; the room has a wall."""
     cos, sin = np.cos(beams.axis)[:, None], np.sin(beams.axis)[:, None]
     slope = np.tan(half_angle)
     ax, ay = room.walls[:, 0] - beams.x[:, None], room.walls[:, 1] - beams.y[:, None]
@@ -147,7 +147,7 @@ def _cone(room: Room, beams: Beams, half_angle: float) -> Expected:
 
 
 def _cone_of_circles(room: Room, beams: Beams, half_angle: float) -> Expected:
-    """Return the distance of the nearest point of a circle inside each beam; see `expected_ranges`."""
+    """Return range and gradient of the nearest point of a circle inside each of (n,) beams; the room has a circle."""
     px, py, gap = _fronts(room, beams.x[:, None], beams.y[:, None])
     in_beam = px * np.cos(beams.axis)[:, None] + py * np.sin(beams.axis)[:, None] >= gap * np.cos(half_angle)
     found = _nearest(px, py, np.where(in_beam, gap, np.inf))
@@ -224,7 +224,7 @@ def mirror_points(room: Room, x: Floats, y: Floats) -> tuple[Floats, Floats, Flo
 
 
 def _specular(room: Room, beams: Beams, half_angle: float) -> Expected:
-    """Return the distance of the nearest mirror point of each beam; see `expected_ranges`."""
+    """Return range and gradient of the nearest mirror point of each of (n,) beams; see `mirror_points`."""
     px, py, distance = mirror_points(room, beams.x, beams.y)
     cos, sin = np.cos(beams.axis)[:, None], np.sin(beams.axis)[:, None]
     beam, point = np.nonzero(px * cos + py * sin >= distance * np.cos(half_angle))

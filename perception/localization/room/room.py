@@ -30,8 +30,9 @@ class Room:
     offsets : (w,) float
         Normal · point for the points of each wall, m.
     corners : (c, 4) float
-        One row for each sector between two walls that meet: x, y (m), the direction in which the sector starts, and
-        its opening counter-clockwise (rad). Below π it is a concave corner, above a convex edge.
+        One row for each sector between successive walls that leave a point: x, y (m), the direction in which the
+        sector starts, and its opening counter-clockwise (rad). Below π it is a concave corner, above a convex edge;
+        2π at the free end of a wall.
     circles : (k, 3) float
         Centre x, y and radius of each round object, m.
     """
@@ -102,7 +103,7 @@ def room_of(world: WorldConfig) -> Room:
 
 
 def _sectors(walls: Floats, normals: Floats, offsets: Floats) -> Floats:
-    """Return the sectors at the ends of all walls; arguments and result as in `Room`."""
+    """Return `Room.corners`, of walls as in `Room`: straight continuations are left out."""
     rows: list[tuple[float, float, float, float]] = []
     seen: list[tuple[float, float]] = []
     for x, y in walls.reshape(-1, 2).tolist():

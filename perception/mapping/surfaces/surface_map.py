@@ -191,9 +191,16 @@ class SurfaceMap(NoSurfaces):
     def archived_shown(
         self, archived: tuple[DetectedObject, ...], known: Callable[[], tuple[DetectedObject, ...]]
     ) -> tuple[DetectedObject, ...]:
-        """Return what is shown of the objects left behind, which may be many; the same tuple until it changes.
+        """Return the archived objects without those that surfaces replace or refute.
 
-        `known` as for `report`.
+        They may be many, and this is asked often: another tuple than before is filtered, the same one is not.
+
+        Parameters
+        ----------
+        archived : tuple of DetectedObject
+            What the method left behind; the same tuple until that changes.
+        known : callable
+            As for `report`.
         """
         report = self.report(known)
         if self._archived is None or archived is not self._archived[0]:

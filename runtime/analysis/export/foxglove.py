@@ -7,7 +7,7 @@ what the bridge does not have: `/clusters` and the evidence grid.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Final, TypeVar
@@ -22,9 +22,10 @@ from runtime.analysis.export.foxglove_messages import Outline, RunChannels, line
 from runtime.analysis.export.shapes import CLUSTER, FiringScan, even_radius, firing_scans, truth_outlines, whole_ring
 from runtime.analysis.plots.cross_arcs import newest_cross_paths
 from runtime.analysis.plots.geometry import outline
-from runtime.analysis.timeline import LogEntry, RunSnapshot, Timeline
+from runtime.analysis.timeline import Cluster, LogEntry, RunSnapshot, Timeline
 
 CROSS_M: Final = 0.08
+"""Half the size of the cross at a cluster's centre, m."""
 
 T = TypeVar("T")
 
@@ -120,6 +121,7 @@ class _RunExporter:
             self._run.write_arc(Pose(row["x"], row["y"], row["bearing"]), half, row["range_m"], at)
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
+        """Write what perception had found, in `odom`, and where that is in the map; corners are not drawn."""
         settings = self._timeline.settings
         if snapshot.place is not None:
             self._run.write_frames([("map", "odom", snapshot.place.map_in_odom.inverse())], at)
@@ -127,28 +129,30 @@ class _RunExporter:
             newest = newest_cross_paths(self._timeline.cross_paths, snapshot.t_s)
             self._run.write_cross_paths(newest, math.radians(settings.ring.beam_half_angle_deg), at)
         self._run.write_segments(snapshot.segments.reshape(-1, 2).tolist(), at)
-        boxes = []
-        for c in snapshot.clusters:
-            corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
-            boxes.append(line(corners, CLUSTER, closed=True))
-            for up in (CROSS_M, -CROSS_M):
-                stroke = [(c.x - CROSS_M, c.y - up), (c.x + CROSS_M, c.y + up)]
-                boxes.append(line(stroke, CLUSTER, closed=False))
-        scene(self._clusters, "clusters", boxes, [], at)
+        scene(self._clusters, "clusters", _cluster_lines(snapshot.clusters), [], at)
         outlines = [outline(seen, self._models.get(seen.model), whole=self._whole) for seen in snapshot.objects]
         drawn: list[Outline] = [(points.tolist(), closed) for points, closed in outlines]
         drawn += [((wall.ends[:2], wall.ends[2:]), False) for wall in snapshot.walls if wall.ends is not None]
         polylines = [one.points.tolist() for one in snapshot.polylines]
-        labels = [
-            (seen.x, seen.y, object_label(number, seen.model, seen.score))
-            for number, seen in enumerate(snapshot.objects, 1)
-        ]
+        labels = [(seen.x, seen.y, object_label(seen.number, seen.model, seen.score)) for seen in snapshot.objects]
         self._run.write_objects(drawn, polylines, labels, at)
         if snapshot.grid is not None and snapshot.grid.percent.size:
             self._grid.log(_grid(snapshot.grid, at), log_time=at)
 
     def _write_log_entry(self, entry: LogEntry, at: int) -> None:
         self._run.write_log(entry.level, entry.text, at)
+
+
+def _cluster_lines(clusters: Iterable[Cluster]) -> list[fx.LinePrimitive]:
+    """Return the rectangle around each cluster, and a cross at its centre."""
+    lines = []
+    for c in clusters:
+        corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
+        lines.append(line(corners, CLUSTER, closed=True))
+        for up in (CROSS_M, -CROSS_M):
+            stroke = [(c.x - CROSS_M, c.y - up), (c.x + CROSS_M, c.y + up)]
+            lines.append(line(stroke, CLUSTER, closed=False))
+    return lines
 
 
 def _grid(known: KnownCells, at: int) -> fx.Grid:

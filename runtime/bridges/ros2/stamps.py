@@ -28,7 +28,9 @@ class StampClock:
         self._late_since_s = math.inf
 
     def update(self, robot_s: float, ros_s: float, host_s: float, *, is_steady: bool) -> str | None:
-        """Take in that a state of this robot's time arrived; return the message if a clock has jumped.
+        """Update the offset when a state arrives; return a message if a clock has jumped, else None.
+
+        `nanoseconds` needs it to have been called once.
 
         Parameters
         ----------
@@ -48,12 +50,14 @@ class StampClock:
             return None
         self._late_since_s = min(self._late_since_s, host_s) if offset_s - before_s > JUMP_S else math.inf
         stood_still = host_s - self._late_since_s > LATE_MAX_S
+        # A delay only raises the offset, so a fall is a jump; a rise is one if a clock was set, restarted or stood.
         has_jumped = abs(offset_s - before_s) > JUMP_S
         if has_jumped and (was_set or restarted or stood_still or offset_s < before_s):
             self._offset_s, self._late_since_s = offset_s, math.inf
             return (
                 f"clock jump: ROS time and the robot's clock differ by {offset_s - before_s:+.2f} s from before; the "
-                f"robot restarted, or the time of ROS or of this machine was set: stamps follow the new time"
+                f"robot restarted, its clock stood still, or the time of ROS or of this machine was set: stamps "
+                f"follow the new time"
             )
         self._offset_s = min(offset_s, before_s + DRIFT * max(0.0, elapsed_s))
         return None

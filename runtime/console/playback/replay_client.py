@@ -49,7 +49,7 @@ class ReplayProcess:
     on_frame : callable
         Gets each frame.
     on_answer : callable
-        Gets each answer but the first.
+        Gets each answer: progress of opening, and what follows it. The description is returned by `begin`.
     """
 
     def __init__(
@@ -138,6 +138,7 @@ class ReplayProcess:
         return last
 
     async def _read_all(self) -> None:
+        """Pass on frames and answers until the process ends, then say so; after `close` nothing is said."""
         with contextlib.suppress(asyncio.IncompleteReadError, OSError):
             while True:
                 kind, (source, number), (head, changes, whole) = await self._read()

@@ -287,13 +287,15 @@ def compare_with_settings(recording: Recording, settings: Settings, console: Con
 
 
 def errors_line(run: RunOutcome, units: Units) -> str:
-    """Return how far the objects are from the true drums in one line; only their number where these are unknown."""
+    """Return in one line how many drums of the true world were found, how many are false, and how far off they are.
+
+    Where the true world is not known, the line gives the number of objects alone.
+    """
     if run.errors_m is None:
         return f"{len(run.objects)} objects"
     found = [error for error in run.errors_m if error is not None]
-    mean = format_length(sum(found) / len(found), units, 4) if found else "none"
-    worst = format_length(max(found), units, 4) if found else "none"
-    return (
-        f"{len(found)} of {len(run.errors_m)} drums, {run.false} false; "
-        f"mean error {mean} {units}, worst {worst} {units}"
-    )
+    line = f"{len(found)} of {len(run.errors_m)} drums, {run.false} false"
+    if not found:
+        return line
+    mean, worst = (format_length(error, units, 4) for error in (sum(found) / len(found), max(found)))
+    return f"{line}; mean error {mean} {units}, worst {worst} {units}"

@@ -42,12 +42,12 @@ def ring_test(
     import asyncio
 
     from config.load import load_settings
-    from runtime.cli.commands.robots.ring_trial import RingTest, one_at_a_time, only_port
+    from runtime.cli.commands.robots.ring_trial import RingTest, only_port, with_single_firing
 
     if rounds < 1:
         raise UserError("--rounds: must be at least 1", WRONG_CALL)
     config = load_settings(None, (), robot=robot)
     link = config.link.model_copy(update={"port": port or config.link.port or only_port()})
-    single = one_at_a_time(config.model_copy(update={"link": link}))
+    single = with_single_firing(config.model_copy(update={"link": link}))
     test = RingTest(single, sys.stdout.write, own=config.ring)
     return asyncio.run(test.run(rounds, move=move, hand=hand))

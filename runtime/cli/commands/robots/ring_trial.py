@@ -19,7 +19,7 @@ from drivers.driver import LineState
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.link import Link
 from drivers.messages import Flags, Floats, Odometry, Twist
-from drivers.registry import make_driver
+from drivers.registry import line_options, make_driver
 from runtime.cli.commands.robots.crosstalk_trial import crosstalk
 from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
 from runtime.cycle.connection import POLL_S, Connection
@@ -27,9 +27,11 @@ from runtime.cycle.connection import POLL_S, Connection
 SLACK_S: Final = 2.0
 """How much longer than its firings need the test of the sensors may take, s."""
 WARNING_S: Final = 3.0
+"""Time from the warning to the first motion, s."""
 MOVE_S: Final = 1.0
+"""Time of each motion, s."""
 SETTLE_S: Final = 0.5
-"""Time from the warning to the first motion, of each motion, and after a base stands again by its file, s."""
+"""Time to wait after a base stands again by its file, s."""
 HAND_S: Final = 15.0
 """So long a hand before a sensor is waited for, s."""
 DRIVE_S: Final = 0.05
@@ -53,10 +55,11 @@ WAY_MIN, WAY_MAX = 0.4, 1.6
 """Least and greatest way by the odometry, of what was asked for; a base also has to speed up and to stop."""
 
 
-def one_at_a_time(config: RobotConfig) -> RobotConfig:
-    """Return the robot with a pattern that fires each sensor by itself; with its own where it cannot do that.
+def with_single_firing(config: RobotConfig) -> RobotConfig:
+    """Return the robot with the preset `single`: one sensor at a time, or one of each of its arrays.
 
-    A robot with several arrays, or banks, of sonars fires one sensor of each together.
+    Period and window stay; listeners and sets are left out. `config` is returned unchanged if its driver cannot fire
+    that way.
     """
     own = config.ring.firing
     firing = FiringConfig(preset="single", step_period_s=own.step_period_s, window_m=own.window_m)
@@ -218,7 +221,8 @@ class RingTest:
         self._config = config
         self._write = write
         self._driver = make_driver(config)
-        self._link = Link(config.link, self._opened, self._received, lambda _reason: self._driver.line_closed())
+        handlers = (self._opened, self._received, lambda _reason: self._driver.line_closed())
+        self._link = Link(config.link, *handlers, **line_options(config))
         self._connection = Connection(self._link, self._driver, self._send, clock, config.body)
         self._flags = Flags.NONE
         self._odometry: Odometry | None = None

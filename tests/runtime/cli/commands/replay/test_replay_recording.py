@@ -112,5 +112,5 @@ def test_other_settings_are_compared(run: Path, capsys: pytest.CaptureFixture[st
 def test_errors_in_one_line() -> None:
     run = RunOutcome(errors_m=[0.3048, None, 0.6096], false=1)
     assert errors_line(run, "ft") == "2 of 3 drums, 1 false; mean error 1.5000 ft, worst 2.0000 ft"
-    assert errors_line(RunOutcome(errors_m=[None]), "m") == "0 of 1 drums, 0 false; mean error none m, worst none m"
+    assert errors_line(RunOutcome(errors_m=[None]), "m") == "0 of 1 drums, 0 false"
     assert errors_line(RunOutcome(), "m") == "0 objects"

@@ -12,7 +12,7 @@ from config.robot import RingConfig
 from drivers.registry import make_device
 from runtime.cli.commands.robots import ring_trial
 from runtime.cli.commands.robots.crosstalk_trial import crosstalk
-from runtime.cli.commands.robots.ring_trial import RingTest, one_at_a_time
+from runtime.cli.commands.robots.ring_trial import RingTest, with_single_firing
 from tests.runtime.cli.commands.robots.test_hand_trial import FRONT3
 from tests.runtime.virtual_time import MemoryLink, VirtualLoop
 
@@ -40,9 +40,9 @@ def test_neighbours_that_fire_together_are_found(share: float, code: int, monkey
         update={"acoustics": acoustics, "start": config.world.start.model_copy(update={"heading_deg": 35.0})}
     )
     device = make_device(config, world, 3)
-    monkeypatch.setattr(ring_trial, "Link", lambda *args: MemoryLink(device, loop, *args))
+    monkeypatch.setattr(ring_trial, "Link", lambda *args, **_options: MemoryLink(device, loop, *args))
     try:
-        trial = RingTest(one_at_a_time(config), said.append, loop.time, TOGETHER)
+        trial = RingTest(with_single_firing(config), said.append, loop.time, TOGETHER)
         assert loop.run_until_complete(trial.run(10, move=False)) == code, said
     finally:
         loop.close()

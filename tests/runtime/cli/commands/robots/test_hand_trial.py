@@ -13,7 +13,7 @@ from config.load import load_settings
 from config.robot import RingConfig
 from drivers.messages import Floats
 from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
-from runtime.cli.commands.robots.ring_trial import RingTest, one_at_a_time
+from runtime.cli.commands.robots.ring_trial import RingTest, with_single_firing
 
 FRONT = (30.0, 0.0, -30.0)
 BASE = {"beam_half_angle_deg": 15.0, "resolution_m": 0.003, "range_min_m": 0.02, "range_max_m": 4.0}
@@ -56,7 +56,7 @@ def outcome(
 
     monkeypatch.setattr(RingTest, "_exchange", exchange)
     config = load_settings("room", ("link.port=memory",), robot="servo1").model_copy(update={"ring": ring})
-    trial = RingTest(one_at_a_time(config), write, lambda: 0.1 * firings[0], ring)
+    trial = RingTest(with_single_firing(config), write, lambda: 0.1 * firings[0], ring)
     return asyncio.run(trial._test_places([[FREE_M]] * len(ring.mounts))), said
 
 

@@ -22,8 +22,9 @@ from drivers.messages import Flags, Floats, Odometry, Pose, Twist
 from drivers.registry import make_device
 from runtime.cli.app import run_command
 from runtime.cli.commands.robots import ring_trial
-from runtime.cli.commands.robots.ring_trial import RingTest, judge_motion, judge_sensor, one_at_a_time, only_port
+from runtime.cli.commands.robots.ring_trial import RingTest, judge_motion, judge_sensor, only_port, with_single_firing
 from tests.drivers.firmware.board import install, start
+from tests.drivers.ros2 import robot as ros_robot
 from tests.hil.machine import TIMEOUT_S
 from tests.runtime.virtual_time import MemoryLink, VirtualLoop
 
@@ -107,13 +108,20 @@ def reports_of(
     config = load_settings("room", ("link.port=memory",), robot=robot)
     assert config.world is not None
     device = make_device(config, config.world, 3, faults=faults)
-    monkeypatch.setattr(ring_trial, "Link", lambda *args: MemoryLink(device, loop, *args))
+    monkeypatch.setattr(ring_trial, "Link", lambda *args, **_options: MemoryLink(device, loop, *args))
     try:
-        test = RingTest(one_at_a_time(config), said.append, loop.time)
+        test = RingTest(with_single_firing(config), said.append, loop.time)
         code = loop.run_until_complete(test.run(10, move=move))
     finally:
         loop.close()
     return code, [line for line in said if not line.startswith("note: ")]
+
+
+def test_the_line_of_a_robot_behind_ros_is_opened_as_its_family_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, object] = {}
+    monkeypatch.setattr(ring_trial, "Link", lambda *_args, **options: given.update(options))
+    RingTest(ros_robot.CONFIG, list[str]().append)
+    assert given["opener"] is not None
 
 
 ROBOTS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver != "ros2")
