@@ -327,7 +327,7 @@ def weigh_repeat(
 ) -> None:
     """Update the evidence that the ring repeats old readings by a sensor's reading: `echoes[i]` and `ring[0]`.
 
-    A *standstill* is a stretch in which no reading ahead changes, not one of the robot. A reading ahead that has
+    A *standstill* is a time in which no reading ahead changes, not one of the robot. A reading ahead that has
     changed begins a new one, which clears the ring's evidence; one elsewhere takes its sensor's share back. Called
     once for each reading, after it was entered in `echoes` as the latest, and before `weigh_look`.
 
