@@ -383,30 +383,16 @@ def _lay_models(names: Layers, settings: Layers) -> list[str]:
     return problems
 
 
-def _named_table(
-    kind: Kind, at: Location, value: object, named_by: Source
-) -> tuple[dict[str, Any], Source, list[str]]:
-    """Return the table that `value` is or names, its source, and why it cannot be had; then the table is empty.
-
-    Parameters
-    ----------
-    kind
-        What the table describes.
-    at
-        Where the value stands in the tree of all settings; there a named file's table is mounted.
-    value
-        A table, or the name of a file.
-    named_by
-        Where the value stands, and so the source of a table that is given there.
-    """
+def _named_table(kind: Kind, at: Location, value: object, by: Source) -> tuple[dict[str, Any], Source, list[str]]:
+    """Return the table that `value`, which stands `at` this location, is or names; its source; and its problems."""
     if isinstance(value, dict):
-        return value, named_by, []
+        return value, by, []
     if not isinstance(value, str):
-        return {}, named_by, [_not_a_name(dotted(at), value, named_by)]
+        return {}, by, [_not_a_name(dotted(at), value, by)]
     try:
-        document = read_document(kind, value, named_by)
+        document = read_document(kind, value, by)
     except ConfigError as error:
-        return {}, named_by, list(error.problems)
+        return {}, by, list(error.problems)
     return document.table, document.source.mounted(at), []
 
 
