@@ -26,12 +26,26 @@ def encode_servo_tail(frame: Scan | Echo3) -> bytes:
 
 
 def _scan_tail(frame: Scan) -> bytes:
+    """Return the bytes of a SCAN after its fixed ones.
+
+    Raises
+    ------
+    ValueError
+        It has too many sweeps, or none.
+    """
     if not 1 <= len(frame.sweeps) <= SWEEPS_MAX:
         raise ValueError(f"{len(frame.sweeps)} sweeps, expected 1 to {SWEEPS_MAX}")
     return bytes((len(frame.sweeps),)) + b"".join(_SWEEP.pack(*sweep) for sweep in frame.sweeps)
 
 
 def _echo3_tail(frame: Echo3) -> bytes:
+    """Return the bytes of an ECHO3 after its fixed ones.
+
+    Raises
+    ------
+    ValueError
+        Masks, counts and bearings do not fit each other.
+    """
     sizes = frame.fired.bit_count(), frame.turned.bit_count()
     if frame.turned & ~frame.fired or (len(frame.counts), len(frame.bearings)) != sizes:
         raise ValueError(f"masks of {sizes} bits, {len(frame.counts)} counts, {len(frame.bearings)} bearings")

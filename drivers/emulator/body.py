@@ -213,6 +213,7 @@ class Body:
         return False
 
     def _clearance(self, pose: Pose) -> float:
+        """Return the distance from the edge of the base to the nearest surface, m; that of the last pose is kept."""
         if self._last_clearance is not None and self._last_clearance[0] is pose:
             return self._last_clearance[1]
         here_m = clearance(pose.x, pose.y, self._scene.circles, self._scene.segments) - self._config.radius_m

@@ -332,6 +332,7 @@ def load_faults(path: str | Path) -> tuple[Fault, ...]:
 
 
 def _describe(details: ErrorDetails) -> str:
+    """Return in a clause which key of a fault is wrong, its value, and why."""
     # After the number of a fault, pydantic names its kind, which is not a key of the file.
     where = dotted(part for i, part in enumerate(details["loc"]) if i != 2)
     given = "" if isinstance(details["input"], dict | list | tuple) else f" = {shown_value(details['input'])}"

@@ -175,6 +175,7 @@ def _angle_between(a: float, b: float) -> float:
 
 
 def _distance_to_side(point: _Point, a: _Point, b: _Point) -> float:
+    """Return the distance of a point from the side between two others, m."""
     ux, uy = b[0] - a[0], b[1] - a[1]
     along = ((point[0] - a[0]) * ux + (point[1] - a[1]) * uy) / (ux * ux + uy * uy)
     along = min(1.0, max(0.0, along))

@@ -216,6 +216,7 @@ class RobotSide:
         return max(1, round(1e6 * meaning.range_m / self._unit_um))
 
     def _send_group(self) -> None:
+        """Send the ranges of a group as an echo; dropped before the host asks for any, or the first odometry."""
         group, self._group = self._group, {}
         if not self._fires or self._first_s is None or self._group_s <= self._first_s:
             return
@@ -224,9 +225,11 @@ class RobotSide:
         self._send(frames.Echo2(0, self._time_us(self._group_s), 0, mask, 0, counts))
 
     def _time_us(self, stamp_s: float) -> int:
+        """Return what the host sees as the robot's counter at a time of its stamps."""
         return round(1e6 * (stamp_s - (self._first_s or 0.0))) % 2**32
 
     def _send(self, frame: frames.RobotFrame) -> None:
+        """Queue a frame for the host; one with impossible numbers is noted and dropped."""
         try:
             self._out += encode(frame, self._seq)
         except ValueError as error:

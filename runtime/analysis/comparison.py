@@ -133,11 +133,13 @@ def _ignore(command: Command) -> None:
 
 
 def _note_stop(outcome: RunOutcome, record: CycleRecord, at_s: float) -> None:
+    """Add a stop to the outcome if the mode changed to it in this cycle."""
     if record.mode.mode is Mode.SAFE_STOP and record.mode.entered_run_s == record.inputs.run_s:
         outcome.stops.append((at_s, record.mode.reason or ""))
 
 
 def _sum_up(outcome: RunOutcome, state: State, world: WorldConfig | None) -> None:
+    """Write to the outcome the objects at its end and, of a world with drums, their errors."""
     outcome.objects = [object_row(seen) for seen in state.perception.objects()]
     if world is None or not world.drum:
         return

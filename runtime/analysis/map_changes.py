@@ -71,6 +71,7 @@ class MapChange:
     """How far it was moved, or how long the wall, the outline or the opening is."""
 
     def __str__(self) -> str:
+        """Return the change in a line."""
         x, y = self.place
         at = f"{self.kind}: {self.what} at ({x:.2f}, {y:.2f}) m"
         return (
@@ -123,6 +124,11 @@ def looks_at_wall(echoes: Echoes, ends: Sequence[float], half_angle_rad: float) 
 def _looks(
     echoes: Echoes, bearing: Floats, expected: Floats, piece: NDArray[np.int64], count: int, half_angle_rad: float
 ) -> Looks:
+    """Return how often readings hit and passed each of `count` pieces.
+
+    A reading has one piece that it may look at, `expected` m away at `bearing`, rad; it counts if that is from 0 to
+    `count` − 1, inside the beam, and neither too near nor too far.
+    """
     off = np.abs(np.angle(np.exp(1j * (bearing - echoes["bearing"]))))
     sees = (off < BEAM_SHARE * half_angle_rad) & (expected > AGREE_M) & (expected < LOOK_MAX_M)
     sees &= (piece >= 0) & (piece < count)

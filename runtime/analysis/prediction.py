@@ -102,6 +102,7 @@ def _readings(settings: Settings, firings: Sequence[Firing]) -> tuple[Beams, Flo
 
 
 def _found(settings: Settings, perceived: PerceivedRows) -> WorldConfig:
+    """Return what was perceived as a world."""
     walls = [[wall["x1"], wall["y1"], wall["x2"], wall["y2"]] for wall in perceived["walls"]]
     objects = [
         DetectedObject(one["model"], one["x"], one["y"], one["theta"], one["sigma"], one["support"], one["score"])

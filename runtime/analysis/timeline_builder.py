@@ -60,18 +60,29 @@ class TimelineBuilder:
         self._mounts, self._turning = mounts_array(settings.ring.mounts), settings.ring.turning
         self._interval_s = interval_s
         self._next_s = 0.0
+        """When the next snapshot is due."""
         self._rows: list[Echoes] = []
+        """Readings of each firing …"""
         self._row_count = 0
+        """… and how many they are."""
         self._crosses: list[CrossPathRows] = []
+        """Cross paths of each firing."""
         self._segments: dict[bytes, tuple[float, float, Floats]] = {}
+        """When each was seen first and last, and its row, by its rounded bytes."""
         self._pose: Pose | None = None
+        """Of the last firing or odometry; None before both."""
         self._yaw = 0.0
         self._clusters = ClusterView(settings.perception)
         self._placed: list[tuple[Pose, Echoes]] = []
+        """Pose in the map and readings in its frame, of each firing while the place was known."""
         self._near_map: dict[int | None, DetectedObject] = {}
+        """Objects in the frame of the map, by number."""
         self._room: WorldConfig | None = None
+        """The map to which both belong."""
         self._unplaced = 0
+        """Firings that `_place_in_map` has passed."""
         self._moments: list[tuple[int, Moment]] = []
+        """Moments of the map frame, and how many firings there were by then."""
 
     @property
     def pose(self) -> Pose | None:
@@ -152,6 +163,7 @@ class TimelineBuilder:
             timeline.segments = np.array([[first, last, *row] for first, last, row in self._segments.values()])
 
     def _known_echoes(self, frame: OdometryFrame) -> Echoes:
+        """Return all readings, each from where the robot is known now to have been at its time."""
         known, begin = list[Echoes](), 0
         for end, moment in self._moments:
             to = frame.moved_since(moment)
@@ -173,6 +185,7 @@ class TimelineBuilder:
             self._near_map[seen.number] = turned_object(to, seen)
 
     def _map_view(self, perception: Perception, known: WorldConfig) -> MapView:
+        """Return the known room with the readings and objects in its frame; only objects that still exist."""
         numbers = {seen.number for seen in perception.objects()}
         to = perception.odometry_from_map().inverse()
         walls = tuple(turned_object(to, seen) for seen in walls_of(perception))
@@ -186,6 +199,7 @@ class TimelineBuilder:
         )
 
     def _add_snapshot(self, t_s: float, perception: Perception) -> None:
+        """Take a snapshot; at `SNAPSHOTS_MAX` every second one goes, and the interval doubles. None before a pose."""
         rows = perception.segment_geometry()
         for key, row in zip((r.tobytes() for r in np.round(rows, DIGITS)), rows, strict=True):
             first = self._segments[key][0] if key in self._segments else t_s
@@ -215,6 +229,7 @@ class TimelineBuilder:
         )
 
     def _clusters_of(self, segments: Floats) -> tuple[Cluster, ...]:
+        """Return the clusters of segments, (n, 6) as of `segment_geometry`."""
         return tuple(
             Cluster(
                 box.centre_x,

@@ -120,6 +120,15 @@ def between_keyframes(recording: Recording) -> range:
 def _of_recording(
     recording: Recording, source: TimelineSource, on_step: Progress, skimmed: range = range(0)
 ) -> Timeline:
+    """Return the timeline of a recording; cycles of `skimmed` are not replayed.
+
+    Raises
+    ------
+    RecordingError
+        It has no cycle that can be replayed.
+    KeyframeError
+        A keyframe is refused, and cycles were to be skimmed.
+    """
     world = recording.world if source.world is None else load_world(source.world)
     info = recording.info
     timeline = Timeline(recording.path, recording.settings, world, versions=info.versions, started=info.started)
@@ -152,12 +161,18 @@ class _Collector:
         self._timeline = timeline
         self._builder = TimelineBuilder(timeline, interval_s)
         self._driver = make_driver(timeline.settings)
+        """Counts frames: the record of a cycle has what was in them."""
         self._driver.line_opened(0.0)
         self._has_bytes = False
+        """Whether the recording has bytes of the line."""
         self._first_run_s: float | None = None
+        """Run's time of the first cycle; None before."""
         self._last_run_s = 0.0
+        """Of the last cycle."""
         self._state: State | None = None
+        """After the last cycle whose state is known."""
         self._log: list[LogLine] = []
+        """Lines of the log; added at the end, when the time of the first cycle is known."""
 
     def add(self, found: ReplayStep, state: State | None) -> None:
         """Add one step of the replay, and the state it left."""
@@ -183,12 +198,14 @@ class _Collector:
             self._timeline.summary = decode(RunEnd, message.data).summary
 
     def _add_bytes(self, message: RawMessage) -> None:
+        """Let a driver receive the bytes of the line, for its counts."""
         self._has_bytes = True
         for run_s, data in decode(SerialBytes, message.data).pieces():
             self._driver.receive(data, run_s)
         self._driver.take_received()
 
     def _add_cycle(self, record: CycleRecord, log_ns: int, odometry: Odometry | None) -> None:
+        """Add what a cycle received, its mode, and the time since the one before."""
         timeline, builder, run_s = self._timeline, self._builder, record.inputs.run_s
         if self._first_run_s is None:
             self._first_run_s = run_s
@@ -226,6 +243,7 @@ class _Collector:
 def _of_ring_log(
     path: Path, source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress
 ) -> Timeline:
+    """Return the timeline of a ring log: each firing is a cycle. `prepare` gets the settings before the first one."""
     settings = load_settings(None, source.sets, robot=source.robot, models=source.models).of_log()
     found: list[str] = []
     firings = open_ring_log(path, settings, source.log, found.append)

@@ -163,6 +163,7 @@ def _trade_offs(study: StudyConfig, combinations: Sequence[Combination]) -> list
 
 
 def _effects(effects: Sequence[Sensitivity]) -> list[str]:
+    """Return for each objective the figure and the table of what each setting changes in it; nothing without any."""
     parts = []
     for objective in dict.fromkeys(effect.objective for effect in effects):
         own = [effect for effect in effects if effect.objective == objective]

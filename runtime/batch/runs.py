@@ -168,6 +168,7 @@ def _truths(study: StudyConfig, base: Path, subjects: Iterable[str]) -> dict[str
 
 
 def _identity(path: Path, folder: Path) -> str:
+    """Return what makes a recording another one: its path in the folder, its size, a digest of its ends."""
     size = path.stat().st_size
     with path.open("rb") as file:
         digest = hashlib.sha256(file.read(EDGE_BYTES))

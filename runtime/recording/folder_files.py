@@ -139,6 +139,13 @@ def delete_recording(folder: Path, name: str) -> None:
 
 
 def _found(folder: Path, name: str) -> Path:
+    """Return the path of a recording in a folder.
+
+    Raises
+    ------
+    UserError
+        There is none of this name.
+    """
     path = find_recording(folder, name)
     if path is None:
         raise UserError(f"there is no recording {one_line(name)!r} in {folder}: list the recordings again")
@@ -146,6 +153,13 @@ def _found(folder: Path, name: str) -> Path:
 
 
 def _finished(folder: Path, name: str) -> Path:
+    """Return the path of a recording that no run is writing.
+
+    Raises
+    ------
+    UserError
+        There is none of this name, or it is being written.
+    """
     path = _found(folder, name)
     if is_locked(path):
         raise UserError(f"{name} is being written: stop recording first")

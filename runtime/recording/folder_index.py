@@ -86,6 +86,7 @@ def is_finished_recording(path: Path) -> bool:
 
 
 def _is_ours(head: bytes) -> bool:
+    """Return whether a file that begins with these bytes is a recording of this program."""
     if len(head) < _HEAD.size:
         return False
     magic, opcode, _, _ = _HEAD.unpack_from(head)

@@ -52,7 +52,9 @@ class McapFile:
             self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
         self._channels: dict[str, int] = {}
+        """Numbers by topic."""
         self._schemas: dict[str, int] = {}
+        """Numbers by name."""
         try:
             self._begin(info, log_ns)
         except OSError:
@@ -60,6 +62,7 @@ class McapFile:
             raise
 
     def _begin(self, info: bytes, log_ns: int) -> None:
+        """Write the head of the file: every channel, and the information on the run."""
         self._writer.start(profile=f"{PROFILE}/{FORMAT}", library=f"echolocate {VERSION}")
         for topic, kind in CHANNELS.items():
             self._register(topic, kind.__name__, schema_of(kind))

@@ -139,6 +139,7 @@ class McapScanner:
         self._read_header()
 
     def _read_header(self) -> None:
+        """Read profile and library, if the header is whole."""
         try:
             code, length = struct.unpack_from("<BQ", self._data, 8)
             if code == Opcode.HEADER:

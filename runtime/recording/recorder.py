@@ -132,9 +132,13 @@ class Recorder:
         self._queue_item = self._writer.thread.put
         self._on = on
         self._is_starting = False
+        """Whether recording was switched on and no cycle has ended since."""
         self._last_keyframe_run_s: float | None = None
+        """When the last keyframe was queued; None before the first cycle."""
         self._has_gap = False
+        """Whether a cycle was lost since: a keyframe is due."""
         self._cycle = 0
+        """Number of the last cycle."""
         self._bookmarks: list[tuple[str | None, str]] = []
         """File and text of each that stands."""
 
@@ -293,6 +297,7 @@ class Recorder:
         self._put((LOG, host_s, run_s, line))
 
     def _put(self, item: QueuedItem) -> None:
+        """Queue an item while recording is on; if a cycle is lost, the next keyframe is due at once."""
         if self._on and not self._is_starting and not self._queue_item(item):
             self._has_gap = self._has_gap or item[0] == CYCLE
 

@@ -62,6 +62,15 @@ def recover(source: Path, target: Path) -> Recovered:
 
 
 def _copy(scanner: McapScanner, source: Path, file: BinaryIO, target: Path) -> Recovered:
+    """Copy whatever is readable into a new file and return what that was; `target` is only named.
+
+    Raises
+    ------
+    RecordingError
+        Nothing is.
+    OSError
+        The file cannot be written.
+    """
     chunks = messages = cycles = 0
     first_ns = last_ns = 0
     writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True)

@@ -183,6 +183,7 @@ class Replayer:
         self.settings_data = recording.info.settings
         self.state: State | None = None
         self._chunk_offset = 0
+        """Where the chunk of the last message starts in the file."""
         if start is None:
             self.state = fresh_state(self._settings)
             self._messages = self._since(None)
@@ -220,11 +221,13 @@ class Replayer:
         return Checkpoint(state.cycle, self._chunk_offset, self.settings_data, carried_state(state), snapshot)
 
     def _since(self, chunk_offset: int | None) -> Iterator[RawMessage]:
+        """Yield the messages from a chunk on; `_chunk_offset` follows them."""
         for offset, chunk in self._recording.chunks(chunk_offset):
             self._chunk_offset = offset
             yield from chunk
 
     def _after_cycle(self, start: Checkpoint) -> Iterator[RawMessage]:
+        """Yield the messages after the cycle of a checkpoint."""
         messages = self._since(start.chunk_offset)
         for message in messages:
             if message.topic == CYCLE and cycle_head(message)[0] == start.cycle:
@@ -232,6 +235,13 @@ class Replayer:
         yield from messages
 
     def _after_keyframe(self, start: KeyframePosition) -> Iterator[RawMessage]:
+        """Take over the state of a keyframe, and return the messages after it.
+
+        Raises
+        ------
+        KeyframeError
+            It is not there, or its state is refused.
+        """
         messages = self._since(start.chunk_offset)
         for message in messages:
             if message.topic == KEYFRAME and keyframe_cycle(message) == start.cycle:
@@ -259,6 +269,13 @@ class Replayer:
                 apply_settings(self.state, self._settings)
 
     def _cycle(self, message: RawMessage) -> ReplayStep:
+        """Run a cycle on the recorded inputs. In a gap, or where it is only skimmed, the state is not known then.
+
+        Raises
+        ------
+        RecordingError
+            The cycle cannot be computed.
+        """
         record = self._recording.decode_cycle(message)
         if record.cycle in self._skimmed:
             self.state = None

@@ -113,6 +113,13 @@ def _firings(
     parse: Callable[[str], float],
     servos: ServoColumns | None,
 ) -> Iterator[Firing]:
+    """Yield the firing of each row after the header, as it is read; `servos` turns bearings into mounts.
+
+    Raises
+    ------
+    RingLogError
+        The header or a row is invalid; firings before it have been yielded by then.
+    """
     header_row, header = next(rows, (1, None))
     if header is None:
         raise RingLogError(f"{path}: is empty; {_FORM}")
@@ -230,6 +237,13 @@ def _number(cell: str) -> float:
 
 
 def _finite(cell: str) -> float:
+    """Return the finite number in a cell.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
     value = _number(cell)
     if not math.isfinite(value):
         raise ValueError(cell)
@@ -237,6 +251,13 @@ def _finite(cell: str) -> float:
 
 
 def _range(cell: str) -> float:
+    """Return the range in a cell, m: NaN if it is empty, inf for the text inf.
+
+    Raises
+    ------
+    ValueError
+        It is negative, or no number.
+    """
     if not cell:
         return math.nan
     value = _number(cell)

@@ -41,6 +41,7 @@ class FiringReplayer:
         self._cycle_stats = CycleStats(late_after_s=float("inf"))
 
     def __iter__(self) -> Iterator[Firing]:
+        """Yield each firing after perception has taken it in, and refined as a cycle would."""
         perception = self.perception
         for firing in self._firings:
             started_s = time.perf_counter()

@@ -94,7 +94,9 @@ class RingLogRows:
         self.count = 0
         self.dropped = 0
         self._sensors = 0
+        """Number of range columns; 0 before the header."""
         self._last_t = -math.inf
+        """Time of the last row, s."""
 
     def write(self, firing: Firing) -> None:
         """Write a row, and before the first one the header.

@@ -39,9 +39,12 @@ class RingLogWriter:
         self._servos = servos
         self._pairs = pairs
         self._file: TextIO | None = None
+        """None before it is opened, and after an error."""
         self._rows: RingLogRows | None = None
         self._bytes = 0
+        """Size of the file; 0 before the end."""
         self.last_error: str | None = None
+        """The first trouble with the file; None if there was none."""
         self._thread = BackgroundWriter[Firing](
             "ring log",
             self._write,
@@ -80,6 +83,7 @@ class RingLogWriter:
         return self._thread.probe()
 
     def _begin(self) -> None:
+        """Open the file; called in the thread, as are `_write` and `_finish`."""
         try:
             self._file = self._path.open("w", encoding="utf-8", newline="\n")
             self._rows = RingLogRows(self._file, self._path, self._pairs, self._servos)
@@ -87,6 +91,13 @@ class RingLogWriter:
             self._fail(str(cannot_write(self._path, error)))
 
     def _write(self, firing: Firing) -> None:
+        """Write a firing.
+
+        Raises
+        ------
+        OSError
+            It is lost: the background writer counts it.
+        """
         if self._file is None or self._rows is None:
             raise OSError(self.last_error)  # counted as lost
         try:
@@ -98,6 +109,7 @@ class RingLogWriter:
             raise OSError(self.last_error) from error
 
     def _finish(self) -> None:
+        """Close the file, and note if nothing was written."""
         if self._file is None or self._rows is None:
             return
         try:

@@ -115,6 +115,7 @@ class SerialBytes(TimedPayload):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        """Check that pieces, times and data fit each other."""
         if len(self.after_us) != len(self.sizes):
             raise ValueError(f"{len(self.sizes)} pieces of data with {len(self.after_us)} times")
         if 2 * sum(self.sizes) != len(self.data):

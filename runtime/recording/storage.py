@@ -324,6 +324,7 @@ def list_recordings(folder: Path) -> list[RecordingFile]:
 
 
 def _recordings(folder: Path) -> Iterator[RecordingFile]:
+    """Yield the recordings in a folder; a folder or file that cannot be read yields nothing."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith(SUFFIX) and is_utf8(entry.name):  # the console has no other text

@@ -178,6 +178,7 @@ class Verifier:
             self.result.add_refused(found.refused)
 
     def _check_cycle(self, found: ReplayStep, recorded: CycleRecord) -> None:
+        """Count a cycle as compared, skimmed or skipped, and compare its replay with its recorded bytes."""
         result, last, self._last = self.result, self._last, recorded
         if last is not None and recorded.cycle != last.cycle + 1:
             result.add_gap(last.cycle + 1, recorded.cycle - 1)
@@ -205,6 +206,7 @@ class Verifier:
             self._count(recorded.cycle, find_difference(before, without_later(now, before, known)))
 
     def _count(self, cycle: int, difference: tuple[str, object, object] | None) -> None:
+        """Count a difference, if there is one, and keep the first."""
         if difference is None:
             return
         self.result.differences += 1

@@ -147,19 +147,19 @@ class RecordingWriter:
         self._target = target
         self._info = info
         self._host_clock = host_clock
-        self._file: McapFile | None = None
+        self._file: McapFile | None = None  # none while recording is off, and from an error to the next keyframe
         self._parts = 0
         self._on = on
-        self._retry_s = self._flushed_s = self._synced_s = self._limited_s = 0.0
-        self._bytes_before = 0
-        self._unflushed = 0
-        self._is_empty = True
+        self._retry_s = self._flushed_s = self._synced_s = self._limited_s = 0.0  # not before; when last
+        self._bytes_before = 0  # in all files before this one
+        self._unflushed = 0  # messages that an error would lose
+        self._is_empty = True  # no cycle and no bookmark so far
         self._have_pinned: list[bool] = []
         """Of each bookmark of the file that stands, whether it pinned it."""
-        self._mode: ModeState | None = None
-        self._map: dict[bytes, int] = {}
-        self._map_count = 0
-        self._pieces: dict[str, list[QueuedItem]] = {}
+        self._mode: ModeState | None = None  # of the last cycle in this file
+        self._map: dict[bytes, int] = {}  # number of each segment in the file's map, by its bytes
+        self._map_count = 0  # numbers given so far
+        self._pieces: dict[str, list[QueuedItem]] = {}  # bytes of the line since the last flush, by topic
         self.thread = BackgroundWriter[QueuedItem](
             "recorder", self._write, begin=self._begin, tick=self._tick, finish=lambda: self._guarded(self._finish),
             poll_s=POLL_S, capacity=queue_max, close_max_s=CLOSE_MAX_S,
@@ -285,6 +285,7 @@ class RecordingWriter:
             self.wants_keyframe = True
 
     def _sync(self) -> None:
+        """Wait until the disk has the file; keep the longest time that this took."""
         if self._file is not None:
             started_s = time.monotonic()
             self._file.sync()
@@ -352,6 +353,7 @@ class RecordingWriter:
         return self._info.unix_minus_host_ns + round(1e9 * host_s)
 
     def _enter_cycle(self, record: CycleRecord, log_ns: int) -> None:
+        """Write a cycle, and the mode if it changed."""
         self._is_empty = False
         self._add(CYCLE, Cycle.model_construct(record=record), log_ns, record.cycle)
         if record.mode != self._mode:

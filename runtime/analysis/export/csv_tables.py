@@ -136,6 +136,7 @@ def _polylines(timeline: Timeline) -> Table:
 
 
 def _odometry(timeline: Timeline) -> Table:
+    """Return the table of the odometry; speeds that are not known are empty."""
     path_rows = timeline.odometry
     return {
         "t_s": [t for t, _ in path_rows],

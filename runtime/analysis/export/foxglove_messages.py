@@ -80,6 +80,7 @@ class RunChannels:
         self._write_scan(sensor, -half_angle, half_angle, [range_m] * ARC_POINTS, at)
 
     def _write_scan(self, eye: Pose, start: float, end: float, ranges_m: Sequence[float], at: int) -> None:
+        """Write ranges (m) at even angles from `start` to `end`, rad from the direction of `eye`."""
         message = fx.LaserScan(
             timestamp=stamp(at),
             frame_id="odom",

@@ -106,6 +106,7 @@ def _marked(places: PlacesConfig) -> Iterator[dict[str, Any]]:
 
 
 def _feature(shape: str, coordinates: list[Any], **properties: object) -> dict[str, Any]:
+    """Return a GeoJSON feature."""
     return {
         "type": "Feature",
         "properties": properties,

@@ -91,6 +91,7 @@ class _RunExporter:
         self._writer = writer
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._connections: dict[str, Any] = {}
+        """By topic."""
         self._say = Messages(Frames())
         self._models = [
             {"name": m.name, "vertices": m.vertices_m, "closed": m.closed, "arc_radius_m": m.arc_radius_m}
@@ -109,6 +110,7 @@ class _RunExporter:
             write(timeline.unix_ns(t_s))
 
     def _write(self, output: Output, at: int, qos: BagQos | None = None) -> None:
+        """Write a message at a time, ns; the first on a topic creates it. `qos`: by default that of its type."""
         topic, kind = f"/{output.topic.lstrip('/')}", output.kind.replace("/", "/msg/")
         if topic not in self._connections:
             offered = qos or bag_qos(QOS[output.kind])
@@ -125,6 +127,7 @@ class _RunExporter:
         return self._store.types[kind](**values)
 
     def _value(self, form: Any, value: Any) -> Any:  # noqa: ANN401 - a field of any message
+        """Return a field's value in its form, as `fielddefs` describes it; None becomes zero, empty or false."""
         node, about = form
         if node is Nodetype.NAME:
             return self._message(about, value or {})
@@ -138,6 +141,7 @@ class _RunExporter:
         return [self._value(element, row) for row in rows]
 
     def _write_frames(self, frames: Sequence[Frame], at: int, *, static: bool = False) -> None:
+        """Write frames to /tf, or to /tf_static."""
         transforms = [
             {
                 "header": header(frame.parent, frame.stamp_ns),
@@ -168,12 +172,14 @@ class _RunExporter:
         self._write(mode(entered.mode), at)
 
     def _write_scan(self, scan: FiringScan, at: int) -> None:
+        """Write the range of each sensor that fired."""
         ring = self._timeline.settings.ring
         half, limits = math.radians(ring.beam_half_angle_deg), (ring.range_min_m, ring.range_max_m)
         for row in scan.rows:
             self._write(self._say.range(int(row["sensor"]), float(row["range_m"]), limits, half, at), at)
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
+        """Write what perception had found: place, objects with their poses, what they are made of, and the grid."""
         if (place := snapshot.place) is not None:
             self._write_frames([self._say.map_frame(place.map_in_odom, at)], at)
             known = [float(place.covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2))]

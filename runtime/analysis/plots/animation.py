@@ -97,6 +97,7 @@ def _title(axes: Axes, snapshot: RunSnapshot | None, timeline: Timeline) -> None
 
 
 def _draw(axes: Axes, timeline: Timeline, snapshot: RunSnapshot, canvas: Canvas) -> list[Line2D]:
+    """Draw the run at a snapshot: readings, segments, clusters, objects, path; return the handles of the legend."""
     settings, frame = timeline.settings, canvas.frame
     newest = timeline.echoes[max(0, snapshot.echoes - ECHOES_SHOWN) : snapshot.echoes]
     newest = newest[np.isfinite(newest["range_m"])]
@@ -151,6 +152,7 @@ def save_moving(
 
 
 def _gif(shown: list[Pixels], step_s: float, path: Path) -> Path:
+    """Write the frames, the last of which rests for a while; return the file."""
     palette = _palette(shown)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in shown]
     step_ms = round(1000.0 * step_s)
@@ -171,6 +173,7 @@ def _palette(shown: list[Pixels]) -> Image.Image:
 
 
 def _mp4(shown: list[Pixels], step_s: float, path: Path, ffmpeg: str) -> list[Path]:
+    """Write the frames with ffmpeg; return the file, or nothing if ffmpeg cannot."""
     height, width, _ = shown[0].shape
     rest = [shown[-1]] * round(REST_S / step_s)
     command = [

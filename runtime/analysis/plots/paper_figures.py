@@ -135,6 +135,7 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
 
 
 def _figure(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]]) -> Figure:
+    """Return a figure with what `draw` draws, over the true world, the path and the bookmarks."""
     figure, axes = canvas.figure()
     timeline, frame = canvas.timeline, canvas.frame
     handles = draw(axes)

@@ -74,6 +74,7 @@ def page(timeline: Timeline, units: Units) -> str:
 
 
 def _match_truth(timeline: Timeline) -> tuple[list[DrumRow], list[BoxRow], int] | None:
+    """Return how objects match the true world: drums, boxes and polygons, how many are false; None without one."""
     if timeline.world is None:
         return None
     placed = [timeline.start.compose(Pose(o.x, o.y, o.theta)) for o in timeline.objects]
@@ -85,6 +86,7 @@ def _match_truth(timeline: Timeline) -> tuple[list[DrumRow], list[BoxRow], int] 
 
 
 def _head(timeline: Timeline, units: Units) -> str:
+    """Return the title, the numbers that matter most, and the notes."""
     method = {"bayes": "Bayesian method", "paper": "paper's method"}[timeline.settings.perception.method]
     when = "" if timeline.started is None else f"{timeline.started}, "
     tiles = []
@@ -144,6 +146,7 @@ def _table_2(timeline: Timeline, units: Units) -> str:
 
 
 def _others(timeline: Timeline, units: Units) -> str:
+    """Return the table of all objects."""
     if not timeline.objects:
         return note("Nothing was recognised.")
     heads = ["", f"x ({units})", f"y ({units})", "heading (°)", f"σ ({units})", "support", "score"]
@@ -167,6 +170,7 @@ def _others(timeline: Timeline, units: Units) -> str:
 
 
 def _walls(timeline: Timeline, units: Units) -> str:
+    """Return the table of the walls, and what there is of polylines."""
     heads = [
         "",
         f"from ({units})",
@@ -201,6 +205,7 @@ def _walls(timeline: Timeline, units: Units) -> str:
 
 
 def _pictures(timeline: Timeline, units: Units) -> str:
+    """Return the figures."""
     with styled(text_as_text=True):
         drawn = {
             **{name: (svg_of(figure), CAPTIONS[name]) for name, figure in pictures(timeline, units).items()},
@@ -217,6 +222,7 @@ def _pictures(timeline: Timeline, units: Units) -> str:
 
 
 def _bookmarks(timeline: Timeline, units: Units) -> list[str]:
+    """Return the table of the bookmarks; nothing without any."""
     rows = []
     for number, mark in enumerate(timeline.bookmarks, 1):
         there = None if mark.pose is None else timeline.start.compose(mark.pose)
@@ -232,6 +238,7 @@ def _bookmarks(timeline: Timeline, units: Units) -> list[str]:
 
 
 def _timing(timeline: Timeline) -> list[str]:
+    """Return the spread of times that the run's summary has, late cycles, and why refinement ended."""
     summary = timeline.summary or {}
     rows: list[tuple[str, list[float]]] = []
     parts = []
@@ -267,10 +274,12 @@ def _timing(timeline: Timeline) -> list[str]:
 
 
 def _spread(spread: dict[str, float]) -> list[float]:
+    """Return median, p99, p99.9 and worst in ms, of µs; NaN for what is not known."""
     return [1e-3 * spread.get(key, math.nan) for key in ("p50", "p99", "p999", "max")]
 
 
 def _line(timeline: Timeline) -> list[str]:
+    """Return the counts of the frames on the line; nothing of a run without them."""
     link = (timeline.summary or {}).get("link")
     counts = timeline.counts
     rows = []
@@ -282,6 +291,7 @@ def _line(timeline: Timeline) -> list[str]:
 
 
 def _modes(timeline: Timeline) -> list[str]:
+    """Return the reasons of stops and the table of the modes; nothing of a ring log."""
     reasons = [str(reason) for reason in (timeline.summary or {}).get("stop_reasons", [])]
     if not reasons:
         reasons = [m.reason for m in timeline.modes if m.mode in {"SAFE_STOP", "FAULT"} and m.reason]

@@ -147,6 +147,13 @@ def save_route(_: Call, asked: SaveRoute) -> str:
 
 
 def _parsed_mission(toml: str) -> MissionConfig:
+    """Return the mission of a text.
+
+    Raises
+    ------
+    CommandError
+        It is invalid; the field is `toml`.
+    """
     try:
         return parse_text(MissionConfig, toml, "mission")
     except ConfigError as error:

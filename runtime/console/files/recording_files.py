@@ -124,6 +124,13 @@ class RecordingFiles:
 
 
 async def _in_thread(work: Callable[[], T]) -> T:
+    """Do work with files in a thread and return its result.
+
+    Raises
+    ------
+    CommandError
+        It is refused.
+    """
     try:
         return await asyncio.to_thread(work)
     except UserError as error:

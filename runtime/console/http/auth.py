@@ -60,6 +60,7 @@ class Auth:
         return None if origin == f"{SCHEME}://{host}" else f"Origin {_quoted(origin)} is not this console's page"
 
     def _hosts(self, address: str) -> tuple[str, ...]:
+        """Return the Host headers that are right for a request which came to this local address."""
         names = {address, *self.names}
         if is_loopback(address):
             names.add("localhost")

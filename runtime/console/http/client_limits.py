@@ -93,6 +93,7 @@ class ConsoleLog:
         return self._limits.setdefault(event, LineLimit(LOG_LINES_PER_S, LOG_LINES_BURST))
 
     def _write(self, level: str, event: str, limit: LineLimit, **fields: object) -> None:
+        """Write a line unless its limit is reached; the next one that is written says how many were not."""
         suppressed = limit.take(self._clock())
         if suppressed is None:
             return

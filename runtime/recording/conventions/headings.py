@@ -77,6 +77,7 @@ def mirror_image(one: Angles) -> Angles:
 
 
 def _named(one: Angles, wanted: HeadingRule) -> Angles:
+    """Return angles with the name of the heading that follows this rule."""
     for name, rule in HEADINGS.items():
         is_from_there = math.isclose(math.cos(rule.offset_rad - wanted.offset_rad), 1.0)
         if is_from_there and (rule.turn, rule.hand) == (wanted.turn, wanted.hand):

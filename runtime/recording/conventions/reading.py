@@ -103,6 +103,13 @@ def converted_firings(
 
 
 def _decided(seen: list[Firing], path: Path, robot: RobotConfig, options: RingLogOptions) -> Conventions:
+    """Return the conventions that the first firings show.
+
+    Raises
+    ------
+    RingLogError
+        They show none; the text names the file.
+    """
     try:
         return decide(_table(seen), robot, options)
     except RingLogError as error:
@@ -183,6 +190,13 @@ def _at_heard_poses(
 
 
 def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
+    """Yield the firings, once all conventions have been applied.
+
+    Raises
+    ------
+    RingLogError
+        A range is still negative.
+    """
     for firing in firings:
         if (firing.ranges_m < 0.0).any():
             raise RingLogError(
@@ -192,6 +206,7 @@ def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
 
 
 def _table(firings: list[Firing]) -> Table:
+    """Return firings as a table; all have the same number of sensors."""
     return Table(
         np.array([one.robot_s for one in firings]),
         np.array([(one.pose.x, one.pose.y, one.pose.theta, one.ring_yaw) for one in firings]),

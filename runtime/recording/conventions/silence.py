@@ -181,6 +181,7 @@ def _nan_is_silence(ranges: Floats, set_size: int) -> bool:
 
 
 def _one_value(value: float, finite: Floats) -> Silence:
+    """Return the silence of ranges that are all exactly `value`; `finite`: all ranges that are numbers, (n,)."""
     share = np.count_nonzero(finite == value) / len(finite)
     is_top = value > 0.0 and float(np.count_nonzero(finite > value)) < GLITCHES * len(finite)
     # Ranges above a greatest value are glitches: they stay what they are.

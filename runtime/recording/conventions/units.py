@@ -219,6 +219,7 @@ class _Facts(NamedTuple):
 
     @staticmethod
     def of(table: Table, silence: Silence, angle: str) -> _Facts:
+        """Return the facts of a table whose angles are in the unit `angle`; a rate or speed of few steps is 0."""
         dt = np.diff(table.t)
         gaps = dt[dt > 0.0]
         period = float(np.median(gaps)) if len(gaps) else 0.0
