@@ -151,10 +151,11 @@ def polylines_line(polylines: Sequence[PolylineRow], units: Units) -> str:
 def pose_line(pose: PoseRow, units: Units) -> str:
     """Return where the robot is in the map frame, in one line."""
     sigma_x, sigma_y, sigma_theta = (math.sqrt(pose["covariance"][i][i]) for i in range(3))
-    heading, error = math.degrees(pose["theta"]) % 360.0, math.degrees(sigma_theta)
+    heading = math.degrees(pose["theta"]) % 360.0
     return (
         f"{pose['status']}: the robot is at {format_point(pose['x'], pose['y'], units)} {units}, "
-        f"{page_text.spread(max(sigma_x, sigma_y), units)}, heading {heading:.1f}° ± {error:.1f}°"
+        f"{page_text.spread(max(sigma_x, sigma_y), units)}, heading {heading:.1f}° "
+        f"{page_text.turn_spread(sigma_theta)}"
     )
 
 

@@ -51,6 +51,12 @@ def degrees(radians: float) -> str:
     return f"{angle}°".replace("-", "\N{MINUS SIGN}")
 
 
+def turn_spread(sigma_rad: float) -> str:
+    """Return an angle's standard error; no evidence makes it nought."""
+    sigma_deg = math.degrees(sigma_rad)
+    return f"± {sigma_deg:.1f}°" if sigma_deg >= 0.05 else "± less than 0.1°"
+
+
 def percent(share: float) -> str:
     """Return a probability in whole per cent; no evidence makes it 0 or 100."""
     return f"{'> 99' if share >= 0.995 else '< 1' if share < 0.005 else math.floor(100.0 * share + 0.5)} %"
@@ -128,4 +134,4 @@ def localized_place(here: LocalizedPose, units: Units) -> str:
         return f"unknown, {said}"
     sigma = worst_sigma(float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
     at = f"{number(here.pose.x, units)}, {number(here.pose.y, units)} {spread(sigma, units)}"
-    return f"{at}, {degrees(here.pose.theta)} ± {math.degrees(math.sqrt(covariance[2, 2])):.1f}°, {said}"
+    return f"{at}, {degrees(here.pose.theta)} {turn_spread(math.sqrt(covariance[2, 2]))}, {said}"

@@ -140,7 +140,7 @@ export class Status extends Panel {
     const [xx, xy, yy, heading] = covariance;
     const sigma = Math.sqrt((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy));
     const place = `${this.units.number(x)}, ${this.units.number(y)} ${this.units.spread(sigma)}`;
-    return `${place}, ${degrees(theta)} ± ${((Math.sqrt(heading) * 180) / Math.PI).toFixed(1)}°, ${said}`;
+    return `${place}, ${degrees(theta, Math.sqrt(heading))}, ${said}`;
   }
 
   // Whether a count has grown recently: one bad frame an hour ago does not matter now.

@@ -71,7 +71,14 @@ export const radians = (degrees) => /** @type {T} */ (degrees === null ? null : 
 /** @param {number} radians @param {number | null} [sigma] */
 export const degrees = (radians, sigma = null) =>
   `${Math.round((Math.atan2(Math.sin(radians), Math.cos(radians)) * 180) / Math.PI)}°`.replace("-", "−") +
-  (sigma === null ? "" : ` ± ${((180 * sigma) / Math.PI).toFixed(1)}°`);
+  (sigma === null ? "" : ` ${turnSpread(sigma)}`);
+
+// An angle's standard error; no evidence makes it nought.
+/** @param {number} sigma */
+export function turnSpread(sigma) {
+  const deg = (180 * sigma) / Math.PI;
+  return deg >= 0.05 ? `± ${deg.toFixed(1)}°` : "± less than 0.1°";
+}
 
 // A probability; no evidence makes it 0 or 100.
 /** @param {number} share */

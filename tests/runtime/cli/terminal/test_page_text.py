@@ -40,12 +40,12 @@ def test_the_forms_are_those_of_the_page() -> None:
     sigmas = [0.0, 3e-5, 7e-4, 0.001, 0.04, *(10.0 ** rng.uniform(-9.0, 9.0) for _ in range(50))]
     page = Path(page_folder.__file__).parent / "page"
     script = (
-        f"import {{Units, degrees, percent}} from {json.dumps((page / 'units.js').as_uri())};"
+        f"import {{Units, degrees, percent, turnSpread}} from {json.dumps((page / 'units.js').as_uri())};"
         "const units = new Units(); const out = [];"
         f"for (const name of ['m', 'ft']) {{ units.choose(name); for (const v of {values})"
         " out.push(units.number(v), units.length(v, 3), units.place(v, -v), degrees(v)); }"
         f"for (const s of {shares}) out.push(percent(s));"
-        f"for (const s of {sigmas}) out.push(units.spread(s)); console.log(JSON.stringify(out));"
+        f"for (const s of {sigmas}) out.push(units.spread(s), turnSpread(s)); console.log(JSON.stringify(out));"
     )
     units: tuple[Units, ...] = ("m", "ft")
     ours = [
@@ -57,7 +57,7 @@ def test_the_forms_are_those_of_the_page() -> None:
             page_text.degrees(v),
         )
     ]  # fmt: skip
-    spreads = [page_text.spread(sigma, "ft") for sigma in sigmas]
+    spreads = [said for sigma in sigmas for said in (page_text.spread(sigma, "ft"), page_text.turn_spread(sigma))]
     assert printed(script) == [*ours, *map(page_text.percent, shares), *spreads]
 
 
@@ -67,6 +67,7 @@ def test_no_probability_is_0_or_100_and_no_uncertainty_is_nought(exponent: int) 
     for said in (page_text.percent(share) for share in (small, 1.0 - small, 0.0, 1.0)):
         assert not said.startswith(("0 ", "100 ")), said
     assert re.search("[1-9]", page_text.spread(10.0**exponent, "m"))
+    assert re.search("[1-9]", page_text.turn_spread(10.0**exponent))
 
 
 def test_odds_on_the_page_end_at_a_million_and_magnitudes_at_a_thousand() -> None:
