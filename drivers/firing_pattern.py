@@ -107,7 +107,13 @@ def scan_order(sensor: SensorConfig) -> tuple[int, ...]:
 
 
 def _scan_masks(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the masks of a ring with servos, whose bits are bearings, until all servos are where they began."""
+    """Return the masks of a ring with servos, whose bits are bearings, until all servos are where they began.
+
+    Raises
+    ------
+    FiringError
+        They meet again only after too many firings.
+    """
     listed = ring.sensors or ()
     orders = [scan_order(sensor) for sensor in listed]
     begins = list(itertools.accumulate((len(sensor.views) for sensor in listed), initial=0))
@@ -130,7 +136,13 @@ def _scan_masks(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _listeners(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the masks of those that listen, one a step; none if no sensor ever listens."""
+    """Return the masks of those that listen, one a step; none if no sensor ever listens.
+
+    Raises
+    ------
+    FiringError
+        A sensor fires in that step, or could hear two; or there is no set for each step.
+    """
     firing, count = ring.firing, len(ring.mounts)
     if not firing.has_listeners:
         return ()

@@ -125,7 +125,7 @@ class Link:
     def set_baud(self, baud: int | None) -> None:
         """Set the line's speed, bits per second, or back to that of the settings; a line without a speed ignores it.
 
-        Bytes that have not been transmitted yet may be lost. If the port refuses the speed, the line is ended.
+        Without effect while closed. Bytes not transmitted yet may be lost. If the port refuses, the line is ended.
         """
         baud = self._config.baud if baud is None else baud
         if baud == self._baud or self._line is None:

@@ -157,7 +157,13 @@ class _Callbacks(ctypes.Structure):
 
 
 def _renamed() -> Any:  # noqa: ANN401 - a class of ROS
-    """Return a type with the name of `TFMessage` and the functions of `TransformStamped`, which bytes do not need."""
+    """Return a type with the name of `TFMessage` and the functions of `TransformStamped`, which bytes do not need.
+
+    Raises
+    ------
+    ImportError
+        ROS has no support for it here.
+    """
     from geometry_msgs.msg import TransformStamped
 
     python = ctypes.pythonapi

@@ -61,7 +61,7 @@ class LineLimit:
         self.suppressed = 0
 
     def take(self, now_s: float) -> int | None:
-        """Return how many lines were left out before this one; None if this one is left out too."""
+        """Return how many lines were left out before this one, and forget them; None if this one is left out, too."""
         if not self._bucket.take(now_s):
             self.suppressed += 1
             return None

@@ -291,7 +291,7 @@ class Decoder(Generic[F]):
         return found
 
     def _take(self) -> list[F]:
-        """Return the frames in the bytes kept, and keep from the first incomplete one on."""
+        """Return the frames in the bytes kept, count corrupt ones, and keep from the first incomplete one on."""
         found: list[F] = []
         data, at = bytes(self._pending), 0
         while (start := data.find(HEADER, at)) >= 0 and start + 2 < len(data):

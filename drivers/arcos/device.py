@@ -246,7 +246,10 @@ class ArcosDevice(EventDevice):
             self._servo.moved(before, body.odometry_pose)
 
     def _wheels(self) -> tuple[Twist, tuple[float, float] | None]:
-        """Return the velocity that the wheels accelerate towards, and the accelerations; None for a hard brake."""
+        """Return the velocity that the wheels accelerate towards, and the accelerations; None for a hard brake.
+
+        A velocity that was commanded is kept, for wheels that ignore a halt.
+        """
         faults, servo, twist = self._faults, self._servo, self._body.twist
         if faults.has(Reboot) or faults.has(BlockedWheels) or self._is_off():
             return STILL, None

@@ -66,7 +66,7 @@ class RequestedPackets:
         return True
 
     def due(self, body: Body, firmware: Firmware, front: int, rear: int) -> list[Packet]:
-        """Return the packets that follow the present SIP; a single one is then done with."""
+        """Return the packets that follow the present SIP; one that was asked for once is not sent again."""
         packets = [self._packet(number, body, firmware, front, rear) for number, left in self._asked.items() if left]
         self._asked = {number: left for number, left in self._asked.items() if left > 1}
         return packets

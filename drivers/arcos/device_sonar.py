@@ -79,7 +79,7 @@ class SonarArrays:
         self._cycle_us = 1000 * min(CYCLE_MAX_MS, max(CYCLE_MIN_MS, cycle_ms))
 
     def fire(self, now_us: int) -> list[int]:
-        """Return the sensors that fire now, at most one of each array; none if it is not time."""
+        """Return the sensors that fire now, at most one of each array; none if it is not time. Go on to the next."""
         if self._due_us is None or now_us < self._due_us:
             return []
         self._due_us += self._cycle_us

@@ -200,7 +200,7 @@ class ArcosDriver(Session[PoseStamper]):
         self._is_ending = self._state is not LineState.CLOSED
 
     def outgoing(self, *, writable: bool) -> bytes:
-        """Return the bytes to send now; only stops while the line is not `writable`."""
+        """Return the bytes to send now, and consider them sent; only stops while the line is not `writable`."""
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""
@@ -220,7 +220,7 @@ class ArcosDriver(Session[PoseStamper]):
         return data
 
     def _due_commands(self) -> tuple[Command, ...]:
-        """Return the commands that are due besides a stop; one at a time of those that can wait."""
+        """Remove and return the commands that are due besides a stop; one at a time of those that can wait."""
         commands: tuple[Command, ...] = ()
         drive, self._drive = self._drive, None
         if self._state is not LineState.READY and self._run_s >= self._refused_until_s:

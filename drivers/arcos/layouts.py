@@ -129,7 +129,13 @@ def pack_integer(message: object, field: str, code: str, value: int) -> bytes:
 
 
 def pack(message: object, layout: Layout) -> bytes:
-    """Return the bytes of the fields up to the first that is None."""
+    """Return the bytes of the fields up to the first that is None.
+
+    Raises
+    ------
+    ValueError
+        A value does not fit its field.
+    """
     out = bytearray()
     for field, code in layout:
         value = getattr(message, field)

@@ -50,6 +50,8 @@ class SonarTimes:
             When the SIP was measured.
         count
             Number of cycles that ended since the SIP before.
+
+        Each SIP with ranges is given once, in order: it narrows the bounds for the next.
         """
         passed_s = count * self.cycle_s
         low_s = max(self._low_s + passed_s - _SLACK_S, sip_s - self.cycle_s)

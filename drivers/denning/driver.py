@@ -181,7 +181,7 @@ class DenningDriver(Session[PoseStamper]):
         """End the session: this protocol has none."""
 
     def outgoing(self, *, writable: bool) -> bytes:
-        """Return the bytes to send now; only HALT while the line is not `writable`."""
+        """Return the bytes to send now, and consider them sent; only HALT while the line is not `writable`."""
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""

@@ -120,7 +120,10 @@ class PoseStamper(Stamper):
         self._held.clear()
 
     def odometry(self, odom: Odom, run_s: float) -> Odometry | Jump:
-        """Return the sample of an odometry frame received at `run_s`; or a `Jump`, and then the frame is not used."""
+        """Return the sample of an odometry frame received at `run_s`; or a `Jump`, and then the frame is not used.
+
+        A clock that is too slow is noted for the operator.
+        """
         t_us = self._clock.read(odom.t_us, run_s)
         if isinstance(t_us, Jump):
             return t_us

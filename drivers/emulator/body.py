@@ -221,7 +221,10 @@ class Body:
         return here_m
 
     def _free_share(self, end: Pose, distance: float, turn: float) -> float:
-        """Return which share of the arc to `end`, 0 to 1, can be driven before the rim touches a surface."""
+        """Return which share of the arc to `end`, 0 to 1, can be driven before the rim touches a surface.
+
+        Call it once for each arc that is driven: it counts the distance down that is free in any direction.
+        """
         if distance == 0.0:
             return 1.0
         self._clear_m -= abs(distance)  # no surface can come nearer by more than the distance driven
@@ -241,7 +244,10 @@ class Body:
         return free
 
     def _move(self, distance: float, turn: float) -> float:
-        """Move along the arc as far as it is free, and return which share of it that is."""
+        """Move along the arc as far as it is free, and return which share of it that is.
+
+        The odometry counts the same arc with its errors; the ring turns as well, but on a synchro drive.
+        """
         end = arc(self.pose, distance, turn)
         share = self._free_share(end, distance, turn)
         if share < 1.0:

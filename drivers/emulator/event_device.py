@@ -96,7 +96,7 @@ class EventDevice(ABC):
         return self._line.take()
 
     def _hear(self, data: bytes) -> bytes:
-        """Return what the robot receives of bytes from the host; none while it restarts."""
+        """Return what the robot receives of bytes from the host, and plan anew; none while it restarts."""
         if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
             return b""
         self._next_event_us = None

@@ -93,7 +93,10 @@ class SlippingClock:
         return self._emulated_s
 
     def steps(self, now_s: float, *, may_slip: bool = True) -> Iterator[float]:
-        """Yield the emulated times to advance to, in steps, up to the clock's reading `now_s`."""
+        """Yield the emulated times to advance to, in steps, up to the clock's reading `now_s`.
+
+        A lag beyond `LAG_MAX_S` is given up if `may_slip`, and counted; the emulated time then runs later for good.
+        """
         lag_s = now_s - self._start_s - self._emulated_s
         if may_slip and lag_s > LAG_MAX_S:
             self._start_s += lag_s - LAG_MAX_S

@@ -86,7 +86,13 @@ class TcpServerPort:
         return None if end is None else end.fileno()
 
     def open(self) -> None:
-        """Plug in: listen for a host."""
+        """Plug in: listen for a host.
+
+        Raises
+        ------
+        EmulatorError
+            The address is taken or not of this machine.
+        """
         try:
             family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
             self._listener = socket.create_server((self._host, self._port), family=family, backlog=1)

@@ -134,6 +134,13 @@ def _scan(servo: Sequence[float] | None) -> str:
 
 
 def _render(values: Mapping[str, Any]) -> str:
+    """Return the robot file of a robot_config.py's values.
+
+    Raises
+    ------
+    ValueError
+        They contradict each other.
+    """
     mounts, count = values["MOUNTS"], len(values["SENSORS"])
     if mounts is not None and len(mounts) != count:
         raise ValueError(f"MOUNTS has {len(mounts)} places and SENSORS {count} sensors")

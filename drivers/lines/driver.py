@@ -122,7 +122,7 @@ class LineDriver(Session[LineStamper]):
         """Do nothing: this protocol has no end of a session."""
 
     def outgoing(self, *, writable: bool) -> bytes:
-        """Return the bytes to send now: a standstill before all else, and nothing else on a line that is full."""
+        """Return the bytes to send now, and consider them sent: a standstill first; on a full line, nothing else."""
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""

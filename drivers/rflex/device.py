@@ -234,7 +234,10 @@ class RflexDevice(EventDevice):
             self._moved_us = self._now_us
 
     def _wheels(self) -> tuple[Twist, float | None]:
-        """Return the velocity that the wheels go for, and the time of a stop that is harder than commanded."""
+        """Return the velocity that the wheels go for, and the time of a stop that is harder than commanded.
+
+        A velocity that was commanded is kept, for wheels that ignore a halt.
+        """
         faults = self._faults
         if any(faults.has(kind) for kind in (Reboot, BlockedWheels, MotorFault, StopButton)):
             return STILL, BRAKE_S

@@ -217,7 +217,7 @@ class RflexDriver(Session[Measurements]):
         self._is_ending = self._state is not LineState.CLOSED
 
     def outgoing(self, *, writable: bool) -> bytes:
-        """Return the command to send now, one at a time; only those of a halt while the line is not `writable`."""
+        """Return the command to send now, and consider it sent; only that of a halt if the line is not `writable`."""
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""

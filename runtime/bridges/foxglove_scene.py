@@ -137,7 +137,10 @@ class SceneChannels:
 
 
 def cross_path_rows(firings: list[Message], ring: Message) -> CrossPathRows:
-    """Return the cross paths of a state as an analysis has them; `t_s` is the robot's clock."""
+    """Return the cross paths of a state, (n,) `CROSS_PATH`, in odometry's frame.
+
+    `t_s` is the robot's clock here, as there is no time of the run. `ring`: that of the session.
+    """
     rows = []
     for firing in firings:
         x, y, heading, ring_yaw = firing["pose"]

@@ -112,7 +112,7 @@ class Console:
         run.live_settings.subscribe(self._show_settings)
         self._commands = CommandContext(run, self.hub, self.tuning, clock, *controls)
         if controls.files is not None:
-            controls.files.jobs.tell = self.hub.broadcast
+            controls.files.jobs.broadcast = self.hub.broadcast
         self.dispatcher = CommandDispatcher(self._commands, self._console_log, self._start_task)
         self._publisher = FramePublisher(run, self.hub, self._commands, settings, log, clock, self._on_stalled)
         self._issue_challenge = run.timing_monitor.timed(CONSOLE_SEND, self._challenge)

@@ -139,7 +139,7 @@ class ReplayControl(Protocol):
 class JobControl(Protocol):
     """Makes reports and maps of recordings, one at a time; a CommandError of any call is the client's answer."""
 
-    tell: Callable[[JobMessage], None]
+    broadcast: Callable[[JobMessage], None]
     """Sends every client how far a job is."""
 
     def listed(self) -> list[JobMessage]:

@@ -206,7 +206,10 @@ class McapScanner:
         return bool(length == INDEX_HEAD.size + list_bytes)
 
     def _find_chunk(self, at: int) -> tuple[list[RawMessage] | None, int]:
-        """Return the next whole chunk from `at` on and the byte after it; without one, None and the file's end."""
+        """Return the next whole chunk from `at` on and the byte after it; without one, None and the file's end.
+
+        What is skipped is noted as corrupt.
+        """
         size = len(self._data)
         for found in self._marks(at):
             start = found - ZSTD_AT

@@ -285,7 +285,7 @@ class Recorder:
         self._put_now(SUMMARY, RunEnd.model_construct(run_s=self._clock(), summary=dict(summary)))
 
     def on_log(self, event: Mapping[str, Any]) -> None:
-        """Record a line of the log."""
+        """Record a line of the log; lost, and counted, if the queue is full."""
         fields = {name: value for name, value in event.items() if name not in {"level", "event", "timestamp"}}
         run_s, host_s = self._clock.both()
         line = LogLine.model_construct(

@@ -252,7 +252,13 @@ class Replayer:
         raise KeyframeError(f"the keyframe of cycle {start.cycle} cannot be read")
 
     def _apply_settings(self, data: dict[str, Any]) -> None:
-        """Put other settings in force, as the run did at this point."""
+        """Put other settings in force, as the run did at this point.
+
+        Raises
+        ------
+        RecordingError
+            They are not those that a run may change.
+        """
         if data == self.settings_data:
             return
         settings = parse_settings(data)
@@ -306,6 +312,7 @@ class Replayer:
             ) from error
 
     def _keyframe(self, message: RawMessage) -> ReplayStep:
+        """Return a keyframe to compare if the state is known there; else adopt its state, unless that is refused."""
         cycle = keyframe_cycle(message)
         try:
             frame = decode(Keyframe, message.data)

@@ -75,7 +75,13 @@ def read_ring_log(
 
 
 def _lines(file: BinaryIO, path: Path) -> Iterator[str]:
-    """Yield the file's lines as text; decoded one by one, so that an error can name the row."""
+    """Yield the file's lines as text; decoded one by one, so that an error can name the row.
+
+    Raises
+    ------
+    RingLogError
+        A line is too long, or no text in UTF-8.
+    """
     for row, raw in enumerate(iter(lambda: file.readline(LINE_MAX_BYTES), b""), start=1):
         if len(raw) == LINE_MAX_BYTES:
             raise row_error(
@@ -95,6 +101,11 @@ def _rows(file: BinaryIO, path: Path) -> Iterator[tuple[int, list[str]]]:
 
     Each line is parsed by itself. A quoted cell may span lines in CSV but not here: a missing quote would otherwise
     read the whole rest of the file into memory as a single row.
+
+    Raises
+    ------
+    RingLogError
+        A row is not CSV.
     """
     for row, line in enumerate(_lines(file, path), start=1):
         try:
@@ -176,7 +187,13 @@ def _cross_paths(pairs: Sequence[tuple[int, int]], cells: Sequence[str]) -> Cros
 def _check_header(
     names: Sequence[str], path: Path, row: int, angles: Sequence[str]
 ) -> tuple[int, int, list[tuple[int, int]]]:
-    """Return the columns at which ranges begin and end, and the pair of sensors of each column of half paths."""
+    """Return the columns at which ranges begin and end, and the pair of sensors of each column of half paths.
+
+    Raises
+    ------
+    RingLogError
+        It is none of this ring; the text says what is wrong.
+    """
     _check_names(names, path, row)
     lead = [*REQUIRED, RING_YAW] if RING_YAW in names else [*REQUIRED]
     first_cross = next(
@@ -215,7 +232,13 @@ def _check_names(names: Sequence[str], path: Path, row: int) -> None:
 
 
 def _pair_of(name: str, count: int, path: Path, row: int) -> tuple[int, int]:
-    """Return the sensors, one of `count` that pings and one that listens, of a column of half paths."""
+    """Return the sensors, one of `count` that pings and one that listens, of a column of half paths.
+
+    Raises
+    ------
+    RingLogError
+        It is the name of no such column.
+    """
     found = _CROSS.fullmatch(name)
     transmitter, listener = (int(found[1]), int(found[2])) if found else (0, 0)
     if transmitter == listener or max(transmitter, listener) >= count or name != cross_column(transmitter, listener):
@@ -230,7 +253,13 @@ def cross_column(transmitter: int, listener: int) -> str:
 
 
 def _number(cell: str) -> float:
-    """Return the number in a cell; `float` alone would also accept 1_000 and digits of other scripts."""
+    """Return the number in a cell; `float` alone would also accept 1_000 and digits of other scripts.
+
+    Raises
+    ------
+    ValueError
+        It holds none.
+    """
     if "_" in cell or not cell.isascii():
         raise ValueError(cell)
     return float(cell)
@@ -268,7 +297,13 @@ def _range(cell: str) -> float:
 
 
 def _any_range(cell: str) -> float:
-    """Return a range in any convention: negative ones as they are, and −inf for the text nan."""
+    """Return a range in any convention: negative ones as they are, and −inf for the text nan.
+
+    Raises
+    ------
+    ValueError
+        It is infinite without being written so.
+    """
     value = _number(cell) if cell else math.nan
     if value == -math.inf or (value == math.inf and _SPELT_INF.fullmatch(cell) is None):
         raise ValueError(cell)

@@ -140,7 +140,7 @@ class RingLogRows:
         self.count += 1
 
     def _half_paths(self, heard: CrossPaths | None) -> list[float]:
-        """Return a number for each column of half paths, NaN where the sensor did not listen."""
+        """Return a number for each column of half paths, NaN where none listened; count those without a column."""
         if heard is None:
             return [math.nan] * len(self._pairs)
         pairs = zip(heard.transmitters.tolist(), heard.listeners.tolist(), strict=True)

@@ -40,8 +40,8 @@ PART_SHARE: Final = 0.25
 class RecordingTarget(Protocol):
     """Where the files of one recording are written."""
 
-    def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1; its folder exists afterwards."""
+    def begin_part(self, part: int) -> Path:
+        """Return the path of the next file, numbered from 1, and see to it that it can be written there."""
         ...
 
     def enforce_limits(self, current: Path) -> str | None:
@@ -74,8 +74,8 @@ class SingleFile:
 
     first: Path
 
-    def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1; only the first, which the user named, may exist already.
+    def begin_part(self, part: int) -> Path:
+        """Return the path of a file, numbered from 1: the first as the user named it, a later one is created.
 
         Raises
         ------
@@ -150,8 +150,10 @@ class RotatingFolder:
     _announced: Path | None = None
     """The file that the last check has named."""
 
-    def path(self, part: int) -> Path:
-        """Create a file, numbered from 1, and return its path.
+    def begin_part(self, part: int) -> Path:
+        """Create a file, numbered from 1, and return its path; it counts as one of this run.
+
+        Where another run has files of this name, `run` changes.
 
         Raises
         ------

@@ -241,7 +241,7 @@ class RecordingWriter:
         self._parts += 1
         self._info = self._info.model_copy(update={"part": self._parts})
         log_ns = self._log_ns(self._host_clock())
-        self._file = McapFile(self._target.path(self._parts), encode(self._info), log_ns)
+        self._file = McapFile(self._target.begin_part(self._parts), encode(self._info), log_ns)
         self._bytes_before = self._status.bytes
         self._mode = None
         path, files = utf8(str(self._file.path)), self._status.files + 1

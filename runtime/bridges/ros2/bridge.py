@@ -117,7 +117,10 @@ class _Bridge:
         self._begin(work())
 
     def goal(self, x: float, y: float, heading_rad: float | None, frame: str) -> None:
-        """Drive to a place."""
+        """Drive to a place.
+
+        Refused, with a warning, in the frame `map` while the place in it is not known.
+        """
 
         async def work(operator: Operator) -> None:
             place = None if self._topics is None else self._topics.place

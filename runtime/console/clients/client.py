@@ -217,7 +217,7 @@ class Client:
                 self._sending_since_s = None
 
     def _next(self) -> bytes | None:
-        """Return what to send next, None if there is nothing."""
+        """Remove and return what to send next: a message, else the challenge, else the frame; None without any."""
         if self._queue:
             data = self._queue.popleft()
             self._queue_bytes -= len(data)

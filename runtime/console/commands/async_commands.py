@@ -79,7 +79,13 @@ async def add_bookmark(call: Call, bookmark: AddBookmark) -> None:
 
 
 async def undo_bookmark(call: Call, _: NoArguments) -> str:
-    """Withdraw the last bookmark; return its text."""
+    """Withdraw the last bookmark; return its text.
+
+    Raises
+    ------
+    CommandError
+        There is none, or it cannot be withdrawn any more.
+    """
     try:
         return await _recording(call).undo_bookmark()
     except UserError as error:

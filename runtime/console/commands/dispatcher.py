@@ -130,7 +130,13 @@ class CommandDispatcher:
             self._context.hub.control.note_use(client, self._context.clock())
 
     def _start(self, call: Call, command: Command[Any], message: Message) -> object:
-        """Start the task that runs a handler and answers."""
+        """Start the task that runs a handler and answers.
+
+        Raises
+        ------
+        CommandError
+            A command of this client is still under way.
+        """
         if call.client.is_busy:
             raise CommandError(BUSY)
 

@@ -52,6 +52,13 @@ def cancel_job(call: Call, given: CancelJob) -> None:
 
 
 def _files(call: Call) -> FileControl:
+    """Return the part of the run that has files.
+
+    Raises
+    ------
+    CommandError
+        It has none.
+    """
     if call.context.files is None:
         raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
     return call.context.files

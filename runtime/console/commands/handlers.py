@@ -183,7 +183,13 @@ def edit_mission(call: Call, _: NoArguments) -> None:
 
 
 def _request_drive(call: Call, asked: DriveInput) -> None:
-    """Pass what is to be driven, or a change of the mission, to the next cycle, unless that would refuse it."""
+    """Pass what is to be driven, or a change of the mission, to the next cycle, unless that would refuse it.
+
+    Raises
+    ------
+    CommandError
+        The next cycle would refuse it; the text says why.
+    """
     state = call.context.robot.state
     if needs_map(asked) and state.perception.localized() is None:
         raise CommandError(NO_MAP)
@@ -260,6 +266,13 @@ def undo_edit(call: Call, _: NoArguments) -> AnsweredLater[str]:
 
 
 def _queue(call: Call, *pending: PendingEdit) -> None:
+    """Pass edits to the next cycle; each command is answered when they are done.
+
+    Raises
+    ------
+    CommandError
+        Too many are waiting already.
+    """
     if not call.context.robot.edit(*(one.edit for one in pending)):
         raise CommandError("too many edits are waiting for the next cycle: try again")
     call.context.pending_edits.extend(pending)
@@ -332,6 +345,13 @@ def save_toml(call: Call, _: NoArguments) -> str:
 
 
 def _refuse_if(reason: str | None) -> None:
+    """Refuse a command for a reason, if there is one.
+
+    Raises
+    ------
+    CommandError
+        There is.
+    """
     if reason is not None:
         raise CommandError(reason)
 

@@ -357,7 +357,13 @@ def _has_bounds(hint: Any) -> bool:  # noqa: ANN401 - any type hint
 
 
 def wire_model(name: str, of: type) -> type[BaseModel]:
-    """Return the model of a command's messages."""
+    """Return the model of a command's messages.
+
+    Raises
+    ------
+    TypeError
+        An argument has no bounds.
+    """
     hints = get_type_hints(of, include_extras=True)
     defaults = _arguments(of)
     arguments = {key: BOUNDS.get(key, hints[key]) for key in defaults}

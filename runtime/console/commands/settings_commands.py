@@ -92,6 +92,13 @@ async def restart_run(call: Call, _: NoArguments) -> None:
 
 
 def _files(call: Call) -> SettingsFileControl:
+    """Return the part of the run that has settings files.
+
+    Raises
+    ------
+    CommandError
+        It has none.
+    """
     if call.context.settings_files is None:
         raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
     return call.context.settings_files

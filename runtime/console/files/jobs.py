@@ -88,7 +88,7 @@ class Jobs:
         """Has a folder for the files of each job; None before the first one."""
         self._resources = contextlib.ExitStack()
         """Deletes that folder."""
-        self.tell: Callable[[JobMessage], None] = lambda _: None
+        self.broadcast: Callable[[JobMessage], None] = lambda _: None
         """Sends a message to every page."""
 
     def listed(self) -> list[JobMessage]:
@@ -188,7 +188,7 @@ class Jobs:
             job.error = f"its process cannot be started: {error.strerror}"
         finally:
             job.is_over, job.what = True, "done" if job.error is None else "failed"
-            self.tell(job.message())
+            self.broadcast(job.message())
             if process is not None:
                 await kill_child(process)
 
@@ -202,7 +202,7 @@ class Jobs:
                     share, _, job.what = text.removeprefix(MARK).partition(" ")
                     with contextlib.suppress(ValueError):
                         job.share = float(share)
-                    self.tell(job.message())
+                    self.broadcast(job.message())
                 elif text:
                     last = text
         return last

@@ -118,7 +118,13 @@ class RecordingFiles:
         return self.jobs.start(kind, file, await self.find(file))
 
     def _refuse_live(self, file: str) -> None:
-        """Refuse the recording in progress also where the file system has no locks."""
+        """Refuse the recording in progress also where the file system has no locks.
+
+        Raises
+        ------
+        CommandError
+            It is that one.
+        """
         if str(self._folder / file) == self._current():
             raise CommandError(f"{file} is being written: stop recording first")
 

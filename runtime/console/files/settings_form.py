@@ -67,7 +67,13 @@ def with_setting(kind: Kind, text: str, path: str, value: TomlValue) -> str:
 
 
 def _read(path: str, text: str) -> TomlValue:
-    """Return the value that a text in TOML says."""
+    """Return the value that a text in TOML says.
+
+    Raises
+    ------
+    CommandError
+        It says none, or several.
+    """
     try:
         said = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError as error:

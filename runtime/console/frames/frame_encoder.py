@@ -276,7 +276,7 @@ class FrameEncoder:
         )
 
     def _encode_segments(self, state: State, *, may_wait: bool) -> bytes:
-        """Return the changes of the map's segments; list them only if they may have changed and may not wait."""
+        """Return the changes of the map's segments, and list clusters, if they may have changed and may not wait."""
         perception = state.perception
         counts = (perception.counts.segments_total, perception.counts.segments)
         if not self._is_stale and (may_wait or counts == self._segment_counts):

@@ -149,7 +149,13 @@ class ReplayProcess:
         self._on_answer(problem("the process that replays the recording has ended: open the recording again"))
 
     async def _read(self) -> tuple[bytes, tuple[int, int], tuple[bytes, bytes, bytes]]:
-        """Return the next message: its kind, a frame's source and number, and its parts."""
+        """Return the next message: its kind, a frame's source and number, and its parts.
+
+        Raises
+        ------
+        asyncio.IncompleteReadError, OSError
+            The process has ended, or has no pipes.
+        """
         out = self._process.stdout
         if out is None:
             raise OSError("the process was started without pipes")
@@ -318,6 +324,13 @@ class ReplayClient:
         await asyncio.gather(*(self._end(replay) for replay in replays), *self._closing, return_exceptions=True)
 
     def _replay_of(self, viewer: Viewer) -> ReplayProcess:
+        """Return the worker of a client.
+
+        Raises
+        ------
+        ReplayError
+            It has none open.
+        """
         replay = self._open.get(id(viewer))
         if replay is None:
             raise ReplayError("no recording is open: open one first")

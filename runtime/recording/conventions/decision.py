@@ -216,7 +216,13 @@ def _period_s(table: Table, units: Units, period: float) -> float:
 
 
 def _shown(ranges: Floats, silence: Silence) -> Floats:
-    """Return the ranges with inf for silence; all are at least 0."""
+    """Return the ranges with inf for silence; all are at least 0.
+
+    Raises
+    ------
+    RingLogError
+        One is below 0.
+    """
     shown = np.array([silence.applied(row) for row in ranges])
     if (shown < 0.0).any():
         raise RingLogError(f"has ranges below 0, as {float(np.nanmin(shown)):g}; correct them, or say --silence -1")

@@ -47,7 +47,7 @@ def older(folder: Path, *sizes: int) -> list[Path]:
 
 def write(target: RotatingFolder, part: int, size: int) -> list[str | None]:
     """Write a file as the recorder does, with a check at its opening and at its end; return the warnings."""
-    path = target.path(part)
+    path = target.begin_part(part)
     first = target.enforce_limits(path)
     path.write_bytes(b"y" * size)
     return [first, target.enforce_limits(path)]
@@ -152,8 +152,8 @@ def test_a_clock_that_was_set_back_changes_nothing(tmp_path: Path) -> None:
 def test_runs_of_the_same_name_share_a_folder(tmp_path: Path) -> None:
     """As of two containers whose processes have the same number: each has files of its own."""
     first, second = (RotatingFolder(tmp_path, RUN, config(cap_bytes=1_000)) for _ in range(2))
-    finished = first.path(1)
-    written = McapFile(first.path(2), b"{}", 0)
+    finished = first.begin_part(1)
+    written = McapFile(first.begin_part(2), b"{}", 0)
     write(second, 1, 300)
     names = [path.name for path in sorted(tmp_path.glob("*.mcap"))]
     assert names == [f"{RUN}-001.mcap", f"{RUN}-002.mcap", f"{RUN}.2-001.mcap"]
@@ -171,7 +171,7 @@ def test_runs_of_the_same_name_share_a_folder(tmp_path: Path) -> None:
 def test_a_person_is_warned_which_goes_next_and_how_to_keep_it(tmp_path: Path) -> None:
     first, second = older(tmp_path, 400_000, 400_000)
     target = RotatingFolder(tmp_path, RUN, config())
-    current = target.path(1)
+    current = target.begin_part(1)
     current.write_bytes(b"y" * 50_000)
     assert target.enforce_limits(current) is None, "a tenth is free"
     current.write_bytes(b"y" * 450_000)
@@ -218,11 +218,11 @@ def test_what_is_switched_off_without_content_is_removed(tmp_path: Path) -> None
 
 def test_only_the_file_that_the_user_named_is_replaced(tmp_path: Path) -> None:
     target = SingleFile(tmp_path / "run.mcap")
-    assert target.path(1) == tmp_path / "run.mcap"
+    assert target.begin_part(1) == tmp_path / "run.mcap"
     (tmp_path / "run.mcap").touch()
     (tmp_path / "run-2.mcap").touch()
-    assert target.path(1) == tmp_path / "run.mcap"
-    assert target.path(2) == tmp_path / "run-3.mcap"
+    assert target.begin_part(1) == tmp_path / "run.mcap"
+    assert target.begin_part(2) == tmp_path / "run-3.mcap"
 
 
 def test_what_is_no_recording_has_no_bookmark(tmp_path: Path) -> None:
@@ -234,11 +234,11 @@ def test_what_is_no_recording_has_no_bookmark(tmp_path: Path) -> None:
 
 def test_a_file_of_the_user_is_never_split_or_deleted(tmp_path: Path) -> None:
     target = SingleFile(tmp_path / "run.mcap")
-    assert [target.path(part).name for part in (1, 2, 11)] == ["run.mcap", "run-2.mcap", "run-11.mcap"]
+    assert [target.begin_part(part).name for part in (1, 2, 11)] == ["run.mcap", "run-2.mcap", "run-11.mcap"]
     assert not target.is_part_full(10**15)
     old = tmp_path / "old.mcap"
     old.touch()
-    target.enforce_limits(target.path(1))
+    target.enforce_limits(target.begin_part(1))
     assert old.exists()
 
 

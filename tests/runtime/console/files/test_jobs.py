@@ -20,7 +20,7 @@ PROGRAM = "tests.runtime.console.files.stub_job"
 @asynccontextmanager
 async def jobs_of() -> AsyncIterator[tuple[Jobs, list[JobMessage]]]:
     jobs, sent = Jobs(program=PROGRAM), list[JobMessage]()
-    jobs.tell = sent.append
+    jobs.broadcast = sent.append
     try:
         yield jobs, sent
     finally:
