@@ -166,7 +166,7 @@ def _listeners(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
                 f"fires; leave it out of that step"
             )
         for sensor in sensors(mask):
-            near = _nearest(axes, sensor, fired)
+            near = _nearest_firing(axes, sensor, fired)
             if len(near) > 1:
                 raise FiringError(
                     f"ring.firing.listen: sensor {sensor} would listen midway between {near[0]} and {near[1]}, which "
@@ -176,7 +176,7 @@ def _listeners(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
     return heard if any(heard) else ()
 
 
-def _nearest(axes: tuple[float, ...], sensor: int, fired: int) -> tuple[int, ...]:
+def _nearest_firing(axes: tuple[float, ...], sensor: int, fired: int) -> tuple[int, ...]:
     """Return those of the sensors that fire whose axes are nearest to that of `sensor`."""
     between = {j: abs(math.remainder(axes[j] - axes[sensor], 2.0 * math.pi)) for j in sensors(fired)}
     least = min(between.values(), default=0.0)
@@ -199,7 +199,7 @@ def cross_pairs(axes: tuple[float, ...], fired: int, listeners: int) -> tuple[tu
     """
     ours = (1 << len(axes)) - 1
     fired &= ours
-    return tuple((_nearest(axes, i, fired)[0], i) for i in sensors(listeners & ours)) if fired else ()
+    return tuple((_nearest_firing(axes, i, fired)[0], i) for i in sensors(listeners & ours)) if fired else ()
 
 
 def pattern_pairs(ring: RingConfig) -> tuple[tuple[int, int], ...]:

@@ -25,7 +25,7 @@ class Jump(Enum):
     AHEAD = "ahead"
 
 
-def _nearest(t_us: int, reference_us: int) -> int:
+def _nearest_time(t_us: int, reference_us: int) -> int:
     """Return the time nearest to `reference_us` at which the counter shows `t_us`."""
     return reference_us + (t_us - reference_us + _HALF) % _WRAP - _HALF
 
@@ -96,7 +96,7 @@ class RobotClock:
         if self._t_us is not None:
             waited_us = round((run_s - self._read_s) * 1e6)
             expected = self._t_us + waited_us
-            t = _nearest(t_us, expected)
+            t = _nearest_time(t_us, expected)
             if t < self._t_us:
                 return Jump.BACK
             if t - expected > _AHEAD_MAX_US + _DRIFT * waited_us and not self._trusting:
@@ -110,7 +110,7 @@ class RobotClock:
 
     def near_last(self, t_us: int) -> int | None:
         """Return the time nearest to the last reading at which the counter shows `t_us`; None before the first."""
-        return None if self._t_us is None else _nearest(t_us, self._t_us)
+        return None if self._t_us is None else _nearest_time(t_us, self._t_us)
 
     def trust_next(self) -> None:
         """Accept the next reading however far ahead it is: the robot has confirmed that it did not restart."""

@@ -159,7 +159,11 @@ class RobotSide:
         self._group[sensor] = self._count(frame, range_m, limits)
 
     def odometry(self, frame: str, stamp_s: float, pose: Pose, twist: Twist, host_s: float) -> None:
-        """Take a sample of the odometry of a frame: pose (m, rad) and velocity at a time of the robot's stamps, s."""
+        """Take a sample of the odometry of a frame: pose (m, rad) and velocity at a time of the robot's stamps, s.
+
+        Ignored, with a note, if it is of another frame or not finite. A base that moves although it should stand is
+        sent another standstill.
+        """
         base = self._config.ros2.base_frame
         if frame.lstrip("/") not in {"", base}:
             self._note(

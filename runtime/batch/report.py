@@ -24,7 +24,7 @@ SHOWN: Final = 20
 DIGITS: Final = 4
 
 
-def page(
+def sweep_page(
     name: str, study: StudyConfig, runs: int, combinations: Sequence[Combination], unfinished: Sequence[Unfinished]
 ) -> str:
     """Return the page as one HTML text that refers to nothing outside itself.

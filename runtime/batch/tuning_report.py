@@ -90,7 +90,7 @@ def trials_text(study: StudyConfig, tuned: Tuned) -> str:
     return text.getvalue()
 
 
-def page(
+def tuning_page(
     name: str, study: StudyConfig, present: Mapping[str, Value], tuned: Tuned, unfinished: Sequence[Unfinished]
 ) -> str:
     """Return the page as one HTML text that refers to nothing outside itself.

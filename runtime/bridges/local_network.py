@@ -127,14 +127,14 @@ def announced(
     port : int or None
         Its port.
     """
-    usable = [str(address) for text in addresses if (address := _address(text)) is not None]
+    usable = [str(address) for text in addresses if (address := _usable_address(text)) is not None]
     if port is None or not 0 < port < 65536 or not usable:
         return None
     name, mode, version = (_text(properties.get(key)) for key in (b"name", b"mode", b"version"))
     return Announced(name or "a robot without a name", mode or "?", usable[0], port, version)
 
 
-def _address(text: str) -> ipaddress.IPv4Address | None:
+def _usable_address(text: str) -> ipaddress.IPv4Address | None:
     with contextlib.suppress(ValueError):
         return ipaddress.IPv4Address(text)
     return None

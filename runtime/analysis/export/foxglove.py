@@ -18,7 +18,15 @@ from foxglove import messages as fx
 
 from drivers.messages import Pose
 from perception.mapping.grid.known_cells import KnownCells
-from runtime.analysis.export.foxglove_messages import Outline, RunChannels, line, object_label, placed, scene, stamp
+from runtime.analysis.export.foxglove_messages import (
+    Outline,
+    RunChannels,
+    foxglove_pose,
+    line,
+    object_label,
+    scene,
+    stamp,
+)
 from runtime.analysis.export.shapes import CLUSTER, FiringScan, even_radius, firing_scans, truth_outlines, whole_ring
 from runtime.analysis.plots.cross_arcs import newest_cross_paths
 from runtime.analysis.plots.geometry import outline
@@ -160,7 +168,7 @@ def _grid(known: KnownCells, at: int) -> fx.Grid:
     return fx.Grid(
         timestamp=stamp(at),
         frame_id="odom",
-        pose=placed(known.x_m, known.y_m, 0.0),
+        pose=foxglove_pose(known.x_m, known.y_m, 0.0),
         column_count=known.percent.shape[1],
         cell_size=fx.Vector2(x=known.cell_m, y=known.cell_m),
         row_stride=known.percent.shape[1],

@@ -68,7 +68,7 @@ class RunChannels:
 
     def write_pose(self, pose: Pose, at: int) -> None:
         """Write the robot's pose."""
-        message = fx.PoseInFrame(timestamp=stamp(at), frame_id="odom", pose=placed(pose.x, pose.y, pose.theta))
+        message = fx.PoseInFrame(timestamp=stamp(at), frame_id="odom", pose=foxglove_pose(pose.x, pose.y, pose.theta))
         self._pose.log(message, log_time=at)
 
     def write_ring(self, ring: Pose, ranges_m: Sequence[float], at: int) -> None:
@@ -84,7 +84,7 @@ class RunChannels:
         message = fx.LaserScan(
             timestamp=stamp(at),
             frame_id="odom",
-            pose=placed(eye.x, eye.y, eye.theta),
+            pose=foxglove_pose(eye.x, eye.y, eye.theta),
             start_angle=start,
             end_angle=end,
             ranges=list(ranges_m),
@@ -115,7 +115,11 @@ class RunChannels:
         lines += [line(points, MODEL, closed=False, thickness_px=POLYLINE_PX) for points in polylines]
         texts = [
             fx.TextPrimitive(
-                pose=placed(x, y, 0.0, HEIGHT_M), billboard=True, font_size=FONT_M, color=_colour(MODEL), text=text
+                pose=foxglove_pose(x, y, 0.0, HEIGHT_M),
+                billboard=True,
+                font_size=FONT_M,
+                color=_colour(MODEL),
+                text=text,
             )
             for x, y, text in labels
         ]
@@ -175,7 +179,7 @@ def stamp(at: int) -> fx.Timestamp:
     return fx.Timestamp(sec=at // 1_000_000_000, nsec=at % 1_000_000_000)
 
 
-def placed(x: float, y: float, yaw: float, z: float = 0.0) -> fx.Pose:
+def foxglove_pose(x: float, y: float, yaw: float, z: float = 0.0) -> fx.Pose:
     """Return a pose from place (m) and direction (rad)."""
     return fx.Pose(position=fx.Vector3(x=x, y=y, z=z), orientation=_quaternion(yaw))
 

@@ -79,11 +79,11 @@ def write_bag(timeline: Timeline, folder: Path) -> list[Path]:
         It cannot be written.
     """
     with Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
-        _RunExporter(timeline, writer).write()
+        _BagExporter(timeline, writer).write()
     return [folder]
 
 
-class _RunExporter:
+class _BagExporter:
     """Writes a run into a bag."""
 
     def __init__(self, timeline: Timeline, writer: Writer) -> None:

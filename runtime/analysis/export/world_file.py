@@ -61,7 +61,7 @@ def world_of(
                 DrumConfig(x_m=round(seen.x, DIGITS), y_m=round(seen.y, DIGITS), radius_m=model.arc_radius_m)
             )
             continue
-        corners = [(round(x, DIGITS), round(y, DIGITS)) for x, y in placed(model, seen).tolist()]
+        corners = [(round(x, DIGITS), round(y, DIGITS)) for x, y in placed_vertices(model, seen).tolist()]
         if model.closed:
             polygons.append(PolygonConfig(vertices_m=tuple(corners)))
         else:
@@ -130,7 +130,7 @@ def round_names(objects: Sequence[DetectedObject], models: Sequence[ModelConfig]
     return [seen.model for seen in objects if seen.model in is_round]
 
 
-def placed(model: ModelConfig, seen: DetectedObject) -> Floats:
+def placed_vertices(model: ModelConfig, seen: DetectedObject) -> Floats:
     """Return a model's vertices where it was recognised, shape (n, 2), m."""
     c, s = math.cos(seen.theta), math.sin(seen.theta)
     turned: Floats = np.asarray(model.vertices_m) @ np.array([[c, s], [-s, c]]) + (seen.x, seen.y)

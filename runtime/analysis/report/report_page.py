@@ -47,7 +47,7 @@ CAPTIONS: Final = MappingProxyType(
 )
 
 
-def page(timeline: Timeline, units: Units) -> str:
+def run_page(timeline: Timeline, units: Units) -> str:
     """Return the page as one HTML text that refers to nothing outside itself."""
     name = escape(utf8(timeline.path.name))
     body = "".join(

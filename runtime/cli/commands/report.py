@@ -75,7 +75,7 @@ def write_page(timeline: Timeline, target: Path, console: Console, *, units: Uni
     UserError
         The file cannot be written.
     """
-    from runtime.analysis.report.report_page import page
+    from runtime.analysis.report.report_page import run_page
 
     with progress(console, "drawing"), writing("--out", target):
-        target.write_text(page(timeline, units), encoding="utf-8")
+        target.write_text(run_page(timeline, units), encoding="utf-8")

@@ -289,7 +289,7 @@ def write_results(
         Runs that were given up.
     """
     from runtime.batch.outcome import combine
-    from runtime.batch.report import page
+    from runtime.batch.report import sweep_page
     from runtime.batch.rows import RowFolder, table, write_table
     from runtime.support.whole_file import whole_file
 
@@ -298,7 +298,7 @@ def write_results(
     with writing("--out", folder):
         write_table(study, table(study, runs, finished), folder)
         with whole_file(folder / PAGE) as part:
-            part.write_text(page(name, study, len(runs), combinations, unfinished), encoding="utf-8")
+            part.write_text(sweep_page(name, study, len(runs), combinations, unfinished), encoding="utf-8")
     return combinations
 
 

@@ -200,10 +200,10 @@ def write_results(
     unfinished : sequence of Unfinished
         Runs that were given up.
     """
-    from runtime.batch.tuning_report import changes_text, page, trials_text
+    from runtime.batch.tuning_report import changes_text, trials_text, tuning_page
     from runtime.support.whole_file import whole_file
 
-    texts = {PAGE: page(name, study, present, tuned, unfinished), TRIALS: trials_text(study, tuned)}
+    texts = {PAGE: tuning_page(name, study, present, tuned, unfinished), TRIALS: trials_text(study, tuned)}
     if tuned.best.values:
         texts[CHANGES] = changes_text(name, study, tuned)
     else:

@@ -55,27 +55,27 @@ class SaveSettings:
 
 def list_settings(call: Call, _: NoArguments) -> list[SettingsRow]:
     """Return the settings files of the run."""
-    return _files(call).listed()
+    return _settings_files(call).listed()
 
 
 async def read_settings(call: Call, given: ReadSettings) -> SettingsText:
     """Return the text of a file."""
-    return await _files(call).read(given.file)
+    return await _settings_files(call).read(given.file)
 
 
 async def check_settings(call: Call, given: CheckSettings) -> SettingsCheck:
     """Return what a changed text would mean."""
-    return await _files(call).check(given.file, given.toml)
+    return await _settings_files(call).check(given.file, given.toml)
 
 
 async def change_settings(call: Call, given: ChangeSettings) -> str:
     """Return the text with the change."""
-    return await _files(call).changed(given.file, given.toml, given.path, given.value)
+    return await _settings_files(call).changed(given.file, given.toml, given.path, given.value)
 
 
 async def save_settings(call: Call, given: SaveSettings) -> SettingsText:
     """Write a changed text in place of a file."""
-    return await _files(call).save(given.file, given.toml, given.digest)
+    return await _settings_files(call).save(given.file, given.toml, given.digest)
 
 
 async def restart_run(call: Call, _: NoArguments) -> None:
@@ -88,10 +88,10 @@ async def restart_run(call: Call, _: NoArguments) -> None:
     """
     if call.context.robot.state.mode.mode is Mode.DRIVE:
         raise CommandError(STOP_FIRST)
-    await _files(call).restart()
+    await _settings_files(call).restart()
 
 
-def _files(call: Call) -> SettingsFileControl:
+def _settings_files(call: Call) -> SettingsFileControl:
     """Return the part of the run that has settings files.
 
     Raises

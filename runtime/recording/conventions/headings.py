@@ -117,14 +117,16 @@ def motion_scores(table: Table, options: RingLogOptions) -> Motion:
         return Motion(dict.fromkeys(choices, 0.0), is_known=False, is_related=False)
 
     def score(one: Angles, offset_rad: float) -> float:
-        return _score(directions - HEADINGS[one.heading].turn * _middle(ANGLES[one.unit] * angles) - offset_rad)
+        return _direction_score(
+            directions - HEADINGS[one.heading].turn * _middle(ANGLES[one.unit] * angles) - offset_rad
+        )
 
     scores = {one: score(one, HEADINGS[one.heading].offset_rad) for one in choices}
     best = max(scores.values())
     turned = None
     if options.heading == "auto":
         offsets = np.linspace(-math.pi, math.pi, TURNS, endpoint=False)
-        alone = max(_score(directions - offset) for offset in offsets)
+        alone = max(_direction_score(directions - offset) for offset in offsets)
         found = {
             (one, offset): score(one, offset) for one in choices if one.heading in {"ccw", "cw"} for offset in offsets
         }
@@ -155,7 +157,7 @@ def _middle(angles: Floats) -> Floats:
     return middle
 
 
-def _score(off: Floats) -> float:
+def _direction_score(off: Floats) -> float:
     """Return the log-likelihood of directions by how far they are off the heading, rad."""
     off = np.abs(np.angle(np.exp(1j * off)))
     fits = np.exp(-0.5 * (off / SPREAD_RAD) ** 2) + 0.3 * np.exp(-0.5 * ((math.pi - off) / SPREAD_RAD) ** 2)

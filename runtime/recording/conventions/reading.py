@@ -98,7 +98,7 @@ def converted_firings(
     every = itertools.chain(seen, rows if first >= FIRST else _confirmed(rows, seen, found, path, robot, options))
     firings: Iterator[Firing] = (one if found.is_plain else found.converted(one) for one in every)
     if found.cycle_s is not None:
-        firings = _changes(firings, robot.ring, found.cycle_s)
+        firings = _without_repeats(firings, robot.ring, found.cycle_s)
     yield from _checked(_at_heard_poses(firings, path, robot.ring, options, warn, rows=min(first, LAG_ROWS)), path)
 
 
@@ -145,7 +145,7 @@ def _confirmed(
         yield row
 
 
-def _changes(firings: Iterable[Firing], ring: RingConfig, cycle_s: float) -> Iterator[Firing]:
+def _without_repeats(firings: Iterable[Firing], ring: RingConfig, cycle_s: float) -> Iterator[Firing]:
     """Yield the firings of a log of last values without repeats, from where the robot was when they were fired.
 
     Values that are new in a row are of the firings since the row before, or of the last cycle if that is shorter. A

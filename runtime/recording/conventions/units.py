@@ -135,7 +135,7 @@ def find_units(
         return choices[0], {choices[0]: 0.0}
     facts = _Facts.of(table, silence, angle)
     ways = {pair: _way_score(ratios, LENGTHS[pair[0]] / LENGTHS[pair[1]]) for pair in {one[1:] for one in choices}}
-    scores = {units: _score(units, facts, robot) + ways[units[1:]] for units in choices}
+    scores = {units: _units_score(units, facts, robot) + ways[units[1:]] for units in choices}
     best = max(scores, key=scores.__getitem__)
     default = Units(
         *(
@@ -247,7 +247,7 @@ def _way_score(ratios: Floats, expected: float) -> float:
     return float(np.logaddexp.reduce(scores) - np.logaddexp.reduce(-0.5 * PAIRS_BIASES**2))
 
 
-def _score(units: Units, facts: _Facts, robot: RobotConfig) -> float:
+def _units_score(units: Units, facts: _Facts, robot: RobotConfig) -> float:
     """Return the log-likelihood of units but for the ratios of range to way."""
     body, ring = robot.body, robot.ring
     t, length, range_ = TIMES[units.time], LENGTHS[units.length], LENGTHS[units.range_]

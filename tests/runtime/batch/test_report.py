@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 from config.study import StudyConfig, VaryConfig
 from runtime.batch.dispatch import Unfinished
 from runtime.batch.outcome import Combination
-from runtime.batch.report import best_rows, number, page, shown_value
+from runtime.batch.report import best_rows, number, shown_value, sweep_page
 from runtime.batch.runs import Run
 
 STUDY = StudyConfig(
@@ -44,7 +44,7 @@ class Words(HTMLParser):
 
 def test_the_page_names_the_best_and_what_did_not_finish() -> None:
     run = Run("k", "world", "a<b.toml", 2, "{}", varied={"x.y": 2, "x.on": True})
-    text = page("my <study>", STUDY, 13, FOUND, [Unfinished(run, "<script>")])
+    text = sweep_page("my <study>", STUDY, 13, FOUND, [Unfinished(run, "<script>")])
     shown = Words(text)
     assert {"12 of 13", "my <study>", "<script>", "x.y = 2, x.on = true"} <= set(shown.words)
     assert "script" not in shown.tags
@@ -53,7 +53,7 @@ def test_the_page_names_the_best_and_what_did_not_finish() -> None:
 
 
 def test_a_page_of_nothing() -> None:
-    assert "No run is finished yet." in Words(page("x", STUDY, 12, [], [])).words
+    assert "No run is finished yet." in Words(sweep_page("x", STUDY, 12, [], [])).words
 
 
 def test_rows_are_ordered_and_short() -> None:

@@ -14,7 +14,7 @@ from config.load import load_settings
 from config.study import StudyConfig, VaryConfig
 from runtime.batch.outcome import Combination
 from runtime.batch.tuning import Difference, Trial, Tuned
-from runtime.batch.tuning_report import change_lines, changes_text, gain_lines, judgement, page, trials_text
+from runtime.batch.tuning_report import change_lines, changes_text, gain_lines, judgement, trials_text, tuning_page
 
 BEAM, SURE = "ring.beam_half_angle_deg", "perception.bayes.report_probability"
 STUDY = StudyConfig(
@@ -70,9 +70,11 @@ def test_every_trial_is_in_the_table() -> None:
 
 
 def test_the_page_shows_changes_gain_and_course() -> None:
-    text = page("my <study>", STUDY, {BEAM: 24.0}, replace(TUNED, dropped={"a.b": 1}), [])
+    text = tuning_page("my <study>", STUDY, {BEAM: 24.0}, replace(TUNED, dropped={"a.b": 1}), [])
     for shown in ("my &lt;study&gt;", "a&lt;b", BEAM, "24.0", "+0.75 ± 0.05", "Held out", "brought nothing: a.b"):
         assert shown in text
     assert text.count("<figure>") == 1
     assert "The changes are better in what was held out" in text
-    assert "No change is better" in page("x", STUDY, {}, replace(TUNED, best=PRESENT, held_out=[], searched=[]), [])
+    assert "No change is better" in tuning_page(
+        "x", STUDY, {}, replace(TUNED, best=PRESENT, held_out=[], searched=[]), []
+    )

@@ -14,7 +14,7 @@ from config.model import ModelConfig
 from config.places import NoGoAreaConfig, PlaceConfig, PlacesConfig
 from config.world import WorldConfig
 from perception.detected_object import DetectedObject
-from runtime.analysis.export.world_file import placed, text_with_places, with_places, world_of, world_text
+from runtime.analysis.export.world_file import placed_vertices, text_with_places, with_places, world_of, world_text
 from tests.polylines import BEND
 
 BOX = ModelConfig(name="box", closed=True, vertices_m=((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)))
@@ -60,7 +60,7 @@ def test_an_empty_map_is_a_world_without_anything() -> None:
 
 
 def test_a_model_is_turned_about_its_origin() -> None:
-    assert placed(CORNER, seen("corner", 1.0, 1.0, math.pi)) == pytest.approx(
+    assert placed_vertices(CORNER, seen("corner", 1.0, 1.0, math.pi)) == pytest.approx(
         np.array([(0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]), abs=1e-12
     )
 

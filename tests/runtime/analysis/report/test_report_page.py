@@ -13,7 +13,7 @@ from config.world import PolygonConfig
 from drivers.messages import Pose
 from perception.detected_object import DetectedObject
 from runtime.analysis.report import report_page
-from runtime.analysis.report.report_page import page
+from runtime.analysis.report.report_page import run_page
 from runtime.analysis.timeline import ModeEntry
 from tests.runtime.analysis.report.page_reader import PageReader
 from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_polyline
@@ -24,7 +24,7 @@ SPREAD = {"p50": 170.0, "p99": 1250.0, "p999": 8004.0, "max": 49_653.0}
 
 @pytest.fixture(scope="module")
 def shown() -> str:
-    return page(synthetic_timeline(), "ft")
+    return run_page(synthetic_timeline(), "ft")
 
 
 def test_page_is_self_contained(shown: str) -> None:
@@ -72,7 +72,7 @@ def _no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_no_figures")
 def test_page_without_a_known_world() -> None:
-    unknown = page(synthetic_timeline(with_world=False), "m")
+    unknown = run_page(synthetic_timeline(with_world=False), "m")
     assert "The true world is not known" in unknown
     assert PageReader(unknown).open == []
     assert "<td>1, drum</td>" in unknown
@@ -88,7 +88,7 @@ def test_page_shows_the_summary_and_why_the_robot_stopped() -> None:
         "timing": {"phases": {"refine": SPREAD}, "callbacks": {"link receive": SPREAD}, "late": SPREAD,
                    "faults": {"outside the process": 6}},
     }  # fmt: skip
-    shown = page(run, "m")
+    shown = run_page(run, "m")
     assert shown.encode().decode() == shown, "it is UTF-8, whatever the name of the file is"
     text = " ".join(PageReader(shown).text)
     for piece in ("refine", "between cycles: link receive", "lateness of a cycle's start", "1.25", "49.65"):
@@ -109,7 +109,7 @@ def test_walls_are_numbered_and_counted(shown: str) -> None:
 
 def test_polylines_are_counted_and_drawn(shown: str) -> None:
     assert "polyline" not in shown
-    with_one = page(with_polyline(synthetic_timeline()), "m")
+    with_one = run_page(with_polyline(synthetic_timeline()), "m")
     assert "What is not straight: 1 polyline, 2.00 m together, drawn thinner than walls in the figure." in with_one
     assert 'id="models-polylines"' in with_one
 
@@ -127,6 +127,6 @@ def test_a_polygon_of_ones_own_model_is_not_counted_false() -> None:
     corner = run.start.inverse().compose(Pose(2.0, 3.0, math.pi / 2))
     seen = DetectedObject("bench_top", corner.x, corner.y, corner.theta, 0.01, 30, 0.9)
     run.snapshots[-1] = replace(run.snapshots[-1], objects=(*run.snapshots[-1].objects, seen))
-    shown = page(run, "m")
+    shown = run_page(run, "m")
     assert re.search(r"<td>polygon 1</td><td>\(1.70, 3.60\)</td><td>\(1.70, 3.60\)</td><td>0.000</td>", shown)
     assert "<b>4 of 7</b><span>objects found, 0 false</span>" in shown
