@@ -43,7 +43,12 @@ SHIPPED: Final[Mapping[str, EntryPoint]] = MappingProxyType(
 
 
 class DriverFamily(Protocol):
-    """Both ends of one robot family's protocol."""
+    """Both ends of one robot family's protocol.
+
+    A family may also have: `HAS`, what its robots can do (`capabilities`); `deadman_s`, a function of the robot file;
+    `line_options`, for a line of its own; `frames_in`, a function that counts its frames in bytes, with `ROBOT`, what
+    such a robot is called (`other_robot`). Each is described at the function here that asks for it.
+    """
 
     def make_driver(self, config: RobotConfig) -> RobotDriver:
         """Return a driver for the robot that `config` describes.

@@ -119,7 +119,8 @@ def replay_localized(
         summary = replay_firings(_localizing(settings, LocalizationConfig()), placed)
     else:
         summary = replayer.summary(perception.odometry_from_map().inverse(), perception.mapped_objects())
-    summary["frame"], here = "map", perception.localized()
+    summary["frame"] = "map"
+    here = perception.localized()
     if here is not None:
         summary["pose"] = pose_row(here)
     return summary

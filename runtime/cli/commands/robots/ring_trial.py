@@ -39,6 +39,7 @@ DRIVE_S: Final = 0.05
 UNSTEADY_M: Final = 0.1
 """Ranges of a robot that stands still do not spread farther than this, m, apart from a tenth of them at each end."""
 ANSWERS_MIN: Final = 0.8
+"""Share of the firings that a good sensor answers. More readings that cannot be than the rest are a fault."""
 REPEATS_MIN: Final = 5
 """Fewest equal ranges that count as always the same."""
 FINE_M: Final = 1e-3
