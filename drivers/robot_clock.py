@@ -12,8 +12,10 @@ _DRIFT = 1e-3
 """Greatest relative difference of the two clocks; that of two crystals is a tenth of it."""
 _RATE_ERROR_MAX = 0.01
 """Relative difference beyond which a clock is wrong; ranges and speeds, measured by it, are off by as much."""
-_FIRST_DELAY_MAX_S, _DELAY_MAX_S = 3.0, 1.0
-"""Delay that the very first reading, and the least late one of a period, may have had on the way, s."""
+_FIRST_DELAY_MAX_S = 3.0
+"""Delay that the very first reading may have had on the way, s."""
+_DELAY_MAX_S = 1.0
+"""Delay that the least late reading of a period may have had, s."""
 _FIRST_PERIOD_S, _PERIOD_S = 10.0, 60.0
 """Clocks are compared from one period to the next, s: a clock that is 5 % fast is found within 36 s."""
 

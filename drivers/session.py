@@ -96,7 +96,9 @@ class Session(ABC, Generic[S]):
         return len(self._firings)
 
     def drive(self, twist: Twist) -> None:
-        """Request a velocity, clamped to the limits; dropped unless the robot may be driven when it would be sent.
+        """Request a velocity, in place of one that has not been sent; it is clamped to the limits when it is sent.
+
+        It is dropped unless the robot may be driven then.
 
         Raises
         ------

@@ -16,9 +16,10 @@ from drivers.messages import Odometry, Pose
 from drivers.odometry_jumps import OdometryJumps
 from drivers.token_bucket import TokenBucket
 
-FIRINGS_SHARE, FIRINGS_BURST = 4.0, 64.0
-"""Firings passed on are at most so many times as frequent as those of the pattern, and so many at once, as after a
-delay on the way."""
+FIRINGS_SHARE: Final = 4.0
+"""Firings passed on are at most so many times as frequent as those of the pattern."""
+FIRINGS_BURST: Final = 64.0
+"""Most firings passed on at once, as after a delay on the way."""
 STEP_MIN_S: Final = 1e-3
 EXCESS_NOTE_S: Final = 10.0
 """Time between notes about too many firings, s."""

@@ -11,8 +11,10 @@ from drivers.arcos.frames import NO_ECHO_MM, SonarReading
 from drivers.emulator.body import Body
 from drivers.emulator.faulty_sonar import FaultySonar
 
-ARRAYS, DISCS = 4, 8
-"""Most arrays of a robot, and discs of an array."""
+ARRAYS: Final = 4
+"""Most arrays of a robot."""
+DISCS: Final = 8
+"""Discs of an array."""
 CYCLE_MIN_MS, CYCLE_MAX_MS = 2, 120
 FIRST_FLAG: Final = 1
 """Bit of the first array in the SIP's flags."""

@@ -32,8 +32,9 @@ take up to 0.2 s on an idle computer, and one that counts packets never answers 
 _CLOSING_S: Final = 0.2
 """Time after CLOSE until the robot waits for SYNC0, s."""
 _CONFIG_S: Final = 0.21
+"""Time for the answer to CONFIG, s."""
 _CONFIG_TRIES: Final = 5
-"""Time for the answer to CONFIG, s, and how often it is requested."""
+"""How often that is requested."""
 _SWITCH_S: Final = 0.05
 """Time until HOSTBAUD has left and the robot has changed its speed, s."""
 _FOLLOW_S: Final = 0.9

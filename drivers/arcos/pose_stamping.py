@@ -21,8 +21,12 @@ _HISTORY: Final = 64
 """SIPs kept to look up the pose of a firing, whose range comes with one of the next."""
 _GAP_PERIODS: Final = 4.5
 """Longest gap between two SIPs to interpolate over, in their periods: three lost ones."""
-_SIP_BYTES, _TAIL_BYTES, _READING_BYTES = 30, 11, 3
-"""Length of a SIP with its frame, of the tail that newer firmware sends, and of one range."""
+_SIP_BYTES: Final = 30
+"""Length of a SIP with its frame, without ranges."""
+_TAIL_BYTES: Final = 11
+"""Length of the tail that newer firmware sends."""
+_READING_BYTES: Final = 3
+"""Length of one range."""
 _BITS_PER_BYTE: Final = 10
 
 

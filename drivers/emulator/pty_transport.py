@@ -40,9 +40,13 @@ class PtyPort:
 
     def __init__(self, link_path: str | None) -> None:
         self._link = None if link_path is None else PortLink(link_path)
+        """None without one, and after `close`."""
         self._master: int | None = None
+        """The end of this side; None while unplugged."""
         self._slave_name = ""
+        """Path of the other end."""
         self._has_host = False
+        """Whether a host had it open at the last read."""
         self.dropped = 0
         try:
             self.open()

@@ -57,8 +57,10 @@ TICK_US = 5_000
 """Longest step of the body's simulation, µs."""
 PERIOD_MIN_US = 10_000
 """Shortest period of reports, and shortest sonar step, µs."""
-VOLTS, VOLTS_LOW, VOLTS_OFFSET = 25.2, 20.0, 1.2
-"""The battery: full, nearly empty, and what the controller does not measure of it, V."""
+VOLTS, VOLTS_LOW = 25.2, 20.0
+"""The battery: full, and nearly empty, V."""
+VOLTS_OFFSET = 1.2
+"""What the controller does not measure of it, V."""
 STILL = Twist(0.0, 0.0)
 _PRESSED_M = 1e-3
 """A bumper is pressed by a surface this near, m."""

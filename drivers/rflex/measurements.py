@@ -34,6 +34,7 @@ _HELD_MAX: Final = 64
 _BACK_MAX: Final = 2
 """So many samples in a row from before the last one mean a restart; a single one may be a corrupt frame."""
 _AHEAD_MAX: Final = 3
+"""After so many samples in a row that are far ahead of the last one, the next is believed."""
 _SLACK_M, _SLACK_RAD = 0.2, 0.3
 """A sample farther from the last one than this, and twice the way at full speed, needs a second that agrees: the
 checksum lets one of some hundred corrupt frames pass."""

@@ -191,7 +191,7 @@ class Tuner:
         return kept
 
     def _is_as_good(self, one: Trial, best: Trial) -> bool:
-        """Return whether a trial loses no more to the best than its error; the runs of both are made for that."""
+        """Return whether a trial loses to the best at most `LOSS_MAX` standard errors; the runs of both are made."""
         if not math.isfinite(one.cost) or one.figures is None or best.figures is None:
             return False
         if one.figures.failed > best.figures.failed:

@@ -233,7 +233,10 @@ class Console:
         return lines
 
     def _token(self) -> str:
-        """Return the token of this run; the kept one if the settings say so. Trouble with its file stops no robot."""
+        """Return the token of this run, kept in a file for later ones if the settings say so.
+
+        Trouble with the file stops no robot: it is logged, and the run has a token of its own.
+        """
         if not self._config.keep_token:
             return new_token()
         try:

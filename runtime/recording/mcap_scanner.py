@@ -44,11 +44,13 @@ INDEX_HEAD: Final = struct.Struct("<HI")
 INDEX_MAX: Final = INDEX_HEAD.size + 16 * RECORDS_MAX
 DATA_END_BYTES: Final = 4
 FRAME_HEAD_MAX: Final = 18
+"""Longest head of a Zstandard frame, bytes."""
 BLOCK_HEAD: Final = 3
+"""Bytes before each of its blocks."""
 CHECKSUM_BYTES: Final = 4
+"""Length of its checksum."""
 REPEATED: Final = 1
-"""Of a Zstandard frame: its longest head, bytes before each block, its checksum, and the kind of a block that repeats
-one byte."""
+"""Kind of a block that repeats one byte."""
 HEADER_MAX: Final = 4096
 SEARCH_BYTES: Final = 1 << 20
 """What is searched at a time for the next chunk: a file may be larger than the memory, and most of it a hole."""

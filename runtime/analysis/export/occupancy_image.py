@@ -34,8 +34,9 @@ CELL_M: Final = 0.1
 CELLS_MAX: Final = 2048
 """Greatest side of its window: 205 m."""
 OCCUPIED_MIN: Final = 0.65
+"""Probability from which on a cell is occupied, as map_server has it."""
 FREE_MAX: Final = 0.196
-"""Probabilities from which on a cell is occupied, and up to which it is free, as map_server has them."""
+"""Probability up to which it is free, as map_server has it."""
 EXPLAINED_M: Final = 0.08
 """Greatest error of a range that something recognised explains."""
 PIXELS_MAX: Final = 100_000_000

@@ -75,7 +75,7 @@ def set_goal(call: Call, asked: SetGoal) -> None:
     Raises
     ------
     CommandError
-        The robot does not know a map, and the goal is a place there.
+        The robot does not know a map, and the goal is a place there; or it must not or cannot drive there.
     """
     _request_drive(call, Goal(asked.x, asked.y, frame=asked.frame, heading=asked.heading))
 
@@ -166,7 +166,7 @@ def set_route(call: Call, asked: SetRoute) -> None:
     Raises
     ------
     CommandError
-        The robot does not know a map, and the waypoints are places there.
+        The robot does not know a map, and the waypoints are places there; or it must not or cannot drive there.
     """
     _request_drive(call, route(asked.waypoints, asked.frame))
 

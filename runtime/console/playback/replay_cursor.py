@@ -171,7 +171,7 @@ class ReplayCursor:
         return taken
 
     def _index_file(self) -> None:
-        """Fill the index, the bookmarks and the modes."""
+        """Fill the index, the bookmarks and the modes: the whole file is read, once, at the construction."""
         index, finder = self._index, KeyframeFinder(self._recording)
         first_run_s: float | None = None
         for chunk_offset, messages in self._recording.chunks():

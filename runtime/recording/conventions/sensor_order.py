@@ -27,9 +27,10 @@ from runtime.recording.ring_log import RingLogError
 
 MIRROR_M: Final = 0.02
 """How far a sensor's mirror image may lie from the sensor that takes its column, m and rad."""
-FEW_ECHOES, LIKELY = 400, 3
-"""Echoes by which the likeliest of all orders are found, and how many of these are then compared by all echoes."""
-
+FEW_ECHOES: Final = 400
+"""Echoes by which the likeliest of all orders are found."""
+LIKELY: Final = 3
+"""How many of these are then compared by all echoes."""
 EACH: Final = 100
 """Echoes of a column by which it is tried on every sensor."""
 TRIED: Final = 3.5

@@ -21,8 +21,9 @@ MODE_FACTOR: Final = 8.0
 """How much more frequent than the second commonest range that of silence is: on walls, ranges in tenths of a foot
 differ by less than 3 in this."""
 MODE_SHARE: Final = 0.05
+"""Least share of the ranges that are silence …"""
 TOP_SHARE: Final = 0.01
-"""Share of the ranges that are silence; the second where nothing else is near or above."""
+"""… and where nothing else is near or above."""
 GLITCHES: Final = 0.005
 """Share of the ranges that may lie above those of silence."""
 BAND: Final = 0.06
@@ -36,9 +37,11 @@ LEAST_SPREAD: Final = 1e-3 / WIDTHS
 RANGES_MIN: Final = 100
 LEAP: Final = 1.25
 """A leap is a range longer than those before and after it by this factor."""
-LEAPS_MIN, LEAPS_SHARE = 30, 0.55
-"""Leaps that end in the band. Over 13 drives, 69 % or more did where silence was noisy, and 40 % at most (21 leaps)
-where silence was left out."""
+LEAPS_MIN: Final = 30
+"""Fewest leaps by which a band is judged."""
+LEAPS_SHARE: Final = 0.55
+"""Least share of them that end in the band. Over 13 drives, 69 % or more did where silence was noisy, and 40 % at
+most (21 leaps) where silence was left out."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +127,10 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
 
 
 def _most_frequent(moved: Floats, finite: Floats) -> Silence:
-    """Return the value that stands for silence by how often it came while the robot moved."""
+    """Return the value that stands for silence by how often it came while the robot moved; `Silence()` if none does.
+
+    `moved`: (rows, sensors), ranges of the rows in which it moved; `finite`: (n,), all ranges that are numbers.
+    """
     finite_moved = moved[np.isfinite(moved)]
     if len(finite_moved) < RANGES_MIN:
         return Silence()

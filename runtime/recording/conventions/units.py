@@ -47,8 +47,10 @@ USUAL_SPEED, USUAL_REACH = 0.4, 0.6
 """The most likely median speed and farthest echo, over the robot's greatest ones."""
 FARTHEST: Final = 0.95
 """The farthest echo is this quantile of the ranges."""
-FAR, FAR_SHARE = 1.2, 0.1
-"""Ranges beyond the ring's by this factor are impossible; so many may be glitches."""
+FAR: Final = 1.2
+"""Ranges beyond the ring's greatest one by this factor are impossible."""
+FAR_SHARE: Final = 0.1
+"""Share of the ranges that may be such, as glitches."""
 FAR_NAT: Final = 20.0
 """Evidence against units in which all ranges would be such; in proportion where only some are."""
 CEILING_SAME: Final = 0.01
@@ -58,17 +60,19 @@ RESOLUTION_MIN_M: Final = 0.01
 MULTIPLES_OFF: Final = 0.1
 """Ranges are multiples of the resolution if they are off by less of it in the mean square; any would be by 0.29."""
 EDGE: Final = 0.02
+"""Width in which ranges end at the ring's greatest one, as a share of it."""
 EDGE_NAT: Final = 4.3
-"""Width in which ranges end at the ring's greatest one, as a share of it, and the log of how rarely they do by
-chance: where a room's ranges end is a matter of the room, over a factor of 4 or so."""
+"""Log of how rarely they end there by chance: where they do is a matter of the room, over a factor of 4 or so."""
 EDGE_GLITCHES: Final = 0.05
 """Share of the ranges about the greatest one that may lie beyond it."""
 PAIR_ALONG: Final = 0.85
+"""Least cosine between the way and the beam where a range's change is compared with the way."""
 PAIR_LN: Final = 0.12
-"""Least cosine between the way and the beam where a range's change is compared with the way, and the spread of the
-logarithm of their ratio."""
-PAIRS_WEIGHT, PAIRS_MAX = 0.2, 150
-"""Neighbouring pairs share an echo: each counts a fifth, and all together no more than so many."""
+"""Spread of the logarithm of the ratio of both."""
+PAIRS_WEIGHT: Final = 0.2
+"""What a pair counts, as neighbouring ones share an echo."""
+PAIRS_MAX: Final = 150
+"""All pairs together count no more than so many."""
 PAIRS_BIAS_LN: Final = 0.14
 """Spread of the logarithm of the ratio that most pairs of a log share. A wide beam sees a surface aslant: in 30
 drives it was between -0.30 and 0.26."""
