@@ -24,6 +24,15 @@ class LocalizedPose(NamedTuple):
     """Share of the expected echoes that came lately: near 1 where pose and map are right."""
 
 
+class KnownWay(NamedTuple):
+    """The maps of the way where they are known to lie now."""
+
+    places: Floats
+    """The middle of each: x, y, and the standard deviation of each of both, m; shape (n, 3)."""
+    loops: Floats
+    """Maps that were matched although others lie between them on the way: x, y of one and of the other, m; (k, 4)."""
+
+
 class Moment(NamedTuple):
     """A moment of a run, whose pose may become known better later on."""
 

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final, TypeAlias
 
+import numpy as np
+
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import IDENTITY, Firing, Pose
@@ -28,7 +30,7 @@ from perception.edits import (
 )
 from perception.kernel import Floats
 from perception.localization.drift.drift_correction import DriftCorrection, LandmarkPlace, SeenObject
-from perception.localization.localized_pose import LocalizedPose, Moment
+from perception.localization.localized_pose import KnownWay, LocalizedPose, Moment
 from perception.localization.odometry_frame import AnyEdit, OdometryFrame
 from perception.localization.submaps.submap_graph import SubmapGraph
 from perception.map_moves import FollowsMaps
@@ -172,6 +174,15 @@ class MapFrame(OdometryFrame):
             return IDENTITY
         then, at = Pose(*moment.odometry.tolist()), Pose(*self.submaps.placed(moment).tolist())
         return self.submaps.odometry_from_map().compose(at).compose(then.inverse())
+
+    def known_way(self) -> KnownWay | None:
+        """Return the maps of the way as known now, in odometry's frame of now; None where none corrects it."""
+        if not self.submaps.is_applied:
+            return None
+        to, way = self.submaps.odometry_from_map(), self.submaps.known_way()
+        turn = np.array([[math.cos(to.theta), math.sin(to.theta)], [-math.sin(to.theta), math.cos(to.theta)]])
+        places = np.column_stack([way.places[:, :2] @ turn + (to.x, to.y), way.places[:, 2]])
+        return KnownWay(places, (way.loops.reshape(-1, 2) @ turn + (to.x, to.y)).reshape(-1, 4))
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""

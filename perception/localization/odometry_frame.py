@@ -10,7 +10,7 @@ from drivers.messages import IDENTITY, Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.edits import AreaEdit, Evidence, MapEdit
 from perception.kernel import Floats
-from perception.localization.localized_pose import LocalizedPose, Moment
+from perception.localization.localized_pose import KnownWay, LocalizedPose, Moment
 from perception.map_moves import FollowsMaps
 from perception.polyline import Polyline
 from perception.vacant_areas import VacantArea
@@ -78,6 +78,10 @@ class OdometryFrame:
     def moved_since(self, _moment: Moment) -> Pose:
         """Return the pose of odometry's frame of a moment in that of now, as known now."""
         return IDENTITY
+
+    def known_way(self) -> KnownWay | None:
+        """Return the maps of the way as known now, in odometry's frame of now; None where none corrects it."""
+        return None
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame."""

@@ -21,6 +21,8 @@ SCALES: Final = 4
 map before, and one with another, has lost way, because what comes into view fits less well."""
 OF_ODOMETRY: Final = 2
 """The first so many of them are odometry's."""
+OF_OTHER: Final = 3
+"""The one of matches with another map than the one before."""
 GRAPH_SCALE_SIGMA: Final = 0.03
 """Standard deviation of each before any match."""
 CAUCHY: Final = 2.0

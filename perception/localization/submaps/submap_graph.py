@@ -20,10 +20,10 @@ from config.robot import RingConfig
 from drivers.messages import IDENTITY, Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, up_to
 from perception.kernel import Floats
-from perception.localization.localized_pose import LocalizedPose, Moment, Status
+from perception.localization.localized_pose import KnownWay, LocalizedPose, Moment, Status
 from perception.localization.submaps.held_maps import HeldMaps
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
-from perception.localization.submaps.pose_graph import SCALES, Link, Node
+from perception.localization.submaps.pose_graph import OF_OTHER, SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
     READING_M,
     READING_RAD,
@@ -274,6 +274,16 @@ class SubmapGraph:
         number = min(moment.submap, len(submaps) - 1)
         moved = scaled(between(submaps[number]["pose"], moment.odometry), self._scales)
         return compose(pose_of(self._nodes.archived_rows[number]), moved)
+
+    def known_way(self) -> KnownWay:
+        """Return the maps of the way as known now, in the map frame; only matches that the others bear out."""
+        nodes, links = self._nodes.archived_rows, self._links.archived_rows
+        places = np.column_stack([nodes["x"], nodes["y"], np.zeros(len(nodes))])
+        if len(nodes):
+            places[:, 2] = np.sqrt(0.5 * spread_about(0, links, nodes)[:, 0])
+        is_loop = (links["is_match"] != 0) & (links["by_scale"][:, OF_OTHER] != 0.0).any(axis=1)
+        loops = links[is_loop & (links["weight"] > 0.5)]
+        return KnownWay(places, np.column_stack([places[loops["of"], :2], places[loops["to"], :2]]))
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing, in the map frame."""

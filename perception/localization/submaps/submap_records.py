@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from drivers.messages import wrap_angle
 from perception.bounds import PLACE, Finite, bounds, up_to
 from perception.kernel import Floats
-from perception.localization.submaps.pose_graph import OF_ODOMETRY, Link, Node, spread_from
+from perception.localization.submaps.pose_graph import OF_ODOMETRY, OF_OTHER, Link, Node, spread_from
 from perception.records import Record, Structured, records, zeros
 
 LOST_WAY: Final = (0.02, 0.01)
@@ -113,7 +113,7 @@ def match_link(of: int, to: int, pose: Floats, information: Floats, *, is_next: 
     row["of"], row["to"], row["is_match"], row["weight"] = of, to, 1, 1.0
     way = pose[:2] * (1.0 + LOST_WAY[not is_next])
     row["pose"], row["information"] = (*way, wrap_angle(pose[2])), information
-    row["by_scale"][0, OF_ODOMETRY + (not is_next)] = *way, 0.0
+    row["by_scale"][0, OF_ODOMETRY if is_next else OF_OTHER] = *way, 0.0
     return row
 
 

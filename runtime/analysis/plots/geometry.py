@@ -137,6 +137,8 @@ def window(timeline: Timeline, frame: Frame) -> tuple[float, float, float, float
     margin = MARGIN_M / frame.unit_m
     reach = timeline.settings.body.radius_m / frame.unit_m + 0.3 * margin
     way = np.array([(m.pose.x, m.pose.y) for m in timeline.snapshots] or [(0.0, 0.0)])
+    if timeline.known_path is not None:
+        way = np.concatenate([way, timeline.known_path.places])
     placed = frame.points(way)
     corners = [placed.min(axis=0) - reach, placed.max(axis=0) + reach]
     if timeline.world is not None:

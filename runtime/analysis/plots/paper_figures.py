@@ -15,6 +15,7 @@ from config.load import load_world
 from config.units import FOOT_M
 from runtime.analysis.plots.cross_arcs import heard_cross_paths
 from runtime.analysis.plots.geometry import Frame, window
+from runtime.analysis.plots.known_path import draw_known_path
 from runtime.analysis.plots.layers import (
     draw_arcs,
     draw_bookmarks,
@@ -78,7 +79,7 @@ def paper_figures(timeline: Timeline) -> tuple[int, int, int, int] | None:
 
 
 def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
-    """Return the paper's four figures of the end of a run by name, and the evidence grid's if it has one."""
+    """Return the paper's four figures of the end of a run by name, and those of evidence grid and path if known."""
     canvas, last = Canvas(timeline, units), timeline.last
     if last is None:
         return {}
@@ -131,6 +132,16 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
         side = format_length(known.cell_m, units, 2)
         line = f"cells of {side} {units}, in the window around the robot"
         drawn["grid"] = _figure(canvas, "Evidence grid", line, lambda axes: draw_evidence_grid(axes, known, frame))
+    if timeline.known_path is not None:
+        known_path = timeline.known_path
+        loops = counted(len(known_path.maps.loops), "loop closure")
+        line = f"{loops}; circles hold a map of the way in 95 %, seen from the first"
+        drawn["path"] = _figure(
+            canvas,
+            "Path before and after its correction",
+            line,
+            lambda axes: draw_walls(axes, last.walls, frame) + draw_known_path(axes, known_path, frame),
+        )
     return drawn
 
 

@@ -42,6 +42,7 @@ CAPTIONS: Final = MappingProxyType(
         "segments": "Outline segments, as on the page: tangents to the arcs of two readings of one sensor.",
         "clusters": "Clusters of outline segments by minimum distance, as rectangles with an X at the centre.",
         "grid": "The evidence grid around the robot at the end: what each cell has answered, from any direction.",
+        "path": "Where the robot was by odometry, dashed, and as known at the end, in odometry's frame of the end.",
         "models": "Models at their matched poses and walls from end to end, over the true world if it is known.",
     }
 )

@@ -10,6 +10,7 @@ import numpy as np
 from config.load import load_settings
 from drivers.messages import Flags, LinkCounts, Odometry, Pose, Twist
 from perception.detected_object import DetectedObject
+from perception.localization.localized_pose import KnownWay
 from perception.mapping.grid.known_cells import KnownCells
 from runtime.analysis.timeline import (
     CROSS_PATH,
@@ -17,6 +18,7 @@ from runtime.analysis.timeline import (
     BookmarkEntry,
     Cluster,
     Echoes,
+    KnownPath,
     LogEntry,
     ModeEntry,
     RunSnapshot,
@@ -82,6 +84,14 @@ def with_grid(timeline: Timeline) -> Timeline:
     """Return the timeline with an evidence grid of two rows and three columns at its end."""
     cells = np.array([[-1, 10, 90], [50, -1, 100]], np.int8)
     timeline.snapshots[-1] = replace(timeline.snapshots[-1], grid=KnownCells(cells, 1.0, -0.5, 0.1))
+    return timeline
+
+
+def with_known_path(timeline: Timeline) -> Timeline:
+    """Return the timeline with a path as known at the end, by three maps of the way and one loop closure."""
+    places = np.array([[0.0, 0.0, 0.0], [0.5, 0.1, 0.05], [1.0, 0.3, 0.1]])
+    maps = KnownWay(places, np.array([[0.0, 0.0, 1.0, 0.3]]))
+    timeline.known_path = KnownPath(np.array([[0.0, 0.0], [0.5, 0.1], [1.0, 0.3]]), maps)
     return timeline
 
 

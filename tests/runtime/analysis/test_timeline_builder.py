@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import CrossPaths, Firing, Flags, Odometry, Pose, Twist
-from perception.localization.localized_pose import Moment
+from perception.localization.localized_pose import KnownWay, Moment
 from perception.localization.odometry_frame import OdometryFrame
 from perception.pipeline import Perception
 from runtime.analysis import timeline_builder
@@ -135,7 +135,11 @@ class CorrectedFrame(OdometryFrame):
 
     def moment(self) -> Moment:
         """Return the moment of the last firing."""
-        return Moment(self.submap, np.zeros(3), 0.0)
+        return Moment(self.submap, np.array([float(self.submap), 0.0, 0.0]), 0.0)
+
+    def known_way(self) -> KnownWay:
+        """Return the maps of the way."""
+        return KnownWay(np.zeros((1, 3)), np.zeros((0, 4)))
 
     def moved_since(self, moment: Moment) -> Pose:
         """Return how what was heard then moves."""
@@ -156,3 +160,5 @@ def test_echoes_are_also_at_poses_as_known_at_the_end(timeline: Timeline) -> Non
     moved = timeline.known_echoes["x"] - timeline.echoes["x"]
     assert moved.tolist() == pytest.approx([-0.1, 0.0, 0.0, 0.0])
     assert timeline.echoes["x"].tolist() == pytest.approx([k + RADIUS_M for k in (1.0, 2.0, 2.0, 3.0)])
+    assert timeline.known_path is not None
+    assert timeline.known_path.places.tolist() == pytest.approx(np.array([[0.9, 0.0], [2.0, 0.0]]))

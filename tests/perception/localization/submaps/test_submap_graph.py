@@ -85,6 +85,13 @@ def test_drift_is_corrected(way: float, turn: float) -> None:
     assert here.pose.theta == pytest.approx(here.ring_yaw)
     error = now[-1, :2] - truth[-1, :2]
     assert error @ np.linalg.inv(here.covariance[:2, :2]) @ error < 16.0
+    known = graph.known_way()
+    assert len(known.places) == graph.count
+    assert known.places[0, 2] == 0.0
+    assert known.places[1:, 2].min() > 0.0
+    assert len(known.loops) > 0
+    for place in known.loops.reshape(-1, 2):
+        assert np.abs(known.places[:, :2] - place).sum(axis=1).min() == 0.0
 
 
 def test_exact_odometry_is_left_alone() -> None:
