@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 from rich.console import Console
@@ -62,8 +63,9 @@ def lies(
     json
         File to write.
     robots, kinds
-        Names with commas between them; all shipped robots, and all kinds of lies, if not given. `bench.sparse_rings`
-        has robots with blind sides: front-4, front-6, front-9, front-back, left-6.
+        Names with commas between them; all shipped robots, and all kinds of lies, if not given; "built": the faults
+        that robots are built with. `bench.sparse_rings` has robots with blind sides: front-4, front-6, front-9,
+        front-back, left-6.
     rooms
         Of room, office, hallway, furnished, goal and corridor.
     seeds, first
@@ -76,17 +78,18 @@ def lies(
         Run recognition as well, which takes most of the time.
     """
     use_kernel_cache()
-    from bench.lies import KINDS, ROBOTS, lies_table, measure, trials
+    from bench.lies import BUILT, KINDS, ROBOTS, lies_table, measure, trials
     from bench.lies import honest as honest_plans
 
     console = Console(stderr=True)
     prepare_kernels(load_settings("hallway"), console)
     chosen, where = robots.split(",") if robots else ROBOTS, rooms.split(",")
     numbers, moments = range(first, first + max(1, seeds)), max(1, moments)
+    named_kinds: dict[str, Sequence[str]] = {"": tuple(KINDS), "built": tuple(BUILT)}
     plans = (
         honest_plans(chosen, where, numbers, moments)
         if honest
-        else trials(chosen, where, kinds.split(",") if kinds else tuple(KINDS), numbers, moments)
+        else trials(chosen, where, named_kinds.get(kinds, kinds.split(",")), numbers, moments)
     )
     with console.status("bench") as status:
         results = measure(plans, status.update, recognises=recognise)

@@ -44,36 +44,26 @@ ROBOTS: Final = (
     "p3dx", "p3dx-sh", "parking12", "peoplebot", "powerbot", "servo1",
 )  # fmt: skip
 ROOMS: Final = ("room", "office", "hallway", "furnished", "goal", "corridor")
-AHEAD, ALL_BUT_ONE = "ahead", "all but one"
-"""In place of the numbers of sensors: those within 60° of the robot's front; all but one that looks ahead."""
+AHEAD, ALL_BUT_ONE, ONE = "ahead", "all but one", "one"
+"""In place of the numbers of sensors: those within 60° of the robot's front; all but one ahead; that one."""
 KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
-    "frozen": {"kind": "frozen_ring"},
-    "frozen ahead": {"kind": "frozen_ring", "sensors": AHEAD},
+    "frozen": {"kind": "frozen_ring"}, "frozen ahead": {"kind": "frozen_ring", "sensors": AHEAD},
     "frozen but one": {"kind": "frozen_ring", "sensors": ALL_BUT_ONE},
     "frozen with jitter": {"kind": "frozen_ring", "jitter_m": 0.001},
     "silent ahead": {"kind": "silent_ring", "sensors": AHEAD},
-    "alternately silent": {"kind": "silent_ring", "every": 2},
-    "delayed": {"kind": "delayed_echoes"},
-    "coarse": {"kind": "coarse_ranges"},
-    "odometry frozen": {"kind": "odometry_error"},
+    "alternately silent": {"kind": "silent_ring", "every": 2}, "delayed": {"kind": "delayed_echoes"},
+    "coarse": {"kind": "coarse_ranges"}, "odometry frozen": {"kind": "odometry_error"},
     "odometry backwards": {"kind": "odometry_error", "factor": -1.0},
-    "turned 45": {"kind": "turned_ring", "angle_deg": 45.0},
-    "latched clock": {"kind": "clock_error"},
-    "silent": {"kind": "silent_ring"},
-    "at the maximum": {"kind": "constant_ring", "range_m": math.inf},
-    "blind near": {"kind": "blind_near"},
-    "constant": {"kind": "constant_ring"},
-    "constant at .5 m": {"kind": "constant_ring", "range_m": 0.5},
-    "dropped": {"kind": "dropped_readings"},
+    "turned 45": {"kind": "turned_ring", "angle_deg": 45.0}, "latched clock": {"kind": "clock_error"},
+    "silent": {"kind": "silent_ring"}, "at the maximum": {"kind": "constant_ring", "range_m": math.inf},
+    "blind near": {"kind": "blind_near"}, "constant": {"kind": "constant_ring"},
+    "constant at .5 m": {"kind": "constant_ring", "range_m": 0.5}, "dropped": {"kind": "dropped_readings"},
     "dropped silent": {"kind": "dropped_readings", "silent": True},
-    "random": {"kind": "outliers", "share": 1.0},
-    "turned 90": {"kind": "turned_ring"},
+    "random": {"kind": "outliers", "share": 1.0}, "turned 90": {"kind": "turned_ring"},
     "turned 180": {"kind": "turned_ring", "angle_deg": 180.0},
     "exchanged": {"kind": "swapped_sensors", "first": 0, "second": 2},
-    "long 1.5 ft": {"kind": "range_offset"},
-    "long 4 ft": {"kind": "range_offset", "offset_m": 1.2192},
-    "short 1.5 ft": {"kind": "range_offset", "offset_m": -0.4572},
-    "replayed": {"kind": "replayed_echoes"},
+    "long 1.5 ft": {"kind": "range_offset"}, "long 4 ft": {"kind": "range_offset", "offset_m": 1.2192},
+    "short 1.5 ft": {"kind": "range_offset", "offset_m": -0.4572}, "replayed": {"kind": "replayed_echoes"},
     "clock at half": {"kind": "clock_error", "rate": 0.5},
     "clock at double": {"kind": "clock_error", "rate": 2.0},
     "clock in steps": {"kind": "clock_error", "rate": 1.0, "step_s": 0.2},
@@ -83,6 +73,17 @@ KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
     "object at .3 m": {"kind": "sudden_object", "distance_m": 0.3},
 })  # fmt: skip
 """The kinds of lies; `constant_ring` of +inf stands for the ring's greatest range."""
+_DEAF, _CONSTANT = {"kind": "silent_ring"}, {"kind": "constant_ring"}
+BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
+    "one deaf": {**_DEAF, "sensors": ONE}, "one at 1 m": {**_CONSTANT, "sensors": ONE, "range_m": 1.0},
+    "one too short": {**_CONSTANT, "sensors": ONE, "range_m": 0.0017}, "all deaf": _DEAF,
+    "one at its maximum": {**_CONSTANT, "sensors": ONE, "range_m": math.inf},
+    "one backwards": {"kind": "turned_ring", "sensors": ONE, "angle_deg": 180.0},
+    "two exchanged": KINDS["exchanged"], "all too short": {**_CONSTANT, "range_m": 0.0017},
+    "silence as 0": {"kind": "reported_silence"},
+    "silence as maximum": {"kind": "reported_silence", "range_m": math.inf},
+})  # fmt: skip
+"""Faults that a robot is built with: they are there from the start."""
 CLOCK: Final = "clock"
 """Kinds with this word change nothing on a robot whose packets carry no stamps."""
 AHEAD_DEG: Final = 60.0
@@ -238,12 +239,14 @@ def _corridor(radius_m: float, seed: int) -> WorldConfig:
 
 def make_lie(kind: str, settings: Settings, begin_s: float) -> Fault:
     """Return the fault of a kind of lie that begins then and does not end."""
-    values: dict[str, Any] = dict(KINDS[kind])
+    values: dict[str, Any] = dict(BUILT[kind] if kind in BUILT else KINDS[kind])
     if values.get("range_m") == math.inf:
         values["range_m"] = settings.ring.range_max_m
     axes = [abs(math.degrees(math.remainder(mount.angle_rad, math.tau))) for mount in settings.ring.mounts]
     if values.get("sensors") == AHEAD:
         values["sensors"] = [i for i, angle_deg in enumerate(axes) if angle_deg <= AHEAD_DEG]
+    elif values.get("sensors") == ONE:
+        values["sensors"] = [int(np.argmin(axes))]
     elif values.get("sensors") == ALL_BUT_ONE:
         values["sensors"] = [i for i in range(len(axes)) if i != int(np.argmin(axes))]
     adapter: TypeAdapter[Fault] = TypeAdapter(Fault)
@@ -271,7 +274,7 @@ def run_trial(
     drive = make_drive(robot, room, seed)
     settings = drive.settings
     rng = np.random.default_rng([seed, moment, 41])
-    begin_s = 0.0 if kind is None else float(rng.uniform(FROM_S, UNTIL_S))
+    begin_s = 0.0 if kind is None or kind in BUILT else float(rng.uniform(FROM_S, UNTIL_S))
     faults = () if kind is None else (make_lie(kind, settings, begin_s),)
     device, driver = make_device(settings, drive.world, 1000 * seed + moment, faults=faults), make_driver(settings)
     line = MemoryLine(driver, device)

@@ -54,9 +54,12 @@ LIMITS: Sequence[str] = (
     "walls, or of a drive like this one. They change as the motion says, and what returns to an earlier place are a "
     "few sensors ahead and behind. When they come again they are equal to the bit.",
     "A ring that is mounted turned by a small angle, until the objects that result are seen to be wrong: measure "
-    "it with `echolocate calibrate`. Two sensors exchanged, or one that looks backwards, in a ring of up to "
-    "sixteen, until the robot has turned by about 60°, or by half a turn on one spot: 4 to 20 s in drives through"
-    " rooms. In a ring of more sensors they are not named at all. One of eight sensors or fewer that is turned "
+    "it with `echolocate calibrate`. Two sensors exchanged, one that looks backwards, or one that hears nothing, "
+    "in a ring of up to sixteen: with `body.turns_at_start` they are named by a turn before the first drive (610 "
+    "of 612); without it, or where they become so later, only once the robot has turned by about 60°, or by half "
+    "a turn on one spot: 4 to 40 s in drives through rooms. The turn knows only what the other sensors hear: it "
+    "names nothing where nothing echoes, nor a single sensor that looks backwards, nor the two of a pair that "
+    "are exchanged. In a ring of more sensors they are not named at all. One of eight or fewer that is turned "
     "otherwise, and a ring that is turned by a half among few surfaces, as in a corridor: 6 of 16 drives of rings of "
     "8, 16 and 24 sensors then touched something, 1 of 16 turned by a quarter, and 0 of 16 by 45°.",
     "A frozen ring that hears next to nothing: an AmigoBot in a corridor whose one echo lay behind it was named "

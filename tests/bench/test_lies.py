@@ -129,3 +129,12 @@ def test_each_kind_is_a_fault_that_begins_then(kind: str) -> None:
 def test_all_shipped_robots_are_driven() -> None:
     assert all(load_robot(name).body.radius_m > 0.0 for name in ROBOTS)
     assert list_shipped("robots") == ROBOTS
+
+
+@pytest.mark.parametrize("kind", ["one deaf", "one backwards", "one at 1 m"])
+def test_a_fault_that_a_robot_is_built_with_is_named_in_its_first_turn(kind: str) -> None:
+    result = run_trial("hobby3", "room", kind, 1, 0)
+    assert result.began_s == 0.0
+    assert result.named_s is not None
+    assert result.named_s < 6.0
+    assert not result.is_contact
