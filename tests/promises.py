@@ -55,8 +55,8 @@ LIMITS: Sequence[str] = (
     "few sensors ahead and behind. When they come again they are equal to the bit.",
     "A ring that is mounted turned by a small angle, until the objects that result are seen to be wrong: measure "
     "it with `echolocate calibrate`. Two sensors exchanged, one that looks backwards, or one that hears nothing, "
-    "in a ring of up to sixteen: with `body.turns_at_start` they are named by a turn before the first drive (610 "
-    "of 612); without it, or where they become so later, only once the robot has turned by about 60°, or by half "
+    "in a ring of up to sixteen: with `body.turns_at_start` they are named by a turn before the first drive (280 "
+    "of 288); without it, or where they become so later, only once the robot has turned by about 60°, or by half "
     "a turn on one spot: 4 to 40 s in drives through rooms. The turn knows only what the other sensors hear: it "
     "names nothing where nothing echoes, nor a single sensor that looks backwards, nor the two of a pair that "
     "are exchanged. In a ring of more sensors they are not named at all. One of eight or fewer that is turned "

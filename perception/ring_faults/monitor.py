@@ -86,9 +86,9 @@ WIRING_NAT: Final = EVIDENCE_NAT + math.log(0.5 * SENSORS_MAX**2)
 
 
 TURN_NAT: Final = math.log(100.0)
-"""Evidence of a whole turn in place that suffices, nat: there is one in a run, before its first drive. In 204 honest
-turns of four rings, among mirrors and where everything echoes, the greatest was −7 nat; of 612 with one fault, the
-true one had the greatest and enough of it in 610."""
+"""Evidence of a whole turn in place that suffices, nat: there is one in a run, before its first drive. In 96 honest
+turns of four rings, among mirrors and where everything echoes, none is accused; of 288 with one fault, in rooms that
+were never looked at before, 280 are named rightly, two as another fault and six not."""
 
 
 def deaf_reason(i: int) -> str:

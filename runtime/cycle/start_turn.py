@@ -19,8 +19,9 @@ from drivers.messages import Pose, Twist
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest
 
 TURNS: Final = "the robot turns once on the spot before its first drive, to see that its sensors agree"
-LOOKS_APART: Final = 1.0
-"""How far a sensor turns from one of its looks to the next, in beam half angles: twice in each direction."""
+LOOKS_APART: Final = 1.1
+"""How far a sensor turns from one of its looks to the next, in beam half angles: almost twice in each direction, and
+within 5 s for a ring of eight that fires two at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,4 +69,4 @@ class StartTurn:
             return StartTurn(is_over=judge()), STANDSTILL, TURNS
         half_angle = math.radians(settings.ring.beam_half_angle_deg)
         rate = min(body.turn_max_rad_s, LOOKS_APART * half_angle / firing_pattern(settings.ring).cycle_s)
-        return turned, Twist(0.0, rate), TURNS
+        return turned, Twist(0.0, rate), why or TURNS
