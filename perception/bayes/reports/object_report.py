@@ -12,6 +12,7 @@ import numpy as np
 from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import (
     CIRCLE_INFLATION,
+    GATE_M,
     PLACED_SIGMA_M,
     ROOM_CORNER_M,
     UNKNOWN_HITS_MIN,
@@ -24,6 +25,7 @@ from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, 
 from perception.bayes.reports.claimed_echoes import own_echoes
 from perception.bayes.tracks.track_archive import TrackArchive
 from perception.bayes.walls.crossing import CORNER_SINE_MIN
+from perception.bayes.walls.points import SPREAD_MIN_RAD
 from perception.bayes.walls.report import has_mirrors, room_report
 from perception.detected_object import DetectedObject, wall_between, worst_sigma
 from perception.kernel import Floats
@@ -225,8 +227,10 @@ def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[floa
     return x + float(across[k] * ty[k]), y - float(across[k] * tx[k])
 
 
-def is_heard_from_afar(circle: Structured) -> bool:
-    """Return whether most readings of a point are from where, between mirrors, an edge is not heard.
+def is_corner_of_mirrors(circle: Structured) -> bool:
+    """Return whether most echoes of a point are from where, between mirrors, no edge is heard, and from all round.
+
+    From afar the end of a wall is heard as well, but only along the wall's normal.
 
     Parameters
     ----------
@@ -234,12 +238,18 @@ def is_heard_from_afar(circle: Structured) -> bool:
         The point.
     """
     if READINGS in (circle.dtype.names or ()):
-        ranges = circle[READINGS][: int(circle["kept"]), 3]
+        x, y, _, ranges = circle[READINGS][: int(circle["kept"])].astype(np.float64).T
     else:
         bins = circle["bins"]
-        kept = np.arange(bins["readings"].shape[1]) < bins["count"][:, None]
-        ranges = bins["readings"]["range_m"][kept]
-    return bool(np.count_nonzero(ranges > EDGE_REACH_M) > 0.5 * len(ranges))
+        readings = bins["readings"][np.arange(bins["readings"].shape[1]) < bins["count"][:, None]]
+        x, y, ranges = readings["x"] - circle["x"], readings["y"] - circle["y"], readings["range_m"]
+    is_echo = np.abs(ranges - np.hypot(x, y)) < GATE_M
+    is_far = is_echo & (ranges > EDGE_REACH_M)
+    if np.count_nonzero(is_far) <= 0.5 * np.count_nonzero(is_echo):
+        return False
+    mean = math.atan2(float(y[is_far].sum()), float(x[is_far].sum()))
+    turned = np.remainder(np.arctan2(y[is_far], x[is_far]) - mean + math.pi, 2.0 * math.pi)
+    return bool(np.ptp(turned) >= SPREAD_MIN_RAD)
 
 
 def alternative_labels(p: SettingsRecord, rounds: Sequence[str]) -> tuple[str, ...]:
@@ -306,7 +316,7 @@ def other_circles(
     for at, *row, probability, status, kind, radius in zip(shown.tolist(), *columns, strict=True):
         is_rival = status == ESTABLISHED and kind >= models and probability >= least
         label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"
-        if label == "edge" and are_mirrors and is_heard_from_afar(circles[at]):
+        if label == "edge" and are_mirrors and is_corner_of_mirrors(circles[at]):
             label = "inside corner"
         edge = wall_edge(surfaces, row[0], row[1], radius) if label == "post" else None
         if edge is not None:

@@ -12,8 +12,9 @@ from perception.bayes.inference import lines as walls
 from perception.bayes.inference.kernel_settings import make_settings
 from perception.bayes.memory.parameters import PLACED_SIGMA_M, UNKNOWN_HITS_MIN
 from perception.bayes.memory.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
-from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
+from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, CircleTrack
 from perception.bayes.reports import object_report
+from perception.bayes.tracks.archived_tracks import archived_dtype, pack
 from perception.detected_object import worst_sigma
 from tests import naive_walls
 from tests.naive_tracks import FT, Line
@@ -37,6 +38,27 @@ def test_a_post_at_the_end_of_a_wall_is_its_edge() -> None:
     for x, y in ((1.0, 1.1), (2.3, 1.1), (2.08, 1.2), (5.0, 5.0)):
         assert object_report.wall_edge(surfaces, x, y, 0.1) is None
     assert object_report.wall_edge(np.empty((0, 4)), 2.08, 1.1, 0.1) is None
+
+
+@pytest.mark.parametrize(
+    ("spread_rad", "far", "silent", "is_corner"),
+    [(1.2, 12, 0, True), (0.1, 12, 0, False), (1.2, 4, 0, False), (1.2, 4, 9, False)],
+)
+def test_a_point_between_mirrors_is_an_inside_corner_if_it_is_heard_from_afar_and_from_all_round(
+    spread_rad: float, far: int, silent: int, *, is_corner: bool
+) -> None:
+    """Along one bearing the end of a wall is heard so far, too; silence from afar says nothing."""
+    memory, _ = new_room()
+    track, echoes = memory.tracks[0], []
+    track.x, track.y = 1.0, 2.0
+    for k in range(18):
+        bearing, distance = math.pi + spread_rad * k / 17.0, 3.0 if k < far or k >= 18 - silent else 0.4
+        x, y = 1.0 - distance * math.cos(bearing), 2.0 - distance * math.sin(bearing)
+        echoes.append(reading(x, y, bearing, 2e6 if k >= 18 - silent else distance))
+    keep(track, echoes)
+    assert object_report.is_corner_of_mirrors(memory.circles[0]) == is_corner
+    packed = pack(memory.circles[:1], archived_dtype(CircleTrack), is_reported=False)
+    assert object_report.is_corner_of_mirrors(packed[0]) == is_corner
 
 
 def is_inside_corner(a: Line, b: Line, place: np.ndarray) -> bool:
