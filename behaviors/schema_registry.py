@@ -120,12 +120,16 @@ def goal_of(use: MoveToGoalUse, places: PlacesConfig, places_frame: Frame) -> Go
 
 
 def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveCanyonUse) -> Answer:
-    """Return no vector: the schema turns that of the others (`runtime.cycle.goal_drive`).
+    """Return a vector of zero: `runtime.cycle.goal_drive` lets the schema turn that of the others.
+
+    The response is needed all the same: the arbiter stops a robot of which a schema does not respond.
 
     Parameters
     ----------
-    scene, memory
+    scene
         Not used.
+    memory
+        Handed back.
     use
         The schema.
     """

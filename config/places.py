@@ -31,6 +31,7 @@ class PlaceConfig(Strict):
     name: Name
     x_m: Coordinate
     y_m: Coordinate
+    """The place, m."""
     heading_deg: float | None = Field(default=None, ge=-360.0, le=360.0)
     """Heading at the place, counter-clockwise from x; by default any."""
 

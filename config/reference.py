@@ -56,7 +56,9 @@ class Setting:
 
 
 def settings_of(file: str) -> Iterator[Setting]:
-    """Return every key of one kind of file, table by table.
+    """Yield the keys of one kind of file, table by table; those of installed packages last.
+
+    Those of a run file are its own: what describes the robot, the world and so on is listed with their files.
 
     Parameters
     ----------

@@ -116,7 +116,9 @@ class StartConfig(Strict):
 
     x_m: Coordinate = 0.0
     y_m: Coordinate = 0.0
+    """The place, m."""
     heading_deg: Turn = 0.0
+    """The direction, counter-clockwise from x, degrees."""
 
 
 class AcousticsConfig(Strict):

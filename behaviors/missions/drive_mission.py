@@ -70,13 +70,13 @@ def drive_mission(mission: Mission, scene: Scene) -> MissionDrive:
     if mission.progress.status != "running":
         return MissionDrive(mission, hold_reason=mission.progress.reason)
     mission = _counted(mission, scene)
-    mission, answers = _answered(mission, scene)
+    mission, answers = _with_answers(mission, scene)
     mission = _watched(mission, scene, answers)
     condition = next((c for i, c in enumerate(mission.step.conditions) if _holds(c, i, mission, answers)), None)
     if condition is not None:
         mission = goes_to(mission, condition.go, f"{condition.when} in its step {mission.step.name}")
         if mission.progress.status == "running":
-            mission, answers = _answered(_counted(mission, replace(scene, cycle_s=0.0)), scene)
+            mission, answers = _with_answers(_counted(mission, replace(scene, cycle_s=0.0)), scene)
     elif is_stuck(mission):
         mission = held(mission, _stuck_reason(mission, answers))
     if mission.progress.status != "running":
@@ -144,8 +144,11 @@ def _counted(mission: Mission, scene: Scene) -> Mission:
     return replace(mission, progress=progress)
 
 
-def _answered(mission: Mission, scene: Scene) -> tuple[Mission, tuple[Answer, ...]]:
-    """Return the answers of the step's schemas, and the mission with what they keep."""
+def _with_answers(mission: Mission, scene: Scene) -> tuple[Mission, tuple[Answer, ...]]:
+    """Return the mission with what its step's schemas keep, and their answers in the order of the step's schemas.
+
+    Those that lead are called first; the others get the direction in which they lead (`Scene.way_rad`).
+    """
     progress = mission.progress
     scene = replace(
         scene, start=progress.start or scene.percept.pose, step_s=progress.step_s, visited=progress.visited

@@ -112,7 +112,13 @@ class LineDriver(Session[LineStamper]):
             self._is_latched = self._asks_still = False
 
     def set_firing(self, ring: RingConfig) -> None:
-        """Change the firing pattern."""
+        """Change the firing pattern, if it is another one.
+
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring cannot fire that way.
+        """
         pattern = firing_pattern(ring)
         if pattern != self._pattern:
             self._pattern, self._asks_pattern = pattern, True

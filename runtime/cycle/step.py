@@ -268,7 +268,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) 
 
 
 def _accept_drive_request(state: State, inputs: Inputs) -> None:
-    """Take over the operator's drive request; legs that were done begin again."""
+    """Make the operator's drive request, which `_refusal` allows, the current one; legs that ended begin again."""
     if inputs.drive_request is None:
         return
     before = state.drive_request

@@ -72,7 +72,9 @@ def mean_bearing(
 
 @kernel
 def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius: float) -> float:
-    """Return the log ratio (nat) of a circle on the first `n` readings of the scratch; write the scratch's `score`.
+    """Return the log likelihood ratio (nat) of a circle to the background, on the first `n` readings of the scratch.
+
+    Writes the scratch's `score` and `predicted`.
 
     Parameters
     ----------
@@ -98,7 +100,9 @@ def fit_other_circle(
     other: float,
     steps: int,
 ) -> float:
-    """Return the log ratio (nat) of a circle of another radius on the same surface; write the scratch's `circle_fit`.
+    """Return the log ratio (nat) of a circle of another radius on the same surface.
+
+    Writes the scratch's `circle_fit`, and what `score` writes.
 
     Parameters
     ----------

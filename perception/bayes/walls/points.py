@@ -182,7 +182,7 @@ def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float,
     found.is_edge = 1 if is_near else 0
     found.first = k
     found.second = end_of_edge(wall, along) if is_near else int(along > wall.spans[wall.span_count - 1].high)
-    if not is_shown or spread < SPREAD_MIN_RAD or not displaces(room, found, is_near):
+    if not is_shown or spread < SPREAD_MIN_RAD or not makes_room(room, found, is_near):
         return False
     found.is_used = KEPT
     return True
@@ -284,10 +284,11 @@ def end_of_edge(wall: Wall, along: float) -> int:
 
 
 @kernel
-def displaces(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
-    """Return whether a point is added, in place of the edges near it that are known by fewer echoes.
+def makes_room(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
+    """Remove the edges near a point that are known by fewer echoes; return whether the point may be added.
 
-    Where walls meet it is not, but their corner gets its echoes: most were heard before both walls were known.
+    It may not beside an edge that stays; then none is removed. Nor may it where walls meet, but their corner gets its
+    echoes if it has fewer: most were heard before both walls were known.
 
     Parameters
     ----------
@@ -302,13 +303,16 @@ def displaces(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
             if corner.is_edge == found.is_edge and corner.echoes < found.echoes:
                 copy_heard(found, corner)
             return False
-    for c in range(EDGES_MAX):
-        edge = room.edges[c]
-        if edge.is_used == KEPT and math.hypot(edge.x - found.x, edge.y - found.y) < KNOWN_POINT_M:
+    for is_decided in (False, True):
+        for c in range(EDGES_MAX):
+            edge = room.edges[c]
+            if edge.is_used != KEPT or math.hypot(edge.x - found.x, edge.y - found.y) >= KNOWN_POINT_M:
+                continue
             echoes = edge.echoes - edge.far_echoes if is_near else edge.echoes
-            if echoes >= found.echoes or (is_near and edge.is_edge == 0) or edge.is_kept == 1:
+            if is_decided:
+                edge.is_used = 0
+            elif echoes >= found.echoes or (is_near and edge.is_edge == 0) or edge.is_kept == 1:
                 return False
-            edge.is_used = 0
     return True
 
 

@@ -50,8 +50,8 @@ DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
 STRAY: Final = 0.02
 STRAY_MEMORY: Final = 0.03
-"""Share of the landmarks outside a beam that are heard, at first: of mirrors none, many where a drum answers with any
-part that is in the beam; and the weight of one look in it."""
+"""Share of the landmarks outside a beam that are heard, at first, and the weight of one look in it: of mirrors none
+is heard, many are where a drum answers with any part that is in the beam."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
@@ -234,7 +234,8 @@ def update_with_range(
     """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
 
     The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
-    explain it, it is not used.
+    explain it, it is not used. A range that passed a landmark which should have answered moves that out of the beam;
+    one that misses it by less than `NEAR_M` is a failure of it. Each expected echo enters `fit_share`.
 
     Parameters
     ----------
@@ -245,7 +246,7 @@ def update_with_range(
     mount : SensorPose
         The sensor's mount in the ring's frame, m and rad.
     r : float
-        Range, m; inf: no echo.
+        Range, m, below the greatest one; inf: no echo.
     sonar : SonarModel
         What is known of the sensors.
     """

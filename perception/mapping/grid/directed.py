@@ -205,13 +205,13 @@ def enter_readings(
     Parameters
     ----------
     planes : (9, n, n, 4) int16
-        The torus, direction by direction. Updated.
+        The torus, direction by direction, n a power of two; of a cell what `cell_evidence` says. Updated.
     maybe_sure : (n, n) bool
-        As of `is_sure_elsewhere`. Updated.
+        As of `is_sure_elsewhere`: False where a cell is surely sure in no direction. Updated.
     raster : Raster
         Where the cells are.
     place : int
-        Where on its way the robot is.
+        Number of the robot's place on its way, from 1 on; the same for all readings of a firing.
     beams : Beams
         The beams of the firing.
     known : (float, float, float)
@@ -339,7 +339,7 @@ class DirectedGrid:
         """Enter a firing; see `EvidenceGrid.observe`."""
         if not self.window.follow(firing.pose, (self.cells, self._maybe_sure)):
             return
-        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NOWHERE
+        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NO_PLACE_NUMBER
         enter_readings(
             self._planes,
             self._maybe_sure,

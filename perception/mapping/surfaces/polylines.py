@@ -37,7 +37,7 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
     """
     for at in range(begin, end):
         cell = room.cells[counts.order[at]]
-        if not is_left(room, cell):
+        if not is_unclaimed(room, cell):
             continue
         is_apart = True
         for i in range(max(0, cell.i - APART), min(CELLS, cell.i + APART + 1)):
@@ -51,8 +51,11 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
 
 
 @kernel
-def is_left(room: LocalMap, cell: SurfaceCell) -> bool:
-    """Return whether no straight piece stands for a cell: a piece may end before its cells do."""
+def is_unclaimed(room: LocalMap, cell: SurfaceCell) -> bool:
+    """Return whether no straight piece stands for a cell, so that it may be a point of a polyline.
+
+    The piece that took it may be too short to be kept, or end before the cell. A point of a polyline is claimed.
+    """
     if cell.owner < 0:
         return bool(cell.owner == FREE)
     piece = room.pieces[cell.owner]

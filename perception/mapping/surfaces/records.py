@@ -72,7 +72,7 @@ class SurfaceCell(Record):
     strength: Finite
     """Echoes that speak for it."""
     owner: Annotated[int, Bound(NODE, PIECES_MAX - 1)]
-    """The piece that took it, `FREE` before."""
+    """The piece that took it; `FREE` before, or `NODE` where it is a point of a polyline."""
 
 
 class Piece(Record):

@@ -214,7 +214,7 @@ def _top(finite: Floats) -> Silence | None:
     least = BAND_CONTRAST * (1 + below / 2.0)
     if inside < max(least, TOP_SHARE * len(finite), 10):
         return None
-    return _band(finite, centre, width / WIDTHS, inside)
+    return _noisy_silence(finite, centre, width / WIDTHS, inside)
 
 
 def _spikes(ranges: Floats) -> Silence | None:
@@ -244,20 +244,21 @@ def _spikes(ranges: Floats) -> Silence | None:
     above = np.count_nonzero(leaps > centre + WIDTHS * spread)
     if len(inside) < max(LEAPS_MIN, LEAPS_SHARE * len(leaps)) or above > GLITCHES * ranges.size:
         return None
-    return _band(finite, centre, spread, int(np.count_nonzero(np.abs(finite - centre) <= WIDTHS * spread)))
+    return _noisy_silence(finite, centre, spread, int(np.count_nonzero(np.abs(finite - centre) <= WIDTHS * spread)))
 
 
-def _band(finite: Floats, centre: float, spread: float, count: int) -> Silence:
-    """Return the values near a centre that are likelier silence than ranges.
+def _noisy_silence(finite: Floats, centre: float, spread: float, count: int) -> Silence:
+    """Return the silence about a centre: the values that are likelier silence than ranges, in the file's unit.
 
-    Silence is normally distributed; ranges are as dense there as they are beside it.
+    Silence is normally distributed; ranges are as dense there as they are beside it. On each side it ends where its
+    density has fallen to theirs, at σ √(2 ln(greatest density / density beside)), `WIDTHS` σ at most.
 
     Parameters
     ----------
     finite : (n,) float
         Ranges.
     centre, spread : float
-        Mean and standard deviation of silence.
+        Mean and standard deviation of silence; that is above 0.
     count : int
         Values within `WIDTHS` standard deviations.
     """

@@ -39,7 +39,7 @@ DRIVE_S: Final = 0.05
 UNSTEADY_M: Final = 0.1
 """Ranges of a robot that stands still do not spread farther than this, m, apart from a tenth of them at each end."""
 ANSWERS_MIN: Final = 0.8
-"""Share of the firings that a good sensor answers. More readings that cannot be than the rest are a fault."""
+"""Share of the firings that a good sensor answers; no more than the rest may be ranges that it cannot measure."""
 REPEATS_MIN: Final = 5
 """Fewest equal ranges that count as always the same."""
 FINE_M: Final = 1e-3
@@ -196,7 +196,7 @@ def judge_motion(asked: Twist, before: Odometry, after: Odometry, flags: Flags, 
 
 
 class RingTest:
-    """One test, on one line.
+    """One test of a robot: connects, tests, and closes the line.
 
     Parameters
     ----------
@@ -229,7 +229,22 @@ class RingTest:
         self._odometry: Odometry | None = None
 
     async def run(self, rounds: int, *, move: bool, hand: bool = False) -> int:
-        """Return the exit code: whether all that was tested is good."""
+        """Test the sensors, and what else is asked for; return the exit code, `DONE` if all is good. Once.
+
+        Parameters
+        ----------
+        rounds
+            Firings of each sensor.
+        move
+            Test the motors, too: the wheels turn.
+        hand
+            Ask for a hand before each sensor, too.
+
+        Raises
+        ------
+        UserError
+            The robot does not answer, or is lost.
+        """
         await self._connection.connect(lambda: False)
         try:
             identity = self._driver.identity
@@ -262,7 +277,10 @@ class RingTest:
         return ranges
 
     async def _together(self, rounds: int) -> list[list[float]] | None:
-        """Return the same in the robot's own pattern, and go back; None where that fires one at a time, too."""
+        """Listen as `_listen` does in the robot's own pattern, then return to that of the test.
+
+        None where as many sensors fire at once in either.
+        """
         if self._own is None or firing_pattern(self._own).set_size == firing_pattern(self._config.ring).set_size:
             return None
         self._driver.set_firing(self._own)
@@ -307,6 +325,7 @@ class RingTest:
         return not wrong
 
     async def _test_motors(self) -> bool:
+        """Drive each of `MOTIONS`, and write whether odometry shows it; return whether all are good."""
         self._write(
             f"WARNING: the wheels turn in {WARNING_S:g} s. Put the robot on a block, wheels free; Ctrl-C ends.\n"
         )

@@ -22,8 +22,8 @@ from perception.bayes.walls.points import (
     LINE_CELLS,
     SLANT_MIN,
     count_cuts,
-    displaces,
     find_heard_points,
+    makes_room,
 )
 from perception.bayes.walls.report import room_report
 from perception.bayes.walls.reported_points import ALONE_EDGE_ECHOES
@@ -92,8 +92,20 @@ def test_a_point_displaces_one_of_fewer_echoes_but_none_that_was_sure_at_the_sto
     found = room.edges[1]
     found.x, found.y = CORNER.tolist()
     found.echoes = 12.0
-    assert displaces(room, found, is_near=False) != is_kept
+    assert makes_room(room, found, is_near=False) != is_kept
     assert room.edges[0].is_used == int(is_kept)
+
+
+def test_an_edge_of_fewer_echoes_stays_where_another_one_keeps_the_point_out() -> None:
+    _, room = mirrors()
+    for edge, echoes in zip(room.edges[:2], (3.0, 20.0), strict=True):
+        edge.is_used, edge.echoes = KEPT, echoes
+        edge.x, edge.y = (CORNER + 0.5 * KNOWN_POINT_M).tolist()
+    found = room.edges[2]
+    found.x, found.y = CORNER.tolist()
+    found.echoes = 12.0
+    assert not makes_room(room, found, is_near=False)
+    assert room.edges[0].is_used == KEPT
 
 
 def test_a_corner_that_ranges_passed_or_that_a_wall_would_be_or_that_is_known_is_none() -> None:

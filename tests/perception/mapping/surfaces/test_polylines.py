@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, LINK_M, NODE_M, PIECE_MIN_M
-from perception.mapping.surfaces.polylines import chain_all, choose_nodes, is_left
+from perception.mapping.surfaces.polylines import chain_all, choose_nodes, is_unclaimed
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts
 from perception.records import records
 from tests.perception.mapping.surfaces.test_pieces import mapped
@@ -60,10 +60,10 @@ def test_cells_of_a_piece_that_does_not_reach_them_are_left() -> None:
     piece = local["pieces"][0, 0]
     piece["ux"], piece["low"], piece["high"] = 1.0, 0.0, 0.5
     along = (cells["i"] + 0.5 - 0.5 * CELLS) * CELL_M
-    left = [is_left(room[0], room[0].cells[k]) for k in range(20)]
+    left = [is_unclaimed(room[0], room[0].cells[k]) for k in range(20)]
     np.testing.assert_array_equal(left, along > 0.5 + CELL_M)
     piece["high"] = 0.5 * PIECE_MIN_M
-    assert all(is_left(room[0], room[0].cells[k]) for k in range(20))
+    assert all(is_unclaimed(room[0], room[0].cells[k]) for k in range(20))
 
 
 def test_a_long_outline_is_cut() -> None:
