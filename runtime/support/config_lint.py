@@ -60,7 +60,8 @@ def lint_settings(settings: Settings) -> list[str]:
             f"behaviors.avoid_static_obstacle.echo_age_max_s = {avoid.echo_age_max_s:g}: the robot stops until that "
             "sensor answers again; fire more sensors at a time, or let beams overlap"
         )
-    if (crosstalk := crosstalk_note(settings.ring)) is not None:
+    fires = settings.link.port != "ros2"  # there the sensors' own nodes do, or a simulator, which has no crosstalk
+    if fires and (crosstalk := crosstalk_note(settings.ring)) is not None:
         warnings.append(crosstalk)
     lacks = missing(capabilities(settings)).values()
     return [*warnings, *(f"robot.driver = {settings.robot.driver}: {text}" for text in lacks), *blind_notes(settings)]

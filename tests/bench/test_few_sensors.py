@@ -37,7 +37,7 @@ def test_goals_lie_far_away_and_are_free() -> None:
 
 @pytest.mark.compiled
 def test_a_drive_is_counted() -> None:
-    result = run_room("hobby8", "cone", 1, 12.0)
+    result = run_room("hobby8", "cone", 1, 14.0)
     assert (result.contacts, result.arrived, result.goals) == (0, 0, 0)
     assert result.way_m > 0.1
     assert few_sensors_table([result]).row_count == 1

@@ -42,3 +42,10 @@ def test_sensors_behind_the_rim_hear_nearer_to_it() -> None:
     assert lint_settings(load_settings("room", robot="parking12")) == []
     at_the_rim = lint_settings(load_settings("room", ["body.radius_m=0.12"], robot="parking12"))
     assert sum("set the sensors back from the rim" in text for text in at_the_rim) == 2
+
+
+def test_neighbours_that_fire_together_are_named_where_the_pattern_is_ours() -> None:
+    together = ["ring.firing={sets=[[0, 1, 2]]}"]
+    assert any("fire together" in text for text in lint_settings(load_settings("room", together, robot="hobby3")))
+    ros = [*together, "robot.driver=ros2", "link.port=ros2"]
+    assert not any("fire together" in text for text in lint_settings(load_settings("room", ros, robot="hobby3")))
