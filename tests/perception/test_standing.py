@@ -20,8 +20,8 @@ MODELS = get_args(Reflection)
 pytestmark = [pytest.mark.compiled]
 SETTLED_S = 5.0
 """After this every sensor has fired from where the robot stopped, and all readings are refined."""
-LOST_MAX = 0.02
-"""Share of what was sure that may be lost within ten minutes: asked is nothing, 8 of 861 were measured."""
+LOST_MAX = 0.005
+"""Share of what was sure that may be lost within ten minutes: asked is nothing, 2 of 1,224 were measured."""
 
 
 def losses(trial: StandTrial) -> list[str]:
