@@ -35,8 +35,9 @@ class Promise(NamedTuple):
 
 LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
-    "most such silences are named at once, and some are not before a contact. After 4 m without an echo a line says "
-    "so.",
+    "most such silences are named at once, others by a line after half a metre, or after twice the longest silence "
+    "so far if that is more. After 4 m without anything new the robot creeps. What it had not heard before may be "
+    "touched until then.",
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
     "become so where the ring hears few echoes at that moment (three to eight: in 11 of 32 drives of rings of "
     "8, 16 and 24 sensors among mirrors something was touched when ranges became too long, in 0 of 16 when "
@@ -65,7 +66,7 @@ LIMITS: Sequence[str] = (
     "A frozen ring that hears next to nothing: an AmigoBot in a corridor whose one echo lay behind it was named "
     "after a second, and touched the end at .13 m/s 19 s later, in 1 of some 54 drives.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
-    "then, and nothing is touched. Where nothing echoes, silence is true and false alike.",
+    "then; after 4 m without anything new the robot creeps. Where nothing echoes, silence is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
     "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
     "since it is there after .33 s.",
