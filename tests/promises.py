@@ -127,7 +127,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P8": Promise(
             "Crosstalk, ghosts, stuck sensors and rings that lie are caught",
             "pattern changes expose crosstalk; a sensor that never changes or always fails is masked and reported; "
-            "a ring that freezes, and a robot's clock that is latched, leaps or runs at half or "
+            "a ring that freezes or falls silent, and a robot's clock that is latched, leaps or runs at half or "
             "double speed, at random moments of drives of any shipped robot through any room: a reason or a line "
             "names it, and nothing is touched above .05 m/s; late, duplicate and out-of-window echoes never reach "
             "perception; no honest sensor masked, no honest drive stopped",
