@@ -63,7 +63,10 @@ class WallConfig(Strict):
         return self
 
     def pieces_m(self) -> list[tuple[float, float, float, float]]:
-        """Return both ends of each straight piece of the wall, m; a bent one's are at most `BEND_PIECE_M` long."""
+        """Return both ends of the wall's straight pieces in order, m; a bent one's are about `BEND_PIECE_M` long.
+
+        Each begins exactly where the one before it ends.
+        """
         if self.bend_m == 0.0:
             return [(self.x1_m, self.y1_m, self.x2_m, self.y2_m)]
         dx, dy = self.x2_m - self.x1_m, self.y2_m - self.y1_m
@@ -182,8 +185,8 @@ class WorldConfig(PlacesConfig):
         return PlacesConfig(**{key: getattr(self, key) for key in PLACE_KEYS})
 
     def sides_m(self) -> list[tuple[float, float, float, float]]:
-        """Return both ends of each wall, and of each side of the boxes and polygons, m."""
-        sides = [(wall.x1_m, wall.y1_m, wall.x2_m, wall.y2_m) for wall in self.wall]
+        """Return both ends of each straight piece of a wall, and of each side of the boxes and polygons, m."""
+        sides = [piece for wall in self.wall for piece in wall.pieces_m()]
         outlines = [box.corners_m() for box in self.box] + [list(polygon.vertices_m) for polygon in self.polygon]
         for outline in outlines:
             sides += [(*a, *b) for a, b in zip(outline, outline[1:] + outline[:1], strict=True)]

@@ -49,14 +49,14 @@ _IN_USE = (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK)
 
 
 def opening_error(config: LinkConfig, error: BaseException) -> LinkError:
-    """Return the error for the user: a port in use or out of reach is a failure, other causes are a wrong call."""
+    """Return the error for the user: a port in use, or that does not open in time, is a failure; others are wrong."""
     if config.port is not None and is_tcp(config.port):
         wrong = isinstance(error, ValueError | OverflowError | socket.gaierror)
         return LinkError(explain_tcp(config.port, error), WRONG_CALL if wrong else FAILED)
     if isinstance(error, GatewayError):
         return LinkError(" ".join(str(error).split()), FAILED)
-    in_use = getattr(error, "errno", None) in _IN_USE
-    return LinkError(explain(config, error), FAILED if in_use else WRONG_CALL)
+    is_there = isinstance(error, TimeoutError) or getattr(error, "errno", None) in _IN_USE
+    return LinkError(explain(config, error), FAILED if is_there else WRONG_CALL)
 
 
 def explain(config: LinkConfig, error: BaseException) -> str:

@@ -16,8 +16,8 @@ from urllib.parse import urlsplit
 import serial
 
 SCHEME: Final = "socket://"
-_CONNECT_S: Final = 3.0
-"""Longest wait for each address of the host, s."""
+_CONNECT_S: Final = 1.4
+"""Longest wait for each address of the host, s: two of them within the 3 s in which `drivers.link` opens a port."""
 _SEND_BYTES: Final = 4096
 """The system's buffer for bytes to send: as small as a serial line's, so that no stale command waits in it."""
 _RECEIVE_BYTES: Final = 16_384

@@ -20,6 +20,7 @@ Board: TypeAlias = Literal["pico", "esp32"]
 CONFIG_NAME: Final = "robot_config.py"
 _SOURCES: Final = Path(__file__).parent / "board"
 _ON_I2C: Final = ("srf08", "srf10")
+_PULSED: Final = ("hc-sr04", "mb10xx", "mb12xx")
 _MACHINES: Final = 8
 """State machines of the RP2040, each of which times one echo pin."""
 _SPEED_SHARE: Final = 0.9
@@ -84,7 +85,7 @@ def robot_file(values: Mapping[str, Any], place: str) -> str:
     """
     try:
         text = _render(values)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError) as error:
         missing = f"{error.args[0]} is missing" if isinstance(error, KeyError) else f"a value is malformed ({error})"
         raise FirmwareError(
             f"{place}: {missing}; compare it with the one that --out in a new folder writes"
@@ -141,6 +142,12 @@ def _render(values: Mapping[str, Any]) -> str:
     ValueError
         They contradict each other.
     """
+    for i, (kind, *wires) in enumerate(values["SENSORS"]):
+        if kind not in (*_ON_I2C, *_PULSED) or len(wires) != (1 if kind in _ON_I2C else 2):
+            raise ValueError(
+                f"SENSORS: sensor {i} is {(kind, *wires)!r}; give {', '.join(_PULSED)} with trigger and echo pin, "
+                f"or {', '.join(_ON_I2C)} with an address"
+            )
     mounts, count = values["MOUNTS"], len(values["SENSORS"])
     if mounts is not None and len(mounts) != count:
         raise ValueError(f"MOUNTS has {len(mounts)} places and SENSORS {count} sensors")

@@ -85,7 +85,6 @@ class Gateway:
         try:
             if not self._wait_for_odometry():
                 return
-            self._line.sendall(READY)
             self._line.settimeout(TICK_S)
             while self._take_from_host():
                 pass
@@ -104,10 +103,11 @@ class Gateway:
         while not self._side.has_odometry:
             if time.monotonic() > end_s:
                 kinds = self._node.get_topic_names_and_types()
-                known = ", ".join(name for name, types in kinds if "nav_msgs/msg/Odometry" in types) or "no topic"
-                notes = "; ".join(self._side.take_notes())
+                known = ", ".join(name for name, types in kinds if "nav_msgs/msg/Odometry" in types) or "none"
+                with self._lock:
+                    notes = "; ".join(self._side.take_notes())
                 text = (
-                    f"no odometry on {self._odometry} within {ODOMETRY_MAX_S:g} s, and some on {known}"
+                    f"no odometry on {self._odometry} within {ODOMETRY_MAX_S:g} s; topics of odometry: {known}"
                     f"{notes and f' ({notes})'}; start the robot, or correct ros2.odometry or ROS_DOMAIN_ID"
                 )
                 self._line.sendall(f"{text}\n".encode())
@@ -115,6 +115,7 @@ class Gateway:
             time.sleep(TICK_S)
         with self._lock:
             self._side.take_output()
+            self._line.sendall(READY)  # before any frame, which the lock holds back
             self._is_open = True
         return True
 

@@ -166,7 +166,10 @@ def compare_with_map(
     drums = _compare_drums(known, found, names, echoes, half_angle_rad, changes)
     walls, outlines = list[WallConfig](), list[PolygonConfig]()
     for wall in known.wall:
-        walls += _without_openings(wall, looks_at_wall(echoes, _ends(wall), half_angle_rad), changes)
+        if wall.bend_m != 0.0:  # no piece of it is as long as an opening
+            walls.append(wall)
+        else:
+            walls += _without_openings(wall, looks_at_wall(echoes, _ends(wall), half_angle_rad), changes)
     boxes = []
     for box in known.box:
         if not _is_outline_gone(box.corners_m(), echoes, half_angle_rad):

@@ -78,9 +78,11 @@ class Recording:
                 yield scanner.chunk_offset, chunk
             return
         regions = list(scanner.corrupt_regions)
-        for chunk in scanner.chunks(since):
-            yield scanner.chunk_offset, chunk
-        scanner.corrupt_regions = regions  # a second pass over a part finds some of them again
+        try:
+            for chunk in scanner.chunks(since):
+                yield scanner.chunk_offset, chunk
+        finally:
+            scanner.corrupt_regions = regions  # a second pass over a part finds some of them again
 
     def cycle_records(self) -> Iterator[CycleRecord]:
         """Yield the record of every readable cycle in file order.

@@ -59,10 +59,9 @@ class SdNotifier:
         return cls(address if address and address[0] in "/@" else None, watchdog_s or None)
 
     def alive(self, host_s: float) -> None:
-        """Report that the service works at the time `host_s`: READY the first time, then WATCHDOG at its interval."""
+        """Report that the service works at the time `host_s`: READY until it is sent, WATCHDOG at its interval."""
         if not self._is_ready:
-            self._is_ready = True
-            self._send("READY=1")
+            self._is_ready = self._send("READY=1")
         if self._watchdog_interval_s is not None and host_s - self._watchdog_sent_s >= self._watchdog_interval_s:
             self._watchdog_sent_s = host_s
             self._send("WATCHDOG=1")
@@ -70,9 +69,8 @@ class SdNotifier:
     def status(self, text: str) -> None:
         """Set the status line that the manager shows."""
         line = " ".join(text.split())[:STATUS_MAX]
-        if line != self._status:
+        if line != self._status and self._send(f"STATUS={line}"):
             self._status = line
-            self._send(f"STATUS={line}")
 
     def stopping(self) -> None:
         """Report that the service is stopping."""
@@ -84,15 +82,17 @@ class SdNotifier:
             self._socket.close()
             self._socket = None
 
-    def _send(self, line: str) -> None:
+    def _send(self, line: str) -> bool:
+        """Send a message without waiting; return whether it needs not be sent again. A failure is counted."""
         if self._socket is None or self._address is None:
-            return
+            return True
         try:
             self._socket.sendto(line.encode(), self._address)
         except OSError as error:
-            # The manager is busy or restarts; the next message may reach it.
-            self.lost += 1
+            self.lost += 1  # the manager is busy or restarts
             self.last_error = error.strerror or str(error)
+            return False
+        return True
 
     def __enter__(self) -> SdNotifier:
         return self

@@ -49,6 +49,7 @@ def test_a_bent_wall_is_an_arc_with_its_middle_to_the_left() -> None:
         middle = 1.0 - bend + radius
         np.testing.assert_allclose(np.hypot(pieces[:, 0] - middle, pieces[:, 1] - 2.5), abs(radius), atol=1e-9)
         assert pieces[len(pieces) // 2, 0] == pytest.approx(1.0 - bend)
+        assert WorldConfig(wall=(wall,)).sides_m() == wall.pieces_m()
     straight = WallConfig(x1_m=1.0, y1_m=1.0, x2_m=1.0, y2_m=4.0)
     assert straight.pieces_m() == [(1.0, 1.0, 1.0, 4.0)]
 

@@ -19,7 +19,7 @@ from config.robot import RingConfig
 from drivers.messages import IDENTITY, Firing, Pose, wrap_angle
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, SHARE, Bound, bounds, index_of, up_to
 from perception.localization.known_room.background import Background
-from perception.localization.known_room.keyframes import Keyframes
+from perception.localization.known_room.keyframes import KEYFRAMES_MAX, Keyframes
 from perception.localization.known_room.mixed_reflection import LearnedShares
 from perception.localization.known_room.pose_grid import GRID_CELL_M, GRID_READINGS_MAX, GRID_STEP_RAD, PoseGrid
 from perception.localization.known_room.pose_particles import HYPOTHESES_MAX, MERGE_M, MERGE_RAD
@@ -223,14 +223,7 @@ class KnownRoom:
         elif self._stage == COMPARING:
             self._grid.refine()
             if not self._grid.is_searching:
-                begin = self._search_begin
-                if len(self._grid):
-                    self.shares.guess(self._grid.best_profile)
-                starts, self._is_complete = self._grid.best_starts(HYPOTHESES_MAX), self._grid.is_complete
-                self._candidates.start(
-                    starts, GRID_CELL_M, GRID_STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
-                )
-                self._stage = WEIGHING if len(starts) else IDLE
+                self._weigh_starts()
         elif self._stage == WEIGHING:
             self._enter(self._candidates)
             if not self._candidates.is_behind(self._keyframes):
@@ -239,6 +232,20 @@ class KnownRoom:
                 self._stage = IDLE
                 self._judge()
         return 1
+
+    def _weigh_starts(self) -> None:
+        """Let the places that the grid has found enter the keyframes since; search anew if those are overwritten."""
+        begin, keyframes = self._search_begin, self._keyframes
+        if keyframes.count - begin > KEYFRAMES_MAX:
+            self._window_begin, self._stage = max(self._window_begin, keyframes.count - WINDOW_MAX), DUE
+            return
+        if len(self._grid):
+            self.shares.guess(self._grid.best_profile)
+        starts, self._is_complete = self._grid.best_starts(HYPOTHESES_MAX), self._grid.is_complete
+        self._candidates.start(
+            starts, GRID_CELL_M, GRID_STEP_RAD, keyframes.pose(begin), begin, self._search_evidence
+        )
+        self._stage = WEIGHING if len(starts) else IDLE
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing, as far as known."""

@@ -134,7 +134,15 @@ def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
     """Write a model file and return the exit code; parameters as of `runtime.cli.commands.init.model`."""
     ask = _questions(file, given, yes=yes, force=force)
     name = ask.text("name", "What such an object is called", Path(file).stem)
-    if ask.choice("shape", "Its shape", ("round", "box")) == "round":
+    is_round = ask.choice("shape", "Its shape", ("round", "box")) == "round"
+    for option in ("length", "width") if is_round else ("radius",):
+        if given.get(option) is not None:
+            raise UserError(
+                f"--{option}: a {'round object' if is_round else 'box'} has none; leave it out, or give --shape "
+                f"{'box' if is_round else 'round'}",
+                WRONG_CALL,
+            )
+    if is_round:
         radius = ask.number("radius", "Its radius, m", 0.3048, 0.02, 10.0)
         turns = [2.0 * math.pi * k / CORNERS for k in range(CORNERS)]
         points = [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]

@@ -50,7 +50,7 @@ def page_files() -> dict[str, StaticFile]:
 
 
 def security_headers(host: str) -> dict[str, str]:
-    """Return the headers of every response: no foreign content, no embedding, no caching, no referrer.
+    """Return the headers of a response where the Host is right: nothing foreign, embedded or cached, no referrer.
 
     Parameters
     ----------

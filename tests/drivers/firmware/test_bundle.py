@@ -103,6 +103,11 @@ def test_what_is_no_list_of_constants_is_refused(text: str, said: str) -> None:
         ({"MOUNTS": ((1, 2, 3),)}, "MOUNTS has 1 places and SENSORS 12 sensors"),
         ({"FIRING": "octet"}, "gives ring.firing"),
         ({"SPEED_MAX_MM_S": "fast"}, "a value is malformed"),
+        ({"SENSORS": (("hcsr04", 0, 4),)}, "SENSORS: sensor 0 is .'hcsr04', 0, 4.; give hc-sr04, "),
+        ({"SENSORS": (("hc-sr04", 0, 4), ("hc-sr04", 0))}, "sensor 1 is .'hc-sr04', 0."),
+        ({"SENSORS": (("srf8", 112),)}, "or srf08, srf10 with an address"),
+        ({"SENSORS": ((),)}, "a value is malformed"),
+        ({"LINE": (1, 2, 3)}, "a value is malformed"),
     ],
 )
 def test_wrong_values_are_named(changes: dict[str, Any], said: str) -> None:

@@ -51,6 +51,7 @@ def test_missing_or_blocked_manager_does_not_block_the_run(tmp_path: Path) -> No
                 if notifier.lost > 2:
                     break
             assert notifier.lost == 3, "the socket is full, and the run did not wait"
+            assert ears.recv(100) == b"READY=1", "sent again once the manager listens"
             assert ears.recv(100) == b"WATCHDOG=1"
             notifier.alive(1e6)
             assert notifier.lost == 3, "and there is room again"

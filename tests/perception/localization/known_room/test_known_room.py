@@ -19,7 +19,8 @@ from config.world import AcousticsConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
-from perception.localization.known_room.known_room import TRACKING, KnownRoom
+from perception.localization.known_room.keyframes import KEYFRAMES_MAX
+from perception.localization.known_room.known_room import COMPARING, TRACKING, KnownRoom
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.room import room_of
 from perception.snapshot import put_back, snapshot_of
@@ -275,3 +276,32 @@ def test_after_a_reset_the_place_is_unknown_again() -> None:
     assert (here.status, here.probability) == ("localizing", 0.0)
     assert localizer.odometry_from_map() == Pose(0.0, 0.0, 0.0)
     assert follow(localizer, drive).status[-1] == "tracking"
+
+
+def test_a_search_of_which_the_first_keyframes_are_overwritten_begins_anew() -> None:
+    """The robot turns on the spot for so long that the search's first keyframe has gone when the search is done."""
+    world = world_of(CROOKED, ACOUSTICS)
+    sonar, origin = Sonar(RING, compile_scene(world), ACOUSTICS, np.random.default_rng(5)), Pose(4.0, -3.0, 2.0)
+    localizer = KnownRoom(room_of(world), RING)
+
+    def turn(first: int, count: int) -> Pose:
+        for k in range(first, first + count):
+            here = Pose(1.2 + 0.05 * min(k, 20), 1.2, 0.02 * k)
+            odometry = origin.compose(here)
+            ranges = sonar.fire(here, here.theta, range(24))
+            localizer.observe(Firing(0.1 * k, odometry, odometry.theta, ranges))
+        return here
+
+    turn(0, 40)
+    while localizer.can_refine and localizer._stage != COMPARING:
+        localizer.refine()
+    assert localizer._stage == COMPARING
+    begin = localizer._search_begin
+    here = turn(40, 7 * KEYFRAMES_MAX)
+    assert localizer._keyframes.count - begin > KEYFRAMES_MAX
+    while localizer.can_refine:
+        localizer.refine()
+    assert localizer._search_begin > begin
+    found = localizer.localized()
+    assert localizer.probability > SURE
+    assert math.dist((found.pose.x, found.pose.y), (here.x, here.y)) < 0.1

@@ -86,6 +86,8 @@ def test_a_robot_that_is_described_with_the_defaults_can_be_driven(driver: str) 
         (("robot", "--layout", "behind"), "--layout"),
         (("run", "--robot", "absent.toml"), "absent.toml"),
         (("model", "--name", "a b"), "nothing was written"),
+        (("model", "--length", "2", "--width", "1"), "--length: a round object has none"),
+        (("model", "--shape", "box", "--radius", "1"), "--radius: a box has none"),
     ],
 )
 def test_a_wrong_option_writes_nothing(words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]) -> None:
