@@ -16,8 +16,8 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "drivers/firing_pattern.py": {
             "_listeners: i + turn → i - turn": "the listeners lie on both sides alike",
             "_listeners: True → False": "both have one mask a step, which was checked just before",
-            "_nearest: 0.0 → 1.0": "without a sensor that fires there is none to compare with it",
-            "_nearest: angle <= least + _SAME_ANGLE_RAD → angle < least + _SAME_ANGLE_RAD": (
+            "_nearest_firing: 0.0 → 1.0": "without a sensor that fires there is none to compare with it",
+            "_nearest_firing: angle <= least + _SAME_ANGLE_RAD → angle < least + _SAME_ANGLE_RAD": (
                 "they differ only for angles that differ by exactly a millionth: either answer is right"
             ),
             "pattern_pairs: True → False": "a pattern has one mask of listeners for each of those that fire, or none",

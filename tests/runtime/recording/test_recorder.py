@@ -153,7 +153,7 @@ def test_the_loop_encodes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 class Full(SingleFile):
     """A disk that is full, and stays so."""
 
-    def path(self, part: int) -> Path:  # noqa: ARG002 - always this one
+    def begin_part(self, part: int) -> Path:  # noqa: ARG002 - always this one
         return Path("/dev/full")
 
 

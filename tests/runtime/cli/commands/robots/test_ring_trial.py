@@ -124,6 +124,8 @@ def test_the_line_of_a_robot_behind_ros_is_opened_as_its_family_does(monkeypatch
     assert given["opener"] is not None
 
 
+OF_EACH_KIND = ("denning", "p3dx", "b21r", "hobby3", "servo1")
+"""Robots of different drivers and bases; the others are tested in `make soak`."""
 ROBOTS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver != "ros2")
 
 
@@ -148,7 +150,9 @@ def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is
         assert code == FAILED or "hears nothing" in found
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot", [pytest.param(one, marks=[] if one in OF_EACH_KIND else [pytest.mark.soak]) for one in ROBOTS]
+)
 def test_the_motors_of_every_shipped_robot_are_good(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     code, lines = reports_of(robot, monkeypatch, move=True)
     assert code == DONE, lines
