@@ -64,7 +64,8 @@ LIMITS: Sequence[str] = (
     "otherwise, and a ring that is turned by a half among few surfaces, as in a corridor: 6 of 16 drives of rings of "
     "8, 16 and 24 sensors then touched something, 1 of 16 turned by a quarter, and 0 of 16 by 45°.",
     "A frozen ring that hears next to nothing: an AmigoBot in a corridor whose one echo lay behind it was named "
-    "after a second, and touched the end at .13 m/s 19 s later, in 1 of some 54 drives.",
+    "after a second, and touched the end at .13 m/s 19 s later, in 1 of some 54 drives; a `parking12` in one was "
+    "named after 2 s, and touched it at .3 m/s 4 s later, the only one of 680 frozen or silent drives of 17 robots.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
     "then; after 4 m without anything new the robot creeps. Where nothing echoes, silence is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
