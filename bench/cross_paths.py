@@ -23,8 +23,8 @@ from config.load import load_robot
 from config.robot import SOUND_SPEED_M_S
 from config.world import AcousticsConfig, DrumConfig, StartConfig, WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
-from drivers.emulator.sonar import LISTENING_LOBE, Sonar
-from drivers.firing_pattern import firing_pattern, sensors
+from drivers.emulator.sonar import Sonar
+from drivers.firing_pattern import LISTENING_LOBE, firing_pattern, sensors
 from drivers.messages import Pose
 
 BURST_HZ: Final = 50e3

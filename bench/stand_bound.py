@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.emulator.sonar import LISTENING_LOBE
-from drivers.firing_pattern import pattern_pairs
+from drivers.firing_pattern import LISTENING_LOBE, pattern_pairs
 from perception.echo_kind import half_paths_over_circle
 from perception.kernel import Floats
 

@@ -28,6 +28,11 @@ _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
     }
 )
 _PLACES_AWAY: Mapping[ListenPreset, int] = MappingProxyType({"neighbours": 1, "second": 2})
+LISTENING_LOBE = 2.0
+"""How far off its axis a sensor hears another sensor's pulse, in beam half-angles. At the beam's edge the losses of
+emission and reception together reach the detection limit. For a foreign pulse only reception is off axis, which costs
+half the decibels, so the limit lies farther out: about √2 times for an ordinary echo, about twice for a strong one.
+Strong echoes are those that cause crosstalk."""
 _SAME_ANGLE_RAD = 1e-6
 """Angles that differ by less are equal but for rounding."""
 _TOLERANCE_S = 1e-9

@@ -157,7 +157,7 @@ def angle_to_look(percept: Percept, course_rad: float, presumed_rad: Floats | No
         As of `presumed_ahead_rad`: the robot looks there as well.
     """
     unknown = percept.field_of_view.unknown_rad
-    if presumed_rad is not None:
+    if presumed_rad is not None and len(presumed_rad):
         unknown = np.concatenate([unknown, presumed_rad])
     if not len(unknown):
         return None

@@ -18,13 +18,9 @@ from drivers.emulator.acoustics import ECHO, MOUNT, first_echoes
 from drivers.emulator.cross_paths import first_cross_paths
 from drivers.emulator.scene import Scene
 from drivers.emulator.surfaces import CONE, SILENT, SURFACES, Records
+from drivers.firing_pattern import LISTENING_LOBE
 from drivers.messages import Floats, Pose
 
-LISTENING_LOBE = 2.0
-"""How far off its axis a sensor hears another sensor's pulse, in beam half-angles. At the beam's edge the losses of
-emission and reception together reach the detection limit. For a foreign pulse only reception is off axis, which costs
-half the decibels, so the limit lies farther out: about √2 times for an ordinary echo, about twice for a strong one.
-Strong echoes are those that cause crosstalk."""
 LATE_M = (0.3, 2.0)
 """A late echo's way leads over another surface: so much farther than the first one in the beam, m."""
 

@@ -16,7 +16,6 @@ import math
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
 from perception.angles import wrapped
@@ -225,9 +224,6 @@ class BlindWalls:
     def offsets(self, x: float, y: float) -> Floats:
         """Return the distance of each direction's wall from the odometry's origin, m; infinite without one.
 
-        An echo stands for a wall in each direction of its beam: of neighbours at one distance those in the middle
-        count.
-
         Parameters
         ----------
         x, y
@@ -235,7 +231,7 @@ class BlindWalls:
         """
         offsets, directions = self._walls["offset"], WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         away = offsets - x * np.cos(directions) - y * np.sin(directions)
-        return middle_walls((self._walls["odds"] > 0.0) & (away > self._radius_m), offsets)
+        return np.where((self._walls["odds"] > 0.0) & (away > self._radius_m), offsets, math.inf)
 
     def clear(self) -> None:
         """Forget everything."""
@@ -243,18 +239,19 @@ class BlindWalls:
         self._walls["odds"] = 0.0
 
 
-def middle_walls(is_wall: NDArray[np.bool_], offsets_m: Floats) -> Floats:
+def middle_walls(offsets_m: Floats) -> Floats:
     """Return the offsets of the walls in the middle of each run of neighbours that are one wall; others infinite, m.
+
+    An echo stands for a wall in each direction of its beam: of neighbours at one distance those in the middle count.
 
     Parameters
     ----------
-    is_wall : (`TURN_DIRECTIONS`,) bool
-        Whether there is a wall in each direction.
     offsets_m : (`TURN_DIRECTIONS`,) float
-        Its distance from the odometry's origin, m.
+        As of `BlindWalls.offsets`.
     """
-    middles = np.full(TURN_DIRECTIONS, math.inf)
-    joins = is_wall & np.roll(is_wall, 1) & (np.abs(offsets_m - np.roll(offsets_m, 1)) <= WALL_ECHO_M)
+    middles, is_wall = np.full(TURN_DIRECTIONS, math.inf), np.isfinite(offsets_m)
+    finite = np.where(is_wall, offsets_m, 0.0)
+    joins = is_wall & np.roll(is_wall, 1) & (np.abs(finite - np.roll(finite, 1)) <= WALL_ECHO_M)
     if joins.all():
         return offsets_m.copy()
     for first in np.flatnonzero(is_wall & ~joins).tolist():

@@ -312,6 +312,7 @@ class FreshEchoes:
             self._agreed,
             self.unheard.records,
         )
+        heard_new = not self.unheard.silences[UNCHANGED]
         contradict_echoes(
             firing.ranges_m,
             mounts,
@@ -332,8 +333,9 @@ class FreshEchoes:
                 self._blind_walls.look_again(pose[0], pose[1], self.unheard.has_been_silent)
             elif not self.unheard.has_been_silent:
                 self._blind_walls.has_looked_round = False
+            if heard_new and self.unheard.silences[UNCHANGED]:
+                self.unheard.presume_walls(pose[0], pose[1], self._blind_walls)
             self._blind_walls.update(firing)
-            self.unheard.presume_walls(pose[0], pose[1], self._blind_walls)
 
     def _in_beams(self, pose: RingPose, mounts: Floats) -> NDArray[np.bool_]:
         """Return which echoes lie in a beam now, shape (n, looks): a turn takes few sensors away from all others."""

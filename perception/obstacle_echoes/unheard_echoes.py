@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from drivers.messages import Pose
 from perception.bounds import COUNT, PLACE, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
-from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls
+from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls, middle_walls
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose
 
@@ -267,9 +267,8 @@ class UnheardEchoes:
         return 2 * int(self.silences[UNCHANGED]) >= len(self._echoes)
 
     def presume_walls(self, x: float, y: float, blind_walls: BlindWalls) -> None:
-        """Keep the walls that a ring at a place (m) has heard, if it has just heard anything new."""
-        if not self.silences[UNCHANGED]:
-            self._walls_m[:] = blind_walls.offsets(x, y)
+        """Keep the walls that a ring at a place (m) has heard: call it when the ring begins to hear nothing new."""
+        self._walls_m[:] = blind_walls.offsets(x, y)
 
     def presumed_way_m(self, pose: Pose, radius_m: float) -> float:
         """Return how far a disc can drive straight ahead to where a wall goes on that the ring heard last, m.
@@ -289,7 +288,7 @@ class UnheardEchoes:
         directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         c, s = np.cos(directions), np.sin(directions)
         closing = math.cos(pose.theta) * c + math.sin(pose.theta) * s
-        away = self._walls_m - pose.x * c - pose.y * s
+        away = middle_walls(self._walls_m) - pose.x * c - pose.y * s
         is_ahead = (closing > CLOSING_MIN) & np.isfinite(away)
         return float((np.maximum(away - radius_m, 0.0)[is_ahead] / closing[is_ahead]).min(initial=math.inf))
 

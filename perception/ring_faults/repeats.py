@@ -10,7 +10,7 @@ from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M
-from perception.sensor_faults.wall import NOISE_SHARE
+from perception.sensor_faults.wall import NOISE_SHARE, towards_wall
 
 REPEAT_M: Final = TOLERANCE_MIN_M
 """Readings that differ by no more repeat each other, m: what is old may come with noise of a few millimetres."""
@@ -84,7 +84,7 @@ def is_parallel_wall(
     axis = wrapped(yaw + mounts[i, 2] - path)
     for turn in range(2):
         side = 1.0 - 2.0 * turn
-        nearest = min(max(0.5 * math.pi, side * axis - half_angle), side * axis + half_angle)
+        nearest = towards_wall(side * axis, half_angle)
         if math.sin(nearest) < 1e-3:
             continue
         beside = side * (mounts[i, 0] * forward + mounts[i, 1] * left)
@@ -119,8 +119,8 @@ def turns_beside_wall(r: float, bearing: float, turned: float, reception: Recept
     for turn in range(2):
         side = 1.0 - 2.0 * turn
         now, then = side * wrapped(bearing), side * wrapped(bearing - turned)
-        now = math.sin(min(max(0.5 * math.pi, now - half_angle), now + half_angle))
-        then = math.sin(min(max(0.5 * math.pi, then - half_angle), then + half_angle))
+        now = math.sin(towards_wall(now, half_angle))
+        then = math.sin(towards_wall(then, half_angle))
         if min(now, then) >= 1e-3 and r * abs(now / then - 1.0) <= tolerance + NOISE_SHARE * r:
             return True
     return False
@@ -260,14 +260,14 @@ def may_be_wall(
     for turn in range(2):
         side = 1.0 - 2.0 * turn
         own = side * wrapped(yaw + mounts[i, 2] - path)
-        nearest = min(max(0.5 * math.pi, own - half_angle), own + half_angle)
+        nearest = towards_wall(own, half_angle)
         if math.sin(nearest) < 1e-3:
             continue
         wall = side * (mounts[i, 0] * forward + mounts[i, 1] * left) + r * math.sin(nearest)
         is_outermost = True
         for k in range(len(echoes)):
             bearing = side * wrapped(yaw + mounts[k, 2] - path)
-            best = min(max(0.5 * math.pi, bearing - half_angle), bearing + half_angle)
+            best = towards_wall(bearing, half_angle)
             if k == i or math.sin(best) <= math.sin(nearest):
                 continue
             is_outermost = False

@@ -17,6 +17,20 @@ NOISE_SHARE: Final = 0.04
 
 
 @kernel
+def towards_wall(axis: float, half_angle: float) -> float:
+    """Return the angle from the path, in a beam about `axis`, that is nearest to the normal of a wall along it, rad.
+
+    Parameters
+    ----------
+    axis : float
+        Angle of the beam's axis from the path, rad: towards the wall it is between 0 and π.
+    half_angle : float
+        Half the beam's width, rad.
+    """
+    return min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
+
+
+@kernel
 def is_along_wall(
     i: int,
     x: float,
@@ -76,5 +90,5 @@ def beside_m(r: float, turn: float, side: float, mount: Floats, half_angle: floa
         Half the beam's width, rad.
     """
     axis = side * wrapped(turn + mount[2])
-    nearest = min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
+    nearest = towards_wall(axis, half_angle)
     return float(side * (mount[0] * math.sin(turn) + mount[1] * math.cos(turn)) + r * math.sin(nearest))

@@ -176,6 +176,7 @@ class TimelineBuilder:
         return np.concatenate([*known, *self._rows[begin:]])
 
     def _known_path(self, frame: OdometryFrame) -> KnownPath | None:
+        """Return the path as known now, of `PATH_PLACES_MAX` places or few more; None where no map corrects it."""
         maps, step = frame.known_way(), max(1, len(self._moments) // PATH_PLACES_MAX)
         if maps is None:
             return None

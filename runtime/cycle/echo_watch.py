@@ -5,9 +5,9 @@ does open ground. A robot that has never heard an echo is stopped once, after a 
 again it drives on. If its ring reaches far, so that it would hear any room, it drives slowly until then
 (`runtime.cycle.unheard_limit`).
 
-Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once
-that has lasted for longer than ever before in this run. What the ring heard last holds for as far as it reached then:
-after such a way the robot drives slowly until the next echo. It does not stop.
+Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once that has lasted for
+longer than ever before in this run. What the ring heard last holds for as far as it reached then: after such a way
+the robot drives slowly until the next echo. It does not stop.
 """
 
 from __future__ import annotations
@@ -69,6 +69,8 @@ class EchoWatch:
         """
         hears = any(math.isfinite(r) for firing in firings for r in firing.ranges_m.tolist())
         if hears and hears_new:
+            if self.is_over and self.at is None and not self.is_open:
+                return self
             return EchoWatch(is_over=True, longest_m=max(self.longest_m, self.way_m if self.is_over else 0.0))
         if odometry is None or not firings:
             return self

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from behaviors.surroundings.field_of_view import (
+    ROUNDING_RAD,
     listed,
     oldest_look_s,
     path_half_angle_rad,
@@ -21,17 +22,21 @@ from behaviors.surroundings.field_of_view import (
 )
 from config.robot import BY_HAND_MAX, NO_BODY, RingConfig
 from config.settings import Settings
-from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensor_masks, sensors, time_of_flight_s
+from drivers.firing_pattern import (
+    LISTENING_LOBE,
+    FiringError,
+    FiringPattern,
+    firing_pattern,
+    sensor_masks,
+    sensors,
+    time_of_flight_s,
+)
 from drivers.registry import make_driver
 from perception.percept import FieldOfView, Floats, Percept, Pose
 from perception.sensor_mounts import mounts_array, reach_m
 
 CRAWL_SHARE: Final = 0.1
 """Least share of the base velocity that a pattern must allow; a robot that is slower stands more than it drives."""
-RECEPTION_LOBE: Final = 2.0
-"""How far off its axis a sensor hears another one's pulse, in beam half angles: as the emulator's
-(`drivers.emulator.sonar.LISTENING_LOBE`), since reception alone is off axis."""
-ROUNDING_RAD: Final = 1e-6
 PAIRS_NAMED_MAX: Final = 4
 
 
@@ -140,11 +145,11 @@ def crosstalk_note(ring: RingConfig) -> str | None:
     """Return which sensors that fire together look so nearly the same way that one hears the other's pulse, or None.
 
     Of a wall far away the pulse leaves in the direction in which it returns: within the beam of the one, and within
-    `RECEPTION_LOBE` of the other's.
+    `LISTENING_LOBE` of the other's.
     """
     if ring.has_servo or ring.sensor_count > BY_HAND_MAX:
         return None
-    apart_rad = (1.0 + RECEPTION_LOBE) * math.radians(ring.beam_half_angle_deg)
+    apart_rad = (1.0 + LISTENING_LOBE) * math.radians(ring.beam_half_angle_deg)
     axes = [mount.angle_rad for mount in ring.mounts]
     pairs = sorted(
         {

@@ -30,7 +30,7 @@ from perception.bayes.memory.parameters import (
 from perception.bayes.memory.polygon_parameters import POLYGON_WALL_LENGTH_RADII
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, CircleTrack, CircleTracks, PolygonTrack, StateRecord
-from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, MAX_WALLS, RoomCorner, Wall, WallMap
+from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, MAX_WALLS, RoomCorner, WallMap
 from perception.bayes.tracks.naming import best_other_lead
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
@@ -39,6 +39,7 @@ from perception.bayes.walls.contact import (
     contact,
     cuts_circle,
     edges_answer,
+    is_on_long_span,
     wall_normal,
 )
 from perception.bayes.walls.corners import KEPT
@@ -101,16 +102,6 @@ def point_evidence(point: RoomCorner, q: Reading, p: SettingsRecord, level: int)
     if is_crossed(q) and point.is_edge == 0:  # twice the way to the middle between both
         e = q.range_m - math.hypot(dx - 0.5 * q.listener_x, dy - 0.5 * q.listener_y)
     return float(log_likelihood(p, level, e))
-
-
-@kernel
-def is_on_long_span(wall: Wall, along: float, margin: float, length_min: float) -> bool:
-    """Return whether a position lies on a span that is so long, m, or at most `margin` (m) beyond its ends."""
-    for k in range(wall.span_count):
-        span = wall.spans[k]
-        if span.low - margin <= along <= span.high + margin and span.high - span.low >= length_min:
-            return True
-    return False
 
 
 @kernel

@@ -174,13 +174,19 @@ def tolerance(room: WallMap, wall: Wall, along: float, range_m: float, dot: floa
 
 
 @kernel
-def is_on_span(wall: Wall, along: float, margin: float) -> bool:
-    """Return whether a position lies on a span of a wall, or at most `margin` (m) beyond its ends."""
+def is_on_long_span(wall: Wall, along: float, margin: float, length_min: float) -> bool:
+    """Return whether a position lies on a span that is so long, m, or at most `margin` (m) beyond its ends."""
     for k in range(wall.span_count):
         span = wall.spans[k]
-        if span.low - margin <= along <= span.high + margin:
+        if span.low - margin <= along <= span.high + margin and span.high - span.low >= length_min:
             return True
     return False
+
+
+@kernel
+def is_on_span(wall: Wall, along: float, margin: float) -> bool:
+    """Return whether a position lies on a span of a wall, or at most `margin` (m) beyond its ends."""
+    return is_on_long_span(wall, along, margin, -math.inf)
 
 
 @kernel

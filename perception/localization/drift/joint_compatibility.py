@@ -42,7 +42,6 @@ ALIKE_RAD: Final = math.radians(6.0)
 
 GAIN_MIN: Final = 5.0
 """A landmark's squared innovations must fall by so much to be clearly better."""
-"""No displacement."""
 
 Covariance: TypeAlias = tuple[float, float, float, float, float, float]
 """Of a displacement: xx, xy, xt, yy, yt, tt."""

@@ -7,12 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.firing_pattern import LISTENING_LOBE
 from drivers.messages import Floats
 from runtime.analysis.timeline import CrossPathRows
 
 POINTS: Final = 9
-LISTENING_LOBE: Final = 2.0
-"""A sensor hears the pulse of another one this far off its axis, in half widths of its own beam."""
 NEWEST_S: Final = 1.0
 
 Complex = NDArray[np.complex128]

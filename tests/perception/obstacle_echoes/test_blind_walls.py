@@ -103,7 +103,7 @@ def test_a_mirror_is_one_wall_of_its_own_direction_and_those_beside_it(seed: int
     normal, offset = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(1.0, 2.0))
     walls = BlindWalls(MOUNTS, HALF)
     look_round(walls, 0.0, 0.0, normal, offset)
-    offsets = walls.offsets(0.0, 0.0)
+    offsets = middle_walls(walls.offsets(0.0, 0.0))
     off = np.remainder(WIDTH_RAD * np.arange(TURN_DIRECTIONS) - normal + math.pi, math.tau) - math.pi
     found = np.isfinite(offsets)
     assert 2 <= found.sum() <= 4
@@ -115,11 +115,11 @@ def test_a_mirror_is_one_wall_of_its_own_direction_and_those_beside_it(seed: int
 
 
 def test_neighbours_at_one_distance_are_one_wall_across_the_first_direction_too() -> None:
-    is_wall, offsets = np.zeros(TURN_DIRECTIONS, np.bool_), np.full(TURN_DIRECTIONS, 2.0)
-    is_wall[[34, 35, 0, 1, 2]] = is_wall[[10, 11]] = True
+    offsets = np.full(TURN_DIRECTIONS, math.inf)
+    offsets[[34, 35, 0, 1, 2]] = offsets[[10, 11]] = 2.0
     offsets[11] += 2.0 * WALL_ECHO_M
-    assert set(np.flatnonzero(np.isfinite(middle_walls(is_wall, offsets))).tolist()) == {35, 0, 1, 10, 11}
-    assert np.isfinite(middle_walls(np.ones(TURN_DIRECTIONS, np.bool_), offsets * 0.0 + 1.0)).any(), "all round"
+    assert set(np.flatnonzero(np.isfinite(middle_walls(offsets))).tolist()) == {35, 0, 1, 10, 11}
+    assert np.isfinite(middle_walls(np.ones(TURN_DIRECTIONS))).any(), "all round"
 
 
 def test_shipped_robots_have_no_gap_as_wide_as_a_beam() -> None:

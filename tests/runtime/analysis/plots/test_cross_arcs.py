@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from runtime.analysis.plots.cross_arcs import LISTENING_LOBE, cross_arcs, heard_cross_paths, newest_cross_paths
+from drivers.firing_pattern import LISTENING_LOBE
+from runtime.analysis.plots.cross_arcs import cross_arcs, heard_cross_paths, newest_cross_paths
 from runtime.analysis.timeline import CROSS_PATH, CrossPathRows
 
 BEAM = math.radians(30.0)
