@@ -1,6 +1,7 @@
 """Draw the live view: `python -m runtime.cli.terminal` shows on standard output what standard input asks for.
 
-Standard input takes pickles: a `Scale` first, then a `Snapshot` for each picture, and text for a line above it.
+Standard input takes pickles: a `Scale` first, then a `Snapshot` for each picture, and text for a line above it. In
+the background no picture is drawn: the terminal shows what the shell's next command prints.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from rich.live import Live
 
 from runtime.cli.terminal.escaping_console import EscapingConsole
+from runtime.cli.terminal.keys import in_foreground
 from runtime.cli.terminal.picture import Picture, Scale, Snapshot
 
 
@@ -32,7 +34,7 @@ def main() -> None:
         for message in received():
             if isinstance(message, Scale):
                 picture = Picture(console, message)
-            elif isinstance(message, Snapshot) and picture is not None:
+            elif isinstance(message, Snapshot) and picture is not None and in_foreground(sys.stdout.fileno()):
                 live.update(picture.draw(message), refresh=True)
             elif isinstance(message, str):
                 live.console.print(message, markup=False, highlight=False, soft_wrap=True)

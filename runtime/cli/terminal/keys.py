@@ -17,6 +17,23 @@ from runtime.cycle.inputs import Request
 
 KEYS_MAX: Final = 64
 KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
+BACKGROUND_S: Final = 0.25
+"""How often a program in the background looks whether it is in the foreground again, s: a shell's fg tells a running
+one nothing."""
+
+
+def in_foreground(fd: int) -> bool:
+    """Return whether the program has the terminal: one in the background is stopped if it reads or changes it.
+
+    Parameters
+    ----------
+    fd : int
+        Of the terminal; one that is gone belongs to no program, and may be read.
+    """
+    try:
+        return os.tcgetpgrp(fd) == os.getpgrp()
+    except OSError:
+        return True
 
 
 @contextlib.contextmanager
@@ -45,9 +62,13 @@ def keys(
     fd = sys.stdin.fileno()
     before = termios.tcgetattr(fd)
     loop = asyncio.get_running_loop()
+    look: asyncio.TimerHandle | None = None
 
     def read() -> None:
         # Not through sys.stdin: what is in its buffer does not wake the loop.
+        if not in_foreground(fd):  # what is typed is for the shell
+            wait_for_foreground()
+            return
         try:
             pressed = os.read(fd, KEYS_MAX)
         except OSError:
@@ -64,19 +85,34 @@ def keys(
             else:
                 on_other(key)
 
-    def take_keys() -> None:
-        # A process in the background may not change the terminal; fg continues it once more.
-        if os.tcgetpgrp(fd) == os.getpgrp():
+    def take_keys() -> bool:
+        if not in_foreground(fd):
+            return False
+        with contextlib.suppress(termios.error):
             tty.setcbreak(fd, termios.TCSANOW)  # which keeps a key that was pressed meanwhile
-            on_return()
+        loop.add_reader(fd, read)
+        return True
 
-    tty.setcbreak(fd)
-    loop.add_reader(fd, read)
-    loop.add_signal_handler(signal.SIGCONT, take_keys)  # the shell sets its own mode meanwhile
+    def wait_for_foreground() -> None:
+        nonlocal look
+        loop.remove_reader(fd)
+        if take_keys():
+            on_return()
+        else:
+            if look is not None:
+                look.cancel()
+            look = loop.call_later(BACKGROUND_S, wait_for_foreground)
+
+    if not take_keys():  # started in the background
+        wait_for_foreground()
+    loop.add_signal_handler(signal.SIGCONT, wait_for_foreground)  # the shell sets its own mode meanwhile
     try:
         yield
     finally:
         loop.remove_signal_handler(signal.SIGCONT)
         loop.remove_reader(fd)
-        with contextlib.suppress(termios.error):
-            termios.tcsetattr(fd, termios.TCSADRAIN, before)
+        if look is not None:
+            look.cancel()
+        if in_foreground(fd):
+            with contextlib.suppress(termios.error):
+                termios.tcsetattr(fd, termios.TCSADRAIN, before)

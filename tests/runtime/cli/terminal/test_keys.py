@@ -69,6 +69,37 @@ async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
     assert termios.tcgetattr(fd) == line_mode
 
 
+async def test_in_the_background_what_is_typed_is_left_to_the_shell(
+    keyboard: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program that reads or changes its terminal from the background is stopped; fg signals nothing to it."""
+    fd = sys.stdin.fileno()
+    line_mode, is_in_front = termios.tcgetattr(fd), False
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _fd: os.getpgrp() if is_in_front else -1)
+    monkeypatch.setattr("runtime.cli.terminal.keys.BACKGROUND_S", 0.01)
+    asked: list[Request] = []
+    returns: list[None] = []
+    with keys(asked.append, lambda: None, on_return=lambda: returns.append(None)):
+        assert termios.tcgetattr(fd) == line_mode
+        os.write(keyboard, b"a\n")
+        await asyncio.sleep(0.05)
+        assert not asked
+        assert os.read(fd, 10) == b"a\n"  # as the shell does
+        is_in_front = True
+        async with asyncio.timeout(TIMEOUT_S):
+            while not returns:
+                await asyncio.sleep(0.01)
+            os.write(keyboard, b" ")
+            while not asked:
+                await asyncio.sleep(0.01)
+        is_in_front = False
+        os.write(keyboard, b"a")
+        await asyncio.sleep(0.05)
+        termios.tcsetattr(fd, termios.TCSANOW, line_mode)
+        monkeypatch.setattr(termios, "tcsetattr", lambda *_: pytest.fail("changed from the background"))
+    assert asked == [Request.HALT]
+
+
 async def test_without_a_terminal_there_are_no_keys(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "in").write_text("qqq")
     with (tmp_path / "in").open() as file:
