@@ -119,3 +119,7 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the public surface
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+if __name__ == "__main__":
+    main()

@@ -77,12 +77,7 @@ def test_a_hidden_package_is_one_clear_line(package: str, tmp_path: Path) -> Non
 def test_a_folder_that_hides_a_package_is_named(tmp_path: Path) -> None:
     (tmp_path / "runtime").mkdir()
     (tmp_path / "runtime" / "__init__.py").touch()
-    done = call(
-        "-c",
-        "import echolocate; echolocate.main()",
-        path=os.pathsep.join((str(tmp_path), str(ROOT))),
-        folder=tmp_path,
-    )
+    done = call("-P", "-m", "echolocate", path=os.pathsep.join((str(tmp_path), str(ROOT))), folder=tmp_path)
     assert f"{tmp_path / 'runtime' / '__init__.py'} hides" in done.stderr
 
 

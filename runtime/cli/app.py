@@ -140,7 +140,8 @@ def run_command(arguments: list[str]) -> int:
             result = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except CycloptsError as error:
-        print_error(f"{' '.join(str(error).split())} See `echolocate --help`.")
+        asked = " ".join(["echolocate", *(error.command_chain or ())])
+        print_error(f"{' '.join(str(error).split())} See `{asked} --help`.")
         return WRONG_CALL
     except UserError as error:
         print_error(str(error))

@@ -24,6 +24,12 @@ def test_an_unknown_command_is_a_wrong_call(capfd: pytest.CaptureFixture[str]) -
     assert line.endswith("See `echolocate --help`.")
 
 
+def test_a_wrong_option_leads_to_the_help_of_its_command(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["foxglove", "--frobnicate"]) == WRONG_CALL
+    (line,) = error_lines(capfd.readouterr().err)
+    assert line.endswith("See `echolocate foxglove --help`.")
+
+
 def test_each_problem_has_a_line_of_its_own(capfd: pytest.CaptureFixture[str]) -> None:
     sets = ["--set", "cycle.rate_hz=0", "--set", "ring.beam_half_angle_deg=wide", "--set", "nowhere.x=1"]
     assert run_command(["check", "hallway", *sets]) == WRONG_CALL
