@@ -18,8 +18,8 @@ from runtime.cycle.inputs import Request
 KEYS_MAX: Final = 64
 KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
 BACKGROUND_S: Final = 0.25
-"""How often a program in the background looks whether it is in the foreground again, s: a shell's fg tells a running
-one nothing."""
+"""How often a program in the background looks whether it is in the foreground again, s: a shell's fg sends no
+signal to one that runs."""
 
 
 def in_foreground(fd: int) -> bool:
