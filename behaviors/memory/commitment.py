@@ -2,9 +2,8 @@
 
 Echoes, gaps between beams and schemas that cancel one another may allow a speed in one cycle and none in the next, or
 point the course ahead and behind, or left and right, in turn. A base that follows each of them is worn out and comes
-nowhere. So a start waits until `START_S` after the start before it, and until the robot could have driven for
-`FREE_S`. A turn to the other side waits until `TURN_S` after the one before. And a robot that turns on the spot to a
-course that is nearly opposite keeps its side.
+nowhere. So a start waits until `START_S` after the start before it. A turn to the other side waits until `TURN_S`
+after the one before. And a robot that turns on the spot to a course that is nearly opposite keeps its side.
 
 Stopping and driving slower never wait, and neither does a direction that an operator newly asks for.
 """
@@ -20,9 +19,6 @@ from perception.percept import Twist
 
 START_S: Final = 2.0
 """Least time between two starts, s: each is followed by one stop, which makes one change a second."""
-FREE_S: Final = 1.0
-"""A start waits until each cycle has decided on a speed for so long, s: a gap between beams that opens and closes
-would stop the robot again at once."""
 TURN_S: Final = 1.0
 """Least time between two changes of the side to which the robot turns, s."""
 FAINT_RAD_S: Final = 0.05
@@ -47,8 +43,6 @@ class Commitment:
     """Sign of the last turn that was not faint; 0 before the first one under this request."""
     turned_run_s: Seconds | None = None
     """When that sign last changed, by the run's clock."""
-    free_run_s: Seconds | None = None
-    """Since when each cycle has decided on a speed, by the run's clock; None if the last one did not."""
 
     def kept_angle(self, angle_rad: float, run_s: float | None = None) -> float:
         """Return the angle by which to turn to a course, within (−2π, 2π): on the side to which the robot turns.
@@ -85,11 +79,8 @@ class Commitment:
             side = self.side
         else:
             turned_run_s = run_s
-        free_run_s = None if twist.v == 0.0 else run_s if self.free_run_s is None else self.free_run_s
         is_start = twist.v != 0.0 and (not self.is_moving or started_run_s is None)
-        if is_start and started_run_s is not None and free_run_s is not None:
-            waits_s = max(started_run_s + START_S, free_run_s + FREE_S) - run_s
-            if 0.0 < waits_s <= START_S:
-                twist, is_start = Twist(0.0, twist.w), False
+        if is_start and started_run_s is not None and 0.0 <= run_s - started_run_s < START_S:
+            twist, is_start = Twist(0.0, twist.w), False
         started_run_s = run_s if is_start else started_run_s
-        return twist, Commitment(started_run_s, twist.w, requested, twist.v != 0.0, side, turned_run_s, free_run_s)
+        return twist, Commitment(started_run_s, twist.w, requested, twist.v != 0.0, side, turned_run_s)

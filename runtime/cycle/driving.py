@@ -48,10 +48,7 @@ PLACE_LOST: Final = (
 )
 AWAY_M: Final = 0.5
 """A robot that is farther from its reached goal than its success radius by this was moved, or was not there, m."""
-WAITS_TO_START: Final = (
-    "the robot has only just stopped; it starts again two seconds after its last start, once nothing has stopped it "
-    "for a second"
-)
+WAITS_TO_START: Final = "the robot has only just stopped, and starts again two seconds after its last start"
 LEG_DONE: Final = "the leg is done"
 LEG_GIVEN_UP: Final = (
     f"the leg has ended, as the robot came no farther along it for {ENDED_S:.0f} s: clear the way and resume the "
