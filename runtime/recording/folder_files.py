@@ -69,6 +69,8 @@ def rename_recording(folder: Path, name: str, to: str) -> str:
     """
     path = _finished(folder, name)
     stem = to.removesuffix(SUFFIX)
+    if not stem.strip():
+        raise UserError("the new name is empty: give the recording a name")
     if NAME.fullmatch(stem) is None or len(stem) > NAME_MAX:
         raise UserError(
             f"{one_line(to)!r} cannot be a recording's name: begin with a letter or digit, then letters, digits, "

@@ -31,6 +31,9 @@ async def open_counting(server: FakeServer, opener: Opener) -> Opened:
 async def test_a_wrong_token_is_reported_and_the_right_one_is_hidden(server: FakeServer, opener: Opener) -> None:
     wrong = await opener.open(server.url.replace("right", "wrong"), live=False, expected_errors=REFUSED)
     await wrong.says("#banner-connection", "token is missing or wrong")
+    await wrong.page.keyboard.press("Space")
+    await wrong.run_for(1)
+    await wrong.says("#banner-halt", "HALT not sent, as the run refuses this page's token: use the robot's own stop")
     await wrong.save_screenshot("wrong-token")
 
     opened = await opener.open(server.url)

@@ -53,6 +53,9 @@ async def test_a_mission_is_a_button_with_a_key_and_stays_after_a_reload(server:
     await make_button(opened, "mission:patrol", "m")
     await make_button(opened, f"mission:{MISSIONS[1]['name']}", "f")
     await opened.says("#button-error", "the key F belongs to the page itself")
+    for tool in await page.locator("#tools kbd").all_inner_texts():
+        await make_button(opened, f"mission:{MISSIONS[1]['name']}", tool)
+        await opened.says("#button-error", f"the key {tool} belongs to the page itself")
     await make_button(opened, f"mission:{MISSIONS[1]['name']}", "m")
     await opened.says("#button-error", "the key M belongs to mission patrol")
     await make_button(opened, f"mission:{MISSIONS[1]['name']}", "")

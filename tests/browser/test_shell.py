@@ -105,6 +105,7 @@ async def test_any_number_is_plotted_live_and_in_a_recording(server: FakeServer,
     lines = (await (await saved.value).path()).read_text("utf-8").splitlines()
     assert lines[0] == "robot_s,twist.v,ranges.0,objects.3.probability,phases.refine"
     assert len(lines) > 20
+    assert all(len(line.split(",")[0].partition(".")[2]) <= 6 for line in lines), "microseconds"
     await page.get_by_role("button", name="Remove range 0").click()
     await opened.save_screenshot("plot")
 

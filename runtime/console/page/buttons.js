@@ -7,7 +7,7 @@ import { prefer, preferred } from "./preferences.js";
 
 const KEPT = "buttons";
 // Keys that the page uses itself, see keyboard.js; letters of the drive keys among them.
-const TAKEN = new Set([..."+-=−fulpkwasd[]?12345678 "]);
+const TAKEN = new Set([..."+-=−fulpkwasd[]?123456789 "]);
 
 /**
  * @typedef {{ action: string; key: string }} Kept

@@ -94,6 +94,7 @@ export class Connection extends Emitter {
   /** @type {number | undefined} */
   #unconfirmed = undefined;
   #probing = false;
+  refused = false; // the run has refused this page's token
   showsRecording = () => false;
   isPaused = () => false;
 
@@ -120,6 +121,7 @@ export class Connection extends Emitter {
     let opened = false;
     socket.onopen = () => {
       opened = true;
+      this.refused = false;
       this.#retry_ms = RETRY_FIRST_MS;
       if (this.#halting) this.halt().catch(() => {});
       this.emit("open");
@@ -199,6 +201,7 @@ export class Connection extends Emitter {
 
   // Ask less often from now on, until a connection opens.
   retryLater() {
+    this.refused = true;
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => this.connect(), RETRY_REFUSED_MS);
   }

@@ -31,7 +31,9 @@ export class Drive extends Panel {
         "halt",
         confirmed
           ? null
-          : "HALT not confirmed: use the robot's own stop. It is sent again until the robot's process answers.",
+          : connection.refused
+            ? "HALT not sent, as the run refuses this page's token: use the robot's own stop."
+            : "HALT not confirmed: use the robot's own stop. It is sent again until the robot's process answers.",
         { bad: true },
       ),
     );
