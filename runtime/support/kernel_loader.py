@@ -16,6 +16,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from config.errors import FAILED, UserError
+from config.files import one_line
 from config.settings import Settings
 from runtime.support.child_process import kill_child, start_child
 from runtime.support.kernel_cache import (
@@ -28,6 +29,7 @@ from runtime.support.kernel_cache import (
     PAPER,
     POLYGONS,
     RING,
+    SURFACES,
     VALLEY,
     compiled_signatures,
     is_interpreted,
@@ -55,6 +57,7 @@ KERNEL_COUNTS: Final = MappingProxyType(
         LOCALIZATION: 14,
         KNOWN_ROOM: 29,
         VALLEY: 2,
+        SURFACES: 51,
         ECHO_LAG: 5,
         "directed": 13,
         "moravec_elfes": 6,
@@ -157,6 +160,8 @@ class KernelPreparation:
         self._begin_host_s = host_clock()
         self.progress = PREPARING
         self._process: asyncio.subprocess.Process | None = None
+        self._output: asyncio.Task[tuple[bytes, bytes]] | None = None
+        """Reads what the process writes: behind a full pipe it would wait for ever."""
         self._ring: asyncio.Task[None] | None = None
         self.is_over = asyncio.Event()
 
@@ -186,10 +191,13 @@ class KernelPreparation:
             self._process = await start_child(
                 WARM_UP, [",".join(self._all_parts), "whole"], pipes=False, low_priority=True
             )
+            self._output = asyncio.create_task(self._process.communicate(), name="output of the compiler")
         while uncompiled_parts(self._folder, self._parts):
-            if self._process is None or self._process.returncode is not None:
+            if self._output is None or self._output.done():
+                words = [] if self._output is None else self._output.result()[1].decode(errors="replace").splitlines()
+                why = f" ({one_line(words[-1])})" if words else ""
                 raise UserError(
-                    f"recognition could not be prepared: its kernels were not compiled into {self._folder}, "
+                    f"recognition could not be prepared: its kernels were not compiled into {self._folder}{why}, "
                     "likely for lack of memory or disk space; make room, then start again",
                     FAILED,
                 )
@@ -206,8 +214,9 @@ class KernelPreparation:
 
     async def close(self) -> None:
         """End a compilation in progress; the next start continues from there."""
-        if self._process is not None:
+        if self._process is not None and self._output is not None:
             await kill_child(self._process)
+            await asyncio.wait([self._output])
 
 
 def begin_preparation(settings: Settings) -> KernelPreparation | None:

@@ -136,7 +136,7 @@ class Compiler:
     """Stands for the process that compiles: leaves index files and marks of parts, or ends without."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path, parts: Sequence[str]) -> None:
-        self.returncode: int | None = None
+        self.errors = b""
         self.words: Sequence[str] = ()
         self.killed: list[Compiler] = []
         self._parts = parts
@@ -151,14 +151,13 @@ class Compiler:
     async def _start(self, module: str, words: Sequence[str], *, pipes: bool, low_priority: bool) -> Compiler:
         assert (module, pipes, low_priority) == ("runtime.support.kernel_warmup", False, True)
         self.words = words
-        self._task = asyncio.create_task(self._compile())
         return self
 
-    async def _compile(self) -> None:
+    async def communicate(self) -> tuple[None, bytes]:
         await asyncio.sleep(0.01)
         for part in self._parts:
             (self._folder / part).touch()
-        self.returncode = 0
+        return None, self.errors
 
     async def _kill(self, process: Compiler) -> None:
         self.killed.append(process)
@@ -215,9 +214,15 @@ async def test_what_the_first_cycle_needs_is_compiled_in_a_thread_of_this_proces
 
 
 async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    Compiler(monkeypatch, tmp_path, ())
-    with pytest.raises(UserError, match="memory or disk space"):
+    compiler = Compiler(monkeypatch, tmp_path, ())
+    compiler.errors = b"Traceback\nOSError: [Errno 28] No space left on device\n"
+    with pytest.raises(UserError, match=r"\(OSError: \[Errno 28\] No space .*memory or disk space; make room"):
         await KernelPreparation((EMULATOR, BAYES))(ROUND)
+
+
+def test_every_part_that_a_run_may_need_has_its_count_of_kernels() -> None:
+    assert kernel_loader.KERNEL_COUNTS.keys() == {*kernels.PARTS} - {EMULATOR, RING}
+    assert all(kernel_loader.KERNEL_COUNTS.values())
 
 
 def test_progress_counts_kernels_and_shows_the_time_left() -> None:
