@@ -10,6 +10,7 @@ import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from config.files import ConfigError
 from config.reload import ReloadResult
 from config.settings import Settings
 from runtime.cycle.live_settings import LiveSettings, PrepareSettings
@@ -44,6 +45,8 @@ class Reloader:
         self._propose = propose
         self._log = log
         self._prepare = prepare
+        self._places_of_files = live_settings.initial.places
+        """As of the start, or of the last attempt that was not refused."""
         self._task: asyncio.Task[None] | None = None
         self._is_requested = False
 
@@ -72,7 +75,7 @@ class Reloader:
         while True:
             self._is_requested = False
             try:
-                self._conclude(await self._check())
+                await self._attempt()
             except Exception as error:  # noqa: BLE001 - a reload that fails must not end a run that goes well
                 self._log.error(
                     "the configuration cannot be read and stays as it is", error=f"{type(error).__name__}: {error}"
@@ -80,25 +83,31 @@ class Reloader:
             if not self._is_requested:
                 return
 
-    def _proposed(self) -> Settings:
-        """Return the settings of the files; places that an operator has changed stay unless the files' changed."""
-        settings, live = self._propose(), self._live_settings
-        if settings.places != live.initial.places:
-            return settings
-        return settings.model_copy(update={"places": live.current.places})
-
-    async def _check(self) -> ReloadResult:
-        """Return the result for the files as they are now, with this process prepared for the change."""
+    async def _attempt(self) -> None:
+        """Read the files, prepare this process for the change, and put it in force."""
         live = self._live_settings
+        try:
+            of_files = await asyncio.to_thread(self._propose)
+        except ConfigError as error:
+            self._conclude(ReloadResult(live.current, problems=error.problems))
+            return
         before = live.current
-        result = await asyncio.to_thread(live.check, self._proposed)
+        result = live.check(lambda: self._with_live_places(of_files))
         problem = await self._prepare(before, result.settings)
         if problem is not None:
-            return ReloadResult(before, problems=(problem,))
-        if live.current is not before and not result.problems:
+            result = ReloadResult(before, problems=(problem,))
+        elif live.current is not before and not result.problems:
             # Changed from the console meanwhile; the files take precedence if that change is possible too.
-            return live.check(lambda: result.settings)
-        return result
+            result = live.check(lambda: self._with_live_places(of_files))
+        if not result.problems:
+            self._places_of_files = of_files.places
+        self._conclude(result)
+
+    def _with_live_places(self, of_files: Settings) -> Settings:
+        """Return the files' settings, with the places as an operator left them unless the files' have changed."""
+        if of_files.places != self._places_of_files:
+            return of_files
+        return of_files.model_copy(update={"places": self._live_settings.current.places})
 
     def _conclude(self, result: ReloadResult) -> None:
         if result.problems:

@@ -11,6 +11,7 @@ import structlog
 from structlog.testing import LogCapture
 
 from config.load import ConfigError, load_settings
+from config.places import PlaceConfig, PlacesConfig
 from config.settings import PerceptionConfig, Settings
 from perception.pipeline import Perception
 from runtime.cycle.live_settings import LiveSettings
@@ -95,6 +96,36 @@ async def test_a_change_from_the_console_during_an_attempt_is_replaced_by_the_fi
     assert script.taken == [faster, SLOWER]
     assert script.log.entries[-1]["changed"] == ["behaviors.arbiter.base_velocity_m_s: 0.4 → 0.2"]
     assert script.live_settings.undo() == ()
+
+
+HALL, YARD = (PlacesConfig(place=(PlaceConfig(name=name, x_m=1.0, y_m=0.0),)) for name in ("hall", "yard"))
+
+
+def placed(settings: Settings, places: PlacesConfig) -> Settings:
+    return settings.model_copy(update={"places": places})
+
+
+async def test_places_that_an_operator_sets_during_an_attempt_stay() -> None:
+    """A no-go area that is drawn while kernels are compiled must not vanish with the end of that."""
+    script = Scripted(SLOWER)
+    prepare = script._prepare
+
+    async def slow(running: Settings, proposed: Settings) -> str | None:
+        script.live_settings.apply(placed(script.live_settings.current, YARD), can_undo=True)
+        return await prepare(running, proposed)
+
+    script.reloader._prepare = slow
+    assert await script.attempt() == "the new configuration is in use"
+    assert script.live_settings.current == placed(SLOWER, YARD)
+
+
+async def test_places_of_the_files_are_taken_once_and_then_the_operators_count() -> None:
+    script = Scripted(*[placed(BEFORE, HALL)] * 2)
+    assert await script.attempt() == "the new configuration is in use"
+    assert script.live_settings.current.places == HALL
+    script.live_settings.apply(placed(BEFORE, YARD), can_undo=True)
+    assert await script.attempt() == "the configuration has not changed"
+    assert script.live_settings.current.places == YARD
 
 
 async def test_requests_during_an_attempt_lead_to_one_more() -> None:
