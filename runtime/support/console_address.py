@@ -10,6 +10,7 @@ import contextlib
 import os
 import stat
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,8 @@ from runtime.support.file_lock import file_lock, is_locked
 
 FOLDER: Final = "consoles"
 NEWEST: Final = "console-address"
+YOUNG_S: Final = 60.0
+"""A younger file is not removed: its run may be about to lock it."""
 _BYTES_MAX: Final = 500
 _NO_RUN: Final = (
     "no run of this user is known on this machine: start `echolocate run`, or name another machine's with --connect"
@@ -29,22 +32,16 @@ _NO_RUN: Final = (
 
 @contextmanager
 def announced(url: str, folder: Path) -> Iterator[None]:
-    """Keep a run's start URL in a folder while the context lasts; a folder that cannot be written stops no run.
-
-    Parameters
-    ----------
-    url : str
-        The start URL, with the token.
-    folder : Path
-        The program's state folder.
-    """
+    """Keep a run's start URL, with its token, during the block; a folder that cannot be written stops no run."""
     path = folder / FOLDER / str(os.getpid())
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError, UserError):
             path.parent.mkdir(parents=True, exist_ok=True)
             for left in path.parent.iterdir():
-                if not is_locked(left):
-                    left.unlink()
+                with contextlib.suppress(OSError):  # another run has just removed it, or it is no file
+                    is_young = left != path and time.time() - left.stat().st_mtime < YOUNG_S
+                    if not (is_young or is_locked(left)):
+                        left.unlink()
             os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o600))
             stack.enter_context(file_lock(path, str(path)))
             path.write_text(f"{url}\n", "utf-8")
@@ -56,11 +53,6 @@ def announced(url: str, folder: Path) -> Iterator[None]:
 def find_consoles(folder: Path) -> list[str]:
     """Return the start URLs of this user's runs on this machine, the newest first.
 
-    Parameters
-    ----------
-    folder : Path
-        The program's state folder.
-
     Raises
     ------
     UserError
@@ -70,8 +62,8 @@ def find_consoles(folder: Path) -> list[str]:
     with contextlib.suppress(OSError):
         for path in (folder / FOLDER).iterdir():
             with contextlib.suppress(FileNotFoundError):  # that run has ended meanwhile
-                if is_locked(path):
-                    found.append((path.stat().st_mtime_ns, _read(path)))
+                if is_locked(path) and (url := _read(path)):  # empty: that run is just starting, or its disk is full
+                    found.append((path.stat().st_mtime_ns, url))
     if not found:
         raise UserError(_NO_RUN)
     return [url for _, url in sorted(found, reverse=True)]

@@ -139,7 +139,7 @@ def use_kernel_cache() -> Path:
         The folder in it that says which parts of these sources are compiled.
     """
     kernels = os.environ.get("NUMBA_CACHE_DIR")
-    if kernels is None:
+    if not kernels:  # numba takes an empty one for none, too
         kernels = os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
     folder = Path(kernels) / kernels_key()
     with contextlib.suppress(OSError):  # what writes into it says what is wrong

@@ -8,6 +8,7 @@ again with the next message; nothing waits for it.
 from __future__ import annotations
 
 import contextlib
+import http.client
 import threading
 import urllib.request
 from collections import deque
@@ -16,21 +17,20 @@ from typing import Any, Final
 
 import orjson
 
+from runtime.support.log_sentence import sentence
+
 LEVELS: Final = ("warning", "error", "critical")
 LINES_MAX: Final = 50
 """Lines of a message; of more, the newest."""
 TIMEOUT_S: Final = 5.0
+NOT_SAID: Final = frozenset({"event", "level", "timestamp"})
+NOT_TAKEN: Final = (OSError, http.client.HTTPException, ValueError)
+"""Errors of an address: no answer, what answers speaks another protocol, or it is no address."""
 Post = Callable[[str, bytes], None]
 
 
 def post(url: str, body: bytes) -> None:
-    """Send a message.
-
-    Raises
-    ------
-    OSError
-        The address does not take it.
-    """
+    """Send a message; raise one of `NOT_TAKEN` if the address does not take it."""
     request = urllib.request.Request(url, body, {"Content-Type": "application/json"})  # noqa: S310 - checked by the settings
     with urllib.request.urlopen(request, timeout=TIMEOUT_S):  # noqa: S310 - the settings allow http and https alone
         pass
@@ -92,13 +92,11 @@ class Webhook:
         body = {"text": f"{self._robot}\n{words}", "robot": self._robot, "lines": lines}
         try:
             self._send(self._url, orjson.dumps(body, default=str))
-        except OSError:
-            self._lines.extendleft(reversed(lines[len(self._lines) :]))
+        except NOT_TAKEN:
+            later = [self._lines.popleft() for _ in range(len(self._lines))]
+            self._lines.extend([*lines, *later])  # of more than fit, the oldest go
             self._came.set()
 
 
 def _sentence(line: Mapping[str, Any]) -> str:
-    fields = ", ".join(
-        f"{name} {value}" for name, value in line.items() if name not in {"event", "level", "timestamp"}
-    )
-    return f"{line.get('event', '')}: {fields}" if fields else str(line.get("event", ""))
+    return sentence(str(line.get("event", "")), {name: value for name, value in line.items() if name not in NOT_SAID})

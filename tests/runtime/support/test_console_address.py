@@ -56,6 +56,22 @@ def test_what_a_killed_run_leaves_counts_for_nothing(tmp_path: Path) -> None:
         assert not left.exists()
 
 
+def test_a_run_whose_address_is_not_yet_written_is_none(tmp_path: Path) -> None:
+    starting = another_run(tmp_path, 1, "")
+    starting.write_text("")
+    with file_lock(starting, "starting"), pytest.raises(UserError, match="no run"):
+        find_consoles(tmp_path)
+
+
+def test_what_cannot_be_removed_or_is_just_being_made_stops_no_run(tmp_path: Path) -> None:
+    (tmp_path / FOLDER / "folder").mkdir(parents=True)
+    young = tmp_path / FOLDER / "1"
+    young.touch(0o600)
+    with announced(URL, tmp_path):
+        assert find_consoles(tmp_path) == [URL]
+        assert young.exists()
+
+
 def test_an_address_that_others_can_read_is_refused(tmp_path: Path) -> None:
     with announced(URL, tmp_path):
         next((tmp_path / FOLDER).iterdir()).chmod(0o644)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from http.client import BadStatusLine
 from typing import Any
 
 import orjson
@@ -28,7 +29,7 @@ def test_warnings_are_sent_together_and_other_lines_are_not() -> None:
     hook.send_now()
     ((url, body),) = sent
     assert url == "http://x"
-    assert body["text"] == "Ella\nwarning: sensor 4 is silent: since_s 30\nerror: the line is lost"
+    assert body["text"] == "Ella\nwarning: Sensor 4 is silent (since 30 s)\nerror: The line is lost."
     assert [one["event"] for one in body["lines"]] == ["sensor 4 is silent", "the line is lost"]
 
 
@@ -49,6 +50,23 @@ def test_a_message_that_is_not_taken_goes_with_the_next_one_and_its_size_is_boun
     hook.send_now()
     assert [one["event"] for one in bodies[0]["lines"]] == [str(k) for k in range(10, LINES_MAX + 10)]
     assert len(bodies) == 1
+
+
+@pytest.mark.parametrize("error", [OSError("no route"), BadStatusLine("SSH-2.0"), ValueError("Invalid IPv6 URL")])
+def test_no_line_is_lost_that_comes_while_a_message_is_refused(error: Exception) -> None:
+    sent = list[list[str]]()
+
+    def send(_url: str, body: bytes) -> None:
+        sent.append([one["event"] for one in orjson.loads(body)["lines"]])
+        if len(sent) == 1:
+            hook.on_log(line("warning", "second"))
+            raise error
+
+    hook = Webhook("http://x", 60.0, "Ella", send)
+    hook.on_log(line("warning", "first"))
+    hook.send_now()
+    hook.send_now()
+    assert sent == [["first"], ["first", "second"]]
 
 
 def test_the_log_never_waits_for_a_dead_address() -> None:
