@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, TextIO
 
+from config.files import utf8
 from drivers.messages import Firing
 from runtime.recording.ring_log import RingLogError
 from runtime.recording.ring_log_rows import RingLogRows, cannot_write
@@ -71,7 +72,7 @@ class RingLogWriter:
     def status(self) -> RecorderStatus:
         """The state of the ring log; `messages` counts firings, and `bytes` is known at the end."""
         written = 0 if self._rows is None else self._rows.count
-        return RecorderStatus(str(self._path), 1, self._bytes, written, self._thread.lost, self.last_error)
+        return RecorderStatus(utf8(str(self._path)), 1, self._bytes, written, self._thread.lost, self.last_error)
 
     def put(self, firing: Firing) -> None:
         """Queue a firing."""
@@ -128,4 +129,4 @@ class RingLogWriter:
 
     def _note(self, error: str) -> None:
         """Keep the first error: the others follow from it."""
-        self.last_error = self.last_error or error
+        self.last_error = self.last_error or utf8(error)

@@ -57,7 +57,6 @@ SEGMENT_DIGITS: Final = 3
 """Decimals of a segment's coordinates: a millimetre is a thirtieth of the ring's resolution."""
 OBJECT_DIGITS: Final = 6
 
-
 QueuedItem: TypeAlias = tuple[str, float, float, Any]
 """Something to record: its topic, when it happened by the host's clock and by the run's (s), and what it is.
 
@@ -229,13 +228,15 @@ class RecordingWriter:
             self._abandon(f"{where}: {error.strerror or error}")
 
     def _abandon(self, error: str) -> None:
+        """Close the file as it is, count what is lost with it, and try another one after `RETRY_S`."""
         if self._file is not None:
             self._file.abandon()
         self._file = None
-        self._drop(self._unflushed)
+        self._drop(self._unflushed + sum(map(len, self._pieces.values())))
         self._unflushed = 0
+        self._pieces.clear()  # they belong between the cycles of this file, not into the next one
         self._retry_s = time.monotonic() + RETRY_S
-        self._status = replace(self._status, last_error=error, is_writing=False)
+        self._status = replace(self._status, last_error=utf8(error), is_writing=False)
 
     def _open(self) -> None:
         self._parts += 1
@@ -307,8 +308,7 @@ class RecordingWriter:
             if self._file is None and time.monotonic() >= self._retry_s:
                 self._open()
         if topic == SETTINGS:
-            settings = content.settings.model_dump(mode="json")
-            self._info = self._info.model_copy(update={"settings": settings})
+            self._info = self._info.model_copy(update={"settings": content.settings.model_dump(mode="json")})
         if self._file is None:
             self._drop(int(self._on))
             return

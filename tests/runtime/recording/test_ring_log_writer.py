@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import orjson
 import pytest
 
 from drivers.messages import CrossPaths, Firing, Pose
@@ -60,6 +62,12 @@ def test_a_log_without_firings_is_reported(tmp_path: Path) -> None:
     with RingLogWriter(tmp_path / "log.csv") as log:
         pass
     assert "no firing" in str(log.status.last_error)
+
+
+def test_a_name_that_is_no_text_can_be_in_the_summary(tmp_path: Path) -> None:
+    with RingLogWriter(tmp_path / os.fsdecode(b"\xff.csv")) as log:
+        pass
+    assert b"no firing" in orjson.dumps(log.status)
 
 
 def test_a_full_queue_drops_firings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

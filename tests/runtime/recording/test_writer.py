@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
 
+import orjson
 import pytest
 import structlog
 
@@ -17,11 +19,12 @@ from drivers.messages import Pose
 from runtime.cli.app import run_command
 from runtime.cli.commands.run.run_recording import RunRecording, open_run_recording
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, decode
+from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, SERIAL, decode
 from runtime.recording.reader import open_recording
-from runtime.recording.recorder import BOOKMARK_MAX, Recorder
-from runtime.recording.schema import Bookmark
-from runtime.recording.writer import RecorderStatus
+from runtime.recording.recorder import BOOKMARK_MAX, Recorder, run_info
+from runtime.recording.schema import Bookmark, SerialBytes
+from runtime.recording.storage import SingleFile
+from runtime.recording.writer import RecorderStatus, RecordingWriter
 from runtime.simulation.closed_loop import simulate
 from tests.recorded import entries_of, hall, record, until, verify_file
 
@@ -75,6 +78,26 @@ def test_off_and_on_again(tmp_path: Path) -> None:
         with open_recording(file) as recording:
             list(recording.messages())
             assert recording.finished
+
+
+def test_bytes_that_a_failed_file_loses_are_counted_and_not_in_the_next_one(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"run\xff.mcap")
+    writer = RecordingWriter(SingleFile(path), run_info(hall(), lambda: 0.0, emulated=False))
+    writer._begin()
+    for piece in (b"a", b"b"):
+        writer._enter((SERIAL["in"], 1.0, 1.0, piece))
+    writer._abandon(f"{path}: No space left on device")
+    writer._open()
+    writer._enter((SERIAL["in"], 12.0, 12.0, b"c"))
+    writer._finish()
+    assert (writer.status.files, writer.status.dropped) == (2, 2)
+    assert orjson.dumps(writer.status).startswith(b'{"file":"')
+    found = [
+        decode(SerialBytes, e.data).pieces()
+        for e in entries_of(path.with_stem(f"{path.stem}-2"))
+        if e.topic == SERIAL["in"]
+    ]
+    assert found == [[(12.0, b"c")]]
 
 
 def test_off_from_the_beginning_leaves_nothing(tmp_path: Path) -> None:
