@@ -43,8 +43,11 @@ class Robot(Protocol):
     def request(self, request: Request, is_valid: Callable[[], bool] = ..., /) -> None:
         """Pass a change of mode to the next cycle, which drops it if it is no longer valid; HALT is sent at once."""
 
-    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = ..., /) -> None:
-        """Pass a drive request to the next cycle, which drops it if it is not valid any more; the newest counts."""
+    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = ..., /) -> bool:
+        """Pass a drive request to the next cycle, which drops it if it is not valid any more; the newest counts.
+
+        Return False, and pass none, if too many changes of a mission wait.
+        """
 
     def edit(self, *edits: Edit) -> bool:
         """Pass edits of the map to the next cycles; return False, and pass none, if too many are queued."""

@@ -18,8 +18,8 @@ class DriveInputs:
     def __init__(self) -> None:
         self._waiting: list[tuple[DriveInput, Callable[[], bool]]] = []
 
-    def put(self, asked: DriveInput, is_valid: Callable[[], bool]) -> None:
-        """Add a request; what replaces the drive also replaces what waits.
+    def put(self, asked: DriveInput, is_valid: Callable[[], bool]) -> bool:
+        """Add a request; return False, and add none, where too many wait. One that replaces the drive replaces them.
 
         Parameters
         ----------
@@ -30,8 +30,10 @@ class DriveInputs:
         """
         if not isinstance(asked, MissionEdit):
             self._waiting.clear()
-        if len(self._waiting) < WAITING_MAX:
-            self._waiting.append((asked, is_valid))
+        if len(self._waiting) == WAITING_MAX:
+            return False
+        self._waiting.append((asked, is_valid))
+        return True
 
     def take(self) -> DriveInput | None:
         """Return the request that the next cycle carries out, None if there is none; drop those no longer valid."""

@@ -7,6 +7,7 @@ are made in `runtime.cycle.step` and in the functions that it calls.
 from __future__ import annotations
 
 import asyncio
+import gc
 import math
 import time
 from collections.abc import Callable
@@ -44,7 +45,7 @@ from runtime.timing.clock_sampler import ClockSample
 from runtime.timing.cycle_scheduler import CycleScheduler
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.footprint import Footprint
-from runtime.timing.memory_policy import MemoryPolicy, collect_garbage
+from runtime.timing.memory_policy import MemoryPolicy
 from runtime.timing.phases import Phase
 from runtime.timing.realtime import apply_realtime
 from runtime.timing.run_clock import run_clock
@@ -137,7 +138,7 @@ class RobotProcess:
         self._sender = LineSender(self._link, self._driver, self._clock, observers.on_bytes, send_timed)
         line = (self._link, self._driver, self._sender.send, self._clock)
         self._connection = Connection(*line, settings.body, line_messages)
-        self._memory = MemoryPolicy(timed(COLLECTION, collect_garbage))
+        self._memory = MemoryPolicy(timed(COLLECTION, gc.collect))
         self._mode_log = ModeLog(log, self._notifier)
         self._object_log = ObjectLog(log)
         self._line_log = LineLog(log, line_messages)
@@ -161,9 +162,12 @@ class RobotProcess:
         if request is Request.HALT:
             self._halt()
 
-    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = always_valid) -> None:
-        """Pass a drive request to the next cycle, which drops it if `is_valid` is False; a later one replaces it."""
-        self._drive_inputs.put(drive_request, is_valid)
+    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = always_valid) -> bool:
+        """Pass a drive request to the next cycle, which drops it if `is_valid` is False; a later one replaces it.
+
+        Return False, and pass none, where too many changes of a mission wait already, as while time is paused.
+        """
+        return self._drive_inputs.put(drive_request, is_valid)
 
     def edit(self, *edits: Edit) -> bool:
         """Pass edits of the map to the next cycles; return False, and pass none, where too many wait already."""

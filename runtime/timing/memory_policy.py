@@ -36,18 +36,13 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def collect_garbage(generation: int) -> None:
-    """Collect the objects of a generation and of the younger ones."""
-    gc.collect(generation)
-
-
 class MemoryPolicy:
     """Decides when garbage is collected, and counts collections.
 
     Parameters
     ----------
     collect : callable
-        Collects up to a generation.
+        Collects the objects of a generation and of the younger ones.
 
     Attributes
     ----------
@@ -55,7 +50,7 @@ class MemoryPolicy:
         Collections while driving, of each generation, also those that others requested.
     """
 
-    def __init__(self, collect: Callable[[int], object] = collect_garbage) -> None:
+    def __init__(self, collect: Callable[[int], object] = gc.collect) -> None:
         self._collect = collect
         self.collections = [0] * GENERATIONS
         self._cycles = 0

@@ -188,15 +188,18 @@ def _request_drive(call: Call, asked: DriveInput) -> None:
     Raises
     ------
     CommandError
-        The next cycle would refuse it; the text says why.
+        The next cycle would refuse it, or too many wait; the text says why.
     """
     state = call.context.robot.state
     if needs_map(asked) and state.perception.localized() is None:
         raise CommandError(NO_MAP)
     settings = call.context.tuning.current
     _refuse_if(refusal(state.drive_request, asked) or way_refused(asked, state.zones, state.odometry, settings))
+    if not call.context.robot.drive_request(asked, call.remains_valid()):
+        raise CommandError(
+            "too many changes of the mission are waiting for the next cycle: resume time, then try again"
+        )
     call.context.is_teleoperated = False
-    call.context.robot.drive_request(asked, call.remains_valid())
 
 
 def teleoperate(call: Call, request: Teleoperate) -> None:

@@ -78,9 +78,12 @@ class StubRun:
         self.asked.append(request)
         self.validity.append(is_valid)
 
-    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = lambda: True) -> None:
+    def drive_request(self, drive_request: DriveInput, is_valid: Callable[[], bool] = lambda: True) -> bool:
+        if self.edits_max == 0:
+            return False
         self.asked.append(drive_request)
         self.validity.append(is_valid)
+        return True
 
     def edit(self, *edits: Edit) -> bool:
         if self.edits_max == 0:

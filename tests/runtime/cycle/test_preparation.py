@@ -77,7 +77,7 @@ class Run:
         """The cycles before recognition began."""
         return [record for record in self.cycles if record.inputs.preparing is not None]
 
-    def drive(self, seconds: float, at: dict[float, Callable[[RobotProcess], None]] | None = None) -> None:
+    def drive(self, seconds: float, at: dict[float, Callable[[RobotProcess], object]] | None = None) -> None:
         """Run for this long, seen from the start; call each function at its time after that."""
 
         def on_cycle(record: CycleRecord, state: State, *_: CycleStats | RobotDriver) -> None:

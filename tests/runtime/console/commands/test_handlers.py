@@ -49,6 +49,8 @@ async def test_a_mission_is_held_resumed_and_skipped_where_that_is_possible() ->
         assert (await page.ask(type="skip_step"))["ok"]
         assert case.run.asked == [MissionEdit("hold"), MissionEdit("skip")]
         assert (await page.ask(type="resume_mission"))["error"] == "the mission patrol is not held"
+        case.run.edits_max = 0
+        assert "too many changes" in (await page.ask(type="skip_step"))["error"]
 
 
 async def test_a_mission_that_this_run_cannot_drive_is_refused() -> None:
