@@ -132,7 +132,7 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
     Raises
     ------
     UserError
-        There is no such scheduler, or it has no worker.
+        There is no such scheduler, it has no worker, or this machine starts none.
     """
     import dask
     from distributed import Client, LocalCluster, as_completed
@@ -145,7 +145,14 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
             )
             client = stack.enter_context(Client(stack.enter_context(cluster)))
             command = (*WORKER_COMMAND, cluster.scheduler_address)
-            started = tuple(stack.enter_context(local_workers(command, workers, log)))
+            try:
+                started = tuple(stack.enter_context(local_workers(command, workers, log)))
+            except OSError as error:
+                raise UserError(
+                    f"the workers cannot be started, or cannot write {log}: {error.strerror or error}; end other "
+                    "programs, start fewer with --workers, or remove what stands at that path",
+                    FAILED,
+                ) from error
             where, hint = "this machine", f"{log} says why"
         else:
             try:
@@ -163,14 +170,7 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
 def _await_worker(client: Client, started: Sequence[subprocess.Popen[bytes]], problem: str, hint: str) -> None:
     """Wait for a worker, but no longer than the first ones of this machine live.
 
-    Parameters
-    ----------
-    client : distributed.Client
-        Connected to the scheduler.
-    started : sequence of Popen
-        The first workers of this machine.
-    problem, hint : str
-        What the error says.
+    `problem` and `hint` are what the error says if none comes, or all of `started` end.
 
     Raises
     ------

@@ -46,16 +46,7 @@ class Unfinished(NamedTuple):
 def dispatch(runs: Iterable[Run], pool: Pool, on_row: Callable[[Row], None], retries: int) -> list[Unfinished]:
     """Make the runs and return those without a result.
 
-    Parameters
-    ----------
-    runs : iterable of Run
-        What is to be done.
-    pool : Pool
-        The workers.
-    on_row : callable
-        Called with each row, as soon as it is there.
-    retries : int
-        How often a run is tried again.
+    `on_row` gets each row as soon as it is there. A run without one is tried again `retries` times at most.
     """
     waiting = deque((run, 0) for run in runs)
     unfinished: list[Unfinished] = []

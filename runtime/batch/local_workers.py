@@ -44,9 +44,8 @@ def local_workers(
     OSError
         The file cannot be written, or a process cannot be started.
     """
-    ends = threading.Event()
+    ends, processes = threading.Event(), list[subprocess.Popen[bytes]]()
     with log.open("wb") as output:
-        processes = [_start(command, output) for _ in range(count)]
 
         def replace_dead() -> None:
             while not ends.wait(period_s):
@@ -58,6 +57,8 @@ def local_workers(
         supervisor = threading.Thread(target=replace_dead, name="worker supervisor", daemon=True)
         supervisor.start()
         try:
+            for _ in range(count):
+                processes.append(_start(command, output))
             yield processes
         finally:
             ends.set()

@@ -49,15 +49,7 @@ class Sensitivity:
 
 
 def combine(runs: Iterable[Run], rows: Mapping[str, Row]) -> list[Combination]:
-    """Return the combinations that have a finished run, in the order of the study.
-
-    Parameters
-    ----------
-    runs : iterable of Run
-        All runs of the study.
-    rows : mapping
-        Those that are finished, by key.
-    """
+    """Return the combinations of the study's runs that have a finished run, in its order; `rows` are by key."""
     groups: dict[tuple[tuple[str, Value], ...], list[Row]] = {}
     for run in runs:
         if run.key in rows:
@@ -95,13 +87,6 @@ def sensitivities(study: StudyConfig, combinations: Sequence[Combination]) -> li
 
     The share is the main effect of an analysis of variance: the variance of the values' means, weighted by the number
     of their combinations, over that of all combinations.
-
-    Parameters
-    ----------
-    study : StudyConfig
-        Its varied settings and objectives.
-    combinations : sequence of Combination
-        What was found.
     """
     found = []
     for objective in study.objectives:

@@ -29,18 +29,7 @@ def sweep_page(
 ) -> str:
     """Return the page as one HTML text that refers to nothing outside itself.
 
-    Parameters
-    ----------
-    name : str
-        Of the study.
-    study : StudyConfig
-        The study.
-    runs : int
-        All its runs.
-    combinations : sequence of Combination
-        What was found.
-    unfinished : sequence of Unfinished
-        Runs that were given up.
+    `runs` counts all of the study, of which `unfinished` were given up.
     """
     title = escape(utf8(name))
     done, failed = sum(one.runs for one in combinations), sum(one.failed for one in combinations)
@@ -69,13 +58,7 @@ def sweep_page(
 
 
 def html_document(title: str, body: str) -> str:
-    """Return a whole page.
-
-    Parameters
-    ----------
-    title, body : str
-        HTML, escaped already.
-    """
+    """Return a whole page; `title` and `body` are HTML, escaped already."""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title} · echolocate</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -87,17 +70,7 @@ def html_document(title: str, body: str) -> str:
 def best_rows(
     study: StudyConfig, combinations: Sequence[Combination], shown: int
 ) -> tuple[list[str], list[list[str]]]:
-    """Return headings and rows of the best combinations, as text.
-
-    Parameters
-    ----------
-    study : StudyConfig
-        Its varied settings and objectives.
-    combinations : sequence of Combination
-        What was found.
-    shown : int
-        Rows at most.
-    """
+    """Return headings and at most `shown` rows of the best combinations, as text."""
     settings = [vary.setting for vary in study.vary]
     rows = [
         [

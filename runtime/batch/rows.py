@@ -80,17 +80,7 @@ class RowFolder:
 
 
 def table(study: StudyConfig, runs: Iterable[Run], rows: Mapping[str, Row]) -> dict[str, list[Any]]:
-    """Return the columns of all finished runs: what was run, each varied setting, the results.
-
-    Parameters
-    ----------
-    study : StudyConfig
-        The study.
-    runs : iterable of Run
-        Its runs.
-    rows : mapping
-        Those that are finished, by key.
-    """
+    """Return the columns of all finished runs: what was run, each varied setting, the results; `rows` are by key."""
     done = [(run, rows[run.key]) for run in runs if run.key in rows]
     columns: dict[str, list[Any]] = {
         "key": [run.key for run, _ in done],

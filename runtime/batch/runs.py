@@ -146,8 +146,9 @@ def _subjects(study: StudyConfig, base: Path) -> Iterator[tuple[RunKind, str, st
     files = sorted(path for path in folder.rglob("*") if path.suffix in {".mcap", ".csv"} and path.is_file())
     if not files:
         raise ConfigError(f"recordings {folder}: no recording (.mcap) or ring log (.csv) there; name their folder")
+    whole = folder.resolve()  # of the folder alone: a link in it may lead to a file elsewhere
     for path in files:
-        yield "recording", str(path.resolve()), _identity(path, folder)
+        yield "recording", str(whole / path.relative_to(folder)), _identity(path, folder)
 
 
 def _truths(study: StudyConfig, base: Path, subjects: Iterable[str]) -> dict[str, str | None]:
@@ -168,12 +169,22 @@ def _truths(study: StudyConfig, base: Path, subjects: Iterable[str]) -> dict[str
 
 
 def _identity(path: Path, folder: Path) -> str:
-    """Return what makes a recording another one: its path in the folder, its size, a digest of its ends."""
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        digest = hashlib.sha256(file.read(EDGE_BYTES))
-        file.seek(max(0, size - EDGE_BYTES))
-        digest.update(file.read(EDGE_BYTES))
+    """Return what makes a recording another one: its path in the folder, its size, a digest of its ends.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be read.
+    """
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            digest = hashlib.sha256(file.read(EDGE_BYTES))
+            file.seek(max(0, size - EDGE_BYTES))
+            digest.update(file.read(EDGE_BYTES))
+    except OSError as error:
+        why = error.strerror or error
+        raise ConfigError(f"recordings {path}: cannot be read: {why}; check it, or move it elsewhere") from error
     return f"{path.relative_to(folder)} {size} {digest.hexdigest()}"
 
 

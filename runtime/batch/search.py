@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple, Protocol
 
+from config.errors import WRONG_CALL, UserError
 from config.study import Value, VaryConfig
 
 RANDOM_TRIALS: Final = 12
@@ -45,13 +46,19 @@ class OptunaSearch:
         Their present values, which are tried first if they are among those allowed.
     seed : int
         Of the search.
+
+    Raises
+    ------
+    UserError
+        A setting whose value is whole has a range without a whole number.
     """
 
     def __init__(self, varied: Sequence[VaryConfig], present: Mapping[str, Value], seed: int) -> None:
         import optuna
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
-        self._varied, self._present = varied, present
+        self._varied = varied
+        self._whole = {one.setting: _whole_ends(one) for one in varied if one.range and _is_whole(present, one)}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Optuna calls this option experimental
             sampler = optuna.samplers.TPESampler(seed=seed, n_startup_trials=RANDOM_TRIALS, multivariate=True)
@@ -67,12 +74,12 @@ class OptunaSearch:
         for one in self._varied:
             if one.values:
                 values[one.setting] = trial.suggest_categorical(one.setting, list(one.values))
-            elif isinstance(self._present.get(one.setting), int):
-                low, high = (round(end) for end in one.range)
-                values[one.setting] = trial.suggest_int(one.setting, low, high, log=one.log)
+            elif one.setting in self._whole:
+                values[one.setting] = trial.suggest_int(one.setting, *self._whole[one.setting], log=one.log)
             else:
-                number = trial.suggest_float(one.setting, *one.range, log=one.log)
-                values[one.setting] = float(f"{number:.{DIGITS}g}")
+                low, high = one.range
+                number = float(f"{trial.suggest_float(one.setting, low, high, log=one.log):.{DIGITS}g}")
+                values[one.setting] = min(max(number, low), high)
         return Asked(trial.number, values)
 
     def tell(self, number: int, cost: float) -> None:
@@ -81,6 +88,24 @@ class OptunaSearch:
             self._study.tell(number, cost)
         else:
             self._study.tell(number, state=self._failed)
+
+
+def _is_whole(present: Mapping[str, Value], one: VaryConfig) -> bool:
+    return isinstance(present.get(one.setting), int)
+
+
+def _whole_ends(one: VaryConfig) -> tuple[int, int]:
+    """Return the least and the greatest whole number in a setting's range.
+
+    Raises
+    ------
+    UserError
+        There is none.
+    """
+    low, high = math.ceil(one.range[0]), math.floor(one.range[1])
+    if low > high:
+        raise UserError(f"{one.setting}: no whole number lies in its range: make that wider", WRONG_CALL)
+    return low, high
 
 
 def allows(one: VaryConfig, value: Value) -> bool:

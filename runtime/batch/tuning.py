@@ -52,10 +52,14 @@ class Trial:
 
 
 class Difference(NamedTuple):
-    """What an objective changes by, from the present settings to the tuned ones, in runs of the same subjects."""
+    """What an objective changes by, from the present settings to the tuned ones.
+
+    All numbers are of the same runs: those of a subject and seed that have the figure under both.
+    """
 
     objective: Objective
     present: float
+    """Mean."""
     tuned: float
     runs: int
     mean: float
@@ -88,17 +92,6 @@ def trial_runs(study: StudyConfig, base: Path, values: Sequence[Values], *, held
     """Return the runs with some values: those to search with, or those that are held out.
 
     Held out are every third recording, or as many seeds as the study has after its last one.
-
-    Parameters
-    ----------
-    study : StudyConfig
-        The study.
-    base : Path
-        Its folder.
-    values : sequence of mapping
-        Values of settings by name.
-    held_out : bool
-        Which of the two.
     """
     if study.recordings is None:
         first_seed = study.first_seed + held_out * study.seeds
@@ -198,7 +191,7 @@ class Tuner:
             return False
         runs = self._runs(one.values, best.values)
         first = self._study.objectives[0]
-        differences = _paired(runs, self._make(runs), first, best.values)
+        differences = [after - before for before, after in _paired(runs, self._make(runs), first, best.values)]
         loss = one.figures.cost(first) - best.figures.cost(first)
         return len(differences) > 1 and loss <= LOSS_MAX * stdev(differences) / math.sqrt(len(differences))
 
@@ -206,26 +199,27 @@ class Tuner:
         """Return what each objective changes by in runs with the present settings and with the tuned ones."""
         if not runs or not tuned:
             return []
-        rows = self._make(runs)
-        by_values = {bool(one.values): one for one in combine(runs, rows)}
-        differences = []
+        rows, differences = self._make(runs), list[Difference]()
         for objective in dict.fromkeys((*self._study.objectives, *ALSO_COMPARED)):
             pairs = _paired(runs, rows, objective, tuned)
             if pairs:
-                before, after = (by_values[changed].figures[objective] for changed in (False, True))
-                width = half_width(pairs)
-                differences.append(Difference(objective, before, after, len(pairs), fmean(pairs), width))
+                before, after = (fmean(values) for values in zip(*pairs, strict=True))
+                gains = [with_tuned - as_now for as_now, with_tuned in pairs]
+                row = (before, after, len(gains), fmean(gains), half_width(gains))
+                differences.append(Difference(objective, *row))
         return differences
 
 
-def _paired(runs: Sequence[Run], rows: Mapping[str, Row], objective: Objective, to: Values) -> list[float]:
-    """Return how an objective differs between runs of a subject and seed: with values `to`, less the others."""
+def _paired(
+    runs: Sequence[Run], rows: Mapping[str, Row], objective: Objective, to: Values
+) -> list[tuple[float, float]]:
+    """Return an objective in the two runs of each subject and seed: with other values, and with the values `to`."""
     found: dict[tuple[str, int | None], dict[bool, float]] = {}
     for run in runs:
         value = rows.get(run.key, {}).get(objective)
         if value is not None:
             found.setdefault((run.subject, run.seed), {})[run.varied == to] = value
-    return [pair[True] - pair[False] for pair in found.values() if len(pair) > 1]
+    return [(pair[False], pair[True]) for pair in found.values() if len(pair) > 1]
 
 
 def half_width(differences: Sequence[float]) -> float:

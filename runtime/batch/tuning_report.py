@@ -95,23 +95,12 @@ def tuning_page(
 ) -> str:
     """Return the page as one HTML text that refers to nothing outside itself.
 
-    Parameters
-    ----------
-    name : str
-        Of the study.
-    study : StudyConfig
-        The study, with the settings that were searched.
-    present : mapping
-        Their present values.
-    tuned : Tuned
-        What was found.
-    unfinished : sequence of Unfinished
-        Runs that were given up.
+    `study` has the settings that were searched, and `present` their present values.
     """
     title = escape(utf8(name))
     judged = _judged(tuned)
     gained = f"{number(judged[0].present)} → {number(judged[0].tuned)}" if judged else "none"
-    objective = study.objectives[0]
+    named = judged[0].objective if judged else study.objectives[0]
     changes = [
         [setting, _present(present, setting), shown_value(value)] for setting, value in tuned.best.values.items()
     ]
@@ -120,7 +109,7 @@ def tuning_page(
         (
             f'<h1>{title}</h1><p class="sub">{escape(about(study))}, version {escape(VERSION)}</p>',
             f'<div class="tiles">{tile(str(len(tuned.trials)), "trials")}{tile(str(len(changes)), "changes")}'
-            f"{tile(gained, objective)}</div>",
+            f"{tile(gained, named)}</div>",
             section(
                 "Changes",
                 table(["setting", "present", "tuned"], changes) if changes else "",
@@ -135,7 +124,7 @@ def tuning_page(
                 if tuned.searched
                 else "",
             ),
-            section("The search", _course(tuned, objective)),
+            section("The search", _course(tuned, study.objectives[0])),
             section("Without a result", unfinished_table(unfinished)),
             section("Study", settings_list(study)),
         )

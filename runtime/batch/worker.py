@@ -40,11 +40,6 @@ def run_one(run: Run) -> Row:
 
     A drive that did not arrive is a result as well: its status is ``failed``.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-
     Raises
     ------
     UserError
@@ -183,15 +178,7 @@ def map_figures(objects: Sequence[ObjectRow], world: WorldConfig, settings: Sett
 
 
 def truth_figures(rows: Sequence[DrumRow | BoxRow], false: int) -> Row:
-    """Return how what was recognised compares with the truth.
-
-    Parameters
-    ----------
-    rows : sequence
-        A row for each true object.
-    false : int
-        Objects recognised where there is none.
-    """
+    """Return how `rows`, one for each true object, and the number of false objects compare with the truth."""
     errors = [row["error"] for row in rows if row["error"] is not None]
     return {
         "truth": len(rows),

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import subprocess
 import threading
+from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
+
+import pytest
 
 from runtime.batch.local_workers import local_workers
 
@@ -28,6 +32,21 @@ def test_a_killed_worker_is_replaced_and_none_is_left(tmp_path: Path) -> None:
             assert len(processes) == 2
         seen += processes
     assert all(process.poll() is not None for process in seen)
+
+
+def test_where_one_cannot_be_started_none_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started = list[subprocess.Popen[bytes]]()
+
+    def start(command: Sequence[str], output: IO[bytes]) -> subprocess.Popen[bytes]:
+        if started:
+            raise BlockingIOError("no more processes")
+        started.append(subprocess.Popen(command, stdout=output))
+        return started[0]
+
+    monkeypatch.setattr("runtime.batch.local_workers._start", start)
+    with pytest.raises(BlockingIOError), local_workers(SLEEPER, 2, tmp_path / "log"):
+        pass
+    assert started[0].poll() is not None
 
 
 def test_what_workers_print_is_in_the_log(tmp_path: Path) -> None:

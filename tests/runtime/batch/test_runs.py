@@ -88,6 +88,23 @@ def test_each_recording_may_have_a_truth_of_its_own(tmp_path: Path) -> None:
         expand(one, tmp_path)
 
 
+def test_a_link_to_a_recording_elsewhere_is_one_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "disk.csv").write_text("t,x,y,theta,r00\n0,0,0,0,1\n")
+    for name in ("logs", "truth"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "logs" / "a.csv").symlink_to(tmp_path / "disk.csv")
+    (tmp_path / "truth" / "a.toml").write_text("[start]\nx_m = 7.0\n")
+    (run,) = expand(study(scenes=[], recordings="logs", truth="truth"), tmp_path)
+    assert run.subject == str(tmp_path / "logs" / "a.csv")
+    assert WorldConfig.model_validate_json(run.truth or "").start.x_m == 7.0
+
+
+def test_a_recording_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").symlink_to("/proc/self/mem")  # its first bytes cannot be read
+    with pytest.raises(ConfigError, match=r"bad\.csv: cannot be read: Input/output error; check it"):
+        expand(study(scenes=[], recordings=str(tmp_path)), HERE)
+
+
 def test_paths_are_relative_to_the_study(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("[[drum]]\nx_m = 2.0\ny_m = 1.0\nradius_m = 0.3\n")
     (run,) = expand(study(scenes=[], worlds=["mine.toml"]), tmp_path)

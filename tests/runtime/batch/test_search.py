@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from config.errors import UserError
 from config.study import Value, VaryConfig
 from runtime.batch.search import OptunaSearch, allows
 
@@ -62,6 +63,15 @@ def test_values_are_asked_for_by_kind_and_rounded(calls: list[Any]) -> None:
     search.tell(7, 0.5)
     search.tell(8, math.inf)
     assert calls == [5, PRESENT, (7, 0.5, None), (8, None, "fail")]
+
+
+@pytest.mark.usefixtures("calls")
+def test_no_value_is_rounded_out_of_its_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Trial, "suggest_float", lambda *_, **__: 0.99996)
+    whole, real = VaryConfig(setting="a.whole", range=(0.4, 9.7)), VaryConfig(setting="a.real", range=(0.5, 0.99996))
+    assert OptunaSearch((whole, real), PRESENT, 5).ask().values == {"a.whole": 9, "a.real": 0.99996}
+    with pytest.raises(UserError, match=r"a\.whole: no whole number lies in its range"):
+        OptunaSearch((VaryConfig(setting="a.whole", range=(0.4, 0.6)),), PRESENT, 5)
 
 
 def test_present_values_that_are_not_allowed_are_not_tried(calls: list[Any]) -> None:

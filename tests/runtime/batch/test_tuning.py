@@ -108,6 +108,23 @@ def test_a_gain_that_only_the_searched_seeds_have_is_seen() -> None:
     assert tuned.held_out[0].mean < -0.3
 
 
+def test_a_comparison_is_of_runs_that_have_the_figure_under_both_settings() -> None:
+    """A seed whose figure is known under the present settings alone counts in neither mean."""
+    make = Maker()
+
+    def some(runs: Sequence[Run]) -> Mapping[str, Row]:
+        found = dict(make(runs))
+        for run in runs:
+            if run.seed is not None:
+                found[run.key] = make.rows[run.key] | {"mean_error_m": 100.0 if run.seed == STUDY.seeds else 0.125}
+                if run.seed == STUDY.seeds and run.varied:
+                    del found[run.key]["mean_error_m"]
+        return found
+
+    error = Tuner(STUDY, HERE, some).search(RandomSearch(STUDY.vary, 1), 5).held_out[1]
+    assert (error.runs, error.present, error.tuned, error.mean) == (3, 0.125, 0.125, 0.0)
+
+
 def test_where_nothing_is_better_nothing_changes() -> None:
     tuned = Tuner(STUDY, HERE, Maker(gain=-1.0)).search(RandomSearch(STUDY.vary, 1), 5)
     assert (tuned.best, tuned.held_out) == (tuned.present, [])

@@ -12,6 +12,7 @@ import pytest
 
 from config.load import load_settings
 from config.study import StudyConfig, VaryConfig
+from runtime.analysis.report.html_parts import tile
 from runtime.batch.outcome import Combination
 from runtime.batch.tuning import Difference, Trial, Tuned
 from runtime.batch.tuning_report import change_lines, changes_text, gain_lines, judgement, trials_text, tuning_page
@@ -74,6 +75,8 @@ def test_the_page_shows_changes_gain_and_course() -> None:
     for shown in ("my &lt;study&gt;", "a&lt;b", BEAM, "24.0", "+0.75 ± 0.05", "Held out", "brought nothing: a.b"):
         assert shown in text
     assert text.count("<figure>") == 1
+    only_recall = replace(TUNED, held_out=[Difference("recall", 0.5, 0.75, 4, 0.25, 0.05)])
+    assert tile("0.5 → 0.75", "recall") in tuning_page("x", STUDY, {}, only_recall, []), "f1 is not known there"
     assert "The changes are better in what was held out" in text
     assert "No change is better" in tuning_page(
         "x", STUDY, {}, replace(TUNED, best=PRESENT, held_out=[], searched=[]), []
