@@ -102,14 +102,8 @@ class ClockMonitor:
     def observe(self, odometry: Odometry | None, firings: Sequence[Firing], run_s: float) -> ClockMonitor:
         """Return the monitor after a cycle.
 
-        Parameters
-        ----------
-        odometry
-            The newest sample that arrived in it; None if there was none.
-        firings
-            Those that arrived in it.
-        run_s
-            The cycle's beginning, by the run's clock.
+        Odometry is the newest sample of the cycle that begins at `run_s`, None if there was none; firings are all of
+        it.
         """
         heard = self.heard
         for firing in firings:
@@ -144,11 +138,6 @@ class ClockMonitor:
     def now_s(self, robot_s: float, run_s: float) -> float:
         """Return the robot's time now, at which no echo is younger than the time since its arrival.
 
-        Parameters
-        ----------
-        robot_s
-            The newest time that the robot has reported, s.
-        run_s
-            The run's time now, s.
+        `robot_s` is the newest time that the robot has reported.
         """
         return robot_s if self.heard is None else max(robot_s, run_s + self.heard.greatest_s)

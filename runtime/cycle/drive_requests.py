@@ -115,12 +115,7 @@ def is_same_drive(before: DriveRequest, after: DriveRequest) -> bool:
 def requested(before: DriveRequest, asked: DriveInput) -> DriveRequest:
     """Return what is driven after an operator's request that `refusal` allows.
 
-    Parameters
-    ----------
-    before
-        What has been driven so far.
-    asked
-        The request.
+    `before` is what was driven until then.
     """
     mission = before if isinstance(before, Mission) else None
     if isinstance(asked, MissionEdit):
@@ -163,12 +158,7 @@ def validate(drive_request: DriveRequest) -> str | None:
 def after_stop(drive_request: DriveRequest, *, bumper: bool = False) -> DriveRequest:
     """Return what remains of a drive request once the robot has left DRIVE: the legs, a mission held, or nothing.
 
-    Parameters
-    ----------
-    drive_request
-        What was driven.
-    bumper
-        Whether a contact stopped the robot.
+    `bumper`: whether a contact stopped the robot.
     """
     if isinstance(drive_request, Mission):
         return mission_after_stop(drive_request, bumper=bumper)

@@ -15,18 +15,8 @@ def escape_schemas(
 ) -> tuple[tuple[Response, ...], Trail]:
     """Return their vectors, and the trail for the next cycle.
 
-    Parameters
-    ----------
-    percept : Percept
-        What the robot sees.
-    way_rad : float
-        Direction of the goal or of the leg, in odometry's frame.
-    run_s : float
-        Now, by the run's clock.
-    trail : Trail
-        Where the robot has been, from the cycle before.
-    settings : Settings
-        The run's.
+    `way_rad` is the direction of the goal or of the leg in odometry's frame; `trail` is where the robot has been,
+    from the cycle before.
     """
     behaviors, responses = settings.behaviors, []
     if behaviors.avoid_past.avoid_past_gain > 0.0:

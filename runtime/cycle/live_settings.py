@@ -62,12 +62,7 @@ class LiveSettings:
     def apply(self, settings: Settings, *, can_undo: bool) -> tuple[Difference, ...]:
         """Put settings in force that `check` has accepted; return what changed.
 
-        Parameters
-        ----------
-        settings : Settings
-            The new ones.
-        can_undo : bool
-            Keep the settings before them for `undo`. A change that cannot be undone also ends the history.
+        A change that cannot be undone also ends the history for `undo`.
         """
         changed = tuple(differences(self._current, settings))
         if not changed:

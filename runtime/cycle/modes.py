@@ -110,14 +110,7 @@ class ModeState:
     def enter(self, mode: Mode, run_s: float, reason: str | None = None) -> ModeState:
         """Return the state of having just entered `mode`.
 
-        Parameters
-        ----------
-        mode : Mode
-            The one that is entered, possibly the present one again.
-        run_s : float
-            When, by the run's clock.
-        reason : str, optional
-            Why, for the operator.
+        It may be the present mode again. The reason is for the operator.
         """
         return ModeState(mode, run_s, reason)
 
@@ -192,16 +185,7 @@ def _why_waiting(reason: str | None, inputs: Inputs, flags: Flags) -> str:
 def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> str | None:
     """Return the reason why driving must end, None if it may continue.
 
-    Parameters
-    ----------
-    state : ModeState
-        The mode so far, which is DRIVE.
-    inputs : Inputs
-        The cycle's: line, requests, faults.
-    flags : Flags
-        The base's, of all odometry since the cycle before.
-    gap_s : float
-        Time since the cycle before.
+    Arguments are as of `advance`.
     """
     if inputs.request is Request.HALT:
         return HALTED

@@ -136,14 +136,8 @@ class MotionMonitor:
     def observe(self, odometry: Odometry | None, run_s: float, body: BodyConfig) -> MotionMonitor:
         """Return the monitor after the newest odometry.
 
-        Parameters
-        ----------
-        odometry : Odometry, optional
-            The newest sample since the cycle before; None if there was none.
-        run_s : float
-            The cycle's beginning, by the run's clock.
-        body : BodyConfig
-            The base's limits.
+        Odometry is the newest sample since the cycle before, None if there was none; `run_s` is the beginning of this
+        one.
         """
         commands = self.commands
         while len(commands) > 1 and run_s - commands[0].run_s > AGE_S:

@@ -25,10 +25,7 @@ from runtime.timing.footprint import FootprintRow
 from runtime.timing.timing_monitor import TimingMonitor, TimingSummary
 
 CORNER_KINDS: Final[Mapping[str, Literal["inside", "edge"]]] = MappingProxyType(
-    {
-        "inside corner": "inside",
-        "edge": "edge",
-    }
+    {"inside corner": "inside", "edge": "edge"}
 )
 """Kinds of corners by the labels that perception gives them."""
 
@@ -233,20 +230,14 @@ def perceived_rows(
         "polylines": [],
     }
     for canyon in perception.canyons():
-        (x1, y1), (x2, y2) = (
-            (at.x, at.y)
-            for at in (
-                to.compose(Pose(*canyon.mouth[:2], 0.0)),
-                to.compose(Pose(*canyon.mouth[2:], 0.0)),
-            )
-        )
+        begin, end = (to.compose(Pose(*at, 0.0)) for at in (canyon.mouth[:2], canyon.mouth[2:]))
         rows["canyons"].append(
             {
                 "number": canyon.number,
-                "x1": x1,
-                "y1": y1,
-                "x2": x2,
-                "y2": y2,
+                "x1": begin.x,
+                "y1": begin.y,
+                "x2": end.x,
+                "y2": end.y,
                 "axis": math.remainder(to.theta + canyon.axis_rad, math.tau),
                 "depth": canyon.depth_m,
                 "probability": canyon.probability,
@@ -313,20 +304,7 @@ def run_summary(
 ) -> RunSummary:
     """Return the summary of a run.
 
-    Parameters
-    ----------
-    state : State
-        What the last cycle left. Objects are given in the robot's own odometry, with its jumps.
-    stats : CycleStats
-        Durations and lateness of the cycles.
-    timing_monitor : TimingMonitor
-        What delayed them.
-    driver : RobotDriver
-        Counts of the line, and the origin of the odometry.
-    footprint : FootprintRow
-        What the process used of its machine.
-    mode_log : ModeLog
-        Why the robot stopped and held, and how its mission went on.
+    Objects are in the robot's own odometry, with its jumps.
     """
     counts = driver.counts
     perceived = perceived_rows(state.perception, driver.odometry_origin)

@@ -67,14 +67,7 @@ class ZoneLimits:
     def seen(self, percept: Percept, drive_request: DriveRequest, radius_m: float) -> tuple[Percept, str | None]:
         """Return the percept with no-go lines as obstacles, and why the robot must stand, None if it may drive.
 
-        Parameters
-        ----------
-        percept : Percept
-            In odometry's frame.
-        drive_request : DriveRequest
-            What is driven.
-        radius_m : float
-            Of the body, m.
+        `percept` is in odometry's frame; the body's radius in m.
         """
         if self.frame is not None:
             return with_no_go(percept, self.zones, self.frame, radius_m), None
@@ -125,16 +118,7 @@ def zone_limits(
 ) -> ZoneLimits | None:
     """Return the limits of this cycle; None where the run has no zones.
 
-    Parameters
-    ----------
-    before : ZoneLimits or None
-        Of the cycle before.
-    void : PlacesConfig or None
-        The places whose frame was lost when odometry started anew.
-    perception : Perception
-        Knows the map frame.
-    settings : Settings
-        The run's.
+    `before` are those of the cycle before; `void` are the places whose frame was lost when odometry started anew.
     """
     places = settings.places
     if not places.limits_drive:
@@ -151,16 +135,7 @@ def way_refused(
 ) -> str | None:
     """Return why a goal or a mission leads where the robot must not or cannot drive; None if it does not.
 
-    Parameters
-    ----------
-    asked : DriveInput
-        What the operator requests.
-    zones : ZoneLimits or None
-        The run's.
-    odometry : Odometry or None
-        The newest; without it, blind sides are not looked at.
-    settings : Settings
-        The run's.
+    Without odometry, blind sides are not looked at.
     """
     blind = None
     if isinstance(asked, Mission):

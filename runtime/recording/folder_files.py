@@ -53,14 +53,7 @@ def describe_recordings(folder: Path) -> list[FolderFile]:
 def rename_recording(folder: Path, name: str, to: str) -> str:
     """Give a recording another name, and return that; it counts towards the folder's limits as before.
 
-    Parameters
-    ----------
-    folder
-        Of the recordings.
-    name
-        Its name in the folder.
-    to
-        The new name, with or without its suffix.
+    `to` is the new name, with or without its suffix.
 
     Raises
     ------

@@ -29,12 +29,7 @@ _HEADER_OPCODE: Final = 1
 
 
 def create_listed(path: Path) -> None:
-    """Create an empty file and list it in its folder's index.
-
-    Parameters
-    ----------
-    path : Path
-        In an existing folder.
+    """Create an empty file in an existing folder, and list it in the folder's index.
 
     Raises
     ------

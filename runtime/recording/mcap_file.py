@@ -75,18 +75,9 @@ class McapFile:
         self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[name])
 
     def add(self, topic: str, data: bytes, log_ns: int, sequence: int = 0) -> None:
-        """Add a message to the current chunk.
+        """Add a message, JSON of one of `CHANNELS`, to the current chunk.
 
-        Parameters
-        ----------
-        topic : str
-            One of `CHANNELS`.
-        data : bytes
-            The message's JSON.
-        log_ns : int
-            Unix time, ns.
-        sequence : int
-            MCAP's sequence number; the cycle number where there is one.
+        `log_ns` is a Unix time in ns, `sequence` the number of the cycle where there is one.
         """
         self._writer.add_message(self._channels[topic], log_ns, data, log_ns, sequence)
 

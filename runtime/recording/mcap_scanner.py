@@ -79,15 +79,7 @@ class CorruptRegion:
 
 
 def frame_bytes(data: memoryview, at: int) -> int:
-    """Return the length of the Zstandard frame at a byte, by the heads of its blocks (RFC 8878); 0 if it has no end.
-
-    Parameters
-    ----------
-    data : memoryview
-        The file.
-    at : int
-        Where the frame begins.
-    """
+    """Return the length of the Zstandard frame at a byte, by the heads of its blocks (RFC 8878); 0 without an end."""
     try:
         head = bytes(data[at : at + FRAME_HEAD_MAX])
         end, is_last = at + zstandard.frame_header_size(head), False
@@ -154,10 +146,7 @@ class McapScanner:
     def chunks(self, since: int = BEGIN) -> Iterator[list[RawMessage]]:
         """Yield the messages of every whole chunk, in file order.
 
-        Parameters
-        ----------
-        since : int
-            Start at this byte: a value that `chunk_offset` had before.
+        `since` is the byte to start at, a value that `chunk_offset` had before.
         """
         if not self.is_mcap:
             self._note(0, "the first bytes are not those of an MCAP file")

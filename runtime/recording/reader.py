@@ -66,10 +66,7 @@ class Recording:
     def chunks(self, since: int | None = None) -> Iterator[tuple[int, list[RawMessage]]]:
         """Yield each chunk's offset in the file and its messages.
 
-        Parameters
-        ----------
-        since : int, optional
-            Start at this chunk offset. The whole file must have been read once before.
+        `since` is the offset of the chunk to start at; then the whole file must have been read once before.
         """
         scanner = self._scanner
         if since is None:

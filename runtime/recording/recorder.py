@@ -6,7 +6,6 @@ whole state, as a keyframe, rarely. The cycle's command is sent before any of th
 
 from __future__ import annotations
 
-import os
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -44,7 +43,7 @@ from runtime.recording.writer import (
     RecordingWriter,
     SettingsReload,
 )
-from runtime.support.kernel_cache import kernels_key
+from runtime.support.kernel_cache import is_interpreted, kernels_key
 from runtime.timing.run_clock import RunClock, run_clock
 
 WRITE_S: Final = 0.2
@@ -63,7 +62,7 @@ def software_versions() -> dict[str, str]:
         "numpy": version("numpy"),
         "numba": version("numba"),
         "kernels": kernels_key(),
-        "compiled": "no" if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"} else "yes",
+        "compiled": "no" if is_interpreted() else "yes",
         "processor": f"{platform.machine()} {get_host_cpu_name()}",
     }
 
@@ -218,15 +217,7 @@ class Recorder:
         return words
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
-        """Record a cycle that has just ended, and the map, the objects or a keyframe if one is due.
-
-        Parameters
-        ----------
-        record : CycleRecord
-            The cycle.
-        state : State
-            As the cycle left it.
-        """
+        """Record a cycle that has just left `state`, and the map, the objects or a keyframe if one is due."""
         run_s, host_s = record.inputs.run_s, record.inputs.host_s
         host_s = run_s if host_s is None else host_s  # virtual time has no other clock
         self._cycle = record.cycle
@@ -262,17 +253,7 @@ class Recorder:
             self._writer.thread.wake()
 
     def on_bytes(self, direction: str, run_s: float, host_s: float, data: bytes) -> None:
-        """Record bytes that were just received or sent over the serial line.
-
-        Parameters
-        ----------
-        direction : {"in", "out"}
-            As the program sees it.
-        run_s, host_s : float
-            The present moment by the run's clock and by the host's.
-        data : bytes
-            What went over the line.
-        """
+        """Record bytes that have just been received or sent over the serial line, as the program sees it."""
         if self._on and not self._is_starting:  # as `_put`, at less cost: several times a cycle
             self._queue_item((SERIAL[direction], host_s, run_s, data))
 

@@ -100,13 +100,6 @@ def _recognises(arrays: Iterable[str]) -> bool:
 def adopt(frame: Keyframe, settings: Settings) -> State:
     """Return the state in a keyframe, after every number in it was checked: compiled kernels check none.
 
-    Parameters
-    ----------
-    frame : Keyframe
-        From a recording.
-    settings : Settings
-        In force there.
-
     Raises
     ------
     ValueError, ArithmeticError, LookupError
@@ -134,14 +127,7 @@ def restore(state: State, fields: StateFields, snapshot: Snapshot) -> None:
 def replay_cycle(state: State, record: CycleRecord, settings: Settings) -> CycleRecord:
     """Run the step over the inputs of a record, with its refinement decisions, and return the new record.
 
-    Parameters
-    ----------
-    state : State
-        Left by the cycle before. Updated.
-    record : CycleRecord
-        The recorded cycle.
-    settings : Settings
-        In force in that cycle.
+    `state`, which the cycle before has left, is updated. `settings` were in force in the recorded cycle.
     """
     return step(state, record.inputs, settings, lambda _command: None, lambda done: done < record.quanta)
 
@@ -333,14 +319,7 @@ def replay_from(
 ) -> Replayer:
     """Return a replayer from the first of some starts that is not refused, else from the beginning of the file.
 
-    Parameters
-    ----------
-    recording : Recording
-        Of which the whole file has been read once.
-    starts : iterable
-        Where to start, best first.
-    on_refused : callable
-        Called with each start that is refused, and why.
+    `starts` come best first; `on_refused` gets each that is refused, and why. The file has been read once before.
     """
     for start in starts:
         try:
@@ -376,12 +355,7 @@ class KeyframeFinder:
     def find(self, chunk_offset: int, message: RawMessage) -> KeyframePosition | None:
         """Return the position of a keyframe if the message is a valid one; give every message, in file order.
 
-        Parameters
-        ----------
-        chunk_offset : int
-            Where the message's chunk starts in the file.
-        message : RawMessage
-            The next message.
+        `chunk_offset` is where the chunk of the message starts in the file.
         """
         if message.topic == KEYFRAME:
             cycle = keyframe_cycle(message)

@@ -57,12 +57,8 @@ class FiringReplayer:
     def summary(self, to: Pose | None = None, objects: Iterable[DetectedObject] | None = None) -> ReplaySummary:
         """Return the results of perception so far, and the time they took.
 
-        Parameters
-        ----------
-        to : Pose, optional
-            Pose of the odometry's frame in that of the results; by default they are in odometry's.
-        objects : iterable of DetectedObject, optional
-            The models' objects in the frame of the results, where that is known better.
+        `to` is the pose of odometry's frame in that of the results, by default the same; `objects` are the models',
+        where they are known better than by `perception`.
         """
         perceived = perceived_rows(self.perception, to, objects)
         counts = self.perception.counts
@@ -138,14 +134,7 @@ def replay_in_known_room(
 
     The objects are in the map frame if the robot's place is known at the end, otherwise in odometry's.
 
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models, constants and the known room.
-    firings : iterable of Firing
-        In order of time.
-    on_pose : callable
-        Called after each firing with its time (s) and the robot's pose as known then.
+    `on_pose` gets the time (s) of each firing and the robot's pose as known then.
 
     Raises
     ------
@@ -170,15 +159,7 @@ def replay_in_known_room(
 
 
 def replay_firings(settings: Settings, firings: Iterable[Firing]) -> ReplaySummary:
-    """Run perception over firings and return what it perceived.
-
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants.
-    firings : iterable of Firing
-        In order of time.
-    """
+    """Run perception over firings, in order of time, and return what it perceived."""
     replayer = FiringReplayer(settings, firings)
     for _ in replayer:
         pass

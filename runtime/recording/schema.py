@@ -279,19 +279,7 @@ def carried_state(state: State) -> StateFields:
 
 
 def keyframe(cycle: int, run_s: float, state: StateFields, snapshot: Snapshot) -> Keyframe:
-    """Return the message that holds a whole state.
-
-    Parameters
-    ----------
-    cycle : int
-        Number of the cycle that left the state.
-    run_s : float
-        Time of that cycle by the run's clock, s.
-    state : dict
-        From `carried_state`.
-    snapshot : Snapshot
-        Perception's arrays by name.
-    """
+    """Return the message of the whole state that a cycle has left: from `carried_state`, and perception's arrays."""
     arrays = [ArrayInfo(name=name, dtype=_dtype_text(a.dtype), shape=list(a.shape)) for name, a in snapshot.items()]
     data = zstandard.compress(b"".join(a.tobytes() for a in snapshot.values()))
     return Keyframe.model_construct(

@@ -16,14 +16,8 @@ from perception.snapshot import Snapshot, is_scratch, numbers_of
 def check_snapshot(snapshot: Snapshot, fresh: Snapshot, bounds: Mapping[str, Bound]) -> None:
     """Check every number of perception's state.
 
-    Parameters
-    ----------
-    snapshot : Snapshot
-        The state, of the same names, dtypes and shapes as `fresh`.
-    fresh : Snapshot
-        The state in which a run with these settings starts.
-    bounds : mapping
-        By name of a number, as `perception.snapshot.bounds_of` returns them for these settings.
+    `fresh` is the state in which a run with these settings starts, of the same names, dtypes and shapes; `bounds` are
+    those of `perception.snapshot.bounds_of` for them.
 
     Raises
     ------

@@ -159,15 +159,7 @@ class Verifier:
         self._last: CycleRecord | None = None
 
     def check(self, found: ReplayStep, replayer: Replayer) -> None:
-        """Compare one step.
-
-        Parameters
-        ----------
-        found : ReplayStep
-            The next step.
-        replayer : Replayer
-            That gave it.
-        """
+        """Compare a step with the recording; `replayer` has just given it."""
         if found.recorded is not None:
             self._check_cycle(found, found.recorded)
         elif found.keyframe is not None and replayer.state is not None:
@@ -235,12 +227,7 @@ def _keyframe_difference(frame: Keyframe, state: State) -> tuple[str, object, ob
 def without_later(replayed: object, recorded: object, known: object) -> object:
     """Return a replayed JSON tree without the fields that the version which recorded it did not know.
 
-    Parameters
-    ----------
-    replayed, recorded : JSON value
-        The trees.
-    known : JSON value
-        The recorded tree as this version reads it: every field that is not recorded has its default.
+    `known` is the recorded tree as this version reads it, in which every field that was not recorded has its default.
     """
     if isinstance(replayed, dict) and isinstance(recorded, dict) and isinstance(known, dict):
         kept = ((name, value) for name, value in replayed.items() if name in recorded or name not in known)
@@ -254,12 +241,7 @@ def without_later(replayed: object, recorded: object, known: object) -> object:
 def find_difference(recorded: object, replayed: object, path: str = "") -> tuple[str, object, object] | None:
     """Return the first place where two JSON trees differ in any bit, and both values; None if they are equal.
 
-    Parameters
-    ----------
-    recorded, replayed : JSON value
-        The trees.
-    path : str
-        Prefix of the returned place: dotted names from the root.
+    The place is given by dotted names from the root, after the prefix `path`.
     """
     if isinstance(recorded, dict) and isinstance(replayed, dict):
         names = [*recorded, *(name for name in replayed if name not in recorded)]

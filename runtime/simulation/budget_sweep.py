@@ -74,17 +74,7 @@ class DetectionLog:
         self.cycles += 1
 
     def on_state(self, _record: CycleRecord, state: State, start: Pose) -> None:
-        """Record the drums that are reported for the first time.
-
-        Parameters
-        ----------
-        _record : CycleRecord
-            Not used.
-        state : State
-            After the cycle.
-        start : Pose
-            Where the odometry began, in world coordinates.
-        """
+        """Record the drums first reported in this cycle; `start` is where odometry began, in world coordinates."""
         objects = state.perception.objects()
         if objects is self._last_objects or state.run_s is None:
             return

@@ -27,15 +27,7 @@ way (`behaviors.surroundings.blocked_ahead.STAYS_FOR_M`), and at .3 m/s and .3 r
 
 
 def back_heard_m(settings: Settings, place: CanyonWorld) -> float | None:
-    """Return how far before the mouth the back of a canyon is first heard, m; None if it is not.
-
-    Parameters
-    ----------
-    settings
-        The ring.
-    place
-        The canyon, with the robot's start and goal.
-    """
+    """Return how far before the mouth the back of a canyon is first heard, m; None if it is not."""
     acoustics = AcousticsConfig(model=place.world.acoustics.model)
     walls = place.world.wall
     worlds = (WorldConfig(wall=walls), WorldConfig(wall=(*walls[:BACK], *walls[BACK + 1 :])))

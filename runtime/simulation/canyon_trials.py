@@ -124,24 +124,14 @@ class _Watch:
 
     def is_over(self, state: State) -> bool:
         """Return whether the drive has come to an end."""
-        if self.reported_m is None and getattr(state.perception, "canyons", tuple)():
+        if self.reported_m is None and state.perception.canyons():
             self.reported_m = self.place.local(self.x, self.y)[0]
         is_reached = isinstance(state.drive_request, Goal) and state.drive_request.reached
         return is_reached or state.mode.mode is Mode.SAFE_STOP or self.time_s - self._rest[2] > STILL_S
 
 
 def drive(settings: Settings, place: CanyonWorld, seed: int) -> CanyonOutcome:
-    """Drive to the goal once.
-
-    Parameters
-    ----------
-    settings : Settings
-        Robot, perception and behaviours.
-    place : CanyonWorld
-        The canyon.
-    seed : int
-        Of the noise.
-    """
+    """Drive to the goal once; `seed` is that of the noise."""
     x, y = place.goal_in_odometry()
     settings = settings.model_copy(update={"goal": GoalConfig(x_m=x, y_m=y), "world": place.world})
     watch = _Watch(place)

@@ -88,15 +88,7 @@ class CanyonWorld:
 
 
 def canyon_world(seed: int, reflection: Reflection = "specular") -> CanyonWorld:
-    """Return a world.
-
-    Parameters
-    ----------
-    seed : int
-        Which world.
-    reflection : str
-        The walls are mirrors, or each point of theirs answers.
-    """
+    """Return a world by its number; its walls are mirrors, or each point of theirs answers."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 29]))
     depth, width, before, behind = (float(rng.uniform(*span)) for span in (DEPTH_M, WIDTH_M, BEFORE_M, BEHIND_M))
     start_y, goal_y = (rng.uniform(-OFF_AXIS, OFF_AXIS, 2) * width).tolist()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import mean
 from typing import Final, TypedDict
 
@@ -23,6 +23,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.map_frame import MapFrame
 from perception.pipeline import Perception
+from runtime.simulation.evaluation import nearest_pairs, place_nees
 from runtime.simulation.open_loop import perceive
 from runtime.simulation.random_halls import ACOUSTICS
 from runtime.simulation.scenes import OCTET, SPEED_M_S
@@ -54,8 +55,6 @@ LEVELS: Final = (
     OdometryConfig(scale=1.03, heading_rad_per_sqrt_m=math.radians(2.0)),
 )
 """Errors of the odometry, the first of which is none."""
-MATCH_M: Final = FOOT_M
-"""An object farther than this from every drum is false."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,14 +140,7 @@ def oval(rounds: int = ROUNDS) -> list[Pose]:
 def odometry_along(path: Sequence[Pose], errors: OdometryConfig, rng: np.random.Generator) -> Iterator[Pose]:
     """Yield the poses that odometry reports along a path; at its start it is right.
 
-    Parameters
-    ----------
-    path : sequence of Pose
-        The true poses, with unwrapped headings.
-    errors : OdometryConfig
-        Its scale and the random walk of its heading.
-    rng : Generator
-        Source of the random walk.
+    The true headings are unwrapped; `rng` is the source of the random walk of the reported ones.
     """
     yield path[0]
     reported = path[0]
@@ -197,18 +189,7 @@ def drive(
 ) -> DriftOutcome:
     """Drive the rounds once and return how its end compares with the truth.
 
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and perception.
-    errors : OdometryConfig
-        Of the odometry.
-    seed : int
-        Of the hall and all noise.
-    corrected : bool
-        Whether recognised drums correct the drift.
-    synchro : bool
-        As for `firings`.
+    `corrected`: whether recognised drums correct the drift; `synchro`: as for `firings`.
     """
     world, path = drum_hall(seed), oval()
     config = settings.perception.model_copy(update={"localization": LocalizationConfig(correct_drift=corrected)})
@@ -224,9 +205,10 @@ def drive(
     seen = [one for one in perception.mapped_objects() if one.model in names]
     drums = [(drum.x_m, drum.y_m) for drum in world.drum]
     views = [_from(robot, one.x, one.y) for one in seen]
-    pairs = _pairs([_from(true, *drum) for drum in drums], views)
+    from_true = [_from(true, *drum) for drum in drums]
+    pairs = nearest_pairs(from_true, views)
     outcome = DriftOutcome(
-        tuple(error for _, _, error in pairs),
+        tuple(math.dist(from_true[i], views[k]) for i, k in pairs.items()),
         len(drums) - len(pairs),
         len(seen) - len(pairs),
         math.dist((robot.x, robot.y), (true.x, true.y)),
@@ -235,31 +217,23 @@ def drive(
     if localized is None or not isinstance(perception.map_frame, MapFrame):
         return outcome
     off = np.array([robot.x - true.x, robot.y - true.y, wrap_angle(robot.theta - true.theta)])
-    object_nees = [_nees(seen[k].x - drums[i][0], seen[k].y - drums[i][1], seen[k].covariance) for i, k, _ in pairs]
+    object_nees = [
+        place_nees(seen[k].x - drums[i][0], seen[k].y - drums[i][1], covariance)
+        for i, k in pairs.items()
+        if (covariance := seen[k].covariance) is not None
+    ]
     estimate = perception.map_frame.drift.e[0]
-    return DriftOutcome(
-        outcome.errors,
-        outcome.missed,
-        outcome.false,
-        outcome.place,
-        outcome.heading,
-        float(off @ np.linalg.solve(localized.covariance, off)),
-        mean(object_nees) if object_nees else None,
-        estimate.odometer_scale / errors.scale - 1.0,
-        estimate.range_scale * world.acoustics.sound_speed_scale - 1.0,
+    return replace(
+        outcome,
+        nees=float(off @ np.linalg.solve(localized.covariance, off)),
+        object_nees=mean(object_nees) if object_nees else None,
+        odometer_error=estimate.odometer_scale / errors.scale - 1.0,
+        range_error=estimate.range_scale * world.acoustics.sound_speed_scale - 1.0,
     )
 
 
 def summarise_drives(errors: OdometryConfig, outcomes: Sequence[DriftOutcome]) -> DriftRow:
-    """Return the row of the table for the drives of one level; at least one drive.
-
-    Parameters
-    ----------
-    errors : OdometryConfig
-        The level.
-    outcomes : sequence of DriftOutcome
-        The drives, all corrected or none.
-    """
+    """Return the row of the table for the drives of one level, all corrected or none; at least one drive."""
     of_drums = [error for outcome in outcomes for error in outcome.errors]
     return {
         "scale": errors.scale,
@@ -293,20 +267,3 @@ def _from(robot: Pose, x: float, y: float) -> tuple[float, float]:
     """Return a place as seen from a pose."""
     seen = robot.inverse().compose(Pose(x, y, 0.0))
     return seen.x, seen.y
-
-
-def _nees(dx: float, dy: float, covariance: tuple[float, float, float] | None) -> float:
-    """Return the normalised squared error of a place; NaN without a covariance."""
-    if covariance is None:
-        return math.nan
-    xx, xy, yy = covariance
-    return (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-
-
-def _pairs(truth: Sequence[tuple[float, float]], seen: Sequence[tuple[float, float]]) -> list[tuple[int, int, float]]:
-    """Return indices and distance of each drum and its object: nearest pairs first, none beyond `MATCH_M`."""
-    found: list[tuple[int, int, float]] = []
-    for error, i, k in sorted((math.dist(t, s), i, k) for i, t in enumerate(truth) for k, s in enumerate(seen)):
-        if error <= MATCH_M and all(i != one[0] and k != one[1] for one in found):
-            found.append((i, k, error))
-    return found

@@ -90,16 +90,7 @@ def run_seed(
 ) -> SeedOutcome:
     """Run the experiment once in virtual time and return its outcome.
 
-    Parameters
-    ----------
-    settings : Settings
-        The robot and everything it does.
-    world : WorldConfig
-        The true world.
-    seed : int
-        Of all randomness.
-    on_state, on_bytes : callable, optional
-        As `simulate` calls them; for a recorder.
+    `on_state` and `on_bytes` are called as by `simulate`, for a recorder.
 
     Raises
     ------
@@ -132,16 +123,7 @@ def stop_at_leg_end(settings: Settings) -> Settings:
 
 
 def require_finished(run: SimulationResult, seed: int, seconds_max: float) -> None:
-    """Check that a drive reached the end of the hall.
-
-    Parameters
-    ----------
-    run : SimulationResult
-        The drive.
-    seed : int
-        For the message.
-    seconds_max : float
-        Its time limit, for the message, s.
+    """Check that a drive reached the end of the hall; seed and time limit (s) are for the message.
 
     Raises
     ------
@@ -201,6 +183,12 @@ def nearest_pairs(truth: list[tuple[float, float]], seen: list[tuple[float, floa
         if distance <= GATE_M and i not in match and j not in match.values():
             match[i] = j
     return match
+
+
+def place_nees(dx: float, dy: float, covariance: tuple[float, float, float]) -> float:
+    """Return the squared error of a place over its covariance xx, xy, yy (m²): χ² with two degrees of freedom."""
+    xx, xy, yy = covariance
+    return (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
 
 
 def spread(outcomes: Sequence[SeedOutcome]) -> Spread | None:

@@ -34,15 +34,7 @@ def long_hall(seed: int) -> WorldConfig:
 
 
 def long_hall_drums(seed: int, a_side: int = A_SIDE) -> list[DrumConfig]:
-    """Return the drums of a hall.
-
-    Parameters
-    ----------
-    seed : int
-        Determines their positions.
-    a_side : int
-        Drums on each side.
-    """
+    """Return the drums of a hall, so many on each side; the seed determines their positions."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
     moves = rng.uniform(-1.0, 1.0, (2, a_side, 2)).tolist()
     return [

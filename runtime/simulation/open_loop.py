@@ -15,7 +15,7 @@ from config.settings import Settings
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
 from perception.pipeline import DetectedObject, Perception
-from runtime.simulation.evaluation import CHI2_95, DrumRow, Outcome, match_drums, nearest_pairs
+from runtime.simulation.evaluation import CHI2_95, DrumRow, Outcome, match_drums, nearest_pairs, place_nees
 from runtime.simulation.first_fix import FirstFix, FirstFixTracker, summarise_fixes
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
@@ -109,10 +109,8 @@ def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> 
     for row in drums:
         covariance = None if row["estimate"] is None else by_place.get(row["estimate"])
         if covariance is not None and row["estimate"] is not None:
-            xx, xy, yy = covariance
             dx, dy = row["truth"][0] - row["estimate"][0], row["truth"][1] - row["estimate"][1]
-            squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-            inside.append(squared <= CHI2_95)
+            inside.append(place_nees(dx, dy, covariance) <= CHI2_95)
     return inside
 
 
@@ -124,14 +122,7 @@ def match_objects(
     Objects of none of the models, such as walls, are ignored, and so are drums and polygons that look like none. The
     rows of the polygons follow those of the boxes, with the middle of the vertices as their place.
 
-    Parameters
-    ----------
-    world : WorldConfig
-        The truth.
-    seen : iterable of DetectedObject
-        In world coordinates.
-    models : iterable of ModelConfig
-        The models that were looked for.
+    The objects seen are in world coordinates, as the truth; `models` are those that were looked for.
     """
     models = list(models)
     is_round = {model.name: model.arc_radius_m is not None for model in models}
@@ -202,14 +193,7 @@ def angle_error(box: BoxConfig, theta: float) -> float:
 def run_scene(settings: Settings, name: SceneName, seed: int) -> list[HallOutcome]:
     """Drive through every hall of a scene and return the outcomes; each hall has its own noise.
 
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and perception.
-    name : SceneName
-        The scene.
-    seed : int
-        Of the scene and the noise.
+    The seed is of the scene and of the noise.
     """
     return [run_hall(settings, hall, seed * 1000 + i) for i, hall in enumerate(halls(name, seed))]
 
@@ -223,15 +207,6 @@ def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterab
     """Return the summary over all drives.
 
     Boxes have rows only if a model that is not round was looked for.
-
-    Parameters
-    ----------
-    name : SceneName
-        The scene.
-    outcomes : list of HallOutcome
-        The drives.
-    models : iterable of ModelConfig
-        The models that were looked for.
     """
     with_boxes = any(model.arc_radius_m is None for model in models)
     drums = [row for outcome in outcomes for row in outcome.drums]

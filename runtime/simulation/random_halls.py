@@ -54,19 +54,9 @@ def _rows(rng: np.random.Generator) -> tuple[Placed, float]:
 def random_hall(
     seed: int, acoustics: AcousticsConfig = ACOUSTICS
 ) -> tuple[WorldConfig, tuple[tuple[float, float, float], ...]]:
-    """Return a hall and the path through it.
+    """Return a hall, and the poses x, y, ring_yaw (m, rad) at which the ring fires on its path through it.
 
-    Parameters
-    ----------
-    seed : int
-        Which hall.
-    acoustics : AcousticsConfig
-        By default specular, with 1 % noise, 3 % outliers and 5 % drop-outs.
-
-    Returns
-    -------
-    (WorldConfig, tuple of (x, y, ring_yaw))
-        The hall, and the poses at which the ring fires, m and rad. The two cylinders are drums of other radii there.
+    The two cylinders that are no drums are drums of other radii there.
     """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
     placed, end = _rows(rng)

@@ -285,15 +285,7 @@ def compile_refinement(part: str) -> None:
 
 
 def warm_up(settings: Settings, parts: Iterable[str]) -> None:
-    """Run every kernel of these parts once, the operator's edits included, so that no cycle compiles or loads one.
-
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants of the run.
-    parts : iterable of str
-        Of `PARTS`.
-    """
+    """Run every kernel of these parts once, the operator's edits included, so that no cycle compiles or loads one."""
     for part in parts:
         RUN_ONCE[part](settings)
 
@@ -326,14 +318,7 @@ def prepare_kernels(settings: Settings, console: Console, parts: Iterable[str] |
 def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> None:
     """Compile these parts and mark them as compiled, in two processes where there are two processors.
 
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants of the run.
-    folder : Path
-        From `use_kernel_cache`.
-    parts : sequence of str
-        Of `PARTS`.
+    `folder` is that of `use_kernel_cache`.
     """
     if BAYES in parts and (os.cpu_count() or 1) > 1:
         # What the other process compiles is in the cache afterwards; this one starts with what shares none of it.

@@ -11,28 +11,13 @@ Units: TypeAlias = Literal["m", "ft"]
 
 
 def format_length(metres: float, units: Units, digits: int = 2) -> str:
-    """Return a length as text.
-
-    Parameters
-    ----------
-    metres : float
-        The length, m.
-    units : {"m", "ft"}
-        The unit of the text, which does not name it.
-    digits : int
-        Decimals.
-    """
+    """Return a length, given in metres, as text with so many decimals in a unit that the text does not name."""
     return f"{metres if units == 'm' else metres / FOOT_M:.{digits}f}"
 
 
 def format_point(x: float, y: float, units: Units) -> str:
     """Return the point (x, y), given in metres, as text in parentheses, as the paper's Table 2 prints it.
 
-    Parameters
-    ----------
-    x, y : float
-        The point, m.
-    units : {"m", "ft"}
-        The unit of the text, which does not name it.
+    The text does not name the unit.
     """
     return f"({format_length(x, units)}, {format_length(y, units)})"

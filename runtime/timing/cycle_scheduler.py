@@ -21,8 +21,8 @@ from runtime.timing.wake import Waker
 LATE_SHARE: Final = 0.1
 """A cycle that begins later than this share of its period is late."""
 
-ECHO_WAIT_SHARE: Final = 0.5
-"""Longest wait for an echo, as a share of the longest time between two commands that the base's deadman allows."""
+CYCLE_GAP_SHARE: Final = 0.5
+"""Longest time between two cycles that wait for an echo, as a share of that which the base's deadman allows."""
 
 OVERRUN: Final = "{} cycles in a row left no time for the next one, mostly through {}: reduce its load, then re-arm"
 
@@ -68,7 +68,7 @@ class CycleScheduler:
 
         `gap_max_s` is the longest time between two commands that the base's deadman allows.
         """
-        self._pacer = Pacer(run_s, self._period_s, self._step_s, ECHO_WAIT_SHARE * gap_max_s)
+        self._pacer = Pacer(run_s, self._period_s, self._step_s, CYCLE_GAP_SHARE * gap_max_s)
         return self._stall_sampler.active()
 
     def on_echo(self, run_s: float) -> None:

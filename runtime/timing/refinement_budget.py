@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 QUANTA_PER_CYCLE: Final = 50
-"""QuantumBudget that fit the default budget on a slow machine; virtual time needs a number instead of a clock."""
+"""Quanta that fit the default budget on a slow machine; virtual time needs a number instead of a clock."""
 
 
 def within_quanta_per_cycle(done: int) -> bool:

@@ -39,14 +39,8 @@ class Alerts:
     def update(self, received: Received, state: State, run_s: float) -> list[str]:
         """Return a line for each new fact that asks for attention: what happened, likely cause, next action.
 
-        Parameters
-        ----------
-        received : Received
-            From the robot in this cycle.
-        state : State
-            After the cycle.
-        run_s : float
-            The cycle's beginning; a robot that causes too many lines has the excess counted in the next one.
+        `state` is that after the cycle that begins at `run_s`. Where a robot causes too many lines, a later one says
+        how many were left out.
         """
         facts, recovered = self._new_facts(received, state.perception)
         if (problem := state.ring_problem) is not None and state.mode.reason != problem:

@@ -32,12 +32,7 @@ NO_EVIDENCE: Final = (
 def why_gone(gone: DetectedObject, now: Sequence[DetectedObject]) -> str:
     """Return why an object that was sure is not, as text.
 
-    Parameters
-    ----------
-    gone : DetectedObject
-        As it was reported while it was sure.
-    now : sequence of DetectedObject
-        All objects, those left behind included.
+    `gone` is as it was while it was sure; `now` are all objects, those left behind included.
     """
     for one in now:
         if one.number == gone.number:
