@@ -27,7 +27,7 @@ class Leg:
     outbound: bool = True
     done: bool = False
     gave_up: bool = False
-    """Whether it ended because the robot came no farther."""
+    """Whether it ended because the robot came hardly farther."""
 
     @classmethod
     def starting_at(cls, pose: Pose) -> Leg:

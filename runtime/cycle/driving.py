@@ -51,7 +51,7 @@ AWAY_M: Final = 0.5
 WAITS_TO_START: Final = "the robot has only just stopped, and starts again two seconds after its last start"
 LEG_DONE: Final = "the leg is done"
 LEG_GIVEN_UP: Final = (
-    f"the leg has ended, as the robot came no farther along it for {ENDED_S:.0f} s: clear the way and resume the "
+    f"the leg has ended, as the robot came hardly farther along it for {ENDED_S:.0f} s: clear the way and resume the "
     "legs, or set a goal"
 )
 NO_WAY: Final = (
@@ -103,12 +103,13 @@ def drive(state: DriveState, percept: Percept, settings: Settings, now: Moment) 
     progress, leg, stalled = observe_way(
         after.drive_request,
         leg if after.leg is None else after.leg,
-        None if stands else memory.progress,
+        memory.progress,
         after.goal_drive,
         percept.pose,
         state.requested_run_s,
         now.run_s,
-        settings.behaviors.move_ahead,
+        settings,
+        stands=stands,
     )
     after.leg, after.drive_memory = leg, DriveMemory(memory.commitment, progress)
     return result._replace(hold_reason=result.hold_reason or stalled)

@@ -6,22 +6,22 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from behaviors.memory.commitment import Commitment
-from behaviors.memory.way_progress import ENDED_S, STALLED_S, WayProgress
+from behaviors.memory.way_progress import ENDED_S, STALLED_S, WayProgress, due_m
 from behaviors.missions.mission import Mission
 from behaviors.move_ahead import Leg, along_m, given_up
 from behaviors.move_to_goal import Goal
-from config.behaviors import MoveAheadConfig
+from config.settings import Settings
 from perception.percept import Pose
 from runtime.cycle.drive_requests import DriveRequest, Legs
 from runtime.cycle.goal_drive import GoalDrive
 
 LEG_STALLED: Final = (
-    f"no farther along the leg for {STALLED_S:.0f} s: something is in the way, or the schemas cancel one another; if "
-    "that lasts, the leg turns back or ends"
+    "less than {:.2g} m farther along the leg for {:.0f} s: something is in the way, or the schemas cancel one "
+    "another; if that lasts, the leg turns back or ends"
 )
 GOAL_STALLED: Final = (
-    f"no nearer to the goal for {STALLED_S:.0f} s: the robot looks for a way round what is between; if that lasts, "
-    "the goal is given up"
+    "less than {:.2g} m nearer to the goal for {:.0f} s: the robot looks for a way round what is between; if that "
+    "lasts, the goal is given up"
 )
 STEP_STALLED: Final = (
     "step {} has made no progress for {:.0f} s: something is in the way, or the schemas cancel one another; if that "
@@ -36,20 +36,22 @@ class DriveMemory:
     commitment: Commitment = field(default_factory=Commitment)
     """Of the last command."""
     progress: WayProgress = field(default_factory=WayProgress)
-    """When it last made progress along legs."""
+    """When it last made progress."""
 
 
 def observe_way(
     request: DriveRequest,
     leg: Leg,
-    before: WayProgress | None,
+    before: WayProgress,
     goal_drive: GoalDrive | None,
     pose: Pose,
     requested_run_s: float,
     run_s: float,
-    config: MoveAheadConfig,
+    settings: Settings,
+    *,
+    stands: bool,
 ) -> tuple[WayProgress, Leg, str | None]:
-    """Return the progress along legs, the leg, which turns back or ends without any, and why a drive has none.
+    """Return the progress of a drive, the leg, which turns back or ends without any, and why a drive has none.
 
     Parameters
     ----------
@@ -57,28 +59,38 @@ def observe_way(
         What is driven; an operator's velocity leads where the operator sees fit.
     leg : Leg
         The leg so far.
-    before : WayProgress or None
-        Of the cycle before; None if the robot stands for a reason, as it should.
+    before : WayProgress
+        Of the cycle before.
     goal_drive : GoalDrive or None
-        The drive to a goal, which keeps its own progress, as a mission does.
+        The drive to a goal, of a mission's step, too.
     pose : Pose
         The robot's, in odometry's frame.
     requested_run_s, run_s : float
         When the request was made, and now, by the run's clock, s.
-    config : MoveAheadConfig
-        Of the legs.
+    settings : Settings
+        Of the run.
+    stands : bool
+        Whether the robot stands for a reason, as it should.
     """
-    progress, stalled_s, stalled = WayProgress(), 0.0, GOAL_STALLED
-    nearer_run_s = run_s if goal_drive is None else goal_drive.progress.nearer_run_s
+    behaviors = settings.behaviors
+    gain_m = due_m(min(settings.body.speed_max_m_s, behaviors.arbiter.base_velocity_m_s))
+    progress, stalled_s, stalled = WayProgress(), 0.0, GOAL_STALLED.format(gain_m, STALLED_S)
+    nearest_m = None if goal_drive is None else goal_drive.progress.nearest_m
     match request:
-        case Goal():
-            stalled_s = 0.0 if request.reached else run_s - nearer_run_s
+        case Goal() if not request.reached and nearest_m is not None:
+            progress = before.observe(nearest_m, gain_m, requested_run_s, run_s, outbound=True)
+            stalled_s = progress.stalled_s(run_s)
         case Mission(progress=mission):
             stalled = STEP_STALLED.format(request.step.name, STALLED_S)
-            to_goal = goal_drive is not None and request.step.goal is not None
-            stalled_s = run_s - nearer_run_s if to_goal else mission.step_s - mission.best_s
-        case Legs() if before is not None:
-            progress = before.observe(-along_m(pose, leg, config), requested_run_s, run_s, outbound=leg.outbound)
-            stalled, stalled_s = LEG_STALLED, progress.stalled_s(run_s)
-            leg = given_up(leg, config) if stalled_s >= ENDED_S else leg
+            to_goal = request.step.goal is not None
+            left_m, stalled_s = (nearest_m, 0.0) if to_goal else (mission.best_m, mission.step_s - mission.best_s)
+            if left_m and (to_goal or not stands):  # it leads somewhere, and not only a turn is left
+                part = mission.changes
+                progress = before.observe(left_m, gain_m, requested_run_s, run_s, outbound=True, part=part)
+                stalled_s = progress.stalled_s(run_s)
+        case Legs() if not stands:
+            left_m, outbound = -along_m(pose, leg, behaviors.move_ahead), leg.outbound
+            progress = before.observe(left_m, gain_m, requested_run_s, run_s, outbound=outbound)
+            stalled, stalled_s = LEG_STALLED.format(gain_m, STALLED_S), progress.stalled_s(run_s)
+            leg = given_up(leg, behaviors.move_ahead) if stalled_s >= ENDED_S else leg
     return progress, leg, stalled if stalled_s >= STALLED_S else None
