@@ -141,4 +141,4 @@ def no_such_place(name: str, places: PlacesConfig) -> str:
     known = [place.name for place in places.place]
     listed = f"the places are {', '.join(known)}" if known else "no place has been named yet: name one on the map"
     near = did_you_mean(name, known)
-    return f"no place is named {name}{near or ''}; {listed}"
+    return f"no place is named {name}{near}; {listed}"

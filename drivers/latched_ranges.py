@@ -147,7 +147,7 @@ class FreshDriver:
 
     def __init__(self, driver: RobotDriver, sensors: int, set_size: int, cycle_s: float) -> None:
         self._driver = driver
-        self._set_size = set_size
+        self._sensors, self._set_size, self._cycle_s = sensors, set_size, cycle_s
         self._detector = RepeatDetector(sensors)
         self._filter = RepeatFilter(sensors, cycle_s)
         self._is_latched = False
@@ -157,8 +157,13 @@ class FreshDriver:
         return getattr(self._driver, name)
 
     def take_received(self) -> Received:
-        """Return what was received since the last call, without repeats, and remove it."""
+        """Return what was received since the last call, without repeats, and remove it.
+
+        A robot that has restarted begins its times anew, so that no earlier one says when silence counts again.
+        """
         received = self._driver.take_received()
+        if received.rebooted:
+            self._filter = RepeatFilter(self._sensors, self._cycle_s)
         notes: tuple[str, ...] = ()
         fresh = []
         for firing in received.firings:

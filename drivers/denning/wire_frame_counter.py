@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.denning.codec import Decoder
-from drivers.denning.frames import Drive, Echo
+from drivers.denning.frames import Drive, Echo, Echo2, Echo3
 
 
 class WireFrameCounter:
@@ -14,8 +14,8 @@ class WireFrameCounter:
         self._from_host = Decoder("host", midway=True)
 
     def echoes(self, sent: bytes) -> int:
-        """Return how many ECHO frames the bytes sent to the host complete."""
-        return sum(isinstance(frame, Echo) for frame in self._to_host.feed(sent))
+        """Return how many frames of echoes, of any version, the bytes sent to the host complete."""
+        return sum(isinstance(frame, Echo | Echo2 | Echo3) for frame in self._to_host.feed(sent))
 
     def drives(self, received: bytes) -> int:
         """Return how many DRIVE frames the bytes received from the host complete."""

@@ -96,6 +96,8 @@ def robot_file(values: Mapping[str, Any], place: str) -> str:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise FirmwareError(f"{place}: gives {where} = {first['input']!r}: {first['msg']}; correct it") from error
+    except tomllib.TOMLDecodeError as error:  # a text with line ends, or None for a number, stands in it as it is
+        raise FirmwareError(f"{place}: a value is neither a number nor a plain text ({error}); correct it") from error
     return text
 
 

@@ -17,12 +17,11 @@ from drivers.emulator.event_device import EventDevice
 from drivers.emulator.faults import Bumper, Fault, LowBattery, MotorFault, OdometryJump, Reboot, StopButton
 from drivers.emulator.faulty_sonar import FaultySonar
 from drivers.emulator.latency_trace import FrameCounter
-from drivers.firing_pattern import FiringPattern, firing_pattern, sensors
+from drivers.firing_pattern import FiringPattern, firing_pattern, sensors, time_of_flight_s
 from drivers.lines.wire import NOISE, LineReader, Ranges, Sample, Wire
 from drivers.messages import Flags, Twist
 
 TICK_US: Final = 5_000
-SOUND_M_S: Final = 343.0
 STILL: Final = Twist(0.0, 0.0)
 FLAGS: Final = (
     (Bumper, Flags.BUMPER),
@@ -130,7 +129,7 @@ class LineDevice(EventDevice):
         ranges = self._sonar.fire(self._now_us, self._body.pose, self._body.ring_yaw, fired, pattern.window_m)
         heard = {sensor: range_m for sensor, range_m in zip(fired, ranges, strict=True) if range_m is not None}
         said = self._wire.say(Ranges(heard, self._clock_s))
-        self._heard.append((self._now_us + round(2e6 * pattern.window_m / SOUND_M_S), said))
+        self._heard.append((self._now_us + round(1e6 * time_of_flight_s(pattern.window_m)), said))
 
     @property
     def _clock_s(self) -> float:

@@ -152,7 +152,7 @@ class RobotSide:
             return
         if self._first_s is None or not math.isfinite(stamp_s):
             return
-        if self._group and (sensor in self._group or stamp_s - self._group_s > self._config.ros2.group_s):
+        if self._group and (sensor in self._group or abs(stamp_s - self._group_s) > self._config.ros2.group_s):
             self._send_group()
         if not self._group:
             self._group_s = stamp_s

@@ -75,9 +75,10 @@ class Scripted:
 
     def __init__(self, rows: Floats) -> None:
         self._rows = iter(rows)
+        self.at_s, self.rebooted = 0.0, False
 
     def take_received(self) -> Received:
-        return Received((at(0.0, next(self._rows)),), None, rebooted=False)
+        return Received((at(self.at_s, next(self._rows)),), None, rebooted=self.rebooted)
 
 
 def test_a_live_source_of_last_values_is_said_once_and_a_frozen_one_has_not_fired() -> None:
@@ -97,6 +98,25 @@ def test_silence_of_a_live_source_is_passed_on() -> None:
     driver = FreshDriver(Scripted(np.concatenate([rows, silent])), SENSORS, 2, 0.0)  # type: ignore[arg-type]  # only what is used
     got = np.array([driver.take_received().firings[0].ranges_m for _ in range(2050)])
     assert np.isposinf(got[2000:]).all()
+
+
+def test_silence_after_a_restart_of_the_source_is_passed_on() -> None:
+    """Its times begin at zero again: silence must not wait until they pass those from before."""
+    changes = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
+    silent = np.full((50, SENSORS), np.inf)
+    source = Scripted(np.concatenate([changes, silent, silent]))
+    driver = FreshDriver(source, SENSORS, 2, 0.3)  # type: ignore[arg-type]  # only what is used
+    for k in range(2050):
+        source.at_s = 0.1 * k
+        driver.take_received()
+    source.rebooted = True
+    got = []
+    for k in range(50):
+        source.at_s = 0.1 * k
+        got.append(driver.take_received().firings[0].ranges_m)
+        source.rebooted = False
+    assert np.isnan(got[0]).all(), "of a first firing nothing is known to be new"
+    assert np.isposinf(got).any(axis=0).all()
 
 
 def test_a_frozen_ring_that_was_fresh_is_passed_on_for_the_monitor() -> None:

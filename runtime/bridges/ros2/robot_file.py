@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from config.families.ros2 import SENSORS_MAX
+from drivers.firing_pattern import time_of_flight_s
 from drivers.ros_tf import Frame
 
 DEPTH_MAX: Final = 32
@@ -15,7 +16,6 @@ DEPTH_MAX: Final = 32
 DISTINCT_S: Final = 0.005
 """Readings with stamps that differ by less count as one firing."""
 STEP_MIN_S: Final = 0.02
-SOUND_M_S: Final = 343.0
 
 
 class RobotFileError(ValueError):
@@ -78,7 +78,7 @@ def robot_file(heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: f
             "the robot file by hand"
         )
     range_max_m = max(limit[1] for limit in limits)
-    step_s = max(STEP_MIN_S, 2.0 * range_max_m / SOUND_M_S + 1e-3, firing_period_s(heard.stamps_s.values()))
+    step_s = max(STEP_MIN_S, time_of_flight_s(range_max_m) + 1e-3, firing_period_s(heard.stamps_s.values()))
     return {
         "robot": {"driver": "ros2"},
         "ring": {

@@ -108,6 +108,8 @@ def test_what_is_no_list_of_constants_is_refused(text: str, said: str) -> None:
         ({"SENSORS": (("srf8", 112),)}, "or srf08, srf10 with an address"),
         ({"SENSORS": ((),)}, "a value is malformed"),
         ({"LINE": (1, 2, 3)}, "a value is malformed"),
+        ({"RESOLUTION_M": None}, "a value is neither a number nor a plain text"),
+        ({"NAME": "my\nring"}, "a value is neither a number nor a plain text"),
     ],
 )
 def test_wrong_values_are_named(changes: dict[str, Any], said: str) -> None:

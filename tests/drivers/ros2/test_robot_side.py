@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivers.denning.codec import Decoder
+from drivers.denning.frames import Echo2
 from drivers.driver import LineState
 from drivers.messages import Flags, Pose, Twist
 from tests.drivers.ros2.robot import WALL_M, ready
@@ -29,6 +31,19 @@ def test_ranges_have_the_pose_of_their_own_time() -> None:
     identity = robot.driver.identity
     assert identity is not None
     assert (identity.name, identity.sensors, identity.deadman_s) == ("ROS 2", 8, 0.3)
+
+
+def test_a_reading_that_comes_late_does_not_count_as_one_of_a_newer_firing() -> None:
+    """It would be placed where the robot is by then."""
+    side = ready().side
+    side.take_output()
+    first_s = side._last_s
+    side.reading("us0", 1.0, first_s + 0.5)
+    side.reading("us1", 1.0, first_s + 0.2)
+    side.reading("us2", 1.0, first_s + 0.501)
+    side.reading("us3", 1.0, first_s + 0.6)
+    echoes = [frame for frame in Decoder("robot").feed(side.take_output()) if isinstance(frame, Echo2)]
+    assert [echo.fired for echo in echoes] == [0b1, 0b10, 0b100]
 
 
 def test_a_velocity_is_obeyed_only_after_a_release_and_ends_with_the_host() -> None:
