@@ -62,13 +62,13 @@ class WallConfig(Strict):
             )
         return self
 
-    def pieces_m(self) -> list[tuple[float, float, float, float]]:
-        """Return both ends of the wall's straight pieces in order, m; a bent one's are about `BEND_PIECE_M` long.
+    def points_m(self) -> list[tuple[float, float]]:
+        """Return the wall's ends, and between them those of the straight pieces of a bent one, in order, m.
 
-        Each begins exactly where the one before it ends.
+        The pieces are about `BEND_PIECE_M` long.
         """
         if self.bend_m == 0.0:
-            return [(self.x1_m, self.y1_m, self.x2_m, self.y2_m)]
+            return [(self.x1_m, self.y1_m), (self.x2_m, self.y2_m)]
         dx, dy = self.x2_m - self.x1_m, self.y2_m - self.y1_m
         length = math.hypot(dx, dy)
         # The arc's half angle: tan(a/2) = bend / half chord. Points are even along the arc.
@@ -80,7 +80,11 @@ class WallConfig(Strict):
         ux, uy = dx / length, dy / length
         points = [(self.x1_m + x * ux - y * uy, self.y1_m + x * uy + y * ux) for x, y in local]
         points[0], points[-1] = (self.x1_m, self.y1_m), (self.x2_m, self.y2_m)
-        return [(*a, *b) for a, b in pairwise(points)]
+        return points
+
+    def pieces_m(self) -> list[tuple[float, float, float, float]]:
+        """Return both ends of the wall's straight pieces in order, m; each begins where the one before it ends."""
+        return [(*a, *b) for a, b in pairwise(self.points_m())]
 
 
 class BoxConfig(Strict):

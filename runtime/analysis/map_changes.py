@@ -113,6 +113,8 @@ def looks_at_wall(echoes: Echoes, ends: Sequence[float], half_angle_rad: float) 
     """
     x1, y1, x2, y2 = ends
     length = math.hypot(x2 - x1, y2 - y1)
+    if length == 0.0:  # as between the first corner of a polygon and the same one, given again at its end
+        return Looks(np.zeros(1, np.int64), np.zeros(1, np.int64))
     count = max(1, round(length / CELL_M))
     tx, ty = (x2 - x1) / length, (y2 - y1) / length
     along = (echoes["x"] - x1) * tx + (echoes["y"] - y1) * ty
@@ -277,7 +279,7 @@ def _is_near(places: Floats, sides: Floats, drums: Sequence[DrumConfig]) -> bool
     near = np.zeros(len(places), bool)
     for x1, y1, x2, y2 in sides.tolist():
         d = np.array([x2 - x1, y2 - y1])
-        share = np.clip((places - (x1, y1)) @ d / (d @ d), 0.0, 1.0)
+        share = np.clip((places - (x1, y1)) @ d / max(1e-12, float(d @ d)), 0.0, 1.0)
         near |= np.hypot(*(places - (x1, y1) - share[:, np.newaxis] * d).T) < NEAR_M
     for drum in drums:
         near |= np.abs(np.hypot(*(places - (drum.x_m, drum.y_m)).T) - drum.radius_m) < NEAR_M

@@ -48,10 +48,7 @@ def world_geojson(world: WorldConfig, name: str, frame: Literal["odom", "map"]) 
             *(("box", tuple(box.corners_m())) for box in world.box),
         )
     ]
-    walls = [
-        _feature("LineString", [_point(wall.x1_m, wall.y1_m), _point(wall.x2_m, wall.y2_m)], kind="wall")
-        for wall in world.wall
-    ]
+    walls = [_feature("LineString", [_point(*at) for at in wall.points_m()], kind="wall") for wall in world.wall]
     features = [*drums, *areas, *walls, *_marked(world.places())]
     return {"type": "FeatureCollection", "name": name, "units": "m", "frame": frame, "features": features}
 
@@ -81,9 +78,10 @@ def places_of_geojson(text: str, name: str) -> PlacesConfig:
                 table[kind].append({**row, "points_m": _corners(points)})
             elif kind in {"no_go_area", "speed_area"} and shape["type"] == "Polygon":
                 table[kind].append({**row, "vertices_m": _corners(points[0][:-1])})
+        toml = tomli_w.dumps(table)  # which has no null
     except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
         raise ConfigError(f"{name}: not GeoJSON of a map ({type(error).__name__})") from None
-    return parse_text(PlacesConfig, tomli_w.dumps(table), name)
+    return parse_text(PlacesConfig, toml, name)
 
 
 def _corners(points: list[list[float]]) -> list[tuple[float, float]]:

@@ -206,8 +206,8 @@ def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> F
     at = np.column_stack([rows["x"], rows["y"]])
     best, found = np.full(len(rows), EXPLAINED_M), np.full(len(rows), np.nan)
     contacts = [((drum.x_m, drum.y_m) - at, drum.radius_m) for drum in world.drum]
-    for wall in world.wall:
-        start, chord = np.array([wall.x1_m, wall.y1_m]), np.array([wall.x2_m - wall.x1_m, wall.y2_m - wall.y1_m])
+    for x1, y1, x2, y2 in itertools.chain.from_iterable(wall.pieces_m() for wall in world.wall):
+        start, chord = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
         along = (at - start) @ chord / max(1e-12, float(chord @ chord))
         feet = start + np.outer(np.where((along >= 0.0) & (along <= 1.0), along, np.nan), chord)
         contacts.append((feet - at, 0.0))
@@ -228,13 +228,11 @@ def _pixels_of(window: OccupancyWindow, low: Floats, rows: int, columns: int) ->
 
 
 def world_outlines(world: WorldConfig) -> list[Floats]:
-    """Return the outlines of everything in a world as chains of points, each of shape (n, 2), m."""
+    """Return drums, and the sides of all else in a world, as chains of points, each of shape (n, 2), m."""
     turn = np.linspace(0.0, 2.0 * math.pi, 49)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     drums = [(drum.x_m, drum.y_m) + drum.radius_m * circle for drum in world.drum]
-    polygons = [np.array([*polygon.vertices_m, polygon.vertices_m[0]]) for polygon in world.polygon]
-    walls = [np.array([(wall.x1_m, wall.y1_m), (wall.x2_m, wall.y2_m)]) for wall in world.wall]
-    return [*drums, *polygons, *walls]
+    return [*drums, *(np.array(side).reshape(2, 2) for side in world.sides_m())]
 
 
 def _dense(chain: Floats) -> Floats:

@@ -94,12 +94,9 @@ def rotated(points: Floats, x: float, y: float, theta: float) -> Floats:
 def world_outlines(world: WorldConfig) -> tuple[list[Floats], list[Floats]]:
     """Return the closed outlines (drums, boxes, polygons) and the lines (walls) of a world, each an array (n, 2)."""
     closed = [circle(d.x_m, d.y_m, d.radius_m) for d in world.drum]
-    for box in world.box:
-        w, d = 0.5 * box.width_m, 0.5 * box.depth_m
-        corners = np.array([[w, -d], [w, d], [-w, d], [-w, -d]])
-        closed.append(rotated(corners, box.x_m, box.y_m, math.radians(box.angle_deg)))
+    closed += [np.array(box.corners_m()) for box in world.box]
     closed += [np.array(polygon.vertices_m) for polygon in world.polygon]
-    return closed, [np.array([[w.x1_m, w.y1_m], [w.x2_m, w.y2_m]]) for w in world.wall]
+    return closed, [np.array(wall.points_m()) for wall in world.wall]
 
 
 def outline(seen: DetectedObject, model: ModelConfig | None, *, whole: bool) -> tuple[Floats, bool]:

@@ -350,7 +350,7 @@ def draw_objects(
                   gid=f"centre-{number}")  # fmt: skip
         if labelled:
             model = models.get(seen.model)
-            reach = 0.1 if model is None else model.arc_radius_m or max(math.hypot(*v) for v in model.vertices_m)
+            reach = 0.1 if model is None else model.reach_m
             one = known.get(number - 1)
             error = "" if one is None else f"\n{format_length(one.error_m, units, 3)} {units}"
             _label(

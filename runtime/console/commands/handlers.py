@@ -93,8 +93,8 @@ def start_mission(call: Call, start: StartMission) -> None:
     if mission is None or mission.name != start.name:
         if start.name not in list_shipped("missions"):
             raise CommandError(f"no mission is named {start.name}: choose one from the list", "name")
-        mission = load_mission(start.name)
         try:
+            mission = load_mission(start.name)
             with_mission(settings, mission)
         except ConfigError as error:
             raise CommandError(str(error), "name") from None

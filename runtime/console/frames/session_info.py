@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 
+from config.errors import UserError
 from config.load import list_shipped, load_mission
 from config.mission import MissionConfig
 from config.mission_step import LABELS
@@ -74,8 +76,12 @@ def missions(settings: Settings) -> list[MissionConfig]:
 
 @functools.cache
 def shipped_missions() -> tuple[MissionConfig, ...]:
-    """Return the shipped missions; their files are read once."""
-    return tuple(load_mission(name) for name in list_shipped("missions"))
+    """Return the missions that are shipped or that packages add, but for those whose files are wrong; read once."""
+    found = []
+    for name in list_shipped("missions"):
+        with contextlib.suppress(UserError):  # as one that a package adds; `echolocate check` says what is wrong
+            found.append(load_mission(name))
+    return tuple(found)
 
 
 def surfaces(world: WorldConfig, start: StartConfig) -> SurfacesRow:
@@ -90,7 +96,7 @@ def surfaces(world: WorldConfig, start: StartConfig) -> SurfacesRow:
     polygons += [[in_odom(*corner) for corner in box.corners_m()] for box in world.box]
     return {
         "drums": [(*in_odom(drum.x_m, drum.y_m), drum.radius_m) for drum in world.drum],
-        "walls": [(*in_odom(wall.x1_m, wall.y1_m), *in_odom(wall.x2_m, wall.y2_m)) for wall in world.wall],
+        "walls": [(*in_odom(x1, y1), *in_odom(x2, y2)) for wall in world.wall for x1, y1, x2, y2 in wall.pieces_m()],
         "polygons": polygons,
     }
 

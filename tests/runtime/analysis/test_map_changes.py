@@ -112,6 +112,16 @@ def test_boxes_and_polygons_that_are_gone() -> None:
     assert (corrected.box, corrected.polygon) == ((), (polygon,))
 
 
+def test_a_polygon_whose_first_corner_is_given_again_and_a_wall_without_length_are_compared() -> None:
+    closed = PolygonConfig(vertices_m=((1.0, 1.5), (3.0, 1.5), (2.0, 2.5), (1.0, 1.5)))
+    point = WallConfig(x1_m=9.0, y1_m=9.0, x2_m=9.0, y2_m=9.0)
+    known = WorldConfig(polygon=(closed,), wall=(point,))
+    found = WorldConfig(wall=(WALL.model_copy(update={"y1_m": 5.0, "y2_m": 5.0}),))
+    said, corrected = compare(known, found, looking_up({(1.0, 3.0): 1.5}))
+    assert said == ["new: wall at (2.00, 5.00) m, 4.00 m long"]
+    assert corrected.polygon == (closed,)
+
+
 def test_looks_count_only_within_the_beam_and_in_reach() -> None:
     circle = (2.0, 1.0, 0.3)
     echoes = looking_up({(0.0, 4.0): 0.7})

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from config.robot import FiringConfig, RingConfig, SensorConfig
-from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
+from config.world import BoxConfig, DrumConfig, PolygonConfig, WallConfig, WorldConfig
 from runtime.analysis.export.occupancy_image import (
     CELL_M,
     FREE,
@@ -60,6 +60,15 @@ def test_free_is_what_sound_has_passed_and_where_the_robot_stood_and_occupied_wh
     assert (value_at(image, -0.15, 0.0), value_at(image, -0.3, 0.0)) == (FREE, UNKNOWN)
 
 
+def test_boxes_and_bent_walls_of_a_corrected_map_are_occupied_where_they_are() -> None:
+    """A run in a known room has them from the room's file."""
+    box = BoxConfig(x_m=2.0, y_m=1.0, width_m=1.0, depth_m=0.5)
+    bent = WallConfig(x1_m=1.0, y1_m=-1.0, x2_m=4.0, y2_m=-1.0, bend_m=0.3)
+    image = occupancy_image(WorldConfig(box=(box,), wall=(bent,)), readings(3.0), RING, WAY, BODY_M)
+    assert [value_at(image, x, y) for x, y in ((2.0, 0.76), (1.51, 1.0), (2.5, -0.71))] == [OCCUPIED] * 3
+    assert value_at(image, 2.5, -1.01) == UNKNOWN
+
+
 def test_where_all_surfaces_were_mapped_other_echoes_are_strays() -> None:
     """The grid's cell is not free for that, nor are those beside it."""
     wall = WorldConfig(wall=(WallConfig(x1_m=-1.0, y1_m=1.0, x2_m=4.0, y2_m=1.0),))
@@ -96,7 +105,7 @@ def test_what_was_recognised_is_occupied_wherever_sound_has_passed() -> None:
     image = occupancy_image(world, readings(6.0, 6.0), RING, WAY, BODY_M)
     for x, y in ((1.7, 0.0), (2.3, 0.0), (2.0, 0.3), (0.5, 1.0), (3.5, -1.0), (4.0, -1.5), (3.52, -1.52)):
         assert value_at(image, x, y) == OCCUPIED, (x, y)
-    assert len(world_outlines(world)) == 3
+    assert len(world_outlines(world)) == 5
 
 
 def test_the_files_are_those_of_map_server(tmp_path: Path) -> None:

@@ -91,6 +91,9 @@ def test_the_outlines_of_a_world() -> None:
     assert sorted(map(tuple, np.round(box, 9).tolist())) == [(3.5, -1.0), (3.5, 1.0), (4.5, -1.0), (4.5, 1.0)]
     assert polygon.tolist() == [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
     assert wall.tolist() == [[-1.0, 0.0], [-1.0, 3.0]]
+    bent = world.wall[0].model_copy(update={"bend_m": 0.2})
+    _, (points,) = world_outlines(world.model_copy(update={"wall": (bent,)}))
+    assert points[:, 0].min() == pytest.approx(-1.2, abs=1e-3), "drawn as the emulated robot hears it"
 
 
 def test_the_region_to_show_holds_the_world_or_else_the_segments() -> None:
