@@ -22,7 +22,7 @@ from config.places import check_places
 from config.plugins import plugged_table
 from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
-from config.settings import GoalConfig, Settings
+from config.settings import MODELS_MAX, GoalConfig, Settings
 from config.strict import Strict
 from config.study import StudyConfig
 from config.world import WorldConfig
@@ -49,8 +49,6 @@ __all__ = [
 DEFAULT_RUN = DEFAULT_WORLD = "hallway"
 DEFAULT_MODEL = "semicircle"
 """The paper's experiment: defaults of a run whose file does not name them."""
-MODELS_MAX = 64
-"""Largest number of model files of one run."""
 COMMAND_LINE = Source("command line")
 NAMES = ("robot", "world", "models", "mission")
 """Keys of a run file that name other files; `robot` may also be a section."""

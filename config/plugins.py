@@ -5,6 +5,7 @@ Nothing of a package is imported before a file names it. Names that are shipped 
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Iterable
 from importlib.metadata import EntryPoint, entry_points
 from importlib.resources import files
@@ -43,7 +44,7 @@ def load_plugin(entry: EntryPoint) -> object:
     Raises
     ------
     PluginError
-        It cannot be imported.
+        It cannot be imported, or fails as it is; the text has the error of the package's own code.
     """
     found, why = None, None
     try:
@@ -52,8 +53,11 @@ def load_plugin(entry: EntryPoint) -> object:
             why = f"the folder {next(iter(module.__path__))} hides it: start Python in another folder"
         else:
             found = entry.load()
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, SyntaxError) as error:
         why = str(error)
+    except Exception as error:  # noqa: BLE001 - a package's module may raise anything
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        why = f"{type(error).__name__}: {error}, at {at.filename}:{at.lineno}"
     if why is not None:
         raise PluginError(
             f'the plug-in "{entry.name}" cannot be loaded from {entry.value} ({why}); reinstall or update the '

@@ -20,6 +20,8 @@ from config.robot import RingConfig, RobotConfig
 from config.strict import Strict, TomlList
 from config.world import WorldConfig
 
+MODELS_MAX: Final = 60
+"""Most models of a run."""
 TRACKS_MAX: Final = 1000
 ITERATIONS_MAX: Final = 1_000_000
 QUANTA_MAX: Final = 1000
@@ -290,7 +292,7 @@ class ConsoleConfig(Strict):
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections first, then models, world, perception and behaviours."""
 
-    models: TomlList[ModelConfig] = Field(min_length=1, max_length=60)
+    models: TomlList[ModelConfig] = Field(min_length=1, max_length=MODELS_MAX)
     """The objects to recognise."""
     world: WorldConfig | None = None
     """The world of the emulator, which runs if no port is given."""

@@ -19,7 +19,6 @@ from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.clients.control import Holder
 from runtime.console.commands.command import CommandContext
-from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.dispatcher import CommandDispatcher
 from runtime.console.commands.parameters import parameters
 from runtime.console.commands.place_commands import places_message
@@ -340,7 +339,7 @@ class Console:
             return files.jobs.path_of(int(job), name) if job.isascii() and job.isdigit() and len(job) < 10 else None
         try:
             return await files.find(name)
-        except CommandError:
+        except UserError:
             return None
 
     def _start_task(self, client: Client, work: Callable[[], Awaitable[None]]) -> None:

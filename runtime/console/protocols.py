@@ -109,7 +109,7 @@ class RecordingControl(Protocol):
 
 
 class ReplayControl(Protocol):
-    """Shows recordings, to each client its own; a CommandError of any call is the client's answer."""
+    """Shows recordings, to each client its own; a UserError of any call is the client's answer."""
 
     async def recordings(self) -> list[ListedRecording]:
         """Return the recordings that can be opened."""
@@ -140,7 +140,7 @@ class ReplayControl(Protocol):
 
 
 class JobControl(Protocol):
-    """Makes reports and maps of recordings, one at a time; a CommandError of any call is the client's answer."""
+    """Makes reports and maps of recordings, one at a time; a UserError of any call is the client's answer."""
 
     broadcast: Callable[[JobMessage], None]
     """Sends every client how far a job is."""
@@ -156,7 +156,7 @@ class JobControl(Protocol):
 
 
 class SettingsFileControl(Protocol):
-    """The files of this run's settings; a CommandError of any call is the client's answer."""
+    """The files of this run's settings; a UserError of any call is the client's answer."""
 
     def listed(self) -> list[SettingsRow]:
         """Return the files."""
@@ -181,7 +181,7 @@ class SettingsFileControl(Protocol):
 
 
 class FileControl(Protocol):
-    """The recordings as files; a CommandError of any call is the client's answer."""
+    """The recordings as files; a UserError of any call is the client's answer."""
 
     @property
     def jobs(self) -> JobControl:

@@ -109,7 +109,7 @@ def test_every_missing_file_is_reported(tmp_path: Path) -> None:
         ("world", True, "world = true: must be a name or a path (a string), not true or false"),
         ("models", 1.5, "models = 1.5: must be a list of names, not a number with a fraction"),
         ("models", ["box", 7], "models.1 = 7: must be a name or a path (a string), not an integer"),
-        ("models", ["nowhere"] * 65, "models: may have at most 64 entries, has 65"),
+        ("models", ["nowhere"] * 65, "models: may have at most 60 entries, has 65"),
         ("models", [], "models = []: needs at least one entry, has 0"),
     ],
 )

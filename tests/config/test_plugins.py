@@ -60,12 +60,13 @@ def _package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     files = {
         "plug_family.py": FAMILY, "plug_lists.py": LISTS, "plug_wants.py": FAMILY.replace("default=1.0, ", ""),
         "plug_broken.py": "import plug_missing\n", "plug_data/__init__.py": "",
+        "plug_raises.py": "\nlimit = 1 / 0\n", "plug_typo.py": "limit = = 1\n",
         "plug_data/models/tub.toml": CRATE, "plug_data/robots/skippy.toml": ROBOT + "[skippy]\ntrim = 1.1\n",
         "plug_data/models/drum.toml": CRATE, "plug_hidden/plug_hidden/__init__.py": FAMILY,
     }  # fmt: skip
     install(monkeypatch, tmp_path / "site", files, {
         DRIVERS: {"skippy": "plug_family", "wants": "plug_wants", "lists": "plug_lists", "broken": "plug_broken",
-                  "hidden": "plug_hidden"},
+                  "hidden": "plug_hidden", "raises": "plug_raises", "typo": "plug_typo"},
         "echolocate.schemas": {"none": "plug_family"},
         "echolocate.models": {"mine": "plug_data.models", "gone": "plug_gone.models"},
         "echolocate.robots": {"mine": "plug_data.robots"},
@@ -114,6 +115,8 @@ def test_a_table_may_have_any_type_that_toml_can_write(tmp_path: Path) -> None:
         ("[skipy]\ntrim = 1.0\n", "skipy: unknown key"),
         ("[broken]\ntrim = 1.0\n", 'the plug-in "broken" cannot be loaded'),
         ("[hidden]\ntrim = 1.0\n", "plug_hidden hides it: start Python in another folder"),
+        ("[raises]\ntrim = 1.0\n", "plug_raises (ZeroDivisionError: division by zero, at "),
+        ("[typo]\ntrim = 1.0\n", "cannot be loaded from plug_typo (invalid syntax (plug_typo.py, line 1))"),
     ],
 )
 def test_what_is_wrong_in_it_is_named_with_its_place(tmp_path: Path, text: str, said: str) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from typing import TypeVar
 
-from config.errors import UserError
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import (
@@ -79,17 +78,8 @@ async def add_bookmark(call: Call, bookmark: AddBookmark) -> None:
 
 
 async def undo_bookmark(call: Call, _: NoArguments) -> str:
-    """Withdraw the last bookmark; return its text.
-
-    Raises
-    ------
-    CommandError
-        There is none, or it cannot be withdrawn any more.
-    """
-    try:
-        return await _recording(call).undo_bookmark()
-    except UserError as error:
-        raise CommandError(str(error)) from error
+    """Withdraw the last bookmark; return its text."""
+    return await _recording(call).undo_bookmark()
 
 
 async def list_recordings(call: Call, _: NoArguments) -> list[ListedRecording]:

@@ -119,7 +119,7 @@ class Command(Generic[Arguments]):
     """A frozen dataclass of its arguments: an edit or a drive request itself, or one of `messages`."""
     permission: Permission
     handler: Callable[[Call, Arguments], Any]
-    """Carries it out and returns the data of the answer; raises CommandError if it cannot. A coroutine function runs
+    """Carries it out and returns the data of the answer; raises a UserError if it cannot. A coroutine function runs
     as a task of its own, one at a time for each client."""
     can_begin_motion: Callable[[Arguments], bool] = never
     """Whether the robot may begin to move by these arguments: the message must then carry a fresh challenge."""

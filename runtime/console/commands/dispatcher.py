@@ -7,6 +7,7 @@ from inspect import iscoroutinefunction
 from typing import Any, Final, Protocol
 
 from behaviors.teleoperation import TELEOPERATION_ENDED
+from config.errors import UserError
 from perception.undo import Undo
 from runtime.console.clients.client import Client
 from runtime.console.commands.command import ANSWERED_LATER, Call, Command, CommandContext, Permission
@@ -57,7 +58,7 @@ class CommandDispatcher:
             return
         try:
             data = self._run(client, message)
-        except CommandError as error:
+        except UserError as error:
             self._refuse(client, message.id, error)
         else:
             if data is not ANSWERED_LATER:
@@ -143,7 +144,7 @@ class CommandDispatcher:
         async def run() -> None:
             try:
                 data = await command.handler(call, message.arguments)
-            except CommandError as error:
+            except UserError as error:
                 self._refuse(call.client, call.id, error)
             else:
                 _answer(call.client, call.id, data)
@@ -151,7 +152,7 @@ class CommandDispatcher:
         self._start_task(call.client, run)
         return ANSWERED_LATER
 
-    def _refuse(self, client: Client, number: int | None, error: CommandError) -> None:
+    def _refuse(self, client: Client, number: int | None, error: UserError) -> None:
         self._log.answer_refusal(str(error), client.name)
         _send_answer(client, number, None, error)
 
@@ -160,14 +161,17 @@ def _answer(client: Client, number: int, data: object) -> None:
     _send_answer(client, number, data, None)
 
 
-def _send_answer(client: Client, number: int | None, data: object, error: CommandError | None) -> None:
-    """Send the answer to the command of this number: its data, or the error for which it was refused."""
+def _send_answer(client: Client, number: int | None, data: object, error: UserError | None) -> None:
+    """Send the answer to the command of this number: its data, or the error for which it was refused.
+
+    A `CommandError` also names the field of the page that is wrong.
+    """
     answer: AnswerMessage = {
         "type": "answer",
         "id": number,
         "ok": error is None,
         "error": None if error is None else str(error),
-        "field": None if error is None else error.field,
+        "field": error.field if isinstance(error, CommandError) else None,
         "data": data,
     }
     client.send(answer)

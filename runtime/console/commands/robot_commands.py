@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from config.errors import UserError
 from config.load import ConfigError, parse_text
 from config.robot import RobotConfig
 from config.robot_file import RobotDraft, robot_text
@@ -20,7 +19,7 @@ def robot_file(call: Call, given: DescribeRobot) -> str:
 
     Raises
     ------
-    CommandError
+    UserError
         A value is out of its bounds, the ring cannot fire so, or the robot would not see where it drives.
     """
     text = robot_text(RobotDraft(**asdict(given)))
@@ -30,6 +29,6 @@ def robot_file(call: Call, given: DescribeRobot) -> str:
         refuse_undrivable(Settings.model_validate(settings))
     except ConfigError as error:
         raise CommandError("; ".join(line.removeprefix("robot: ") for line in error.problems)) from None
-    except (UserError, ValueError) as error:
+    except ValueError as error:
         raise CommandError(str(error)) from None
     return text

@@ -13,7 +13,7 @@ import tomli_w
 
 from config.errors import UserError
 from config.layers import Location
-from config.load import MODELS_MAX, ConfigError, parse_text, with_room, with_value
+from config.load import ConfigError, parse_text, with_room, with_value
 from config.model import ModelConfig
 from config.places import PlacesConfig
 from config.problems import shown
@@ -100,8 +100,6 @@ class Tuning:
 
         def proposed() -> Settings:
             models = (*self.current.models, model)
-            if len(models) > MODELS_MAX:
-                raise CommandError(f"{MODELS_MAX} models are recognised already, which is the limit", "toml")
             return with_value(self.current, SOURCE, ("models",), [m.model_dump(mode="json") for m in models])
 
         problem = await self._prepare(self.current, self._validated("toml", proposed).settings)

@@ -7,15 +7,13 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
-from config.errors import UserError
 from runtime.console.commands.command_error import CommandError
 from runtime.console.files.jobs import Jobs, Kind
 from runtime.recording.folder_files import delete_recording, pin_recording, rename_recording
 from runtime.recording.storage import find_recording
 
-T = TypeVar("T")
 UNDO_MAX: Final = 50
 """New names and pins that can be taken back."""
 NO_UNDO: Final = "there is no new name or pin of a recording to undo"
@@ -59,11 +57,11 @@ class RecordingFiles:
 
         Raises
         ------
-        CommandError
+        UserError
             It was not done.
         """
         self._refuse_live(file)
-        name = await _in_thread(partial(rename_recording, self._folder, file, to))
+        name = await asyncio.to_thread(rename_recording, self._folder, file, to)
         if name != file:
             back = partial(rename_recording, self._folder, name, file)
             self._undos.append((f"{name} is {file} again", back))
@@ -74,10 +72,10 @@ class RecordingFiles:
 
         Raises
         ------
-        CommandError
+        UserError
             It was not done.
         """
-        was_pinned = await _in_thread(partial(pin_recording, self._folder, file, pinned=pinned))
+        was_pinned = await asyncio.to_thread(pin_recording, self._folder, file, pinned=pinned)
         if was_pinned is not pinned:
             back = partial(pin_recording, self._folder, file, pinned=was_pinned)
             self._undos.append((f"{file} is {'pinned' if was_pinned else 'unpinned'} again", back))
@@ -87,13 +85,13 @@ class RecordingFiles:
 
         Raises
         ------
-        CommandError
+        UserError
             There is none, or the recording is no longer as it left it.
         """
         if not self._undos:
             raise CommandError(NO_UNDO)
         done, back = self._undos.pop()
-        await _in_thread(back)
+        await asyncio.to_thread(back)
         return done
 
     async def delete(self, file: str) -> None:
@@ -101,11 +99,11 @@ class RecordingFiles:
 
         Raises
         ------
-        CommandError
+        UserError
             It was not done.
         """
         self._refuse_live(file)
-        await _in_thread(partial(delete_recording, self._folder, file))
+        await asyncio.to_thread(delete_recording, self._folder, file)
 
     async def make(self, kind: Kind, file: str) -> int:
         """Begin to make something of a recording, and return the job's number.
@@ -127,17 +125,3 @@ class RecordingFiles:
         """
         if str(self._folder / file) == self._current():
             raise CommandError(f"{file} is being written: stop recording first")
-
-
-async def _in_thread(work: Callable[[], T]) -> T:
-    """Do work with files in a thread and return its result.
-
-    Raises
-    ------
-    CommandError
-        It is refused.
-    """
-    try:
-        return await asyncio.to_thread(work)
-    except UserError as error:
-        raise CommandError(str(error)) from error

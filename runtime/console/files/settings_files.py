@@ -213,7 +213,7 @@ class SettingsFiles:
         if problems := self._check(document, text)["problems"]:
             raise CommandError(f"{document.name} is not saved: {problems[0]['text']}")
         if "\r\n" in before["text"]:  # a page has plain line ends
-            text = "\r\n".join(text.splitlines()) + "\r\n"
+            text = text.replace("\r\n", "\n").replace("\n", "\r\n")
         self._put(document, document.path, text)
         return self._read(document)
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
 
-from config.files import Kind
+from config.errors import UserError
+from config.files import ConfigError, Kind, parse_toml
 from config.layers import Location
-from config.plugins import DRIVERS, PluginError, plugged, plugged_table, plugged_use
+from config.plugins import DRIVERS, plugged, plugged_table, plugged_use
 from config.toml_edit import TomlEditError, TomlValue, with_value
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.parameters import TOML, fields_of
@@ -30,10 +30,9 @@ def form_of(kind: Kind, text: str) -> list[SettingsTable]:
         Its text, which need not be valid.
     """
     try:
-        document = tomllib.loads(text)
-        found = _tables(kind, document)
+        found = _tables(kind, parse_toml(text, "text"))
         return [_table(place, model, values) for place, model, values in found]
-    except (tomllib.TOMLDecodeError, PluginError):  # which the check of the text names
+    except UserError:  # the text or a package is wrong, which the check of the text says
         return []
 
 
@@ -75,8 +74,8 @@ def _read(path: str, text: str) -> TomlValue:
         It says none, or several.
     """
     try:
-        said = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError as error:
+        said = parse_toml(f"value = {text}", "the value")
+    except ConfigError as error:
         raise CommandError(f"{path}: not a value in TOML ({error}); write it as [1, 2] or [{{name = 1}}]") from None
     if len(said) > 1:
         raise CommandError(f"{path}: more than one value; write it as [1, 2] or [{{name = 1}}]")

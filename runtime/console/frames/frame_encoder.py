@@ -144,9 +144,11 @@ class FrameEncoder:
         self._cluster_boxes: list[list[float]] = []
         self._objects: list[ObjectRow] = []
         self._segment_counts: tuple[int, int] | None = None
+        """Of the segments encoded last: equal counts mean equal segments …"""
         self._is_stale = True
-        """The counts of the segments last encoded: equal counts mean equal segments, unless this is set."""
+        """… unless this is set."""
         self._number = 0
+        """Of the last frame."""
         self._archived = ChangingRows(_object)
         self._polylines = ChangingRows(_polyline)
 

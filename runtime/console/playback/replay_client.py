@@ -244,8 +244,10 @@ class ReplayClient:
         self._workers += 1
         try:
             process = await start_child(self._program, [str(path)], pipes=True, low_priority=True)
-        except BaseException:
+        except BaseException as error:
             self._workers -= 1
+            if isinstance(error, OSError):
+                raise ReplayError(f"no process can be started to replay it: {error.strerror}; try again") from error
             raise
         replay = ReplayProcess(process, partial(_forward, viewer), viewer.send)
         try:

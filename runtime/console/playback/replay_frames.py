@@ -54,10 +54,5 @@ class ReplayFrames:
         return grid_message(replayed.state)
 
 
-def make_replay_frames(settings: Settings, *, emulated: bool) -> ReplayFrames:
-    """Return the frame maker for settings of a recording."""
-    return ReplayFrames(settings, emulated=emulated)
-
-
 if __name__ == "__main__":
-    sys.exit(run_worker(sys.argv[1], make_replay_frames))
+    sys.exit(run_worker(sys.argv[1], ReplayFrames))

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import pytest
 
+from config.errors import UserError
 from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.protocols import Viewer
@@ -111,6 +112,19 @@ async def test_an_async_command_is_answered_when_it_is_done(message: dict[str, A
     async with open_console() as case:
         page = await case.page()
         assert (await page.ask(**message))["error"] == f"{message['type']}: not available in this run"
+
+
+async def test_any_error_that_says_what_to_do_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def full() -> str:
+        raise UserError("the disk is full: delete recordings")
+
+    stub = StubControl()
+    monkeypatch.setattr(stub, "undo_bookmark", full)
+    async with open_console(recording=stub) as case:
+        page = await case.page()
+        answer = await page.ask(type="undo_bookmark")
+        assert (answer["error"], answer["field"]) == ("the disk is full: delete recordings", None)
+        assert case.run.health.fault() is None
 
 
 async def test_a_client_that_leaves_ends_its_command() -> None:

@@ -97,8 +97,9 @@ async def test_line_ends_of_another_system_are_kept(run: Run) -> None:
     run.robot.write_bytes(run.robot.read_bytes().replace(b"\n", b"\r\n"))
     number = run.number("mine.toml")
     held = await run.files.read(number)
-    await run.files.save(number, "# mine\n" + held["text"].replace("\r\n", "\n"), held["digest"])
+    await run.files.save(number, "# mine\u2028still mine\n" + held["text"].replace("\r\n", "\n"), held["digest"])
     assert run.robot.read_bytes().count(b"\r\n") == run.robot.read_bytes().count(b"\n") > 20
+    assert run.robot.read_text().startswith("# mine\u2028still mine\n"), "no line end, though it ends a line of text"
 
 
 async def test_a_run_is_started_again_only_with_settings_that_are_right(run: Run) -> None:

@@ -97,6 +97,11 @@ def test_files_without_such_a_table_have_no_form() -> None:
         assert form_of(kind, text) == [], text  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("value", ["1" * 5000, "1" * 20, "[" * 2000], ids=["5000 digits", "64 bits", "nested"])
+def test_a_text_with_a_value_that_cannot_be_read_has_no_form(value: str) -> None:
+    assert form_of("robots", f'robot.driver = "skippy"\n[skippy]\ntrim = {value}\n') == []
+
+
 def test_a_mission_has_each_use_of_a_schema() -> None:
     (table,) = form_of("missions", MISSION)
     assert (table["title"], values([table])) == ("step 1, orbit", {"step.0.schemas.1.way_m": 0.5})
@@ -121,7 +126,7 @@ def test_a_list_is_changed_as_a_text_in_toml(said: str, path: str, value: str) -
     assert values(form_of("robots", default))[path] != value
 
 
-@pytest.mark.parametrize("value", ["[1, ", "1\nname = 2", "", "one"])
+@pytest.mark.parametrize("value", ["[1, ", "1\nname = 2", "", "one", pytest.param("1" * 5000, id="5000 digits")])
 def test_what_is_no_value_in_toml_is_refused(value: str) -> None:
     with pytest.raises(CommandError, match=r"skippy\.masks: "):
         with_setting("robots", 'robot.driver = "skippy"', "skippy.masks", value)

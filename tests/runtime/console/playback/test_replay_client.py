@@ -120,6 +120,19 @@ async def test_a_recording_with_refused_keyframes_is_played_and_they_are_named(f
         assert "canyon_map.firings is -7" in problem["error"]
 
 
+async def test_a_process_that_cannot_be_started_is_an_answer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def full(*_args: object, **_named: object) -> None:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    page = Page()
+    async with replay_client(folder) as client:
+        with monkeypatch.context() as patch:
+            patch.setattr("runtime.console.playback.replay_client.start_child", full)
+            for _ in range(WORKERS_MAX + 1):
+                with pytest.raises(ReplayError, match="no process can be started to replay it: Resource temporarily"):
+                    await client.open(page, "hall.mcap")
+
+
 async def test_invalid_recordings_positions_and_speeds_are_refused(folder: Path) -> None:
     page = Page()
     async with replay_client(folder) as client:

@@ -14,7 +14,7 @@ from perception.edits import DeleteSegments
 from runtime.cli.commands.run.serve_console import REPLAY_PROGRAM
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.console.playback.replay_cursor import ReplayCursor
-from runtime.console.playback.replay_frames import make_replay_frames
+from runtime.console.playback.replay_frames import ReplayFrames
 from runtime.console.playback.replay_worker import PlaybackPosition
 from runtime.cycle.inputs import OperatorInput, Request
 from runtime.cycle.modes import Mode
@@ -45,7 +45,7 @@ def test_the_changes_of_all_frames_add_up_to_the_last_map(folder: Path) -> None:
     seen: dict[int, Any] = {}
     with open_recording(folder / "hall.mcap") as recording:
         cursor = ReplayCursor(recording)
-        frames = make_replay_frames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
+        frames = ReplayFrames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
         for replayed in cursor.seek(cursor.cycles):
             frames.take(replayed.record)
             parts = frames.frame(replayed, PlaybackPosition(cursor.t_s, is_playing=True, speed=2.0))
@@ -89,7 +89,7 @@ def test_frames_of_a_recording_have_its_cross_paths(tmp_path: Path) -> None:
     record(load_settings("hallway", ["perception.method=paper"], robot="ears"), tmp_path / "ears.mcap", 1.0)
     with open_recording(tmp_path / "ears.mcap") as recording:
         cursor = ReplayCursor(recording)
-        frames = make_replay_frames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
+        frames = ReplayFrames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
         for at in (cursor.cycles, cursor.cycles // 2):
             heard: list[float] = []
             for replayed in cursor.seek(at):
