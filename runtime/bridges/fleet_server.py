@@ -16,6 +16,7 @@ from aiohttp import web
 from config.errors import UserError
 from runtime.bridges.fleet import Fleet
 from runtime.console.http.auth import Auth, new_token, url_host
+from runtime.console.http.server import local_address
 from runtime.console.http.static_files import page_files, security_headers
 
 TOKEN_HEADER: Final = "X-Echolocate-Token"  # noqa: S105 - the name of a header
@@ -40,7 +41,7 @@ async def serve_fleet(fleet: Fleet, host: str, port: int, urls: Sequence[str], t
     Raises
     ------
     UserError
-        A URL is wrong, or the port is in use.
+        A URL is wrong, or it cannot listen there.
     """
     for url in urls:
         if (problem := fleet.add(url)) is not None:
@@ -50,7 +51,10 @@ async def serve_fleet(fleet: Fleet, host: str, port: int, urls: Sequence[str], t
     try:
         listening = await asyncio.get_running_loop().create_server(server, host, port)
     except OSError as error:
-        raise UserError(f"--port {port}: {error.strerror or error}; name another port") from error
+        raise UserError(
+            f"cannot listen on {host}, port {port}: {error.strerror or error}; give an address of this machine with "
+            f"--host, or another --port"
+        ) from error
     port = listening.sockets[0].getsockname()[1]
     handler.auth = Auth(new_token(), (host,), port)
     tell(f"fleet: http://{url_host(host)}:{port}/?token={handler.auth.token}")
@@ -77,8 +81,7 @@ class _Handler:
     async def answer(self, request: web.BaseRequest) -> web.StreamResponse:
         """Return the response to a request, with its headers."""
         host = request.headers.get("Host", "")
-        name = None if request.transport is None else request.transport.get_extra_info("sockname")
-        if self.auth.host_error(host, str(name[0]) if name else "") is not None:
+        if self.auth.host_error(host, local_address(request)) is not None:
             return web.Response(status=421, text="this is not the address of the fleet page")
         response = await self._respond(request, host)
         response.headers.update(security_headers(host))

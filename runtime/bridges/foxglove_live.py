@@ -78,6 +78,8 @@ class _Bridge(ServerListener):
         self._loop, self._report, self._allow_set = loop, report, allow_set
         self._client: ConsoleClient | None = None
         """The connection to the run; None without one."""
+        self._changes = 0
+        """Changes of settings under way, for which this client keeps control."""
         self._settings: dict[str, Message] = {}
         """Settings of the run that a page can change, by path."""
 
@@ -95,12 +97,11 @@ class _Bridge(ServerListener):
                     case "session":
                         self.channels.begin(message, at)
                         self._keep(message["parameters"])
-                        if client.has_control:
-                            await client.request("release_control")
                     case "parameters":
                         self._keep(message["parameters"])
-                    case "role" if client.asked_by is not None and client.has_control:
-                        await client.request("grant_control", client=client.asked_by)
+                # Control may come unasked, as to the first client of a run, or late, from a page that had it before.
+                if message["type"] in {"session", "role"} and client.has_control and not self._changes:
+                    await client.request("release_control")
         finally:
             self._client = None
 
@@ -145,15 +146,20 @@ class _Bridge(ServerListener):
         client = self._client
         if client is None:
             raise UserError("there is no connection to the run")
-        if not client.has_control:
-            await client.request("take_control")
         whole = known["kind"] == "int" and isinstance(value, float)
         empty = known["optional"] and value == ""
         new = None if empty else int(value) if whole else value
-        await client.request("set_parameter", path=known["path"], value=new)
-        known["value"] = new
-        with contextlib.suppress(UserError):
-            await client.request("release_control")
+        self._changes += 1
+        try:
+            if not client.has_control:
+                await client.request("take_control")
+            await client.request("set_parameter", path=known["path"], value=new)
+            known["value"] = new
+        finally:
+            self._changes -= 1
+            if client.has_control and not self._changes:
+                with contextlib.suppress(UserError):
+                    await client.request("release_control")
 
     def _keep(self, settings: list[Message]) -> None:
         """Take in the settings of the run, and show them in Foxglove."""

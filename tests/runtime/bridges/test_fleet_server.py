@@ -69,6 +69,11 @@ def test_commands_need_the_page_s_own_origin() -> None:
     served(body)
 
 
+def test_an_address_of_another_computer_is_named() -> None:
+    with pytest.raises(UserError, match=r"cannot listen on 192\.0\.2\.1, port 0"):
+        asyncio.run(serve_fleet(Fleet(lambda: 0.0, list), "192.0.2.1", 0, [], print))
+
+
 def test_a_wrong_url_is_refused() -> None:
     fleet = Fleet(lambda: 0.0, list)
     with pytest.raises(UserError, match="give the start URL"):

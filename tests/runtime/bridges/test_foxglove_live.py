@@ -107,6 +107,29 @@ async def test_a_setting_changes_only_where_that_is_allowed() -> None:
         )
 
 
+async def test_control_is_kept_only_while_a_setting_changes() -> None:
+    async with open_console() as case, viewing(case, allow_set=True) as viewer:
+        hub = case.console.hub
+
+        def held() -> bool:
+            return any(hub.control.is_held_by(client) for client in hub.clients.values())
+
+        path = next(one["path"] for one in _parameters(case) if one["kind"] == "float" and one["value"])
+        await parameter(viewer, path)
+        change = {"op": "setParameters", "parameters": [{"name": path, "value": -1e9}], "id": "2"}
+        await viewer.connection.send_json(change)
+        assert path.rpartition(".")[2] in (await viewer.until("status"))["message"], "refused"
+        await case.settled(lambda: not held(), "control back after a refused change")
+        page = await case.page()
+        assert (await page.ask(type="take_control"))["ok"]
+        await viewer.connection.send_json(change)
+        assert "has control" in (await viewer.until("status"))["message"]
+        case.clock[0] += 11.0
+        hub.control.expire(case.clock[0])
+        await case.settled(lambda: not held(), "control back that came after the change was given up")
+        await page.socket.close()
+
+
 def _parameters(case: ConsoleCase) -> list[Any]:
     from runtime.console.commands.parameters import parameters
 
