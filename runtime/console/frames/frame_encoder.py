@@ -113,12 +113,8 @@ class EncodedFrame(NamedTuple):
             Whether the client has control.
         """
         fields = self.changes if follows else self.whole()
-        return b'%b,%b,"dropped":%d,"controller":%b}' % (
-            self.head,
-            fields,
-            dropped,
-            b"true" if controls else b"false",
-        )
+        controller = b"true" if controls else b"false"
+        return b'%b,%b,"dropped":%d,"controller":%b}' % (self.head, fields, dropped, controller)
 
 
 class FrameEncoder:
@@ -253,16 +249,14 @@ class FrameEncoder:
         """Return what is driven, as the page shows it."""
         match drive_request:
             case Goal(x=x, y=y, frame=frame, heading=heading):
-                at = None if place is None else (round(place.x, 4), round(place.y, 4))
-                is_done = drive_request.reached and (heading is None or drive_request.aligned)
                 return {
                     "kind": "goal",
                     "x": x,
                     "y": y,
                     "heading": heading,
                     "frame": frame,
-                    "at": at,
-                    "reached": is_done,
+                    "at": None if place is None else (round(place.x, 4), round(place.y, 4)),
+                    "reached": drive_request.reached and (heading is None or drive_request.aligned),
                 }
             case Teleoperate(v=v, w=w):
                 return {"kind": "teleoperate", "v": v, "w": w}
@@ -312,8 +306,6 @@ def _json_numbers(values: Iterable[float], places: int) -> list[float | None]:
 
 def _object(detected: DetectedObject) -> ObjectRow:
     """Return an object in the wire's form, m and rad, in the frame of `detected`."""
-    ends = detected.ends
-    x1, y1, x2, y2 = ends or (0.0, 0.0, 0.0, 0.0)
     return {
         "number": detected.number,
         "model": detected.model,
@@ -328,7 +320,7 @@ def _object(detected: DetectedObject) -> ObjectRow:
         "score": round(detected.score, 4),
         "confirmed": detected.confirmed,
         "placed": detected.placed,
-        "ends": None if ends is None else (round(x1, 3), round(y1, 3), round(x2, 3), round(y2, 3)),
+        "ends": None if detected.ends is None else _line(*detected.ends),
     }
 
 
@@ -357,12 +349,15 @@ def _rounded(pose: Pose) -> Triple:
     return round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)
 
 
+def _line(x1: float, y1: float, x2: float, y2: float) -> tuple[float, float, float, float]:
+    return round(x1, 3), round(y1, 3), round(x2, 3), round(y2, 3)
+
+
 def _canyon(canyon: Canyon) -> CanyonRow:
     """Return a box canyon in odometry's frame, m and rad."""
-    x1, y1, x2, y2 = canyon.mouth
     return {
         "number": canyon.number,
-        "mouth": (round(x1, 3), round(y1, 3), round(x2, 3), round(y2, 3)),
+        "mouth": _line(*canyon.mouth),
         "axis": round(canyon.axis_rad, 4),
         "depth": round(canyon.depth_m, 3),
         "probability": round(canyon.probability, 3),
