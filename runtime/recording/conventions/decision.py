@@ -239,7 +239,7 @@ def _find_angles(table: Table, robot: RobotConfig, options: RingLogOptions, unit
     left = list(echoes)
     if len(left) > 1 and options.heading == "auto":
         _check_aim(table, robot, units, motion, default)
-    forward = [one for one in near if one not in backward]
+    forward = [one for one in near if one not in backward] or near  # all: it drove as far backward as forward
     ways, unshifted = [default, *near], Shift(default, 0, 0.0)
     shift = _checked_order(table, robot, options, units, forward, ways, echoes) if motion.is_related else unshifted
     fits = [one for one in left if one in near]

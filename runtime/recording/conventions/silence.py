@@ -202,7 +202,7 @@ def _one_value(value: float, finite: Floats) -> Silence:
 
 def _top(finite: Floats) -> Silence | None:
     """Return a narrow band at the top of the ranges, if there is one."""
-    centre = float(np.quantile(finite, 1.0 - max(GLITCHES, 3.0 / len(finite))))
+    centre = float(np.quantile(finite, max(0.0, 1.0 - max(GLITCHES, 3.0 / len(finite)))))
     for _ in range(5):
         near = finite[np.abs(finite - centre) <= BAND * centre]
         centre = float(np.median(near))

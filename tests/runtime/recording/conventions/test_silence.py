@@ -46,6 +46,12 @@ def test_what_is_said_is_silence(wanted: str, silent: Floats) -> None:
     np.testing.assert_array_equal(got[~is_silent], rows.ranges[~is_silent])
 
 
+def test_of_few_ranges_the_greatest_is_silence_where_that_is_said() -> None:
+    rows, _ = table(np.array([7.6]), 0.0)
+    few = rows._replace(t=rows.t[:2], pose=rows.pose[:2], ranges=np.array([[1.0, np.nan], [np.nan, 2.0]]))
+    assert find_silence(few, "max", 1).applied(few.ranges)[1, 1] == np.inf
+
+
 def test_a_number_is_exact_and_leaves_glitches_above_it() -> None:
     rows, _ = table(np.array([7.6]))
     rows.ranges[5, 0] = 34.0
