@@ -15,6 +15,9 @@ import struct
 from pathlib import Path
 from typing import Final
 
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
 from runtime.recording.mcap_file import PROFILE
 
 INDEX: Final = ".echolocate-recordings"
@@ -24,8 +27,6 @@ INDEX_MAX: Final = 1 << 22
 
 _HEAD: Final = struct.Struct("<8sBQI")
 """Beginning of an MCAP file: magic, opcode and length of its header, length of the profile."""
-_MAGIC: Final = b"\x89MCAP0\r\n"
-_HEADER_OPCODE: Final = 1
 
 
 def create_listed(path: Path) -> None:
@@ -85,7 +86,7 @@ def _is_ours(head: bytes) -> bool:
     if len(head) < _HEAD.size:
         return False
     magic, opcode, _, _ = _HEAD.unpack_from(head)
-    return magic == _MAGIC and opcode == _HEADER_OPCODE and head[_HEAD.size :].startswith(f"{PROFILE}/".encode())
+    return magic == MCAP0_MAGIC and opcode == Opcode.HEADER and head[_HEAD.size :].startswith(f"{PROFILE}/".encode())
 
 
 def _append(index: Path, name: str) -> None:

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
-from types import TracebackType
 from typing import Any, Final
 
 from llvmlite.binding import get_host_cpu_name
@@ -145,9 +144,7 @@ class Recorder:
         self._writer.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._writer.stop()
 
     @property

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import stat
 import tempfile
 import time
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from urllib.parse import urlsplit
 
 from config.errors import UserError
 from runtime.support.file_lock import file_lock, is_locked
+from runtime.support.user_folders import read_private
 
 FOLDER: Final = "consoles"
 NEWEST: Final = "console-address"
@@ -109,16 +109,10 @@ def _read(path: Path) -> str:
     UserError
         It is not this user's alone.
     """
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
-    try:
-        about = os.fstat(fd)
-        if not stat.S_ISREG(about.st_mode) or about.st_uid != os.geteuid() or about.st_mode & 0o077:
-            raise UserError(
-                f"others can read or write the address in {path}: delete this file and start the run again"
-            )
-        return os.read(fd, _BYTES_MAX).decode("utf-8", "replace").strip()
-    finally:
-        os.close(fd)
+    held = read_private(path, _BYTES_MAX)
+    if held is None:
+        raise UserError(f"others can read or write the address in {path}: delete this file and start the run again")
+    return held.decode("utf-8", "replace").strip()
 
 
 def _leave(path: Path, folder: Path) -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from config.errors import UserError
+from runtime.support.user_folders import read_private
 
 NAME: Final = "console-token"
 _FORM: Final = re.compile(rb"[A-Za-z0-9_-]{22,128}\n?")
@@ -72,14 +72,8 @@ def _read(path: Path) -> str:
     UserError
         It holds none, or is not this user's alone.
     """
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
-    try:
-        about = os.fstat(fd)
-        is_private = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and not about.st_mode & 0o077
-        held = os.read(fd, _BYTES_MAX) if is_private else b""
-    finally:
-        os.close(fd)
-    if not is_private:
+    held = read_private(path, _BYTES_MAX)
+    if held is None:
         raise UserError(f"others could know the console's token in {path}: delete this file, and a new one is made")
     if _FORM.fullmatch(held) is None:
         raise UserError(f"{path} holds no token of the console: delete this file, and a new one is made")

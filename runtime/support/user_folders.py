@@ -1,4 +1,4 @@
-"""Folders of the user: for the program's state, and those that a setting names with a tilde.
+"""Folders of the user: for the program's state, those that a setting names with a tilde, and private files in them.
 
 A user may have no home folder: in a container, a process can have a number without an entry in the list of users.
 """
@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -47,6 +49,23 @@ def users_own(find: Callable[[str], Path]) -> Path | None:
         folder = find(NAME)
         return folder if folder.is_absolute() else None  # earlier versions return a folder of the name ~
     return None
+
+
+def read_private(path: Path, bytes_max: int) -> bytes | None:
+    """Return the first bytes of a file that is this user's alone; None if others can read or write it.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, or is a link.
+    """
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        about = os.fstat(fd)
+        is_private = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and not about.st_mode & 0o077
+        return os.read(fd, bytes_max) if is_private else None
+    finally:
+        os.close(fd)
 
 
 @functools.cache

@@ -68,11 +68,14 @@ class Pacer:
             self._locked_s = round(period_s / self._step_s) * self._step_s
         else:
             self._locked_s = self._step_s / round(self._step_s / period_s)
+        """Time from cycle to cycle while they follow the echoes."""
         self._last_begin_s: float | None = None
         self._due_s = begin_s
         self._deadline_s = begin_s
         self._called_s: float | None = None
+        """Arrival of the echo that begins the next cycle at once; None where none calls for it yet."""
         self._oldest_s: float | None = None
+        """Arrival of the first echo since the last cycle began, None without one; and of the last echo of all."""
         self._echo_s: float | None = None
         self._is_locked = False
         self.missed = 0
@@ -169,7 +172,10 @@ class Pacer:
         return self._locked_s - EARLY * min(self._step_s, self._locked_s)
 
     def _plan(self, begin_s: float) -> None:
-        """Plan the cycle after the one that began at `begin_s`."""
+        """Plan the cycle after the one that began at `begin_s`: when it is due, and its deadline.
+
+        It is due with the first expected echo that does not come too early, or else on the grid of its own period.
+        """
         before_s, self._is_locked = self._due_s, self._has_echoes(begin_s)
         if not self._is_locked or self._echo_s is None:
             behind = math.floor((begin_s - before_s) / self._own_s + EARLY + ROUNDING)

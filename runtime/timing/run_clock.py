@@ -104,8 +104,11 @@ class ScaledClock(RunClock):
         self._limit_run_s = math.inf
         """The run's time never passes this: where the emulator has acknowledged its time, or time was resumed."""
         self._acknowledged_run_s = -math.inf
+        """The time that the emulator has reached under the present time scale; −inf until it says so."""
         self._latest_run_s = -math.inf
+        """The latest time that was returned."""
         self._due_s: float | None = None
+        """When the next cycle is due; None before the first one is planned."""
         self._cycles_left: int | None = None
         """Cycles that may still begin; None while time is not paused."""
         self._calls: list[Callable[[], None]] = []

@@ -116,12 +116,16 @@ class TimingMonitor:
         self._callbacks = {name: Series(is_touched=True) for name in callbacks}
         self._echo_wait = Series(is_touched=True)
         self._spans: list[Span] = []
+        """What was measured since the newest cycle began: its phases, and the callbacks after it."""
         self._phases_s: dict[str, float] = {}
         self._busy_s = 0.0
+        """Their duration together, by the run's clock."""
         self._start: CycleStart | None = None
         self._begin: ClockSample | None = None
+        """Of the newest cycle; None before the first one. `_mark` is the end of its last phase so far."""
         self._mark: ClockSample | None = None
         self._last: ClockSample | None = None
+        """The end of the last span, or the beginning of the one in progress; None before the first one."""
         self._busy_since_run_s = 0.0
         self._following = 0
         self._period_s = 0.0
