@@ -36,8 +36,8 @@ class Promise(NamedTuple):
 LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
     "most such silences are named at once, others by a line after half a metre, or after twice the longest silence "
-    "so far if that is more. After 4 m without anything new the robot creeps. What it had not heard before may be "
-    "touched until then.",
+    "so far if that is more, at the latest after 4 m; from the line on the robot creeps. What it had not heard "
+    "before may be touched until then.",
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
     "become so where the ring hears few echoes at that moment (three to eight: in 11 of 32 drives of rings of "
     "8, 16 and 24 sensors among mirrors something was touched when ranges became too long, in 0 of 16 when "
@@ -63,11 +63,9 @@ LIMITS: Sequence[str] = (
     "are exchanged. In a ring of more sensors they are not named at all. One of eight or fewer that is turned "
     "otherwise, and a ring that is turned by a half among few surfaces, as in a corridor: 6 of 16 drives of rings of "
     "8, 16 and 24 sensors then touched something, 1 of 16 turned by a quarter, and 0 of 16 by 45°.",
-    "A frozen ring that hears next to nothing: an AmigoBot in a corridor whose one echo lay behind it was named "
-    "after a second, and touched the end at .13 m/s 19 s later, in 1 of some 54 drives; a `parking12` in one was "
-    "named after 2 s, and touched it at .3 m/s 4 s later, the only one of 680 frozen or silent drives of 17 robots.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
-    "then; after 4 m without anything new the robot creeps. Where nothing echoes, silence is true and false alike.",
+    "then; after half a metre or twice the longest such way so far the robot creeps. Where nothing echoes, silence "
+    "is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
     "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
     "since it is there after .33 s.",
@@ -78,8 +76,8 @@ LIMITS: Sequence[str] = (
     "as it draws near at a slant. Such a robot turns and looks to both sides every 2.5 m, remembers the walls that "
     "it heard, and presumes that they go on; a wall that begins between two looks is not known. A ring that does not "
     "turn with the wheels cannot look: a goal or mission that leads to its blind side is refused. Nor does a ring "
-    "all round hear such a wall between two beams that do not touch: a `p3at`, of whose ring 10° at 70° from "
-    "ahead hear nothing, touched one in 7 h of honest drives, and none of 17 robots in the 9.5 h since.",
+    "all round hear such a wall between two beams that do not touch, as 10° at 70° from ahead of a `p3at`: what "
+    "it heard of the wall before counts there, what it never heard does not.",
     "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",
     "Odometry that is wrong by less than a quarter: the map suffers, and the distances that are kept do not.",
 )

@@ -3,7 +3,8 @@
 A mirror answers only where a beam meets it at a right angle. A robot whose ring has gaps can drive towards a wall
 whose normal lies in a gap, and never hear it. So the ring remembers walls as it heard them: for each direction in
 the odometry's frame, how far away a wall stood that faces from there. As the robot moves, the foot of the
-perpendicular on that wall moves along it, and stands for it as an echo would.
+perpendicular on that wall moves along it, and stands for it as an echo would. A ring all round remembers walls, too:
+they go on while it hears nothing new (`perception.obstacle_echoes.unheard_echoes`).
 
 An echo may come from any direction in its beam, so it stands for a wall in each. The beams that cover a direction
 decide by a likelihood ratio: an echo at the wall's distance is for it, silence and longer ranges are against it.
@@ -34,6 +35,9 @@ HIT_NAT: Final = math.log(0.92 / 0.03)
 MISS_NAT: Final = math.log(0.08 / 0.97)
 """Log of the likelihood ratio of an echo at the wall's distance, and of a look without it: a sensor hears the wall 92
 times in 100, and by chance three times in 100 something at its distance, as the emulator's noise has it."""
+MISSED_SHARE: Final = 0.9
+"""Beams that cover a direction but for a degree have missed it: by so much a robot that drives straight ahead winds.
+At the edge of a gap a drum that was passed else stayed a wall ahead, and a `hobby8` crept for half a minute."""
 SURE_NAT: Final = 2.0 * HIT_NAT
 """Two echoes are as sure as it gets, so that a wall that has left is soon forgotten."""
 KEPT_M: Final = 2.5
@@ -59,6 +63,54 @@ class BlindWall(Record):
     x: Place
     """Place of the ring at the last look, m."""
     y: Place
+    missed_low: Annotated[float, Bound(0.0, WIDTH_RAD)]
+    """How much of the direction beams have missed since that look, rad: from its lower edge on, …"""
+    missed_high: Annotated[float, Bound(0.0, WIDTH_RAD)]
+    """… and up to its upper edge."""
+
+
+@kernel
+def misses_all_of(one: BlindWall, off: float, half_angle: float) -> bool:
+    """Enter that a beam misses the wall of a direction, and return whether beams have now missed it in all of that.
+
+    One beam may hold but a part of a direction, and the next one the rest.
+
+    Parameters
+    ----------
+    one : record
+        What is remembered of the direction. Updated.
+    off : float
+        Angle from the beam's axis to the direction, rad.
+    half_angle : float
+        Half the width of a beam, rad.
+    """
+    low, high = off - 0.5 * WIDTH_RAD, off + 0.5 * WIDTH_RAD
+    if low >= -half_angle:
+        one.missed_low = max(one.missed_low, min(WIDTH_RAD, half_angle - low))
+    if high <= half_angle:
+        one.missed_high = max(one.missed_high, min(WIDTH_RAD, high + half_angle))
+    return bool(one.missed_low + one.missed_high >= MISSED_SHARE * WIDTH_RAD)
+
+
+@kernel
+def forget_ahead(x: float, y: float, heading: float, walls: Records[BlindWall]) -> None:
+    """Forget the directions ahead into which the ring looked from too far away.
+
+    Parameters
+    ----------
+    x, y, heading, walls
+        As of `enter_looks`.
+    """
+    least = KEPT_M
+    for _ in range(2):
+        for k in range(len(walls)):
+            one = walls[k]
+            is_ahead = abs(wrapped(k * WIDTH_RAD - heading)) < 0.5 * math.pi
+            if is_ahead and one.is_known == 1 and math.hypot(x - one.x, y - one.y) > least:
+                one.is_known, one.odds = 0, 0.0
+        for k in range(len(walls)):
+            if abs(wrapped(k * WIDTH_RAD - heading)) < 0.5 * math.pi and walls[k].is_known == 0:
+                least = AGAIN_SHARE * KEPT_M
 
 
 @kernel
@@ -95,35 +147,27 @@ def enter_looks(
         own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
         for k in range(len(walls)):
-            off = abs(wrapped(k * WIDTH_RAD - axis))
-            if off > half_angle:
+            off = wrapped(k * WIDTH_RAD - axis)
+            if abs(off) > half_angle + 0.5 * WIDTH_RAD:
                 continue
             one = walls[k]
             if math.hypot(x - one.x, y - one.y) > KEPT_M:
                 one.odds = 0.0
             along = own_x * math.cos(k * WIDTH_RAD) + own_y * math.sin(k * WIDTH_RAD)
             away = one.offset - along
-            if one.odds > 0.0 and abs(r - away) <= WALL_ECHO_M:
+            may_hear = abs(off) <= half_angle
+            if may_hear and one.odds > 0.0 and abs(r - away) <= WALL_ECHO_M:
                 one.odds = min(SURE_NAT, one.odds + HIT_NAT)
                 one.offset += 0.5 * (r - away)
-            elif math.isfinite(r) and (one.odds <= 0.0 or r < away):  # what is nearer hides the wall
+            elif may_hear and math.isfinite(r) and (one.odds <= 0.0 or r < away):  # what is nearer hides the wall
                 one.odds = HIT_NAT
                 one.offset = along + r
-            elif off <= half_angle - 0.5 * WIDTH_RAD:  # the whole direction lies in the beam
+            elif misses_all_of(one, off, half_angle):
                 one.odds = max(0.0, one.odds + MISS_NAT)
             else:
                 continue
-            one.is_known, one.x, one.y = 1, x, y
-    least = KEPT_M
-    for _ in range(2):
-        for k in range(len(walls)):
-            one = walls[k]
-            is_ahead = abs(wrapped(k * WIDTH_RAD - heading)) < 0.5 * math.pi
-            if is_ahead and one.is_known == 1 and math.hypot(x - one.x, y - one.y) > least:
-                one.is_known, one.odds = 0, 0.0
-        for k in range(len(walls)):
-            if abs(wrapped(k * WIDTH_RAD - heading)) < 0.5 * math.pi and walls[k].is_known == 0:
-                least = AGAIN_SHARE * KEPT_M
+            one.is_known, one.x, one.y, one.missed_low, one.missed_high = 1, x, y, 0.0, 0.0
+    forget_ahead(x, y, heading, walls)
 
 
 class BlindWalls:
@@ -141,12 +185,20 @@ class BlindWalls:
 
     SCRATCH: Final = ("records",)
     """A view of `_walls`."""
-    BOUNDS: Final = bounds(_mounts=CONSTANT, _half_angle=CONSTANT, _radius_m=CONSTANT, _walls=BlindWall.BOUNDS)
+    BOUNDS: Final = bounds(
+        _mounts=CONSTANT,
+        _half_angle=CONSTANT,
+        has_gaps=CONSTANT,
+        _radius_m=CONSTANT,
+        _walls=BlindWall.BOUNDS,
+    )
 
     def __init__(self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = ()) -> None:
         self._mounts, self._turning, self._half_angle = mounts, turning, half_angle
         self._walls = zeros(BlindWall, TURN_DIRECTIONS)
         self.records = records(BlindWall, self._walls)
+        self.has_gaps = widest_gap(mounts) > 2.0 * half_angle + ROUNDING_RAD
+        """Whether there are directions that no beam holds."""
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.has_looked_round = False
         """Whether the robot was to look everywhere in this silence."""
@@ -265,13 +317,23 @@ def middle_walls(offsets_m: Floats) -> Floats:
 
 
 def has_blind_sides(mounts: Floats, half_angle: float) -> bool:
-    """Return whether a ring has a gap as wide as a beam: narrower ones close as the robot turns a little.
+    """Return whether a ring has a gap as wide as a beam, so that the robot must look into it; narrower ones close.
 
     Parameters
     ----------
     mounts, half_angle
         As of `BlindWalls`.
     """
+    return widest_gap(mounts) > 4.0 * half_angle
+
+
+def widest_gap(mounts: Floats) -> float:
+    """Return the greatest angle between the axes of neighbouring sensors, rad.
+
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        As of `BlindWalls`.
+    """
     axes = np.sort(np.remainder(mounts[:, 2], math.tau))
-    gaps = np.diff(axes, append=axes[0] + math.tau)
-    return bool(gaps.max() > 4.0 * half_angle)
+    return float(np.diff(axes, append=axes[0] + math.tau).max())

@@ -276,6 +276,7 @@ class FreshEchoes:
         _bearings=PLACE,
         _times=PLACE._replace(infinite=True),
         _heard_reach_m=CONSTANT,
+        _is_blind=CONSTANT,
         _radius_m=CONSTANT,
     )
 
@@ -295,7 +296,8 @@ class FreshEchoes:
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.unheard = UnheardEchoes(mounts)
         """What the ring has lost."""
-        self._blind_walls = BlindWalls(mounts, half_angle, turning) if has_blind_sides(mounts, half_angle) else None
+        self._walls = BlindWalls(mounts, half_angle, turning)
+        self._is_blind = has_blind_sides(mounts, half_angle)
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
@@ -326,16 +328,16 @@ class FreshEchoes:
         )
         if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
             since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
-            heard = self._heard if self._blind_walls is None else self._in_beams(pose, mounts)
+            heard = self._in_beams(pose, mounts) if self._is_blind else self._heard
             keep_sudden(self._points, self._times, heard, self._steady, since, pose[0], pose[1], self.unheard.records)
-        if self._blind_walls is not None:
+        if self._is_blind:
             if self.unheard.is_ring_silent:
-                self._blind_walls.look_again(pose[0], pose[1], self.unheard.has_been_silent)
+                self._walls.look_again(pose[0], pose[1], self.unheard.has_been_silent)
             elif not self.unheard.has_been_silent:
-                self._blind_walls.has_looked_round = False
-            if heard_new and self.unheard.silences[UNCHANGED]:
-                self.unheard.presume_walls(pose[0], pose[1], self._blind_walls)
-            self._blind_walls.update(firing)
+                self._walls.has_looked_round = False
+        if heard_new and self.unheard.silences[UNCHANGED]:
+            self.unheard.presume_walls(pose[0], pose[1], self._walls)
+        self._walls.update(firing)
 
     def _in_beams(self, pose: RingPose, mounts: Floats) -> NDArray[np.bool_]:
         """Return which echoes lie in a beam now, shape (n, looks): a turn takes few sensors away from all others."""
@@ -383,15 +385,14 @@ class FreshEchoes:
         pose, axes_rad
             As of `BlindWalls.sides`.
         """
-        if self._blind_walls is None:
+        if not self._walls.has_gaps:
             return points, np.zeros(0), np.zeros((0, 2))
-        walls, unknown, presumed = self._blind_walls.sides(pose, axes_rad)
-        return np.concatenate([points, walls]), unknown, presumed
+        walls, unknown, presumed = self._walls.sides(pose, axes_rad)
+        return np.concatenate([points, walls]), unknown if self._is_blind else unknown[:0], presumed
 
     def clear(self) -> None:
         """Remove all readings."""
-        if self._blind_walls is not None:
-            self._blind_walls.clear()
+        self._walls.clear()
         self._heard[:] = False
         self._steady[:] = False
         self.unheard.clear()

@@ -26,12 +26,12 @@ REACH_M = 5.0
 MOUNTS = np.array([[0.2 * math.cos(a), 0.2 * math.sin(a), a] for a in np.radians([-30.0, -10.0, 10.0, 30.0])])
 
 
-def heard(pose: Pose, normal_rad: float, offset_m: float) -> Floats:
-    """Return what the ring hears of an endless mirror."""
+def heard(pose: Pose, normal_rad: float, offset_m: float, mounts: Floats = MOUNTS) -> Floats:
+    """Return what a ring hears of an endless mirror."""
     c, s = math.cos(pose.theta), math.sin(pose.theta)
-    x, y = pose.x + c * MOUNTS[:, 0] - s * MOUNTS[:, 1], pose.y + s * MOUNTS[:, 0] + c * MOUNTS[:, 1]
+    x, y = pose.x + c * mounts[:, 0] - s * mounts[:, 1], pose.y + s * mounts[:, 0] + c * mounts[:, 1]
     ranges = offset_m - x * math.cos(normal_rad) - y * math.sin(normal_rad)
-    off = np.abs(np.remainder(pose.theta + MOUNTS[:, 2] - normal_rad + math.pi, math.tau) - math.pi)
+    off = np.abs(np.remainder(pose.theta + mounts[:, 2] - normal_rad + math.pi, math.tau) - math.pi)
     return np.where((off <= HALF) & (ranges > 0.0) & (ranges < REACH_M), ranges, math.inf)
 
 
@@ -199,3 +199,42 @@ def test_a_ring_that_fell_silent_looks_again_and_once_everywhere_if_that_lasts()
     look_round(walls, on.x, on.y, 0.5, 1.0)
     walls.look_again(on.x, on.y, is_lasting=True)
     assert not len(sides(walls, on)[1]), "a failed ring would have it turn for ever"
+
+
+@pytest.mark.parametrize("robot", ["p3at", "peoplebot"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mirror_between_two_beams_stands_where_it_was_heard_before_the_robot_turned(robot: str, seed: int) -> None:
+    """A `p3at` turned along a wall until its normal lay in a gap of 10°, and touched it in honest drives."""
+    rng, ring = np.random.default_rng([seed, 5]), load_robot(robot).ring
+    mounts, half = mounts_array(ring.mounts), math.radians(ring.beam_half_angle_deg)
+    walls, normal, offset = BlindWalls(mounts, half), float(rng.uniform(-math.pi, math.pi)), 0.8
+    for off_deg in range(30, 71, 4):
+        pose = Pose(0.0, 0.0, normal + math.radians(off_deg))
+        walls.update(Firing(0.0, pose, pose.theta, heard(pose, normal, offset, mounts)))
+    for way in np.arange(0.0, 0.6, 0.03).tolist():
+        pose = Pose(way * math.cos(pose.theta), way * math.sin(pose.theta), pose.theta)
+        ranges = heard(pose, normal, offset, mounts)
+        assert not np.isfinite(ranges).any()
+        walls.update(Firing(0.0, pose, pose.theta, ranges))
+        points, unknown, _ = walls.sides(pose, pose.theta + mounts[:, 2])
+        true_m = offset - pose.x * math.cos(normal) - pose.y * math.sin(normal)
+        assert np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y).min() == pytest.approx(true_m, abs=0.15)
+        assert not len(unknown), "it need not look into so narrow a gap"
+
+
+@pytest.mark.parametrize("heading_deg", [0.0, 0.4, 3.0, 7.0])
+def test_two_beams_that_touch_miss_a_wall_together(heading_deg: float) -> None:
+    """Neither holds all of a direction: a drum that was passed stayed a wall ahead, and the robot crept."""
+    mounts, theta = np.array([[0.1, 0.0, a] for a in np.radians([0.0, 25.0, 50.0])]), math.radians(heading_deg)
+    walls, pose = BlindWalls(mounts, HALF), Pose(0.0, 0.0, theta)
+    for _ in range(2):
+        walls.update(Firing(0.0, pose, theta, np.ones(3)))
+    assert np.isfinite(walls.offsets(0.0, 0.0)).sum() >= 7
+    for _ in range(3):
+        for i in range(3):
+            ranges = np.full(3, math.nan)
+            ranges[i] = math.inf
+            walls.update(Firing(0.0, pose, theta, ranges))
+    left_deg = np.degrees(WIDTH_RAD * np.flatnonzero(np.isfinite(walls.offsets(0.0, 0.0)))) - heading_deg
+    edges = (np.abs(left_deg - 65.0) < 5.0) | (np.abs(left_deg + 15.0) < 5.0) | (np.abs(left_deg - 345.0) < 5.0)
+    assert edges.all(), "only directions at the edge of what the beams cover remain"

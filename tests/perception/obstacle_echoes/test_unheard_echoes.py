@@ -198,14 +198,15 @@ def test_few_sensors_that_turn_away_from_what_they_heard_have_not_lost_it() -> N
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_walls_beside_a_ring_go_on_while_it_hears_nothing(seed: int) -> None:
-    """It looked round between two mirrors, fell silent, and drives at one of them, wherever it turns."""
-    rng = np.random.default_rng([seed, 9])
-    mounts = mounts_array(load_robot("hobby3").ring.mounts)
-    half, tilt = math.radians(15.0), float(rng.uniform(-math.pi, math.pi))
+@pytest.mark.parametrize(("robot", "is_frozen"), [("hobby3", False), ("parking12", False), ("parking12", True)])
+def test_walls_beside_a_ring_go_on_while_it_hears_nothing_new(robot: str, is_frozen: bool, seed: int) -> None:
+    """It looked round between two mirrors, failed, and drives at one of them, wherever it turns."""
+    rng, config = np.random.default_rng([seed, 9]), load_robot(robot).ring
+    mounts, half = mounts_array(config.mounts), math.radians(config.beam_half_angle_deg)
+    tilt = float(rng.uniform(-math.pi, math.pi))
     ring, t = FreshEchoes(mounts, half, (), 4.0), 0.0
     for theta in np.arange(0.0, math.tau, 0.1).tolist():
-        ranges = np.full(3, math.inf)
+        ranges = np.full(len(mounts), math.inf)
         for normal, offset in ((tilt, 0.5), (tilt + math.pi, 0.6)):
             axes = theta + mounts[:, 2]
             off = np.abs(np.remainder(axes - normal + math.pi, math.tau) - math.pi)
@@ -215,13 +216,15 @@ def test_walls_beside_a_ring_go_on_while_it_hears_nothing(seed: int) -> None:
         t += 0.1
     towards = tilt + float(rng.uniform(-0.7, 0.7))
     assert ring.unheard.presumed_way_m(Pose(0.0, 0.0, towards), 0.1) == math.inf or not np.isfinite(ranges).any()
-    for _ in range(6):
-        ring.update(Firing(t, Pose(0.0, 0.0, towards), towards, np.full(3, math.inf)))
+    failed = ranges if is_frozen else np.full(len(mounts), math.inf)
+    for k in range(6):  # a ring that stands may hear the same again
+        ring.update(Firing(t, Pose(0.0, 0.0, towards + 0.01 * k), towards + 0.01 * k, failed))
         t += 0.1
     true_m = 0.4 / math.cos(towards - tilt)
     assert true_m - 0.15 < ring.unheard.presumed_way_m(Pose(0.0, 0.0, towards), 0.1) < true_m + 0.05
     along = tilt + 0.5 * math.pi
-    assert ring.unheard.presumed_way_m(Pose(0.0, 0.0, along), 0.1) > 1.5, "between them the way is free"
-    ring.update(Firing(t, Pose(0.0, 0.0, towards), towards, np.array([math.inf, 3.0, math.inf])))
+    assert ring.unheard.presumed_way_m(Pose(0.0, 0.0, along), 0.1) > 1.2, "between them the way is free"
+    ranges[1] = 3.0
+    ring.update(Firing(t, Pose(0.0, 0.0, towards), towards, ranges))
     assert ring.unheard.presumed_way_m(Pose(0.0, 0.0, towards), 0.1) == math.inf, "it hears again"
     ring.clear()
