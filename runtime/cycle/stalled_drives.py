@@ -16,16 +16,16 @@ from runtime.cycle.drive_requests import DriveRequest, Legs
 from runtime.cycle.goal_drive import GoalDrive
 
 LEG_STALLED: Final = (
-    "less than {:.2g} m farther along the leg for {:.0f} s: something is in the way, or the schemas cancel one "
-    "another; if that lasts, the leg turns back or ends"
+    "less than {gain_m:.2g} m farther along the leg for {stalled_s:.0f} s: something is in the way, or the schemas "
+    "cancel one another; if that lasts, the leg turns back or ends"
 )
 GOAL_STALLED: Final = (
-    "less than {:.2g} m nearer to the goal for {:.0f} s: the robot looks for a way round what is between; if that "
-    "lasts, the goal is given up"
+    "less than {gain_m:.2g} m nearer to the goal for {stalled_s:.0f} s: the robot looks for a way round what is "
+    "between; if that lasts, the goal is given up"
 )
 STEP_STALLED: Final = (
-    "step {} has made no progress for {:.0f} s: something is in the way, or the schemas cancel one another; if that "
-    "lasts, the step is stuck"
+    "step {step} has made no progress for {stalled_s:.0f} s: something is in the way, or the schemas cancel one "
+    "another; if that lasts, the step is stuck"
 )
 
 
@@ -74,14 +74,14 @@ def observe_way(
     """
     behaviors = settings.behaviors
     gain_m = due_m(min(settings.body.speed_max_m_s, behaviors.arbiter.base_velocity_m_s))
-    progress, stalled_s, stalled = WayProgress(), 0.0, GOAL_STALLED.format(gain_m, STALLED_S)
+    progress, stalled_s, stalled = WayProgress(), 0.0, GOAL_STALLED
     nearest_m = None if goal_drive is None else goal_drive.progress.nearest_m
     match request:
         case Goal() if not request.reached and nearest_m is not None:
             progress = before.observe(nearest_m, gain_m, requested_run_s, run_s, outbound=True)
             stalled_s = progress.stalled_s(run_s)
         case Mission(progress=mission):
-            stalled = STEP_STALLED.format(request.step.name, STALLED_S)
+            stalled = STEP_STALLED
             to_goal = request.step.goal is not None
             left_m, stalled_s = (nearest_m, 0.0) if to_goal else (mission.best_m, mission.step_s - mission.best_s)
             if left_m and (to_goal or not stands):  # it leads somewhere, and not only a turn is left
@@ -91,6 +91,9 @@ def observe_way(
         case Legs() if not stands:
             left_m, outbound = -along_m(pose, leg, behaviors.move_ahead), leg.outbound
             progress = before.observe(left_m, gain_m, requested_run_s, run_s, outbound=outbound)
-            stalled, stalled_s = LEG_STALLED.format(gain_m, STALLED_S), progress.stalled_s(run_s)
+            stalled, stalled_s = LEG_STALLED, progress.stalled_s(run_s)
             leg = given_up(leg, behaviors.move_ahead) if stalled_s >= ENDED_S else leg
-    return progress, leg, stalled if stalled_s >= STALLED_S else None
+    if stalled_s < STALLED_S:
+        return progress, leg, None
+    step = request.step.name if isinstance(request, Mission) else ""
+    return progress, leg, stalled.format(gain_m=gain_m, stalled_s=STALLED_S, step=step)
