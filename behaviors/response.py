@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from config.bounded import Coordinate
+from config.bounded import VectorPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,8 +13,8 @@ class Response:
     """A schema's vector in the odometry's frame, its gain included; length 1 requests the base velocity."""
 
     schema: str
-    x: Coordinate
-    y: Coordinate
+    x: VectorPart
+    y: VectorPart
 
 
 def summed(responses: Iterable[Response]) -> tuple[float, float]:

@@ -17,6 +17,8 @@ COORDINATE_MAX: Final = 1e6
 """Greatest coordinate, m; also the greatest unwrapped angle, rad."""
 SPEED_MAX: Final = 1e6
 """Greatest velocity, m/s and rad/s."""
+VECTOR_MAX: Final = 1e12
+"""Greatest part of a schema's vector: what pushes without bound has 1e6, by a gain of at most 100, for each echo."""
 RANGE_MAX_M: Final = 1e3
 """Greatest range, m; a sensor listens up to 100 m at most."""
 COUNT_MAX: Final = 2**53
@@ -26,6 +28,7 @@ Seconds: TypeAlias = Annotated[float, Field(ge=-TIME_MAX_S, le=TIME_MAX_S, allow
 Coordinate: TypeAlias = Annotated[float, Field(ge=-COORDINATE_MAX, le=COORDINATE_MAX, allow_inf_nan=False)]
 """A place or a way, m, or an angle, rad."""
 Speed: TypeAlias = Annotated[float, Field(ge=-SPEED_MAX, le=SPEED_MAX, allow_inf_nan=False)]
+VectorPart: TypeAlias = Annotated[float, Field(ge=-VECTOR_MAX, le=VECTOR_MAX, allow_inf_nan=False)]
 Count: TypeAlias = Annotated[int, Field(ge=0, le=COUNT_MAX)]
 Number: TypeAlias = Annotated[int, Field(ge=-COUNT_MAX, le=COUNT_MAX)]
 Sign: TypeAlias = Annotated[int, Field(ge=-1, le=1)]

@@ -10,8 +10,13 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import numpy as np
 import pytest
 
+from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.move_ahead import Leg
+from behaviors.response import Response, summed
+from config.behaviors import AvoidStaticObstacleConfig
 from config.load import load_settings
+from drivers.messages import Pose
+from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import decode, encode
@@ -24,6 +29,7 @@ from runtime.recording.schema import (
     perception_snapshot,
     state_fields,
 )
+from tests.behaviors.views import EVERYWHERE
 
 RECORD = np.dtype([("x", "<f8", (2,)), ("flag", "?"), ("inner", [("count", "<i4")])])
 
@@ -62,6 +68,19 @@ def test_the_carried_state_comes_back() -> None:
     found = state_fields(frame)
     assert found == fields
     assert repr(found) == repr(fields)
+
+
+def test_a_push_without_bound_comes_back() -> None:
+    """Arkin's repulsion inside the safety margin, with the largest gain, from a whole ring on one side."""
+    config = AvoidStaticObstacleConfig(avoid_obstacle_gain=100.0, summing="sum")
+    angles = np.linspace(-0.5, 0.5, 256)
+    near = np.column_stack([0.3 * np.cos(angles), 0.3 * np.sin(angles)])
+    push = avoid_static_obstacle(Percept(Pose(0.0, 0.0, 0.0), near, EVERYWHERE), 0.3, config)
+    assert math.hypot(push.x, push.y) > 1e10
+    state = a_state()
+    state.vectors = (push, Response("sum", *summed((push, push))))
+    fields = carried_state(state)
+    assert state_fields(decode(Keyframe, encode(keyframe(1, 0.05, fields, {})))) == fields
 
 
 def test_pieces_of_serial_data_keep_their_times() -> None:
