@@ -36,8 +36,8 @@ class Promise(NamedTuple):
 LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
     "most such silences are named at once, others by a line after half a metre, or after twice the longest silence "
-    "so far if that is more, at the latest after 4 m; from the line on the robot creeps. What it had not heard "
-    "before may be touched until then.",
+    "so far if that is more. After 4 m without anything new the robot creeps. What it had not heard before may be "
+    "touched until then.",
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
     "become so where the ring hears few echoes at that moment (three to eight: in 11 of 32 drives of rings of "
     "8, 16 and 24 sensors among mirrors something was touched when ranges became too long, in 0 of 16 when "
@@ -64,8 +64,8 @@ LIMITS: Sequence[str] = (
     "otherwise, and a ring that is turned by a half among few surfaces, as in a corridor: 6 of 16 drives of rings of "
     "8, 16 and 24 sensors then touched something, 1 of 16 turned by a quarter, and 0 of 16 by 45°.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
-    "then; after half a metre or twice the longest such way so far the robot creeps. Where nothing echoes, silence "
-    "is true and false alike.",
+    "then; after half a metre of repeated echoes, or twice the longest such way so far, the robot creeps, and after "
+    "4 m of silence. Where nothing echoes, silence is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
     "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
     "since it is there after .33 s.",

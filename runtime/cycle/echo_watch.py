@@ -5,9 +5,11 @@ does open ground. A robot that has never heard an echo is stopped once, after a 
 again it drives on. If its ring reaches far, so that it would hear any room, it drives slowly until then
 (`runtime.cycle.unheard_limit`).
 
-Later the ring may fail, or freeze: then it hears nothing new. Once that has lasted for longer than ever before in
-this run, a line of the log says so, and the robot drives slowly until the next new echo; at the latest after a way as
-far as a ring may have heard. It does not stop.
+Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once that has lasted for
+longer than ever before in this run. If old echoes were repeated on the way, the robot drives slowly from there on
+until the next new echo: no honest ring does that for long. What a silent ring heard last holds for as far as it
+reached then, and few sensors often hear nothing for half a metre: after such a way it drives slowly, too. It does not
+stop.
 """
 
 from __future__ import annotations
@@ -24,20 +26,21 @@ WAY_MIN_M: Final = 1.0
 """Way without an echo since the start after which a robot stops whose ring reaches far, m."""
 LONGER: Final = 2.0
 LINE_MIN_M: Final = 0.5
-"""A way without anything new is a line, and slow from there on, if it is so many times as long as any before, and
-this long, m: an honest run gives at most four, as each doubles what the next one needs."""
+"""A way without anything new is worth a line if it is so many times as long as any before, and this long, m: an
+honest run gives at most four, as each doubles what the next one needs."""
 OPEN_M: Final = 4.0
 """Way and reach together at which a ring that hears nothing stops the robot, m: from the middle of a room 8 m wide it
 has come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m. After
-the first echo, this is the longest way without anything new after which it drives slowly: honest rings of 17 robots
-heard something new after 2.0 m at most in rooms, and none drives farther than it can have heard."""
+the first echo, this is the way without anything new after which it drives slowly: honest rings of 17 robots heard
+something new after 2.0 m at most in rooms, and none drives farther than it can have heard."""
 NOTHING_YET: Final = (
     "no sensor has heard an echo since the start: the robot drives slowly until one does; in the open that is right, "
     "else check the ring's power and cables"
 )
 _SLOWLY: Final = (
-    "the robot drives slowly until one does; in the open that is right, and it drives on as before once it is halted "
-    "and re-armed; if anything stands within range, check the ring's power and cables (`echolocate ring-test --hand`)"
+    "the robot drives slowly until it hears something new; in the open that is right, and it drives on as before "
+    "once it is halted and re-armed; if anything stands within range, check the ring's power and cables (`echolocate "
+    "ring-test --hand`)"
 )
 NOTHING_NEW: Final = f"no sensor has heard anything new over the last {OPEN_M:g} m: {_SLOWLY}"
 
@@ -54,6 +57,8 @@ class EchoWatch:
     """The longest such way that an echo has ended, m."""
     is_open: bool = False
     """The operator has armed the robot although the ring hears nothing: it is in the open until the next echo."""
+    repeats: bool = False
+    """Old echoes were repeated in this silence."""
     at: Pose | None = None
     """Where the robot was by its newest odometry in this silence."""
 
@@ -76,11 +81,17 @@ class EchoWatch:
             return self
         pose = odometry.pose
         way = 0.0 if self.at is None else math.dist((pose.x, pose.y), (self.at.x, self.at.y))
-        return replace(self, is_over=self.is_over or hears, way_m=min(self.way_m + way, OPEN_M), at=pose)
+        return replace(
+            self,
+            is_over=self.is_over or hears,
+            way_m=min(self.way_m + way, OPEN_M),
+            repeats=self.repeats or hears,
+            at=pose,
+        )
 
     def armed(self) -> EchoWatch:
         """Return the watch after the robot was armed, by an operator who has seen where it stands."""
-        return replace(self, is_open=self.is_open or self.silence is not None) if self.is_over else self
+        return replace(self, is_open=self.is_open or self.slow_reason(OPEN_M) is not None) if self.is_over else self
 
     def slow_reason(self, reach_m: float) -> str | None:
         """Return why a robot whose ring reaches so far, m, must drive slowly; None if it need not.
@@ -89,17 +100,23 @@ class EchoWatch:
         """
         if not self.is_over:
             return NOTHING_YET if reach_m >= OPEN_M - WAY_MIN_M else None
-        return self.silence
+        return self.silence if self.repeats or self.way_m >= OPEN_M else None
 
     @property
     def silence(self) -> str | None:
-        """Why the robot drives slowly where the ring has long heard nothing new."""
+        """What to check where the ring has long heard nothing new, after its first echo or that stop; or None."""
         least_m = max(LINE_MIN_M, LONGER * self.longest_m)
         if not self.is_over or self.is_open or self.way_m < min(least_m, OPEN_M):
             return None
         if self.way_m >= OPEN_M:
             return NOTHING_NEW
-        return f"no sensor has heard anything new over the last {least_m:.1f} m, never so long before: {_SLOWLY}"
+        over = f"over the last {least_m:.1f} m, in this run never before for so long"
+        if self.repeats:
+            return f"all echoes are old ones, repeated {over}: {_SLOWLY}"
+        return (
+            f"no sensor has heard anything new {over}: if anything stands within range, halt the robot and check the "
+            f"ring's power and cables"
+        )
 
     def stopped(self, reach_m: float, problem: str | None = None) -> tuple[EchoWatch, str | None]:
         """Return the watch, and why a robot whose ring reaches so far must stop; then it is over.
