@@ -222,18 +222,19 @@ class RobotProcess:
             self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             link_task = asyncio.create_task(self._link.run(), name="link")
             self.health.watch_task("link", link_task)
-            for refusal in apply_realtime(self._settings.realtime):
-                self._log.warning(refusal)
-            footprint = self._footprint = Footprint(self._memory)
             try:
+                for refusal in apply_realtime(self._settings.realtime):
+                    self._log.warning(refusal)
+                footprint = self._footprint = Footprint(self._memory)
                 self._arm_when_ready = arm
                 with self._memory.driving():
                     await self._run_cycles(seconds)
-            finally:
                 await self._preparation.close()
                 process_row = footprint.close()
-                self._scheduler.close()
+            finally:  # whatever failed, the base is halted and the line closed
                 await self._shut_down(link_task)
+                await self._preparation.close()
+                self._scheduler.close()
         return run_summary(
             self._state,
             self._scheduler.stats,

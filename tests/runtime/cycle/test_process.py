@@ -21,6 +21,7 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.process import EDITS_MAX, EDITS_PER_CYCLE, Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.footprint import Footprint, FootprintRow
 from runtime.timing.stall_sampler import StackSample, StallSampler
 from tests.runtime.virtual_time import in_virtual_time
 
@@ -197,6 +198,19 @@ def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(monkeypatch: pytest
     assert "ZeroDivisionError: planted" in summary["stop_reasons"][-1]
     (error,) = [event for event in log.events if event["event"] == "the cycle failed"]
     assert str(error["exc_info"]) == "planted"
+
+
+def test_a_base_is_halted_whatever_fails_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_footprint: Footprint) -> FootprintRow:
+        raise ValueError("planted")
+
+    monkeypatch.setattr(Footprint, "close", fail)
+    with in_virtual_time(monkeypatch, "perception.method=paper") as (loop, settings, robot, _links):
+        process = RobotProcess(settings, Log().log, clock=loop.time)
+        with pytest.raises(ValueError, match="planted"):
+            loop.run_until_complete(process.run(arm=True, seconds=2.0))
+        assert robot.truth.twist.v == 0.0
+        assert robot.truth.flags & Flags.LATCHED
 
 
 def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(monkeypatch: pytest.MonkeyPatch) -> None:
