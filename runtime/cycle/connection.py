@@ -72,6 +72,7 @@ class Connection(NamedTuple):
         return is_confirmed
 
     async def _halt(self) -> bool:
+        """Halt the base; return whether it reports a set latch and no motion in its time to answer and brake."""
         self.driver.halt()
         begin_run_s, answer_max_s = self.clock(), self.link.config.answer_max_s
         deadline_run_s = begin_run_s + answer_max_s

@@ -75,6 +75,7 @@ class ProgramLine:
         return None if text is None else self.message(text)
 
     def _cause(self, *, is_closed: bool) -> str:
+        """Return the likely cause of trouble on the line to a program, and the next action."""
         if self.has_ended():
             return f"{self.program} has ended: {self.action}"
         if is_closed:

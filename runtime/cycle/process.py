@@ -236,12 +236,7 @@ class RobotProcess:
                 await self._preparation.close()
                 self._scheduler.close()
         return run_summary(
-            self._state,
-            self._scheduler.stats,
-            self.timing_monitor,
-            self._driver,
-            process_row,
-            self._mode_log,
+            self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row, self._mode_log
         )
 
     def _on_prepared(self) -> None:

@@ -72,6 +72,7 @@ class Reloader:
             self._task.cancel()
 
     async def _attempts(self) -> None:
+        """Make an attempt, and another if one was requested meanwhile; an error is logged and changes nothing."""
         while True:
             self._is_requested = False
             try:
@@ -110,6 +111,7 @@ class Reloader:
         return of_files.model_copy(update={"places": self._live_settings.current.places})
 
     def _conclude(self, result: ReloadResult) -> None:
+        """Log what came of an attempt, and put what it changes in force."""
         if result.problems:
             for line in result.problems:
                 self._log.warning("the new configuration is refused", problem=line)

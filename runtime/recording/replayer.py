@@ -186,6 +186,7 @@ class Replayer:
         return self
 
     def __next__(self) -> ReplayStep:
+        """Return the next message once it has taken effect on the state, or on the settings in force."""
         message = next(self._messages)
         match message.topic:
             case channels.CYCLE:

@@ -60,6 +60,7 @@ class RingLogWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Write what is queued, note if that failed, and keep the size of the file."""
         self._thread.close()
         if self._thread.is_stuck:
             self._note(f"{self._path}: its end was not written within {CLOSE_MAX_S:.0f} s: check the disk")

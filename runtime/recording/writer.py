@@ -115,14 +115,10 @@ class RecordingWriter:
 
     Parameters
     ----------
-    target : RecordingTarget
-        Where its files are written.
     info : RunInfo
         The first message of each file.
     host_clock : callable
         The host's clock of the run, s, for the log time of `info`.
-    queue_max : int
-        Items that may wait.
     on : bool
         Whether to record from the start.
 
@@ -239,6 +235,7 @@ class RecordingWriter:
         self._status = replace(self._status, last_error=utf8(error), is_writing=False)
 
     def _open(self) -> None:
+        """Begin the next file."""
         self._parts += 1
         self._info = self._info.model_copy(update={"part": self._parts})
         log_ns = self._log_ns(self._host_clock())
@@ -252,6 +249,7 @@ class RecordingWriter:
         self._enforce_limits(self._file.path)
 
     def _finish(self) -> None:
+        """Close the file, if one is open, with everything that belongs into it."""
         if self._file is not None:
             self._enter_pieces()
             file, self._file = self._file, None
@@ -275,6 +273,7 @@ class RecordingWriter:
             self._status = replace(self._status, file=None, files=self._status.files - 1, bytes=self._bytes_before)
 
     def _flush(self) -> None:
+        """End the chunk; ask for a keyframe if the next file is due, as one begins with it."""
         if self._file is not None:
             self._enter_pieces()
             self._file.flush()
@@ -362,6 +361,7 @@ class RecordingWriter:
             self._add(MODE, change, log_ns)
 
     def _enter_snapshot(self, snapshot: MapSnapshot, run_s: float, log_ns: int) -> None:
+        """Write what a snapshot has of keyframe, map and objects."""
         cycle = snapshot.cycle
         if snapshot.state is not None and snapshot.perception is not None:
             self._add(RUN_INFO, self._info, log_ns)

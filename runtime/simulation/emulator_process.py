@@ -81,6 +81,7 @@ async def start_emulator(
 
 
 def _folder(stack: contextlib.ExitStack) -> Path:
+    """Return the folder for the link to the port; it is removed with the stack."""
     try:
         return stack.enter_context(temp_folder())
     except OSError as error:
@@ -105,6 +106,7 @@ def _write(process: asyncio.subprocess.Process, line: bytes) -> None:
 
 
 async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
+    """Wait until the emulator says so; if it does not, kill it and raise a `UserError` with what it wrote."""
     out, err = process.stdout, process.stderr
     if out is None or err is None:
         raise UserError("the emulator was started without pipes: this is a fault of the program", FAILED)
@@ -127,6 +129,7 @@ def _end_of(code: int) -> str:
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:
+    """End the emulator in order, or after `END_MAX_S` by force, and wait for that."""
     _signal(process, signal.SIGTERM)
     try:
         await asyncio.wait_for(process.wait(), END_MAX_S)

@@ -158,6 +158,7 @@ class BackgroundWriter(Generic[Item]):
         self.close()
 
     def _work(self) -> None:
+        """Write what is queued, in batches if there is a backlog, until the writer is closed and the queue empty."""
         if self._begin is not None:
             self._begin()
         has_backlog = is_closing = False
@@ -178,6 +179,7 @@ class BackgroundWriter(Generic[Item]):
             self._finish()
 
     def _write_one(self, item: Item) -> None:
+        """Write an item, and before it the number of those lost; it is lost itself if the disk refuses."""
         try:
             gap = self._refused + self._unwritten - self._gap_written
             if self._write_gap is not None and gap:

@@ -130,6 +130,7 @@ class Health:
         self._log.error("a part has ended", part=name, how=how, exc_info=error)
 
     def _on_unhandled_error(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Keep an exception that the loop reports for the next call of `fault`, and log it."""
         error, task = context.get("exception"), context.get("future") or context.get("task")
         if isinstance(error, BaseException):
             source = f"callback `{_first_own_function(error)}`"

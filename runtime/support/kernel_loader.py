@@ -241,6 +241,7 @@ def progress_text(done: int, expected: int, elapsed_s: float) -> str:
 
 
 async def _compile_in_child(part: str) -> None:
+    """Compile a part in another process; afterwards the mark of the part says whether that succeeded."""
     process = await start_child(WARM_UP, [part, "whole"], pipes=False, low_priority=True)
     try:
         with contextlib.suppress(TimeoutError):

@@ -158,6 +158,7 @@ def observe_only(settings: Settings) -> None:
 
 
 def _circles(settings: Settings) -> None:
+    """Drive past a wall, do every edit, and call what a report on walls and points may call by itself."""
     from perception.bayes.inference.kernel_settings import make_settings
     from perception.bayes.memory.state import Memory
     from perception.bayes.walls.bins import bin_of
@@ -184,6 +185,7 @@ def _polygons(settings: Settings, method: str = BAYES) -> None:
 
 
 def _emulator(settings: Settings) -> None:
+    """Let an emulated robot fire at a drum and a wall in each kind of acoustics."""
     from config.world import DrumConfig, WallConfig, WorldConfig
     from drivers.registry import make_device
 

@@ -151,6 +151,7 @@ class _LineOutput:
             self._show({**warning, "level": "warning", "timestamp": event.get("timestamp")})
 
     def _show(self, event: Mapping[str, Any]) -> None:
+        """Pass a line to the listeners, without its secret fields, and to the terminal, if there is one."""
         for listener in (*(() if self._listener is None else (self._listener,)), *self._status.listeners):
             listener({name: value for name, value in event.items() if name not in SECRET})
         if self._status.terminal is not None:

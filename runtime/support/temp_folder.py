@@ -53,6 +53,7 @@ def remove_stale_folders() -> None:
 
 
 def _may_be_stale(folder: Path) -> bool:
+    """Return whether this is a folder of this user, and not so young that its run may be about to lock it."""
     try:
         found = folder.lstat()
     except OSError:

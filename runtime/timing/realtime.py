@@ -58,6 +58,7 @@ def request_slice(slice_s: float) -> str | None:
 
 
 def _pin(core: int) -> str | None:
+    """Run on this core only; return why that is refused, or None, as the next two functions do."""
     allowed = sorted(os.sched_getaffinity(0))
     if core not in allowed:
         listed = ", ".join(map(str, allowed))

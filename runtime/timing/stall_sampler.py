@@ -65,6 +65,7 @@ class StallSampler:
             signal.setitimer(signal.ITIMER_REAL, max(delay_s, DELAY_MIN_S))
 
     def _take_sample(self, _number: int, frame: FrameType | None) -> None:
+        """Keep the stack as of now: the handler of SIGALRM."""
         functions = []
         while frame is not None and not frame.f_code.co_filename.startswith(self._loop_files):
             functions.append(readable(frame.f_code.co_qualname))

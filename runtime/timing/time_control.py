@@ -167,6 +167,7 @@ class EmulatorTimeControl:
         self._changed.set()
 
     async def _pause(self) -> str | None:
+        """Pause unless time is paused, and wait until run and emulator stand; return why that failed, or None."""
         if self._problem is not None:
             return self._problem
         if not self.clock.has_cycles:

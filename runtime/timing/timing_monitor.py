@@ -238,6 +238,7 @@ class TimingMonitor:
             self._busy_since_run_s = now.run_s
 
     def _add_span(self, span: Span) -> None:
+        """Keep a span of the cycle in progress, in place of the oldest one if there are too many."""
         if len(self._spans) == SPANS_MAX:
             del self._spans[0]
         self._spans.append(span)

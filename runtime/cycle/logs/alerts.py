@@ -121,6 +121,7 @@ class Alerts:
         return before is None or before.fault != report.fault
 
     def _new_waiting(self, perception: Perception) -> list[str]:
+        """Return a line if objects have begun to wait for room in perception."""
         before, self._waiting = self._waiting, perception.counts.waiting
         if before or not self._waiting:
             return []

@@ -92,6 +92,7 @@ class LineLog:
             self._count(driver.counts, run_s)
 
     def _returned(self, driver: RobotDriver, run_s: float) -> None:
+        """Log that the line is back, and whether another robot answers on it."""
         self._problem = None
         robot = driver.identity
         if robot is not None and self._robot is not None and (differs := differences(robot, self._robot)):
@@ -110,6 +111,7 @@ class LineLog:
             self._log.warning("arming refused", mode=mode.mode.value, reason=reason, **_more(left_out))
 
     def _count(self, counts: LinkCounts, run_s: float) -> None:
+        """Log that the line has become noisy, or brings too many frames, since the last count."""
         before, self._counts = self._counts, counts
         since_s, self._counted_s = self._counted_s, run_s
         if since_s is None or run_s <= since_s:
