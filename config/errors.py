@@ -18,12 +18,7 @@ WRONG_CALL: Final = 2
 class UserError(Exception):
     """An error that a user can cause: one line with what happened, the likely cause, and the next action.
 
-    Parameters
-    ----------
-    text : str
-        The line.
-    exit_code : int, optional
-        What the command exits with, if it differs from the class's own `exit_code`.
+    The command exits with `exit_code`, or with the class's own.
     """
 
     exit_code: int = FAILED

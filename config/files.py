@@ -47,13 +47,7 @@ _LONG_KEY = re.compile(rf"{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{31}}")
 
 
 class ConfigError(UserError):
-    """Invalid settings: one line for each problem, ready to be shown to the user.
-
-    Parameters
-    ----------
-    problems
-        One line each; at least one.
-    """
+    """Invalid settings: one line for each problem, ready to be shown to the user."""
 
     exit_code = WRONG_CALL
 
@@ -282,12 +276,7 @@ def in_place_of(path: Path, data: bytes) -> Iterator[None]:
 
     The file itself is not changed. One file at a time: an inner block hides the outer one.
 
-    Parameters
-    ----------
-    path : Path
-        Absolute; compared as it is written, without following links.
-    data : bytes
-        What the file is taken to hold.
+    The path is absolute, and compared as it is written, without following links.
     """
     token = _IN_PLACE.set((path, data))
     try:

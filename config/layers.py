@@ -57,17 +57,7 @@ class Layers:
         self._order: list[str] = [root.name]
 
     def lay(self, table: dict[str, Any], source: Source, at: Location = ()) -> None:
-        """Merge `table` into the tree key by key; lists and single values are replaced as a whole.
-
-        Parameters
-        ----------
-        table
-            Table to merge.
-        source
-            Source of its values.
-        at
-            Location of the table in the tree.
-        """
+        """Merge a table into the tree at a location, key by key; lists and single values are replaced as a whole."""
         under: Any = self.tree
         for key in at:
             under = under[key]
@@ -82,15 +72,6 @@ class Layers:
 
     def put(self, location: Location, value: object, source: Source) -> None:
         """Set one value, creating the tables above it.
-
-        Parameters
-        ----------
-        location
-            Where to set it.
-        value
-            Value to set.
-        source
-            Its source.
 
         Raises
         ------

@@ -191,14 +191,7 @@ def load_settings(
 def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -> Settings:
     """Return complete settings with single values overridden.
 
-    Parameters
-    ----------
-    settings
-        Complete settings, as from a recording.
-    name
-        Name of their source in error messages.
-    overrides
-        Texts of the form ``dotted.path=value``.
+    Each override is ``dotted.path=value``; `name` is that of the settings' source in error messages.
 
     Raises
     ------
@@ -234,14 +227,7 @@ def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) ->
 def with_room(settings: Settings, room: WorldConfig | None, name: str) -> Settings:
     """Return the settings with the surfaces of a world as the known room, or without a known room.
 
-    Parameters
-    ----------
-    settings
-        Complete settings.
-    room
-        The world; None for no known room.
-    name
-        Of the map in error messages.
+    A room of None is no known room; `name` is that of the map in error messages.
 
     Raises
     ------
@@ -280,16 +266,7 @@ def with_mission(settings: Settings, mission: MissionConfig) -> Settings:
 def with_value(settings: Settings, name: str, location: Location, value: object) -> Settings:
     """Return complete settings with one value replaced.
 
-    Parameters
-    ----------
-    settings
-        Complete settings.
-    name
-        Name of the value's source in error messages.
-    location
-        Location of the value.
-    value
-        As a file would hold it; None where it is not given.
+    The value is as a file would hold it, None where it is not given; `name` is that of its source in error messages.
 
     Raises
     ------

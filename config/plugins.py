@@ -143,14 +143,7 @@ def _lacking(model: type[BaseModel], data: object) -> list[InitErrorDetails]:
 def with_own_tables(model: type[M], data: object, validate: Callable[[object], M]) -> M:
     """Return a robot file whose further tables are validated by the installed drivers of these names.
 
-    Parameters
-    ----------
-    model
-        The robot file's.
-    data
-        The file's content.
-    validate
-        Validates the model's own fields.
+    `model` is the robot file's; `validate` validates its own fields.
 
     Raises
     ------

@@ -67,14 +67,7 @@ PROBLEMS_MAX = 100
 def describe_errors(error: ValidationError, layers: Layers, model: type[BaseModel]) -> list[str]:
     """Return one line for each problem in `error`, in the order of the schema.
 
-    Parameters
-    ----------
-    error
-        Error that pydantic raised for the tree of `layers`.
-    layers
-        The tree, with the source of each value.
-    model
-        Schema that the tree was validated against.
+    The error is that of the layers' tree; `model` is the schema of the whole.
     """
     found = error.errors(include_url=False)
     at_fault = {details["loc"] for details in found}
@@ -108,14 +101,7 @@ def given_type(value: object) -> str:
 def unknown_key(location: Location, model: type[BaseModel], also: tuple[str, ...] = ()) -> str:
     """Return the message for an unknown key: the nearest name here, the same name elsewhere, or all names.
 
-    Parameters
-    ----------
-    location
-        Location of the key.
-    model
-        Schema of the whole tree.
-    also
-        Further names that are known here.
+    `model` is the schema of the whole tree; `also` are further names that are known here.
     """
     key = str(location[-1])
     parent = _unwrapped(_annotation_at(model, location[:-1]))

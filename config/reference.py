@@ -60,10 +60,7 @@ def settings_of(file: str) -> Iterator[Setting]:
 
     Those of a run file are its own: what describes the robot, the world and so on is listed with their files.
 
-    Parameters
-    ----------
-    file
-        A name of `FILES`.
+    `file` is a name of `FILES`.
     """
     model = next(model for name, model, _ in FILES if name == file)
     # A run file names these files, whose keys are listed with them.

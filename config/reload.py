@@ -96,14 +96,8 @@ class ReloadResult:
 def reload(current: Settings, propose: Callable[[], Settings], also: frozenset[str] = frozenset()) -> ReloadResult:
     """Return the settings in force after an attempt to change them.
 
-    Parameters
-    ----------
-    current
-        Settings in force so far; never modified.
-    propose
-        Loads and validates the new settings; raises ConfigError if they are invalid.
-    also
-        Settings and sections that can be applied now besides `LIVE_SETTINGS`.
+    `propose` reads the new settings, and raises ConfigError if they are invalid. What `also` names can be applied now
+    besides `LIVE_SETTINGS`.
     """
     try:
         proposed = propose()
@@ -119,12 +113,7 @@ def reload(current: Settings, propose: Callable[[], Settings], also: frozenset[s
 def differences(before: object, after: object, at: Location = ()) -> Iterator[Difference]:
     """Yield every value that differs, in the order of the schema; lists are compared as a whole.
 
-    Parameters
-    ----------
-    before, after
-        Settings, or values within them, to compare.
-    at
-        Location of the two values.
+    `at` is where both are in the settings.
     """
     if isinstance(before, BaseModel) and type(before) is type(after):
         for key in type(before).model_fields:

@@ -360,12 +360,7 @@ class RobotConfig(Strict):
     def own_table(self, name: str, model: type[M]) -> M:
         """Return the section of an installed driver; the model's defaults where the file has none.
 
-        Parameters
-        ----------
-        name
-            The driver's, which is that of the section.
-        model
-            The driver's `Config`.
+        The section has the driver's name; `model` is its `Config`.
         """
         found = (self.model_extra or {}).get(name)
         return found if isinstance(found, model) else model()

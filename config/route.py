@@ -18,14 +18,7 @@ ABOUT: Final = "The waypoints that the operator set."
 def route_config(waypoints: tuple[Waypoint, ...], frame: Frame, name: str) -> MissionConfig:
     """Return the mission of driving to places in turn.
 
-    Parameters
-    ----------
-    waypoints
-        One at least.
-    frame
-        The frame of all of them.
-    name
-        Of the mission.
+    All of them, one at least, are in the same frame; `name` is that of the mission.
 
     Raises
     ------

@@ -39,14 +39,7 @@ def _scalar(pair: Mapping[str, object]) -> str:
 def with_value(text: str, place: Sequence[str | int], value: TomlValue) -> str:
     """Return a TOML text that says the same, but for one value.
 
-    Parameters
-    ----------
-    text
-        The TOML text.
-    place
-        Keys of tables and indices of lists that lead to the value, which need not be there yet.
-    value
-        The new value; None removes it.
+    `place` leads to the value by keys and indices, and need not be there yet. A value of None is removed.
 
     Raises
     ------

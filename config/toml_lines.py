@@ -33,14 +33,7 @@ class Problem(NamedTuple):
 def located(problem: str, name: str, text: str) -> Problem:
     """Return a problem of a settings text with its line.
 
-    Parameters
-    ----------
-    problem : str
-        A line of `config.files.ConfigError`.
-    name : str
-        Of the text in it.
-    text : str
-        The TOML text.
+    `problem` is a line of `config.files.ConfigError`, in which the text has this name.
     """
     said = problem.removeprefix(f"{one_line(name)}: ")
     if (place := _PLACE.match(said)) is not None:

@@ -19,14 +19,7 @@ class CalibratedDriver:
     The corrected path begins where the robot's odometry does. Each step of the odometry is an arc: its turn is
     divided by the turn's scale and its chord by the distance's, so that corrected poses stay continuous.
 
-    Parameters
-    ----------
-    driver
-        The robot's own driver.
-    calibration
-        Its scales.
-    synchro
-        The ring does not turn with the wheels: its direction is measured for itself, and not corrected.
+    `synchro`: the ring does not turn with the wheels, so its direction is measured for itself, and not corrected.
     """
 
     def __init__(self, driver: RobotDriver, calibration: CalibrationConfig, *, synchro: bool) -> None:

@@ -33,12 +33,7 @@ CAPABILITIES: Final[Mapping[str, str]] = MappingProxyType(
 
 
 def missing(has: Iterable[str]) -> dict[str, str]:
-    """Return what a robot lacks, with what follows.
-
-    Parameters
-    ----------
-    has
-        What it has, as a driver's family lists it in `HAS`.
+    """Return what a robot lacks that has what its family lists in `HAS`, with what follows.
 
     Raises
     ------
@@ -69,12 +64,7 @@ class MovesOn(NamedTuple):
 def moves_on(body: BodyConfig, deadman_s: float | None) -> MovesOn | None:
     """Return how far a base moves after `kill -9`; None if it never stops by itself.
 
-    Parameters
-    ----------
-    body
-        Its greatest velocities and accelerations.
-    deadman_s
-        Longest time without a command until it begins to stop, s; None if it never does.
+    Without a command the base begins to stop after `deadman_s`; None if it never does.
     """
     if deadman_s is None:
         return None

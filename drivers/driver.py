@@ -157,11 +157,8 @@ class RobotDriver(Protocol):
 
         A run asks in each cycle, and again 10 ms after it got some.
 
-        Parameters
-        ----------
-        writable
-            False while the line still holds earlier bytes: then only a halt may be returned, so that no drive command
-            is sent late.
+        Where the line still holds earlier bytes (not `writable`) only a halt may be returned, so that no drive
+        command is sent late.
         """
 
     def take_received(self) -> Received:

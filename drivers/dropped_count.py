@@ -20,12 +20,7 @@ RANGES_BEYOND: Final = (
 class DroppedCount:
     """How many were dropped; a note says so when there are `NOTED_FROM`, and each time they have doubled since.
 
-    Parameters
-    ----------
-    text
-        `LATE_FIRINGS` or `RANGES_BEYOND`.
-    note
-        Takes the message.
+    The text is `LATE_FIRINGS` or `RANGES_BEYOND`.
     """
 
     def __init__(self, text: str, note: Callable[[str], None]) -> None:

@@ -195,12 +195,7 @@ def cross_pairs(axes: tuple[float, ...], fired: int, listeners: int) -> tuple[tu
     A listener reports the first pulse to arrive, of any sensor. Beams are narrow, so that is the pulse of the
     sensor that looks most nearly the same way; of two that look equally near, the one of the lower index.
 
-    Parameters
-    ----------
-    axes
-        Directions of the ring's sensors, rad; sensors beyond them are ignored.
-    fired, listeners
-        Masks of the sensors that fired and listened.
+    Axes are the directions of the ring's sensors, rad; bits of the masks beyond them are ignored.
     """
     ours = (1 << len(axes)) - 1
     fired &= ours

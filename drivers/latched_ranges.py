@@ -39,13 +39,7 @@ NOTE: Final = (
 
 
 class RepeatDetector:
-    """Counts of the intervals between changes, over all sensors.
-
-    Parameters
-    ----------
-    sensors : int
-        Number of sensors.
-    """
+    """Counts of the intervals between changes, over all sensors."""
 
     def __init__(self, sensors: int) -> None:
         self._last: Floats = np.full(sensors, np.nan)
@@ -56,13 +50,7 @@ class RepeatDetector:
         self._counts: NDArray[np.int64] = np.zeros(INTERVALS_MAX + 1, dtype=np.int64)
 
     def add(self, ranges_m: Floats) -> None:
-        """Count what a firing says; entries that are NaN did not fire.
-
-        Parameters
-        ----------
-        ranges_m : (sensors,) float
-            As in a `Firing`.
-        """
+        """Count what a firing says; entries that are NaN did not fire."""
         was, has = self._last, ~np.isnan(ranges_m)
         known = has & ~np.isnan(was)
         same = known & (ranges_m == was)
@@ -96,12 +84,7 @@ class RepeatFilter:
 
     Silence repeats to the bit when a sensor fires again and hears nothing. It counts once in each cycle of the ring.
 
-    Parameters
-    ----------
-    sensors : int
-        Number of sensors.
-    cycle_s : float
-        Time in which each sensor fires once, in the firings' unit of time.
+    Each sensor fires once in `cycle_s`, which is in the firings' unit of time.
     """
 
     def __init__(self, sensors: int, cycle_s: float) -> None:
@@ -111,13 +94,7 @@ class RepeatFilter:
         """When each sensor last fired; inf before the first firing, of which nothing is known to be new."""
 
     def fresh(self, firing: Firing) -> Firing:
-        """Return the firing with NaN for each repeated value; of the first firing, nothing is known to be new.
-
-        Parameters
-        ----------
-        firing : Firing
-            The next one.
-        """
+        """Return the firing with NaN for each repeated value; of the first firing, nothing is known to be new."""
         ranges, is_first = firing.ranges_m, bool(np.isposinf(self._read_s).all())
         has = ~np.isnan(ranges)
         is_due = np.isposinf(ranges) & (firing.robot_s - self._read_s >= 0.999 * self._cycle_s)
@@ -133,16 +110,7 @@ class FreshDriver:
     A ring whose values never change again then has not fired: the robot, which must not drive blind, stops. Silence
     is passed on once a cycle: in an open hall a sensor that fires gives it each time.
 
-    Parameters
-    ----------
-    driver
-        The robot's own driver.
-    sensors
-        Number of sensors.
-    set_size
-        Most sensors that fire at once: values are repeated only where firings have more.
-    cycle_s
-        Time in which each sensor fires once.
+    Each sensor fires once in `cycle_s`, at most `set_size` at once: values are repeated only where firings have more.
     """
 
     def __init__(self, driver: RobotDriver, sensors: int, set_size: int, cycle_s: float) -> None:

@@ -24,16 +24,7 @@ BAUDS: Final = (9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
 def refuse_slow_line(link: LinkConfig, fixed_bytes_s: float, firing_bytes: float, step_s: float) -> None:
     """Raise an error if the line is too slow for what the robot sends.
 
-    Parameters
-    ----------
-    link : LinkConfig
-        Port and speed of the line.
-    fixed_bytes_s : float
-        What the robot sends besides its ranges, byte/s.
-    firing_bytes : float
-        What it sends for a firing, bytes.
-    step_s : float
-        Time from one firing to the next, s.
+    Besides its ranges it sends `fixed_bytes_s`, for each firing `firing_bytes`, every `step_s`.
 
     Raises
     ------
@@ -77,11 +68,6 @@ FLOOD: Final = (
 
 class ReceiveBudget:
     """Bounds the bytes that a driver gets from its line, so that no peer can fill the loop's time.
-
-    Parameters
-    ----------
-    link : LinkConfig
-        Port and speed of the line.
 
     Attributes
     ----------

@@ -16,14 +16,7 @@ _UNFRAMED_MIN = 64
 def deadman_refused(name: str, deadman_s: float, link: LinkConfig) -> str | None:
     """Return the message for a base whose deadman the robot file does not allow; None if it does.
 
-    Parameters
-    ----------
-    name
-        The robot's.
-    deadman_s
-        How long the base drives on without a command.
-    link
-        The limits.
+    `deadman_s` is how long the base drives on without a command.
     """
     if link.deadman_min_s <= deadman_s <= link.deadman_max_s:
         return None
@@ -37,12 +30,7 @@ def deadman_refused(name: str, deadman_s: float, link: LinkConfig) -> str | None
 def finer_than_line(resolution_m: float, unit_m: float) -> str | None:
     """Return the message for a robot file that promises finer ranges than the line can carry; None if it does not.
 
-    Parameters
-    ----------
-    resolution_m
-        Of the robot file; 0 promises nothing.
-    unit_m
-        Step of the ranges on the line.
+    `resolution_m` is that of the robot file, 0 promises nothing; `unit_m` is the step of ranges on the line.
     """
     if resolution_m == 0.0 or resolution_m >= unit_m * (1.0 - 1e-3):
         return None
@@ -55,16 +43,8 @@ def finer_than_line(resolution_m: float, unit_m: float) -> str | None:
 def silence(silent_s: float, *, others: bool, bad: int, heard: HeardBytes | None = None) -> str:
     """Return the message for missing odometry.
 
-    Parameters
-    ----------
-    silent_s
-        For how long it has been missing.
-    others
-        Whether frames of other kinds are still received.
-    bad
-        Corrupt frames received since the last odometry.
-    heard
-        All bytes received since, where the driver keeps them.
+    It has been missing for `silent_s`, in which `bad` corrupt frames came and, where `others`, valid ones of other
+    kinds. `heard` is all bytes since, where the driver keeps them.
     """
     if heard is not None and heard.stranger is not None:
         return f"no odometry for {silent_s:.2f} s, and {heard.stranger}"
@@ -100,14 +80,8 @@ def noise(bad: int, what: str) -> str | None:
 def no_answer(what: str, frames: int, heard: HeardBytes) -> str:
     """Return the message for a robot that does not answer a call.
 
-    Parameters
-    ----------
-    what
-        The call and how it was made, as "no answer to 3 HELLO commands".
-    frames
-        Valid frames received on the line so far.
-    heard
-        All bytes received.
+    `what` is the call and how it was made, as "no answer to 3 HELLO commands". So far `frames` valid ones came on the
+    line, and the bytes of `heard`.
     """
     if (stranger := heard.stranger) is not None:
         return f"{what}, and {stranger}"

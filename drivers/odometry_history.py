@@ -35,17 +35,7 @@ class OdometryHistory:
     def at(self, robot_s: float, gap_max_s: float) -> tuple[Pose, float] | None:
         """Return the pose and ring yaw at a time, interpolated between the samples around it.
 
-        Parameters
-        ----------
-        robot_s
-            The time, by the robot's clock.
-        gap_max_s
-            Longest time between two samples to interpolate over.
-
-        Returns
-        -------
-        tuple of Pose and float, or None
-            None if the time is outside the samples, or the two around it are too far apart.
+        Both are None where the time is outside the samples, or the two around it are more than `gap_max_s` apart.
         """
         newest = self.newest
         if newest is None or robot_s > newest.robot_s:

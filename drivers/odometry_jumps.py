@@ -25,10 +25,7 @@ _IDENTITY = Pose(0.0, 0.0, 0.0)
 class OdometryJumps:
     """Finds the jumps of one base's odometry, and removes them.
 
-    Parameters
-    ----------
-    body
-        The base's limits, which distinguish a motion from a jump.
+    The limits of its body distinguish a motion from a jump.
 
     Attributes
     ----------
@@ -109,12 +106,8 @@ class OdometryJumps:
 def _message(off_m: float, turned_rad: float, ring_rad: float) -> str:
     """Return the message for a jump of the odometry.
 
-    Parameters
-    ----------
-    off_m
-        Distance between the odometry and where the wheels' speeds would have brought the base.
-    turned_rad, ring_rad
-        The same of the heading and of the ring's direction.
+    `off_m` and `turned_rad` are how far the odometry is from where the wheels' speeds would have brought the base,
+    `ring_rad` the same of the ring's direction.
     """
     return (
         f"the odometry jumped by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees, the ring's direction by "

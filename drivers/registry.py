@@ -64,20 +64,7 @@ class DriverFamily(Protocol):
     ) -> RobotDevice:
         """Return an emulated robot that answers the driver of `config`.
 
-        A family without an emulator raises `DriverError`.
-
-        Parameters
-        ----------
-        config
-            The robot.
-        world
-            What surrounds the robot, and where in it the robot starts.
-        seed
-            Seed of all random numbers: the same seed and input give the same output.
-        faults
-            What goes wrong with the robot or its line, and when; may be empty.
-        clock_start_us
-            First reading of the robot's own clock, µs.
+        Arguments are as of `registry.make_device`, which calls it. A family without an emulator raises `DriverError`.
         """
 
 

@@ -60,12 +60,7 @@ def interpolate(start: Pose, end: Pose, share: float) -> Pose:
     Headings are unwrapped: the body turns by ``end.theta - start.theta``. Beyond half a turn the arc is unlikely to
     be the true path, and the position is interpolated along the chord.
 
-    Parameters
-    ----------
-    start, end
-        The two poses.
-    share
-        Share of the time between them, 0 to 1.
+    `share` is that of the time between them, 0 to 1.
     """
     if share <= 0.0:
         return start

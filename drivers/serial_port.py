@@ -94,15 +94,6 @@ async def open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) 
     The thread is a daemon, so that a port that never opens blocks neither the loop nor the end of the process. A port
     that opens after the timeout is closed again.
 
-    Parameters
-    ----------
-    config
-        Names the port.
-    opener
-        Opens it, in the thread.
-    timeout_s
-        Longest time that this may take.
-
     Raises
     ------
     LinkError

@@ -17,10 +17,7 @@ _SLACK = 0.51
 class ServoViews:
     """The bearings of a ring's sensors.
 
-    Parameters
-    ----------
-    ring
-        The ring; without servos each sensor has one bearing.
+    Without servos each sensor has one bearing.
 
     Attributes
     ----------

@@ -23,11 +23,6 @@ S = TypeVar("S", bound=Stamper)
 class Session(ABC, Generic[S]):
     """The part of a `drivers.driver.RobotDriver` that does not depend on the protocol; a driver is a subclass of it.
 
-    Parameters
-    ----------
-    stamper
-        That of the protocol.
-
     Attributes
     ----------
     heard

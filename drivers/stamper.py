@@ -34,10 +34,7 @@ NOTES_MAX: Final = 16
 class Stamper:
     """The part of a protocol's stamper that does not depend on the protocol.
 
-    Parameters
-    ----------
-    body
-        The base's limits, which distinguish a motion from a jump.
+    The limits of the body distinguish a motion from a jump.
 
     Attributes
     ----------

@@ -36,10 +36,7 @@ def is_tcp(port: str | None) -> bool:
 class TcpPort:
     """An open connection; opening blocks for some seconds at most.
 
-    Parameters
-    ----------
-    url
-        ``socket://host:port``.
+    The URL is ``socket://host:port``.
 
     Attributes
     ----------

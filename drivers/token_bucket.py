@@ -4,15 +4,7 @@ from __future__ import annotations
 
 
 class TokenBucket:
-    """Limits a rate of events, on average and in a burst.
-
-    Parameters
-    ----------
-    rate_per_s : float
-        Tokens added each second.
-    burst : float
-        Tokens the bucket holds; it starts full.
-    """
+    """Limits a rate of events: on average, and to `burst` at once, as which it starts."""
 
     def __init__(self, rate_per_s: float, burst: float) -> None:
         self._rate_per_s = rate_per_s
@@ -23,12 +15,7 @@ class TokenBucket:
     def take(self, now_s: float, count: float = 1.0) -> bool:
         """Take tokens and return True; return False if so many are not left.
 
-        Parameters
-        ----------
-        now_s : float
-            By any clock; one that goes backward adds nothing.
-        count : float
-            How many.
+        A clock that goes backward adds nothing.
         """
         if self._updated_s is not None:
             added = self._rate_per_s * max(0.0, now_s - self._updated_s)
@@ -42,13 +29,6 @@ class TokenBucket:
 
 class LineLimit:
     """Limits the lines of one kind in the log, and counts those that are left out.
-
-    Parameters
-    ----------
-    rate_per_s : float
-        Lines a second, on average.
-    burst : float
-        Lines at once.
 
     Attributes
     ----------

@@ -253,10 +253,7 @@ def _sip_body(sip: Sip) -> bytes:
 class Decoder(Generic[F]):
     """Turns the bytes of one direction into commands or packets.
 
-    Parameters
-    ----------
-    decode
-        Decodes a body: `decode_command` for the bytes to the robot, `decode_packet` for those from it.
+    It decodes bodies by `decode_command` for the bytes to the robot, by `decode_packet` for those from it.
 
     Attributes
     ----------

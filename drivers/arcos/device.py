@@ -64,16 +64,7 @@ class Session(Enum):
 class ArcosDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the protocol of the Pioneer family.
 
-    Parameters
-    ----------
-    robot, world
-        What the robot is, and what surrounds it.
-    firmware
-        Its names, factors and flash settings.
-    seed
-        Seed of all random numbers.
-    faults
-        What goes wrong, and when.
+    `firmware` has its names, factors and flash settings.
 
     Raises
     ------

@@ -26,10 +26,7 @@ def _approach(left: float, speed_max: float, deceleration: float) -> float:
 class MotionServo:
     """Set-points of two independent channels, translation and rotation, and the ramps between them.
 
-    Parameters
-    ----------
-    firmware
-        Limits, factors, and the ramps at the start.
+    `firmware` gives limits, factors, and the ramps at the start.
 
     Attributes
     ----------
@@ -62,15 +59,7 @@ class MotionServo:
         """An ESTOP is under way: until the base stands, other commands of motion are ignored."""
 
     def obey(self, command: Command, heading: float) -> bool:
-        """Carry out a command of motion; return False if it is none.
-
-        Parameters
-        ----------
-        command
-            The command.
-        heading
-            The heading by odometry, rad.
-        """
+        """Carry out a command of motion at a heading by odometry, rad; return False if it is none."""
         value, number = command.value, command.number
         match number:
             case CommandNumber.ENABLE:
@@ -116,12 +105,7 @@ class MotionServo:
     def target(self, heading: float, twist: Twist) -> tuple[Twist, tuple[float, float]]:
         """Return the velocity to go for, and the accelerations towards it, m/s² and rad/s².
 
-        Parameters
-        ----------
-        heading
-            The heading by odometry, rad.
-        twist
-            The present velocity.
+        `heading` is that by odometry, rad; `twist` is the present velocity.
         """
         firmware, ramps = self._firmware, self.ramps
         if self._braking:

@@ -23,12 +23,8 @@ FIRST_FLAG: Final = 1
 class SonarArrays:
     """Which disc of each array fires when.
 
-    Parameters
-    ----------
-    numbers
-        Number of each sensor of the ring, counted from 0; the array is the number over eight.
-    cycle_ms
-        Time between the firings of an array.
+    `numbers` are those of the ring's sensors, counted from 0: the array is the number over eight. An array fires
+    every `cycle_ms`.
     """
 
     def __init__(self, numbers: Sequence[int], cycle_ms: int) -> None:
@@ -101,14 +97,8 @@ class SonarArrays:
 class SonarReadings:
     """The ranges of discs that have fired; each is known at the end of its cycle.
 
-    Parameters
-    ----------
-    firmware
-        Numbers and factor of the ranges.
-    sonar
-        The discs, with their faults.
-    window_m
-        How far they listen at most, m.
+    `firmware` has numbers and factor of the ranges, `sonar` is the discs with their faults, which listen up to
+    `window_m`.
     """
 
     def __init__(self, firmware: Firmware, sonar: FaultySonar, window_m: float) -> None:

@@ -20,14 +20,7 @@ _FRONT, _REAR = 1, 2
 class Touch:
     """Two bumpers round a base, each of segments from left to right, counted from 1.
 
-    Parameters
-    ----------
-    firmware
-        How many segments they have.
-    scene
-        The surfaces.
-    radius_m
-        Radius of the base, m.
+    `radius_m` is the base's.
 
     Attributes
     ----------

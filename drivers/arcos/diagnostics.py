@@ -105,10 +105,7 @@ def wrong_robot(name: RobotName, config: RobotConfig) -> str | None:
 def traits(packet: ConfigPacket | None, name: RobotName | None) -> tuple[tuple[str, str], ...]:
     """Return what a robot says of itself besides its name that no command changes: names and values.
 
-    Parameters
-    ----------
-    packet, name
-        Its configuration, and its answer to SYNC2; None where it sent none.
+    They are in its configuration, and in its answer to SYNC2; None where it sent none.
     """
     said = {"class": name and name.class_name, "subclass": name and name.subclass}
     if packet is not None:
@@ -138,12 +135,8 @@ def deadman_s(packet: ConfigPacket | None) -> float:
 def no_answer(bauds: tuple[int, ...], frames: int, heard: HeardBytes) -> str:
     """Return the message for a robot that does not answer SYNC0.
 
-    Parameters
-    ----------
-    bauds
-        Speeds at which it was called; none on a line without a speed.
-    frames, heard
-        Valid frames, and all bytes, received so far.
+    It was called at these speeds, none on a line without a speed. So far `frames` valid ones came, and the bytes of
+    `heard`.
     """
     tried = f" at {', '.join(map(str, bauds))} baud" if bauds else ""
     return line_diagnostics.no_answer(f"no answer to SYNC0{tried}", frames, heard)

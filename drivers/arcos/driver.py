@@ -57,11 +57,6 @@ _MOVING_MORE_S: Final = 1.0
 class ArcosDriver(Session[PoseStamper]):
     """A `drivers.driver.RobotDriver` for the Pioneer family.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-
     Raises
     ------
     drivers.firing_pattern.FiringError

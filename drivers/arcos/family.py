@@ -34,13 +34,7 @@ def make_device(
     faults: Sequence[Fault],
     clock_start_us: int,  # noqa: ARG001 - a Pioneer reports no time
 ) -> RobotDevice:
-    """Return an emulated Pioneer of the robot file's first model.
-
-    Parameters
-    ----------
-    config, world, seed, faults, clock_start_us
-        As of `drivers.registry.make_device`.
-    """
+    """Return an emulated Pioneer of the robot file's first model."""
     from drivers.arcos.device import ArcosDevice  # it loads compiled kernels, which a real robot does not need
 
     return ArcosDevice(config, world, firmware_of(config), seed, faults)

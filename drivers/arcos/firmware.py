@@ -67,17 +67,7 @@ class Firmware:
     turn_acceleration_top_deg_s2: int = 600
 
     def config_packet(self, speed_mm_s: int, turn_deg_s: int, watchdog_ms: int, ramps: RampSettings) -> ConfigPacket:
-        """Return the CONFIGpac.
-
-        Parameters
-        ----------
-        speed_mm_s, turn_deg_s
-            The maxima in force.
-        watchdog_ms
-            The watchdog in force.
-        ramps
-            The accelerations in force.
-        """
+        """Return the CONFIGpac."""
         numbers = self.sensor_numbers
         return ConfigPacket(
             self.class_name,

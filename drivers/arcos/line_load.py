@@ -16,12 +16,7 @@ RANGE_BYTES: Final = 3
 def traffic_of(polling: Polling, discs: tuple[int, ...]) -> tuple[float, float]:
     """Return what a firing adds to the packets, bytes, and the time from one to the next, s.
 
-    Parameters
-    ----------
-    polling
-        The firing pattern as the robot carries it out.
-    discs
-        The robot's number of each sensor of the ring.
+    `discs` are the robot's numbers of the ring's sensors.
     """
     arrays = len({disc // DISCS_PER_ARRAY for disc in discs})
     return float(RANGE_BYTES * arrays), 1e-3 * polling.cycle_ms

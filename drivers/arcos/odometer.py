@@ -24,13 +24,7 @@ def _difference(now: int, before: int, modulus: int) -> int:
 
 
 class Odometer:
-    """Continues the counters of one robot.
-
-    Parameters
-    ----------
-    config
-        The robot's factors.
-    """
+    """Continues the counters of one robot."""
 
     def __init__(self, config: ArcosConfig) -> None:
         self._config = config
@@ -56,14 +50,7 @@ class Odometer:
     def read(self, sip: Sip, robot_s: float, flags: Flags) -> Odometry:
         """Return the sample of a SIP; the first one starts where its counters stand.
 
-        Parameters
-        ----------
-        sip
-            The packet.
-        robot_s
-            When the robot measured it.
-        flags
-            The base's status.
+        `robot_s` is when the robot measured it; flags are the base's.
         """
         before = (0, 0, 0) if self._last is None else (self._last.x, self._last.y, self._last.heading)
         self._last = sip

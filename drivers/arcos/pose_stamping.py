@@ -35,12 +35,7 @@ class PoseStamper(Stamper):
 
     The robot's clock is that of the run, from the first SIP after the robot's last known restart.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-    discs
-        The robot's number of each sensor of the ring.
+    `discs` are the robot's numbers of the ring's sensors.
     """
 
     def __init__(self, config: RobotConfig, discs: tuple[int, ...]) -> None:
@@ -73,14 +68,8 @@ class PoseStamper(Stamper):
     def begin_session(self, sip: Sip, *, was_reset: bool, was_lost: bool) -> bool:
         """Prepare for the first SIP of a session, and return whether the robot has restarted.
 
-        Parameters
-        ----------
-        sip
-            The packet.
-        was_reset
-            Whether the controller said that it was reset.
-        was_lost
-            Whether the robot was no longer in the session of before when it was called.
+        `was_reset`: the controller said so. `was_lost`: the robot was no longer in the session of before when it was
+        called.
         """
         is_first, was_at_zero = self._epoch_s is None, self._odometer.is_at_zero
         is_set_to_zero = not was_at_zero and Odometer.is_near_zero(sip)
@@ -99,18 +88,8 @@ class PoseStamper(Stamper):
     ) -> tuple[Odometry, list[Firing]]:
         """Return the sample of a SIP and the firings whose ranges it lists.
 
-        Parameters
-        ----------
-        sip
-            The packet.
-        arrived_s
-            Its arrival by the run's clock.
-        flags
-            The base's status.
-        baud
-            The line's speed, which delays it; None on a line without one.
-        after_loss
-            Whether a corrupt frame came since the SIP before.
+        It arrived at `arrived_s` by the run's clock, delayed by the line's speed `baud`; None on a line without one.
+        `after_loss`: a corrupt frame came since the SIP before.
         """
         if baud is not None:
             length = _SIP_BYTES + _TAIL_BYTES * (sip.charge is not None) + _READING_BYTES * len(sip.sonar)

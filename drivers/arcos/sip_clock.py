@@ -23,10 +23,7 @@ _GAP_PERIODS: Final = 10.0
 class SipClock:
     """Smooths the arrival times of SIPs.
 
-    Parameters
-    ----------
-    period_s
-        Nominal time from one SIP to the next.
+    `period_s` is their nominal interval.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -39,14 +36,10 @@ class SipClock:
         self._read_s = None
 
     def read(self, arrived_s: float, *, after_loss: bool) -> float:
-        """Return when the SIP that arrived at `arrived_s` was measured, later than the one before.
+        """Return when a SIP was measured, later than the one before.
 
-        Parameters
-        ----------
-        arrived_s
-            Its arrival, less the time that its bytes take.
-        after_loss
-            Whether a corrupt frame came since the SIP before.
+        `arrived_s` is its arrival, less the time that its bytes take. `after_loss`: a corrupt frame came since the
+        SIP before.
         """
         before_s, self._read_s = self._read_s, arrived_s
         if before_s is None:

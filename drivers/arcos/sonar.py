@@ -28,13 +28,7 @@ _TOO_MANY: Final = 2
 
 
 class SonarTimes:
-    """Estimates when sonar cycles end.
-
-    Parameters
-    ----------
-    cycle_s
-        Duration of a cycle.
-    """
+    """Estimates when sonar cycles of `cycle_s` end."""
 
     def __init__(self, cycle_s: float) -> None:
         self.cycle_s = cycle_s
@@ -44,12 +38,7 @@ class SonarTimes:
     def last_end_s(self, sip_s: float, count: int) -> float:
         """Return when the last cycle ended whose range is in the SIP measured at `sip_s`.
 
-        Parameters
-        ----------
-        sip_s
-            When the SIP was measured.
-        count
-            Number of cycles that ended since the SIP before.
+        `count` cycles ended since the SIP before.
 
         Each SIP with ranges is given once, in order: it narrows the bounds for the next.
         """
@@ -67,12 +56,7 @@ class SonarTimes:
 class SonarRing:
     """Turns the sonar lists of one robot into ranges by sensor.
 
-    Parameters
-    ----------
-    discs
-        The robot's number of each sensor of the ring.
-    range_factor
-        Millimetres per unit of a range.
+    `discs` are the robot's numbers of the ring's sensors; `range_factor` is millimetres per unit of a range.
     """
 
     def __init__(self, discs: tuple[int, ...], range_factor: float) -> None:
@@ -100,19 +84,7 @@ class SonarRing:
     ) -> list[tuple[float, Floats]]:
         """Return time and ranges of each firing whose ranges a SIP lists, oldest first; times only grow.
 
-        Parameters
-        ----------
-        readings
-            The SIP's list.
-        sip_s
-            When the robot measured the SIP.
-        period_s
-            Time from one SIP to the next.
-
-        Returns
-        -------
-        list of (float, array of shape (sensors,))
-            As `Firing.robot_s` and `Firing.ranges_m`.
+        The SIP was measured at `sip_s`, `period_s` after the one before. Times and ranges are as in `Firing`.
         """
         arrays: dict[int, list[SonarReading]] = {}
         for reading in readings:

@@ -120,14 +120,9 @@ def ring_with(ring: RingConfig, **firing: object) -> RingConfig:
 
 
 def family_of(robot: RobotConfig | str, **known: Any) -> Family:
-    """Return a robot under contract, with times that follow from its file; `known` replaces any of them.
+    """Return a robot under contract, given by its file or name, with times that follow from the file.
 
-    Parameters
-    ----------
-    robot
-        The robot, its name, or its file.
-    known
-        Attributes of `Family`.
+    `known` replaces any attribute of `Family`.
     """
     if isinstance(robot, str):
         robot = load_robot(robot)

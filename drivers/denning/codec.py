@@ -134,12 +134,7 @@ def crc(data: bytes) -> int:
 def encode(frame: Frame, seq: int | None = None) -> bytes:
     """Return the bytes of a frame, its closing zero included.
 
-    Parameters
-    ----------
-    frame
-        The frame.
-    seq
-        Its sequence number; the frame's own if not given.
+    The number `seq` replaces the frame's own.
 
     Raises
     ------
@@ -285,13 +280,8 @@ def _decode_ident_tail(version: int, tail: bytes) -> tuple[object, ...] | NakCod
 class Decoder:
     """Turns the bytes of one direction into frames.
 
-    Parameters
-    ----------
-    direction
-        The side that sends the frames.
-    midway
-        The line may be in use already, so that the first bytes are the end of a frame: up to the first 0x00 they are
-        dropped without being counted.
+    `direction` is the side that sends. `midway`: the line may be in use already, so that the first bytes are the end
+    of a frame: up to the first 0x00 they are dropped without being counted.
 
     Attributes
     ----------

@@ -54,16 +54,7 @@ _STILL = Twist(0.0, 0.0)
 class DenningDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the ring-and-base protocol.
 
-    Parameters
-    ----------
-    robot, world
-        What the robot is, and what surrounds it.
-    seed
-        Seed of all random numbers.
-    faults
-        What goes wrong, and when.
-    clock_start_us
-        First reading of the robot's own clock, µs: 0 on a real robot, near 2³² to see it wrap soon.
+    Its own clock begins at `clock_start_us`: 0 on a real robot, near 2³² to see it wrap soon.
 
     Raises
     ------

@@ -84,14 +84,7 @@ def coarse_ranges(ident: Ident, resolution_m: float) -> str | None:
 def no_answer(command: str, tries: int, frames: int, heard: HeardBytes) -> str:
     """Return the message for a command that stayed unanswered.
 
-    Parameters
-    ----------
-    command
-        Its name in the protocol.
-    tries
-        How often it was sent.
-    frames, heard
-        Valid frames, and all bytes, received on the line so far.
+    So far `frames` valid ones came on the line, and the bytes of `heard`.
     """
     return line_diagnostics.no_answer(f"no answer to {tries} {command} commands", frames, heard)
 

@@ -35,11 +35,6 @@ _SEND_ORDER = ("HALT", "HELLO", "PATTERN", "LISTEN", "SCAN", "RELEASE")
 class DenningDriver(Session[PoseStamper]):
     """A `drivers.driver.RobotDriver` for the ring-and-base protocol.
 
-    Parameters
-    ----------
-    config
-        The robot file: the ring the robot must have, and the timeouts of its answers.
-
     Raises
     ------
     drivers.firing_pattern.FiringError

@@ -26,13 +26,7 @@ def make_driver(config: RobotConfig) -> RobotDriver:
 def make_device(
     config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
 ) -> RobotDevice:
-    """Return an emulated Denning robot, whose clock wraps at 2³² µs.
-
-    Parameters
-    ----------
-    config, world, seed, faults, clock_start_us
-        As of `drivers.registry.make_device`.
-    """
+    """Return an emulated Denning robot, whose clock wraps at 2³² µs."""
     from drivers.denning.device import DenningDevice  # it loads compiled kernels, which a real robot does not need
 
     return DenningDevice(config, world, seed, faults=faults, clock_start_us=clock_start_us)

@@ -24,16 +24,7 @@ def sent_bytes_s(
 ) -> float:
     """Return how much a robot sends regularly, byte/s.
 
-    Parameters
-    ----------
-    pattern : WirePattern
-        The firing pattern.
-    listeners : tuple of int
-        Mask of the sensors that listen in each step; empty where none does.
-    version : int
-        Of the protocol.
-    sweeps : tuple of Sweep
-        Of the ring's servos.
+    `listeners` are the masks of each step, empty where none listens.
     """
     return odometry_bytes_s() + _firing_bytes(pattern, listeners, version, sweeps) / (1e-3 * pattern.step_period_ms)
 
@@ -61,12 +52,7 @@ def refuse_overload(
 ) -> None:
     """Raise an error if the line is too slow for the traffic.
 
-    Parameters
-    ----------
-    link : LinkConfig
-        Port and speed of the line.
-    pattern, listeners, version, sweeps
-        As of `sent_bytes_s`.
+    Arguments are as of `sent_bytes_s`.
 
     Raises
     ------

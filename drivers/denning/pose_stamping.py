@@ -40,13 +40,6 @@ _FUTURE_MAX_US = 1_000_000
 class PoseStamper(Stamper):
     """Gives each firing its pose, from the history of the odometry.
 
-    Parameters
-    ----------
-    ring
-        The ring, for the directions of its sensors.
-    body
-        The base's limits, which distinguish a motion from a jump.
-
     Attributes
     ----------
     out_of_window
@@ -70,14 +63,9 @@ class PoseStamper(Stamper):
         self._step_period_ms: int | None = None
 
     def set_pattern(self, window: int, step_period_ms: int) -> None:
-        """Set what the firing pattern allows; more is dropped.
+        """Set what the firing pattern allows: the longest range (tenths of a foot) and the time between firings.
 
-        Parameters
-        ----------
-        window
-            Longest range, tenths of a foot.
-        step_period_ms
-            Time between firings.
+        More is dropped.
         """
         self._window = window
         if step_period_ms != self._step_period_ms:

@@ -19,17 +19,6 @@ from drivers.servo_views import ServoViews
 class EchoReporter:
     """Fires the ring's sensors and reports what they hear, faults of sensors included.
 
-    Parameters
-    ----------
-    ring
-        The ring.
-    sonar
-        Its electronics.
-    faults
-        What is wrong with the robot at present.
-    rng
-        Random numbers of their faults.
-
     Attributes
     ----------
     unit_um

@@ -53,13 +53,7 @@ class CommandAckMonitor:
 
 
 class EchoTimeout:
-    """Expires when a ring that should fire has been silent for so long that the robot may have restarted.
-
-    Parameters
-    ----------
-    timeout_s
-        The longest silence.
-    """
+    """Expires when a ring that should fire has been silent for so long that the robot may have restarted."""
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_s = timeout_s

@@ -202,14 +202,7 @@ def ranges_of(echo: Echo | Echo2 | Echo3, views: ServoViews, unit_m: float = TEN
     Bits of the mask beyond the ring's sensors are ignored, and so are the readings of sensors that only listened:
     see `cross_paths_of`; and those of a sensor on a servo without its bearing, or at one that is not of its scan.
 
-    Parameters
-    ----------
-    echo
-        The frame.
-    views
-        The ring's mounts.
-    unit_m
-        What a count of an ECHO2 or ECHO3 stands for, m; an ECHO has tenths of a foot.
+    `unit_m` is what a count of an ECHO2 or ECHO3 stands for; an ECHO has tenths of a foot.
     """
     bearings: dict[int, int] = {}
     if isinstance(echo, Echo3):
@@ -233,14 +226,7 @@ def cross_paths_of(echo: Echo | Echo2 | Echo3, axes: tuple[float, ...], unit_m: 
 
     None if no listener that works is left, and for an ECHO or ECHO3, which have none.
 
-    Parameters
-    ----------
-    echo
-        The frame.
-    axes
-        Directions of the ring's sensors, rad.
-    unit_m
-        What a count of an ECHO2 stands for, m.
+    Axes are the directions of the ring's sensors, rad; `unit_m` is what a count of an ECHO2 stands for.
     """
     if not isinstance(echo, Echo2) or not echo.heard:
         return None

@@ -71,12 +71,7 @@ def read_config(text: str, place: str) -> dict[str, Any]:
 def robot_file(values: Mapping[str, Any], place: str) -> str:
     """Return the text of the robot file for a board's configuration.
 
-    Parameters
-    ----------
-    values
-        As of `read_config`.
-    place
-        The configuration's file, for messages.
+    `values` are as of `read_config`; `place` names the configuration's file in messages.
 
     Raises
     ------

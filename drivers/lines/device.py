@@ -33,15 +33,7 @@ STOPPING: Final = Flags.BUMPER | Flags.MOTOR_FAULT | Flags.LATCHED
 
 
 class LineDevice(EventDevice):
-    """It lives in ticks of 5 ms; all that happens, happens at one.
-
-    Parameters
-    ----------
-    robot, world, seed, faults
-        As of `drivers.registry.make_device`.
-    wire
-        The robot's lines.
-    """
+    """It lives in ticks of 5 ms; all that happens, happens at one."""
 
     # Reset by a restart; see `_boot`.
     _reader: LineReader

@@ -26,13 +26,6 @@ class LineDriver(Session[LineStamper]):
     """A `drivers.driver.RobotDriver` for robots that speak lines.
 
     A new driver is latched: a robot that is found stands until `release`.
-
-    Parameters
-    ----------
-    config
-        The robot file.
-    wire
-        The robot's lines.
     """
 
     def __init__(self, config: RobotConfig, wire: Wire) -> None:

@@ -26,12 +26,7 @@ _GAP_PERIODS: Final = 4.0
 class LineStamper(Stamper):
     """Gives samples of the odometry and firings their poses.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-    period_s
-        Time from one sample to the next, s.
+    `period_s` is the time from one sample to the next.
     """
 
     def __init__(self, config: RobotConfig, period_s: float) -> None:

@@ -70,17 +70,6 @@ _I32 = 1 << 32
 class RflexDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the rFLEX protocol.
 
-    Parameters
-    ----------
-    robot, world
-        What the robot is, and what surrounds it.
-    seed
-        Seed of all random numbers.
-    faults
-        What goes wrong, and when.
-    clock_start_us
-        First reading of its clock.
-
     Raises
     ------
     DriverError

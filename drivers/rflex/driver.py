@@ -62,11 +62,6 @@ _VOLTS_OFFSET: Final = 1.2
 class RflexDriver(Session[Measurements]):
     """A `drivers.driver.RobotDriver` for robots with an rFLEX controller.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-
     Raises
     ------
     drivers.firing_pattern.FiringError

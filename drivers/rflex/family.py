@@ -31,13 +31,7 @@ def deadman_s(config: RobotConfig) -> float:
 def make_device(
     config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
 ) -> RobotDevice:
-    """Return an emulated robot, whose clock wraps at 2³² µs.
-
-    Parameters
-    ----------
-    config, world, seed, faults, clock_start_us
-        As of `drivers.registry.make_device`.
-    """
+    """Return an emulated robot, whose clock wraps at 2³² µs."""
     from drivers.rflex.device import RflexDevice  # it loads compiled kernels, which a real robot does not need
 
     return RflexDevice(config, world, seed, faults, clock_start_us)

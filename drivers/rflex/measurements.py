@@ -50,12 +50,7 @@ def _difference(now: int, before: int) -> int:
 class Measurements(Stamper):
     """Gives samples of the odometry their poses, and firings theirs.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-    ids
-        The id of each sensor of the ring.
+    Each sensor of the ring has its id.
     """
 
     # Set by a restart; see `_reset` and `break_off`.

@@ -45,11 +45,6 @@ class Brake:
 
     The brake comes on when the base stands, or when it does not obey for long.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-
     Attributes
     ----------
     mode
@@ -163,11 +158,6 @@ class StallMonitor:
 
     A model of the base follows the commands within the limits of its file. The base is stalled if it reports less
     than a share of what the model has done for a while: a command that has just grown says nothing yet.
-
-    Parameters
-    ----------
-    config
-        The robot file.
 
     Attributes
     ----------

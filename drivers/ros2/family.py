@@ -48,13 +48,7 @@ def deadman_s(config: RobotConfig) -> float:
 def make_device(
     config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
 ) -> RobotDevice:
-    """Return an emulated robot, without ROS.
-
-    Parameters
-    ----------
-    config, world, seed, faults, clock_start_us
-        As of `drivers.registry.make_device`.
-    """
+    """Return an emulated robot, without ROS."""
     from drivers.denning.device import DenningDevice  # it loads compiled kernels, which a real robot does not need
 
     return DenningDevice(config, world, seed, faults, clock_start_us)

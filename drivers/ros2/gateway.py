@@ -34,15 +34,7 @@ NO_ROS: Final = (
 
 
 class Gateway:
-    """The node and its line.
-
-    Parameters
-    ----------
-    config : RobotConfig
-        The robot file.
-    line : socket.socket
-        To the driver.
-    """
+    """The node and its line to the driver."""
 
     def __init__(self, config: RobotConfig, line: socket.socket) -> None:
         import rclpy

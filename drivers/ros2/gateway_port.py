@@ -24,11 +24,6 @@ _BUFFER_BYTES: Final = 16_384
 class GatewayPort(TcpPort):
     """An open line; opening blocks until ROS has found the robot's odometry.
 
-    Parameters
-    ----------
-    config
-        The robot file.
-
     Raises
     ------
     GatewayError

@@ -55,17 +55,9 @@ class Meaning(NamedTuple):
 def range_meaning(value: float, ring: Limits, sensor: Limits, unit_m: float, *, zero_is_silence: bool) -> Meaning:
     """Return what the range of a message means.
 
-    Parameters
-    ----------
-    value : float
-        `range`, m.
-    ring, sensor : Limits
-        Of the robot file, and `min_range` and `max_range` of the message; these count only if ranges can lie
-        between them.
-    unit_m : float
-        Ranges that round to the same multiple of this are the same, m.
-    zero_is_silence : bool
-        Whether 0 and negative numbers stand for silence.
+    The limits are those of the robot file and `min_range` and `max_range` of the message, which count only if ranges
+    can lie between them. Ranges that round to the same multiple of `unit_m` are the same. `zero_is_silence`: 0 and
+    negative numbers stand for silence.
     """
     both = (ring, sensor) if sensor.are_known else (ring,)
     least_m, greatest_m = max(limits.least_m for limits in both), min(limits.greatest_m for limits in both)

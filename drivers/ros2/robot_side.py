@@ -34,12 +34,7 @@ UNKNOWN_LIMITS: Final = Limits(math.nan, math.nan)
 class RobotSide:
     """A robot of the ring-and-base protocol.
 
-    Parameters
-    ----------
-    config : RobotConfig
-        The robot file.
-    boot_id : int
-        A number that no other start has.
+    `boot_id` is a number that no other start has.
     """
 
     def __init__(self, config: RobotConfig, boot_id: int) -> None:

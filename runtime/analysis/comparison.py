@@ -57,14 +57,7 @@ def compare_runs(
 ) -> Comparison:
     """Replay a recording with its own settings and with others, cycle by cycle, and return both outcomes.
 
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    settings : Settings
-        The other settings.
-    on_message : callable
-        Called after each message, for a progress bar.
+    `on_message` is called after each message, for a progress bar.
 
     Raises
     ------
@@ -106,12 +99,7 @@ def compare_runs(
 def run_under(recording: Recording, settings: Settings) -> tuple[RunOutcome, CycleStats]:
     """Replay a recording with other settings only; return the outcome and what its cycles took.
 
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    settings : Settings
-        Of the same robot.
+    The settings are of the same robot.
     """
     outcome, state, cycle_stats = RunOutcome(), fresh_state(settings), CycleStats(late_after_s=math.inf)
     first_run_s = None

@@ -84,14 +84,7 @@ class MapChange:
 def looks_at_circle(echoes: Echoes, circle: tuple[float, float, float], half_angle_rad: float) -> Looks:
     """Return how often readings hit and passed a round object.
 
-    Parameters
-    ----------
-    echoes : (n,) ECHO
-        All readings, in the frame of the circle.
-    circle : tuple of float
-        Centre x, y and radius, m.
-    half_angle_rad : float
-        Half the beam's opening.
+    The circle is centre x, y and radius, m, in the frame of the echoes.
     """
     x, y, radius = circle
     dx, dy = x - echoes["x"], y - echoes["y"]
@@ -102,14 +95,7 @@ def looks_at_circle(echoes: Echoes, circle: tuple[float, float, float], half_ang
 def looks_at_wall(echoes: Echoes, ends: Sequence[float], half_angle_rad: float) -> Looks:
     """Return how often readings hit and passed each piece of a wall, pieces of about `CELL_M` from its first end.
 
-    Parameters
-    ----------
-    echoes : (n,) ECHO
-        All readings, in the frame of the wall.
-    ends : sequence of float
-        x1, y1, x2, y2, m.
-    half_angle_rad : float
-        Half the beam's opening.
+    Ends are x1, y1, x2, y2 (m) in the frame of the echoes.
     """
     x1, y1, x2, y2 = ends
     length = math.hypot(x2 - x1, y2 - y1)

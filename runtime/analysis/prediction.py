@@ -51,19 +51,8 @@ def withhold(firings: Iterable[Firing]) -> tuple[list[Firing], list[Firing]]:
 def predicted_nat(settings: Settings, perceived: PerceivedRows, withheld: Sequence[Firing]) -> float:
     """Return the mean logarithm of the probability of a withheld reading, over that of one from anywhere.
 
-    Parameters
-    ----------
-    settings : Settings
-        Ring and models, as perception has them.
-    perceived : PerceivedRows
-        What it found in the other firings.
-    withheld : sequence of Firing
-        The readings to predict.
-
-    Returns
-    -------
-    float
-        nat for each reading; 0 is what a map without any knowledge gets.
+    `perceived` is what perception of these settings found in the other firings. The unit is nat; 0 is what a map
+    without any knowledge gets.
 
     Raises
     ------

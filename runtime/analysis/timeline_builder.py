@@ -49,12 +49,7 @@ DIGITS: Final = 4
 class TimelineBuilder:
     """Fills a timeline while a run is replayed.
 
-    Parameters
-    ----------
-    timeline : Timeline
-        Filled, completely once `finish` was called.
-    interval_s : float
-        Time between two snapshots, at first.
+    It is complete once `finish` was called. Snapshots are `interval_s` apart at first.
     """
 
     def __init__(self, timeline: Timeline, interval_s: float = FIRST_INTERVAL_S) -> None:

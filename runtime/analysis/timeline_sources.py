@@ -75,17 +75,10 @@ def load_timeline(
 ) -> Timeline:
     """Return the timeline of a recording or a ring log.
 
-    Parameters
-    ----------
-    source : TimelineSource
-        The file, and the settings for a ring log.
-    prepare : callable
-        Called with the settings before perception starts: compiles kernels.
-    on_step : callable
-        Called after each message or firing, for a progress bar.
-    skim : bool
-        Take what perception knew from the keyframes of a long recording, and replay only what follows the last one.
-        What lies between them is read, but is neither perceived nor compared again.
+    `prepare` is called with the settings before perception starts: it compiles kernels. `on_step` is called after
+    each message or firing, for a progress bar. `skim`: what perception knew is taken from the keyframes of a long
+    recording, and only what follows the last one is replayed; what lies between them is read, but neither perceived
+    nor compared again.
 
     Raises
     ------

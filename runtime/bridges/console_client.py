@@ -117,12 +117,7 @@ class ConsoleClient:
     async def request(self, command: str, **arguments: object) -> Any:  # noqa: ANN401 - the data of any answer
         """Send a command with the newest challenge, wait for its answer and return the answer's data.
 
-        Parameters
-        ----------
-        command : str
-            Its name, as `halt`.
-        **arguments
-            As docs/console-protocol.md lists them.
+        docs/console-protocol.md lists commands, as `halt`, with their arguments.
 
         Raises
         ------
@@ -230,10 +225,7 @@ class ConsoleClient:
 async def connect(url: str) -> AsyncIterator[ConsoleClient]:
     """Connect to a run and yield the client; disconnect at the end.
 
-    Parameters
-    ----------
-    url : str
-        The start URL that the run printed, with its token.
+    The URL is the start URL that the run printed, with its token.
 
     Raises
     ------
@@ -272,14 +264,8 @@ async def stay_connected(
 ) -> None:
     """Connect, serve until the connection ends, and connect again, until cancelled.
 
-    Parameters
-    ----------
-    find : callable
-        Returns the start URL of the run; asked for each attempt, as the next run has another token.
-    serve : callable
-        Gets each connection; ends with it.
-    report : callable
-        Gets one line for each different problem.
+    `find` returns the start URL for each attempt, as the next run has another token; `report` gets one line for each
+    different problem.
     """
     wait_s, reported = RETRY_FIRST_S, ""
     while True:

@@ -75,12 +75,8 @@ class FleetRun:
 class Fleet:
     """The runs of one operator.
 
-    Parameters
-    ----------
-    clock : callable
-        Monotonic, s.
-    find_local : callable
-        Returns the start URLs of this machine's runs; raises UserError where there is none.
+    The clock is monotonic. `find_local` returns the start URLs of this machine's runs, and raises UserError where
+    there is none.
     """
 
     def __init__(self, clock: Callable[[], float], find_local: Callable[[], Iterable[str]]) -> None:

@@ -27,16 +27,8 @@ PAGE: Final = "/page/fleet.html"
 async def serve_fleet(fleet: Fleet, host: str, port: int, urls: Sequence[str], tell: Callable[[str], None]) -> None:
     """Serve the page until cancelled.
 
-    Parameters
-    ----------
-    fleet : Fleet
-        The runs.
-    host, port
-        Where to listen; port 0 takes any that is free.
-    urls : sequence of str
-        Start URLs of runs on other machines.
-    tell : callable
-        Gets the page's start URL in a line.
+    Port 0 takes any that is free. `urls` are start URLs of runs on other machines; `tell` gets the page's own in a
+    line.
 
     Raises
     ------

@@ -29,16 +29,8 @@ async def serve_foxglove(
 ) -> None:
     """Serve a run to Foxglove until cancelled; connect again whenever the run restarts.
 
-    Parameters
-    ----------
-    find : callable
-        Returns the start URL of the run.
-    host, port : str, int
-        Where to listen.
-    report : callable
-        Gets one line for the address and for each problem.
-    allow_set : bool
-        Whether Foxglove may change settings.
+    `find` returns the start URL of the run; `report` gets one line for the address and for each problem. `allow_set`:
+    Foxglove may change settings.
 
     Raises
     ------

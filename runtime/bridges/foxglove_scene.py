@@ -48,13 +48,7 @@ STATE_FIELDS: Final = (
 
 
 class SceneChannels:
-    """The channels of a live run.
-
-    Parameters
-    ----------
-    context : foxglove.Context
-        Of the server.
-    """
+    """The channels of a live run."""
 
     def __init__(self, context: foxglove.Context) -> None:
         self._run = RunChannels(context)

@@ -53,12 +53,7 @@ class Announced(NamedTuple):
 class Finder:
     """Collects the runs that are announced.
 
-    Parameters
-    ----------
-    network : AsyncZeroconf
-        Open.
-    own : str
-        Name of the service that is not to be listed.
+    The service named `own` is not listed.
 
     Attributes
     ----------
@@ -118,14 +113,7 @@ def announced(
 ) -> Announced | None:
     """Return the run that a service describes, with bounded texts; None if it has no usable address.
 
-    Parameters
-    ----------
-    properties : mapping
-        The service's text record; anyone on the network may have written it.
-    addresses : iterable of str
-        Its addresses.
-    port : int or None
-        Its port.
+    Anyone on the network may have written its properties.
     """
     usable = [str(address) for text in addresses if (address := _usable_address(text)) is not None]
     if port is None or not 0 < port < 65536 or not usable:
@@ -148,12 +136,7 @@ def _text(value: bytes | None) -> str:
 async def find_robots(seconds: float, interfaces: Sequence[str] | None = None) -> list[Announced]:
     """Return the runs that answer on the local network, by name.
 
-    Parameters
-    ----------
-    seconds : float
-        How long to wait for answers, s.
-    interfaces : sequence of str, optional
-        Addresses of the interfaces to ask on; by default all.
+    They are asked for on interfaces with these addresses, by default on all.
 
     Raises
     ------
@@ -178,10 +161,7 @@ async def find_robots(seconds: float, interfaces: Sequence[str] | None = None) -
 def addresses_of(host: str) -> list[str]:
     """Return the addresses at which a console that listens on this one can be reached; all of this machine's for any.
 
-    Parameters
-    ----------
-    host : str
-        IPv4 address, or that of all interfaces.
+    The host is an IPv4 address, or that of all interfaces.
     """
     import ifaddr
 
@@ -194,14 +174,8 @@ def addresses_of(host: str) -> list[str]:
 async def serve(host: str, port: int, lines: asyncio.StreamReader) -> None:
     """Announce a run and report the others, until the lines end.
 
-    Parameters
-    ----------
-    host : str
-        IPv4 address on which its console listens: the run is announced, and others are looked for, only there.
-    port : int
-        Of its console.
-    lines : StreamReader
-        JSON objects with the run's name and mode.
+    The run is announced, and others are looked for, only on the host's address. Each line is a JSON object with the
+    run's name and mode.
 
     Raises
     ------
@@ -266,13 +240,7 @@ async def _report(finder: Finder) -> None:
 
 
 async def main(host: str, port: int) -> None:
-    """Serve the run whose console listens here; see the module.
-
-    Parameters
-    ----------
-    host, port
-        As of `serve`.
-    """
+    """Serve the run whose console listens here; see the module."""
     logging.getLogger("zeroconf").addHandler(logging.NullHandler())
     lines = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)

@@ -130,19 +130,7 @@ class Console:
         """The port of the settings, where another program has it."""
 
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
-        """Take in a cycle; its frame is encoded later.
-
-        Parameters
-        ----------
-        record : CycleRecord
-            Of the cycle.
-        state : State
-            After it.
-        stats : CycleStats
-            Late and missed cycles so far.
-        driver : RobotDriver
-            Counts of the link.
-        """
+        """Take in a cycle; its frame is encoded later."""
         before, self._mode = self._mode, state.mode
         if state.mode.entered_since(before) and state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}:
             self.hub.void_challenges()  # whatever stopped it, a command from before must not set it in motion again

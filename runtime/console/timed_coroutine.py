@@ -20,14 +20,7 @@ class Timed(Protocol):
 def timed_coroutine(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
     """Await `work` with each of its steps measured under `name`; return its result.
 
-    Parameters
-    ----------
-    timed : Timed
-        Measures a callback.
-    name : str
-        Of the work, in the timing table.
-    work : coroutine
-        Not yet started; closed at the end.
+    The name is that in the timing table. The work, not yet started, is closed at the end.
     """
     resume, resume_with_error = timed(name, work.send), timed(name, work.throw)
     step, value = resume, None

@@ -36,10 +36,7 @@ Label = tuple[float, float, str]
 class RunChannels:
     """The channels that every run has.
 
-    Parameters
-    ----------
-    context : foxglove.Context
-        Of the file or the server.
+    The context is that of the file or of the server.
     """
 
     def __init__(self, context: foxglove.Context) -> None:
@@ -152,14 +149,7 @@ def scene(
 ) -> None:
     """Replace an entity as a whole, so that elements that are gone disappear.
 
-    Parameters
-    ----------
-    channel, name
-        Where, and the entity's id.
-    lines, texts
-        What it consists of, in the frame `odom`.
-    at
-        Nanoseconds since 1970.
+    The entity has this name as its id, and lines and texts in the frame `odom`; `at` is in nanoseconds since 1970.
     """
     entity = fx.SceneEntity(timestamp=stamp(at), frame_id="odom", id=name, lines=lines, texts=texts)
     channel.log(fx.SceneUpdate(entities=[entity]), log_time=at)

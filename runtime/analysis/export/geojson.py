@@ -28,14 +28,7 @@ DIGITS: Final = 4
 def world_geojson(world: WorldConfig, name: str, frame: Literal["odom", "map"]) -> dict[str, Any]:
     """Return a world as a feature collection: drums and polygons as areas, walls as lines.
 
-    Parameters
-    ----------
-    world : WorldConfig
-        What was recognised.
-    name : str
-        Of the collection.
-    frame : {"odom", "map"}
-        In which the coordinates are.
+    Coordinates are in `frame`.
     """
     drums = [
         _feature("Polygon", [_circle(drum)], kind="drum", x_m=drum.x_m, y_m=drum.y_m, radius_m=drum.radius_m)

@@ -146,12 +146,7 @@ def run_evidence(
 ) -> OccupancyWindow:
     """Return the evidence grid of all readings of a run; ½ where it is free and no line of sight has crossed.
 
-    Parameters
-    ----------
-    world, echoes, ring, method
-        As of `occupancy_image`.
-    low, high : (2,) float
-        The rectangle that it has to hold, m.
+    Arguments are as of `occupancy_image`; low and high corner span the rectangle that it has to hold, m.
 
     Raises
     ------
@@ -194,14 +189,7 @@ def run_evidence(
 def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> Floats:
     """Return where in its beam each echo came from, rad from the axis; NaN where nothing in the world explains it.
 
-    Parameters
-    ----------
-    world : WorldConfig
-        Drums answer from their near side, and walls from the foot of the perpendicular.
-    rows : (n,) record of `timeline.ECHO`
-        The readings.
-    half_angle : float
-        Half the beam's width, rad.
+    Drums answer from their near side, and walls from the foot of the perpendicular.
     """
     at = np.column_stack([rows["x"], rows["y"]])
     best, found = np.full(len(rows), EXPLAINED_M), np.full(len(rows), np.nan)

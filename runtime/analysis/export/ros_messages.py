@@ -89,12 +89,7 @@ class Frames:
 class Messages:
     """Makes the messages of one robot.
 
-    Parameters
-    ----------
-    frames : Frames
-        Names of the frames.
-    no_echo : float, optional
-        The range of a sensor that heard nothing, m; None for its greatest range.
+    `no_echo` is the range of a sensor that heard nothing, m; None for its greatest range.
     """
 
     def __init__(self, frames: Frames, no_echo: float | None = math.inf) -> None:

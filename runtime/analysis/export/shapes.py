@@ -98,14 +98,7 @@ def even_radius(mounts: Sequence[Sequence[float]]) -> float | None:
 def whole_ring(sensors: int, radius: float, scan: FiringScan) -> list[float]:
     """Return a firing's ranges from the ring's centre, one for each sensor; NaN if it did not fire.
 
-    Parameters
-    ----------
-    sensors : int
-        Number of sensors.
-    radius : float
-        Of the ring, m.
-    scan : FiringScan
-        The firing.
+    `radius` is that of the ring, m.
     """
     ranges = np.full(sensors, np.nan)
     ranges[scan.rows["sensor"].astype(int)] = scan.rows["range_m"] + radius

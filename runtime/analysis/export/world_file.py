@@ -39,16 +39,7 @@ def world_of(
     A model with an arc becomes a drum, a closed polygon a polygon, and each side of an open one a wall; so does each
     piece of a polyline.
 
-    Parameters
-    ----------
-    objects : sequence of DetectedObject
-        Those that are not models are left out.
-    walls : (n, 4) float
-        Ends x, y, x, y, m.
-    models : sequence of ModelConfig
-        The models.
-    polylines : sequence of Polyline
-        In the frame of the walls.
+    Walls are ends x, y, x, y (m), in the frame of the polylines. Objects that are none of the models are left out.
     """
     by_name = {model.name: model for model in models}
     drums, polygons, sides = list[DrumConfig](), list[PolygonConfig](), [tuple(row) for row in walls.tolist()]
@@ -89,12 +80,7 @@ def with_places(world: WorldConfig, places: PlacesConfig) -> WorldConfig:
 def text_with_places(text: str, places: PlacesConfig) -> str:
     """Return the text of a world file with other places; the rest of it stays as it is, comments included.
 
-    Parameters
-    ----------
-    text : str
-        Of a valid world file.
-    places : PlacesConfig
-        In place of those that it has.
+    The text is that of a valid world file.
     """
     rows = places.model_dump(mode="json", exclude_defaults=True)
     lines, kept, left_out = text.splitlines(keepends=True), list[str](), list[str]()
@@ -138,15 +124,7 @@ def placed_vertices(model: ModelConfig, seen: DetectedObject) -> Floats:
 
 
 def world_text(world: WorldConfig, head: Sequence[str]) -> str:
-    """Return a world file as TOML, after lines of comment.
-
-    Parameters
-    ----------
-    world : WorldConfig
-        What differs from the defaults is written.
-    head : sequence of str
-        The comment's lines.
-    """
+    """Return a world file as TOML, after the lines of a comment; it has what differs from the defaults."""
     table: dict[str, Any] = world.model_dump(mode="json", exclude_defaults=True)
     comment = "".join(f"# {line}\n" for line in head)
     return f"{comment}\n{tomli_w.dumps(table)}"

@@ -119,18 +119,7 @@ def save_moving(
 ) -> list[Path]:
     """Write the animation as a GIF and, if ffmpeg is installed, as an MP4, and return the files.
 
-    Parameters
-    ----------
-    timeline : Timeline
-        The run.
-    units : {"m", "ft"}
-        Unit of the axes.
-    folder : Path
-        Where the files go.
-    name : str
-        Their name without the suffix.
-    on_frame : callable
-        Called after each frame, for a progress bar.
+    Axes are in `units`; `name` has no suffix; `on_frame` is called after each frame, for a progress bar.
 
     Raises
     ------

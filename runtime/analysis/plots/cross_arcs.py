@@ -38,12 +38,7 @@ def cross_arcs(rows: CrossPathRows, half_angle: float) -> Floats:
     on the ellipse, it is the part within the transmitter's beam and twice the listener's, and at last all of the
     transmitter's.
 
-    Parameters
-    ----------
-    rows : structured array (n,)
-        Of `Timeline.cross_paths`, from `heard_cross_paths`.
-    half_angle : float
-        Of a beam, rad.
+    Rows are of `heard_cross_paths`; half the beam's opening is in rad.
     """
     t, listener = rows["x"] + 1j * rows["y"], rows["listener_x"] + 1j * rows["listener_y"]
     bearing, half = rows["bearing"], rows["half_path_m"]

@@ -36,14 +36,7 @@ def undated(kind: str) -> dict[str, Any]:
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure in every format and return the files.
 
-    Parameters
-    ----------
-    figure : Figure
-        What to write.
-    folder : Path
-        Where the files go.
-    name : str
-        Their name without the suffix.
+    The name has no suffix.
 
     Raises
     ------

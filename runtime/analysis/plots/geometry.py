@@ -44,12 +44,7 @@ def arcs(echoes: Echoes, half_angle: float) -> Floats:
     With handles of 4/3 tan(φ/4) radii, φ the whole angle (the standard approximation of a circular arc by one cubic),
     an arc of 24° is exact to a millionth of its radius.
 
-    Parameters
-    ----------
-    echoes : structured array (n,)
-        Of `Timeline.echoes`, with finite ranges.
-    half_angle : float
-        Of the beam, rad.
+    The echoes have finite ranges; half the beam's opening is in rad.
     """
     radius, bearing = echoes["range_m"][:, None], echoes["bearing"][:, None]
     handle = 4.0 / 3.0 * math.tan(half_angle / 2.0)
@@ -63,29 +58,13 @@ def arcs(echoes: Echoes, half_angle: float) -> Floats:
 
 
 def circle(x: float, y: float, radius: float, corners: int = 72) -> Floats:
-    """Return a circle as a closed polygon, array (corners, 2).
-
-    Parameters
-    ----------
-    x, y, radius : float
-        Centre and radius, m.
-    corners : int
-        Of the polygon.
-    """
+    """Return a circle (centre and radius, m) as a closed polygon, array (corners, 2)."""
     turn = np.linspace(0.0, 2.0 * math.pi, corners, endpoint=False)
     return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
 
 
 def rotated(points: Floats, x: float, y: float, theta: float) -> Floats:
-    """Return points (n, 2) of an object's own frame in the frame in which it has the pose x, y, theta.
-
-    Parameters
-    ----------
-    points : array (n, 2)
-        In the object's own frame, m.
-    x, y, theta : float
-        Pose of the object, m and rad.
-    """
+    """Return points (n, 2) of an object's own frame in the frame in which it has the pose x, y, theta."""
     c, s = math.cos(theta), math.sin(theta)
     placed: Floats = points @ np.array([[c, s], [-s, c]]) + np.array([x, y])
     return placed
@@ -102,14 +81,8 @@ def world_outlines(world: WorldConfig) -> tuple[list[Floats], list[Floats]]:
 def outline(seen: DetectedObject, model: ModelConfig | None, *, whole: bool) -> tuple[Floats, bool]:
     """Return the outline of a recognised object as points (n, 2) in m, and whether it is closed.
 
-    Parameters
-    ----------
-    seen : DetectedObject
-        The object.
-    model : ModelConfig, optional
-        Its model; without one the outline is a small circle.
-    whole : bool
-        Return the whole circle of which a model is an arc: the Bayesian method locates circles, the paper's chords.
+    Without a model it is a small circle. `whole`: of a model that is an arc, the whole circle, as the Bayesian method
+    locates circles, and the paper's chords.
     """
     if model is None:
         return circle(seen.x, seen.y, 0.1), True

@@ -17,14 +17,7 @@ from runtime.simulation.evaluation import CHI2_95
 def draw_known_path(axes: Axes, known: KnownPath, frame: Frame) -> list[Line2D]:
     """Draw the path as known at the end, its loop closures, and the 95 % circle of each map of the way.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    known : KnownPath
-        In odometry's frame of the end.
-    frame : Frame
-        Coordinates of the figure.
+    The path is in odometry's frame of the end.
     """
     radius = math.sqrt(CHI2_95)
     around = [frame.points(circle(x, y, radius * sigma)) for x, y, sigma in known.maps.places.tolist() if sigma > 0.0]

@@ -48,17 +48,7 @@ ARCS_MAX: Final = 4000
 
 
 def draw_world(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
-    """Draw the true world if it is known.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw, in the unit of `frame`.
-    timeline : Timeline
-        The run; without a known world nothing is drawn.
-    frame : Frame
-        The coordinates of the figure: its place in the world and the unit of its axes.
-    """
+    """Draw the true world if it is known."""
     if timeline.world is None:
         return []
     closed, lines = world_outlines(timeline.world)
@@ -81,16 +71,7 @@ def draw_world(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
 def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -> list[Line2D]:
     """Draw the robot at the last pose and its path.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    poses : sequence of Pose
-        In the odometry's frame.
-    frame : Frame
-        Coordinates of the figure.
-    radius_m : float
-        Of the robot.
+    Poses are in odometry's frame.
     """
     if not poses:
         return []
@@ -116,14 +97,7 @@ def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) 
 def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame) -> list[Line2D]:
     """Draw the number of each bookmark at the robot's position at that moment.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw, in the unit of `frame`.
-    bookmarks : sequence of BookmarkEntry
-        All bookmarks of the run, numbered from 1; one without a pose is not drawn.
-    frame : Frame
-        The coordinates of the figure: its place in the world and the unit of its axes.
+    They are numbered from 1; one without a pose is not drawn.
     """
     style: Any = {"marker": "D", "markersize": 5, "linestyle": "", "color": PAPER, "markeredgecolor": INK}
     placed = [(number, mark.pose) for number, mark in enumerate(bookmarks, 1) if mark.pose is not None]
@@ -148,14 +122,7 @@ def thinned(rows: Echoes) -> Echoes:
 def draw_evidence_grid(axes: Axes, known: KnownCells, frame: Frame) -> list[Line2D]:
     """Draw the cells of the evidence grid: occupied ones dark, free ones light, each as strongly as it is known.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw, in the unit of `frame`.
-    known : KnownCells
-        The grid, in the odometry's frame.
-    frame : Frame
-        The coordinates of the figure: its place in the world and the unit of its axes.
+    The grid is in odometry's frame.
     """
     rows, columns = known.percent.shape
     share = (known.percent.astype(np.float64) - 50.0) / 50.0
@@ -176,16 +143,7 @@ def draw_evidence_grid(axes: Axes, known: KnownCells, frame: Frame) -> list[Line
 def draw_arcs(axes: Axes, echoes: Echoes, half_angle: float, frame: Frame) -> list[Line2D]:
     """Draw each echo as the arc on which its reflection may lie.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    echoes : structured array (n,)
-        Of `Timeline.echoes`, with finite ranges.
-    half_angle : float
-        Of the beam, rad.
-    frame : Frame
-        Coordinates of the figure.
+    The echoes have finite ranges; half the beam's opening is in rad.
     """
     curves = frame.points(arcs(echoes, half_angle))
     codes = np.tile([Path.MOVETO, Path.CURVE4, Path.CURVE4, Path.CURVE4], len(curves))
@@ -200,16 +158,7 @@ def draw_arcs(axes: Axes, echoes: Echoes, half_angle: float, frame: Frame) -> li
 def draw_cross_paths(axes: Axes, rows: CrossPathRows, half_angle: float, frame: Frame) -> list[Line2D]:
     """Draw each cross path as the arc of its ellipse.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    rows : structured array (n,)
-        Of `Timeline.cross_paths`, from `cross_arcs.heard_cross_paths`.
-    half_angle : float
-        Of the beam, rad.
-    frame : Frame
-        Coordinates of the figure.
+    Rows are of `cross_arcs.heard_cross_paths`; half the beam's opening is in rad.
     """
     if not len(rows):
         return []
@@ -220,19 +169,7 @@ def draw_cross_paths(axes: Axes, rows: CrossPathRows, half_angle: float, frame: 
 
 
 def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = False) -> list[Line2D]:
-    """Draw outline segments.
-
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    segments : array (n, 4)
-        Ends x, y, x, y, m.
-    frame : Frame
-        Coordinates of the figure.
-    faint : bool
-        Draw them thinner and paler.
-    """
+    """Draw outline segments, ends x, y, x, y (m); faint ones are thinner and paler."""
     lines = LineCollection(
         list(frame.points(segments.reshape(-1, 2, 2))), color=SEGMENT, linewidth=0.9 if faint else 1.3,
         alpha=0.45 if faint else 0.85, zorder=3,
@@ -245,16 +182,7 @@ def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = F
 def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Frame) -> list[Line2D]:
     """Draw clusters as the paper does: a rectangle and an X at the centre; too small ones with dotted lines.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    clusters : iterable of Cluster
-        In the odometry's frame.
-    least : int
-        Segments that a cluster needs to be matched with a model.
-    frame : Frame
-        Coordinates of the figure.
+    Clusters are in odometry's frame; one needs `least` segments to be matched with a model.
     """
     handles = {}
     for number, cluster in enumerate(clusters, 1):
@@ -276,14 +204,7 @@ def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Fr
 def draw_walls(axes: Axes, walls: Sequence[DetectedObject], frame: Frame) -> list[Line2D]:
     """Draw the recognised walls from end to end, each with its number.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    walls : sequence of DetectedObject
-        In the odometry's frame.
-    frame : Frame
-        Coordinates of the figure.
+    They are in odometry's frame.
     """
     style: Any = {"color": MODEL, "linewidth": 2.2, "linestyle": (0, (6, 1.5))}
     for index, wall in enumerate(walls, 1):
@@ -316,20 +237,7 @@ def draw_objects(
 ) -> list[Line2D]:
     """Draw the models at the recognised poses, with the error of each if the true world is known.
 
-    Parameters
-    ----------
-    axes : Axes
-        Drawn into.
-    objects : sequence of DetectedObject
-        In the odometry's frame.
-    timeline : Timeline
-        The run.
-    frame : Frame
-        Coordinates of the figure.
-    units : {"m", "ft"}
-        Unit of the errors.
-    labelled : bool
-        Write names and errors.
+    Objects are in odometry's frame; errors are in `units`; names and errors are written where `labelled`.
     """
     models = {model.name: model for model in timeline.settings.models}
     whole = timeline.settings.perception.method == "bayes"

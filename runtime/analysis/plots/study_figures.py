@@ -14,16 +14,8 @@ Points = Sequence[tuple[float, float]]
 def trade_off_figure(points: Points, front: Points, best: tuple[float, float], labels: tuple[str, str]) -> Figure:
     """Return the figure of two results of every combination of settings.
 
-    Parameters
-    ----------
-    points : sequence of (x, y)
-        All combinations.
-    front : sequence of (x, y)
-        Those that no other is better than in everything.
-    best : (x, y)
-        The best by the order of the objectives.
-    labels : (str, str)
-        Of both axes.
+    `front` are the points (x, y) that no other is better than in everything, `best` is that of the order of the
+    objectives, and labels are those of both axes.
     """
     figure = Figure(figsize=(WIDTH_IN, 3.6), layout="constrained")
     axes = figure.subplots()
@@ -55,12 +47,7 @@ def trade_off_figure(points: Points, front: Points, best: tuple[float, float], l
 def effects_figure(effects: Sequence[tuple[str, Sequence[tuple[str, float]]]], objective: str) -> Figure:
     """Return the figure of an objective's mean for each value of each setting.
 
-    Parameters
-    ----------
-    effects : sequence of (setting, values)
-        For each setting its values, as text, with the mean of the objective.
-    objective : str
-        Its name.
+    Each effect is a setting, and its values as text with the mean of the objective.
     """
     figure = Figure(
         figsize=(WIDTH_IN, 0.9 + 0.28 * sum(len(values) + 1 for _, values in effects)), layout="constrained"
@@ -81,12 +68,7 @@ def effects_figure(effects: Sequence[tuple[str, Sequence[tuple[str, float]]]], o
 def search_figure(trials: Points, best: Sequence[float]) -> Figure:
     """Return the figure of a search: the cost of each trial.
 
-    Parameters
-    ----------
-    trials : sequence of (number, cost)
-        The trials, of which the first is that of the present settings.
-    best : sequence of float
-        The least cost up to each of them.
+    Each trial is its number and cost, the first that of the present settings; `best` is the least cost up to each.
     """
     figure = Figure(figsize=(WIDTH_IN, 2.8), layout="constrained")
     axes = figure.subplots()

@@ -11,14 +11,7 @@ from pydantic import BaseModel
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, text: bool = False) -> str:
     """Return a table.
 
-    Parameters
-    ----------
-    headings : sequence of str
-        One for each column.
-    rows : iterable of sequence of str
-        The cells.
-    text : bool
-        Align the cells for words rather than for numbers.
+    Cells are aligned for words (`text`) rather than for numbers.
     """
     head = "".join(f"<th>{escape(h)}</th>" for h in headings)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)

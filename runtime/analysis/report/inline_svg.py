@@ -34,14 +34,8 @@ FONT: Final = re.compile(r"font: ([^;\"]*?)'DejaVu Sans'[^;\"]*")
 def inlined(svg: str, prefix: str, label: str) -> str:
     """Return an SVG as an element of an HTML page.
 
-    Parameters
-    ----------
-    svg : str
-        As matplotlib writes it, with text as text.
-    prefix : str
-        Added to all ids, which makes them unique in the page.
-    label : str
-        Description for screen readers; without quotes and angle brackets.
+    It is as matplotlib writes it, with text as text. The prefix makes ids unique in the page; the label is for screen
+    readers, without quotes and angle brackets.
     """
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"\sxmlns(:\w+)?=\"[^\"]*\"", "", svg)

@@ -29,12 +29,7 @@ NO_RUN: Final = "there is no connection to the run: start it, or look at the bri
 async def run_bridge(find: Callable[[], str], arguments: Sequence[str]) -> None:
     """Bridge a run and ROS until cancelled; connect again whenever the run restarts.
 
-    Parameters
-    ----------
-    find : callable
-        Returns the start URL of the run.
-    arguments : sequence of str
-        Of ROS, as `--ros-args -r __ns:=/robot1`.
+    `find` returns the start URL of the run. Arguments are those of ROS, as `--ros-args -r __ns:=/robot1`.
     """
     bridge = _Bridge(asyncio.get_running_loop())
     node = bridge.node = BridgeNode(arguments, bridge)

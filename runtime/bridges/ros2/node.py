@@ -80,12 +80,7 @@ class Commands(Protocol):
 class BridgeNode:
     """The node of one run.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Of ROS, as `--ros-args -r __ns:=/robot1`.
-    commands : Commands
-        Gets what ROS asks for.
+    Arguments are those of ROS, as `--ros-args -r __ns:=/robot1`; commands get what ROS asks for.
     """
 
     def __init__(self, arguments: Sequence[str], commands: Commands) -> None:

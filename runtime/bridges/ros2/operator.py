@@ -24,16 +24,8 @@ SPEED_MAX, TURN_MAX = 10.0, 20.0
 class Operator:
     """Passes what ROS asks to one connection.
 
-    Parameters
-    ----------
-    client : ConsoleClient
-        The connection.
-    timeout_s : float
-        A velocity ends this long after it arrived.
-    report : callable
-        Gets one line for each refusal of a velocity.
-    clock : callable
-        Monotonic, s.
+    A velocity ends `timeout_s` after it arrived. `report` gets a line for each refusal of one. The clock is
+    monotonic.
     """
 
     def __init__(

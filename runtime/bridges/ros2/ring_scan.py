@@ -24,13 +24,7 @@ WAIT_MAX_S: Final = 1.0
 
 
 class RingScan:
-    """Collects the readings of a ring.
-
-    Parameters
-    ----------
-    frame : str
-        Of the base.
-    """
+    """Collects the readings of a ring; the frame is that of the base."""
 
     def __init__(self, frame: str) -> None:
         self._frame = frame

@@ -49,12 +49,7 @@ class Heard:
 def robot_file(heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: float) -> dict[str, Any]:
     """Return the tables of the robot file.
 
-    Parameters
-    ----------
-    heard : Heard
-        What was heard of the robot in some seconds.
-    radius_m, speed_m_s, turn_rad_s : float
-        Radius and limits of the body, which no topic says.
+    It was heard for some seconds. Radius and limits of the body are given, since no topic says them.
 
     Raises
     ------

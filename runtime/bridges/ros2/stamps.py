@@ -32,12 +32,8 @@ class StampClock:
 
         `nanoseconds` needs it to have been called once.
 
-        Parameters
-        ----------
-        robot_s, ros_s, host_s : float
-            The robot's clock in the state, ROS time and this machine's monotonic clock when it arrived, s.
-        is_steady : bool
-            Whether the robot's time runs as fast as ROS time: not while an emulated run is paused or slowed down.
+        The clocks are the robot's in the state, ROS time and this machine's monotonic one when it arrived.
+        `is_steady`: the robot's time runs as fast as ROS time, not so while an emulated run is paused or slowed down.
         """
         if is_steady and robot_s == self._robot_s and not math.isnan(self._offset_s):
             return None  # nothing new was measured

@@ -36,14 +36,8 @@ DISCONNECTED: Final = "DISCONNECTED"
 class Topics:
     """Turns the messages of one run into those of ROS, and remembers what has been published.
 
-    Parameters
-    ----------
-    frames : Frames
-        Names of the frames.
-    max_range_for_silence : bool
-        Whether a sensor that heard nothing reports its greatest range, not inf.
-    with_scan : bool
-        Whether the ring is also published as a laser scan.
+    `max_range_for_silence`: a sensor that heard nothing reports its greatest range, not inf. `with_scan`: the ring is
+    also published as a laser scan.
     """
 
     def __init__(self, frames: Frames, *, max_range_for_silence: bool = False, with_scan: bool = False) -> None:
@@ -90,14 +84,8 @@ class Topics:
     ) -> tuple[list[Frame], list[Output]]:
         """Return the new frames and messages of a state; none before the first session.
 
-        Parameters
-        ----------
-        state : dict
-            Of the run.
-        ros_s, host_s : float
-            ROS time and this machine's monotonic clock when it arrived, s.
-        polylines : sequence of dict
-            Those that the run has now; a state has them only when they changed.
+        It arrived at `ros_s` in ROS time, at `host_s` by this machine's monotonic clock. Polylines are all that the
+        run has now: a state has them only when they changed.
         """
         if not self._session or (state["playback"] is not None):
             return [], []

@@ -37,12 +37,7 @@ class Challenge:
 class Challenges:
     """The challenges of one run.
 
-    Parameters
-    ----------
-    clock : callable
-        The host's: monotonic, s.
-    age_max_s : float
-        A command with an older challenge is refused.
+    A command with a challenge older than `age_max_s` is refused. The clock is the host's, monotonic.
 
     Attributes
     ----------
@@ -77,12 +72,7 @@ class Challenges:
     def refusal_reason(self, number: int | None, *, survives_stop: bool = False) -> str | None:
         """Return why a command with this challenge is refused, None if it is fresh.
 
-        Parameters
-        ----------
-        number : int, optional
-            The challenge that the command carries.
-        survives_stop : bool
-            Whether the command may have been sent before the robot stopped.
+        A command that survives a stop may have been sent before it.
         """
         if number is None:
             return ABSENT

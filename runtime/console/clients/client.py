@@ -31,14 +31,8 @@ class Frame(Protocol):
     def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
         """Return the frame as a message for one client.
 
-        Parameters
-        ----------
-        follows : bool
-            Whether the client received the previous frame of this source: segments are then sent as changes.
-        dropped : int
-            Frames that were not sent to this client because it was too slow.
-        controls : bool
-            Whether this client has control of the robot.
+        `follows`: it received the previous frame of this source, so segments are sent as changes. Frames were dropped
+        because it was too slow. `controls`: it has control of the robot.
         """
 
 
@@ -55,20 +49,8 @@ class Transport(Protocol):
 class Client:
     """A page that is open in a browser.
 
-    Parameters
-    ----------
-    number : int
-        Unique in this run.
-    name : str
-        For operators and the log.
-    transport : Transport
-        The connection.
-    limits : Limits
-        Bounds of its queue and its messages.
-    clock : callable
-        Monotonic, s.
-    has_token : bool
-        Whether it may do more than watch.
+    The number is unique in this run; the name is for operators and the log. A client without the token only watches.
+    The clock is monotonic.
 
     Attributes
     ----------

@@ -29,14 +29,7 @@ TEXT_MAX: Final = 500
 class ClientHub:
     """The clients of one run.
 
-    Parameters
-    ----------
-    limits : Limits
-        How many there may be, and the bounds of each.
-    clock : callable
-        Monotonic, s.
-    on_control_lost : callable
-        Gets the client that had control, which has left or lost it.
+    The clock is monotonic; `on_control_lost` gets the client that had control, which has left or lost it.
 
     Attributes
     ----------
@@ -79,16 +72,7 @@ class ClientHub:
     def join(self, transport: Transport, address: str, session: Mapping[str, Any], *, has_token: bool) -> Client:
         """Add a client and send it the session information; return it.
 
-        Parameters
-        ----------
-        transport : Transport
-            Its connection.
-        address : str
-            Of the peer, for its name.
-        session : mapping
-            The session information.
-        has_token : bool
-            Whether it may do more than watch.
+        The address is that of its peer. Without the token it only watches.
         """
         self._number += 1
         name = f"client {self._number} ({address})"

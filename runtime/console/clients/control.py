@@ -33,12 +33,8 @@ class Holder(Protocol):
 class Control:
     """Which client has control of the robot, and which has requested it.
 
-    Parameters
-    ----------
-    notify : callable
-        Gets each client whose role changed or that is asked for control, and the client that asks, if any.
-    on_lost : callable
-        Gets the client that had control until now.
+    `notify` gets each client whose role changed or that is asked for control, and the client that asks, if any;
+    `on_lost` gets the client that had control until now.
     """
 
     def __init__(self, notify: Callable[[Holder, Holder | None], None], on_lost: Callable[[Holder], None]) -> None:

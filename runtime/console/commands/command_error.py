@@ -8,12 +8,7 @@ from config.errors import UserError
 class CommandError(UserError):
     """A command was not carried out; the client gets the text in its answer, and the connection stays open.
 
-    Parameters
-    ----------
-    text : str
-        For the operator: what is wrong and what to do.
-    field : str, optional
-        The input field of the page next to which the text belongs.
+    The text says what is wrong and what to do; `field` is the input field of the page next to which it belongs.
     """
 
     def __init__(self, text: str, field: str | None = None) -> None:

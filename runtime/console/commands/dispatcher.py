@@ -34,14 +34,7 @@ class StartTask(Protocol):
 class CommandDispatcher:
     """Carries out the commands of all clients.
 
-    Parameters
-    ----------
-    context : CommandContext
-        What commands act on.
-    log : ConsoleLog
-        Gets requests to the robot, and whatever is refused.
-    start_task : StartTask
-        Runs the handlers that are coroutines.
+    `log` gets requests to the robot, and whatever is refused; `start_task` runs the handlers that are coroutines.
     """
 
     def __init__(self, context: CommandContext, log: ConsoleLog, start_task: StartTask) -> None:
@@ -67,11 +60,8 @@ class CommandDispatcher:
     def edits_done(self, outcomes: Sequence[tuple[str | None, Undo]]) -> None:
         """Answer the edits that a cycle carried out.
 
-        Parameters
-        ----------
-        outcomes : sequence of (str or None, Undo)
-            For each edit, in the order in which they were queued: why it failed, None if it is done; and what takes
-            back what was done of it.
+        In the order in which they were queued, an outcome is why the edit failed, None if it is done, and what takes
+        back what was done of it.
         """
         for reason, undo in outcomes:
             if not self._context.pending_edits:

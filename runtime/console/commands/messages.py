@@ -279,14 +279,7 @@ class Message(NamedTuple):
 class MalformedMessage(UserError):  # noqa: N818 - names the message, which the caller answers
     """A message that is not a command of the console.
 
-    Parameters
-    ----------
-    text : str
-        What is wrong with it.
-    id : int, optional
-        Its id, if it has a valid one.
-    field : str, optional
-        The path of the argument that is wrong.
+    It has its id if that is valid, and the path of the argument that is wrong.
     """
 
     def __init__(self, text: str, id: int | None, field: str | None = None) -> None:  # noqa: A002 - the wire's name

@@ -65,14 +65,7 @@ def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
 def fields_of(model: type[BaseModel], values: Mapping[str, Any], at: Location) -> Iterator[Parameter]:
     """Yield every key of a table in a file, whether the file gives it or not; lists and the like as text in TOML.
 
-    Parameters
-    ----------
-    model
-        The table's.
-    values
-        The table as the file has it; what it says need not be valid.
-    at
-        Where the table is in the file.
+    `values` is the table as the file has it, which need not be valid; `at` is where.
     """
     for name, field in model.model_fields.items():
         location, inner = (*at, name), field.annotation

@@ -32,16 +32,8 @@ PRESET: Final = ("ring", "firing", "preset")
 class Tuning:
     """Changes of the live settings by an operator.
 
-    Parameters
-    ----------
-    live_settings : LiveSettings
-        The settings in force.
-    prepare : PrepareSettings
-        Awaited before a further model is recognised.
-    on_change : callable
-        Gets what an operator has changed or undone.
-    emulated : bool
-        Whether the port is an emulator's, which a saved file leaves out.
+    `prepare` is awaited before a further model is recognised; `on_change` gets what an operator has changed or
+    undone. The port of an emulated robot is left out of a saved file.
     """
 
     def __init__(
@@ -64,13 +56,6 @@ class Tuning:
 
     def set(self, path: str, value: bool | float | str | None) -> tuple[Difference, ...]:
         """Change one value; return what changed.
-
-        Parameters
-        ----------
-        path : str
-            The dotted name of the setting.
-        value : bool, int, float, str or None
-            Its new value.
 
         Raises
         ------
@@ -111,12 +96,8 @@ class Tuning:
     async def set_map(self, toml: str | None, refusal: Callable[[], str | None]) -> None:
         """Find the robot in a known room from now on, as after a start with `--map`; its places come with it.
 
-        Parameters
-        ----------
-        toml
-            The room as a world file; None forgets the room that is known.
-        refusal
-            Returns why no map can be changed now, None if one can.
+        A `toml` of None forgets the room that is known. `refusal` returns why no map can be changed now, None if one
+        can.
 
         Raises
         ------

@@ -69,12 +69,7 @@ class Job:
 class Jobs:
     """The jobs of a run's console, and the files that they made.
 
-    Parameters
-    ----------
-    units : {"m", "ft"}
-        Of reports.
-    program : str
-        The module that does the work, as a program.
+    Reports are in `units`; the module `program` does the work.
     """
 
     def __init__(self, units: Units = "m", program: str = ECHOLOCATE) -> None:
@@ -98,12 +93,7 @@ class Jobs:
     def start(self, kind: Kind, file: str, path: Path) -> int:
         """Begin a job on a recording, and return its number.
 
-        Parameters
-        ----------
-        kind
-            What to make.
-        file, path
-            The recording, as a page names it and where it is.
+        `file` is the recording as a page names it.
 
         Raises
         ------

@@ -22,14 +22,8 @@ NO_UNDO: Final = "there is no new name or pin of a recording to undo"
 class RecordingFiles:
     """The recordings of a folder and the one in progress; the disk is waited for in threads.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recordings.
-    current : callable
-        Returns the file of the recording in progress, None while nothing is recorded.
-    jobs : Jobs
-        Makes reports and maps.
+    `current` returns the file of the recording in progress, None while nothing is recorded; `jobs` makes reports and
+    maps.
     """
 
     def __init__(self, folder: Path, current: Callable[[], str | None], jobs: Jobs) -> None:

@@ -35,14 +35,8 @@ HEAD: Final = "The places of the map {}, kept for the next run with it (m)."
 class SettingsFiles:
     """The files that the settings of this run were read from.
 
-    Parameters
-    ----------
-    documents : sequence of DocumentRead
-        The files.
-    reload : callable
-        Reads the settings of the whole run again; raises ConfigError where they are wrong.
-    restart : callable
-        Ends the run and starts it again with the same command; returns why it cannot, None if it will.
+    `reload` reads the settings of the whole run again, and raises ConfigError where they are wrong; `restart` ends
+    the run and starts it again with the same command, or returns why it cannot.
     """
 
     def __init__(

@@ -22,12 +22,7 @@ def form_of(kind: Kind, text: str) -> list[SettingsTable]:
 
     A robot file, or a run file with a robot in it, has the table of its driver; a mission has each use of a schema.
 
-    Parameters
-    ----------
-    kind
-        Of the file.
-    text
-        Its text, which need not be valid.
+    The text need not be valid.
     """
     try:
         found = _tables(kind, parse_toml(text, "text"))
@@ -39,14 +34,7 @@ def form_of(kind: Kind, text: str) -> list[SettingsTable]:
 def with_setting(kind: Kind, text: str, path: str, value: TomlValue) -> str:
     """Return a text with another value of a field of its form; what that means, the check says.
 
-    Parameters
-    ----------
-    kind, text
-        As of `form_of`.
-    path
-        Of the field.
-    value
-        None removes the key, so that its default counts. A list and the like is a text in TOML.
+    A value of None removes the key, so that its default counts. A list and the like is a text in TOML.
 
     Raises
     ------

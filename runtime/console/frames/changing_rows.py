@@ -13,10 +13,7 @@ T = TypeVar("T", bound=Hashable)
 class ChangingRows(Generic[T]):
     """The list as the last frame had it.
 
-    Parameters
-    ----------
-    row : callable
-        Returns what JSON has of an item. Items that are equal have equal rows.
+    `row` returns what JSON has of an item; equal items have equal rows.
 
     Attributes
     ----------

@@ -103,14 +103,8 @@ class EncodedFrame(NamedTuple):
     def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
         """Return the message for one client.
 
-        Parameters
-        ----------
-        follows : bool
-            Whether the previous frame of this source is the last one the client was sent.
-        dropped : int
-            Frames that the client was not sent.
-        controls : bool
-            Whether the client has control.
+        `follows`: the previous frame of this source is the last one that it was sent. `dropped` frames were not.
+        `controls`: it has control.
         """
         fields = self.changes if follows else self.whole()
         controller = b"true" if controls else b"false"
@@ -118,13 +112,7 @@ class EncodedFrame(NamedTuple):
 
 
 class FrameEncoder:
-    """Encodes the frames of one run, live or replayed.
-
-    Parameters
-    ----------
-    settings : Settings
-        Of the run.
-    """
+    """Encodes the frames of one run, live or replayed."""
 
     def __init__(self, settings: Settings) -> None:
         count = len(settings.ring.mounts)
@@ -169,14 +157,7 @@ class FrameEncoder:
     def frame(self, state: State, record: CycleRecord | None, context: FrameContext) -> EncodedFrame:
         """Return the frame of the state after a cycle.
 
-        Parameters
-        ----------
-        state : State
-            After the cycle.
-        record : CycleRecord, optional
-            Of the cycle; None before the first one.
-        context : FrameContext
-            What is not in the state.
+        The record is None before the first cycle.
         """
         self._number += 1
         is_moving = not context.is_paused and context.playback is None

@@ -36,22 +36,8 @@ IDLE_PERIOD_S: Final = 1.0
 class FramePublisher:
     """Encodes frames of a run and passes them to its clients.
 
-    Parameters
-    ----------
-    run : Run
-        The robot's process.
-    hub : ClientHub
-        The clients.
-    commands : CommandContext
-        Its time control and recording are shown in each frame.
-    settings : Settings
-        Of the run.
-    log : structlog logger
-        Gets an error that ends the frames.
-    clock : callable
-        Monotonic, s.
-    on_stalled : callable
-        Gets the name of each client that was disconnected because it takes nothing any more.
+    Each frame shows the time control and recording of `commands`. The clock is monotonic; `on_stalled` gets the name
+    of each client that was disconnected because it takes nothing any more.
 
     Attributes
     ----------
@@ -109,16 +95,7 @@ class FramePublisher:
     def take(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Take in a cycle and schedule a frame if one is due.
 
-        Parameters
-        ----------
-        record : CycleRecord
-            Of the cycle.
-        state : State
-            After it; read when the frame is encoded.
-        stats : CycleStats
-            Late and missed cycles so far.
-        driver : RobotDriver
-            Counts of the link.
+        The state is read when the frame is encoded.
         """
         self._encoder.take(record)
         if record.inputs.received.rebooted:

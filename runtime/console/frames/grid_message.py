@@ -14,13 +14,7 @@ SIDE_MAX: Final = 256
 
 
 def grid_message(state: State) -> GridMessage:
-    """Return the message after a cycle; without cells where the settings keep no grid, or it knows nothing.
-
-    Parameters
-    ----------
-    state : State
-        Of the run or of a recording.
-    """
+    """Return the grid after a cycle; without cells where the settings keep none, or it knows nothing."""
     grid = state.perception.grid
     if grid is None:
         return {"type": "grid", "on": False, "columns": 0, "rows": 0, "cells": ""}

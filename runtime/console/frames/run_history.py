@@ -39,14 +39,8 @@ class RunHistory:
     ) -> None:
         """Take in a cycle: keep its place if the robot has moved, and its numbers once in a while.
 
-        Parameters
-        ----------
-        odometry : Odometry
-            The newest.
-        ranges : callable
-            Returns the last range of each sensor in the form of a frame, m; called once a sample, like the next one.
-        phases_s : callable
-            Returns the duration of each phase of the last cycle.
+        `ranges` returns the last range of each sensor in the form of a frame, m, and `phases_s` the duration of each
+        phase of the last cycle; both are called once a sample.
         """
         x, y, t = odometry.pose.x, odometry.pose.y, odometry.robot_s
         if not self._trail or math.hypot(x - self._trail[-1][0], y - self._trail[-1][1]) >= TRAIL_STEP_M:

@@ -25,16 +25,7 @@ from runtime.support.length_format import Units
 def session_info(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> SessionInfo:
     """Return the session message that all clients are sent; the hub adds the client's role.
 
-    Parameters
-    ----------
-    settings : Settings
-        In force.
-    name : str, optional
-        What the robot calls itself.
-    emulated : bool
-        Whether the robot is emulated in the settings' world.
-    units : {"m", "ft"}
-        In which the page shows lengths at first.
+    `name` is what the robot calls itself; `units` are those in which the page shows lengths at first.
     """
     ring, body, known_room = settings.ring, settings.body, settings.perception.localization.known_room
     return {

@@ -49,12 +49,7 @@ class Limits:
 class ConsoleLog:
     """Logs what clients do and what is refused to them, at a bounded rate so that no client can flood the log.
 
-    Parameters
-    ----------
-    log : structlog logger
-        The run's log.
-    clock : callable
-        Monotonic, s.
+    The clock is monotonic.
 
     Attributes
     ----------

@@ -36,12 +36,7 @@ CONNECTIONS_BURST: Final = 600.0
 async def listen(config: ConsoleConfig, before: int | None = None) -> socket.socket:
     """Return a socket that listens on the configured host and port, or on the next free port.
 
-    Parameters
-    ----------
-    config : ConsoleConfig
-        Of the console.
-    before : int, optional
-        The port before a restart, which is tried first.
+    The port `before` a restart is tried first.
 
     Raises
     ------
@@ -83,16 +78,8 @@ async def listen(config: ConsoleConfig, before: int | None = None) -> socket.soc
 class TimedProtocol(asyncio.Protocol):
     """Forwards everything to another protocol and measures the time that takes.
 
-    Parameters
-    ----------
-    inner : Protocol
-        Handles the connection.
-    timed : Timed
-        Measures its callbacks.
-    accepts : callable
-        Gets the number of bytes that have come; returns whether the peer may send so many.
-    on_lost : callable
-        Called when the connection has ended.
+    `inner` handles the connection. `accepts` gets the number of bytes that have come, and returns whether the peer
+    may send so many; `on_lost` is called when the connection has ended.
     """
 
     def __init__(
@@ -158,18 +145,8 @@ class ConnectionLimiter:
 
     One connection too many has the oldest dropped, so that holding connections open keeps no one else out.
 
-    Parameters
-    ----------
-    make_protocol : callable
-        Makes the protocol that handles a connection.
-    limits : Limits
-        How many connections there may be that are not websockets, and what each may send.
-    timed : Timed
-        Measures their callbacks.
-    on_refused : callable
-        Gets the reason why a connection is rejected or dropped.
-    clock : callable
-        Monotonic, s.
+    `make_protocol` makes what handles a connection; `on_refused` gets the reason why one is rejected or dropped. The
+    clock is monotonic.
     """
 
     def __init__(

@@ -30,14 +30,7 @@ OTHER_TYPE: Final = "application/octet-stream"
 async def send_file(request: web.BaseRequest, path: Path, headers: Mapping[str, str]) -> web.StreamResponse:
     """Send a file as it is now, and return the response; a page is shown, anything else saved by the browser.
 
-    Parameters
-    ----------
-    request
-        The request.
-    path
-        The file; of one that is being written, what is there.
-    headers
-        Of every response.
+    Of one that is being written, it is what is there. The headers are those of every response.
 
     Raises
     ------

@@ -12,13 +12,7 @@ MESSAGE_MAX: Final = 200
 
 
 class LogForwarder(logging.Handler):
-    """Logs what aiohttp reports, which is mostly a peer that does not speak HTTP, as something refused.
-
-    Parameters
-    ----------
-    log : ConsoleLog
-        Gets a line for each report.
-    """
+    """Logs what aiohttp reports, which is mostly a peer that does not speak HTTP, as something refused."""
 
     def __init__(self, log: ConsoleLog) -> None:
         super().__init__()

@@ -94,13 +94,7 @@ class _WebSocketTransport:
 
 
 class Server:
-    """Serves one console.
-
-    Parameters
-    ----------
-    context : ServerContext
-        What it serves.
-    """
+    """Serves one console."""
 
     def __init__(self, context: ServerContext) -> None:
         self._context = context

@@ -52,10 +52,7 @@ def page_files() -> dict[str, StaticFile]:
 def security_headers(host: str) -> dict[str, str]:
     """Return the headers of a response where the Host is right: nothing foreign, embedded or cached, no referrer.
 
-    Parameters
-    ----------
-    host : str
-        The request's Host, named for the websocket because not every browser counts that as 'self'.
+    The host is the request's, named for the websocket because not every browser counts that as 'self'.
     """
     policy = (
         f"default-src 'self'; connect-src 'self' ws://{host}; img-src 'self' data: blob:; object-src 'none'; "

@@ -42,14 +42,8 @@ class ReplayError(CommandError):
 class ReplayProcess:
     """A worker process and the recording it has open.
 
-    Parameters
-    ----------
-    process : asyncio.subprocess.Process
-        Runs `runtime.console.playback.replay_worker`.
-    on_frame : callable
-        Gets each frame.
-    on_answer : callable
-        Gets each answer: progress of opening, and what follows it. The description is returned by `begin`.
+    The process runs `runtime.console.playback.replay_worker`. `on_frame` gets each frame, `on_answer` each answer:
+    progress of opening, and what follows it; `begin` returns the description.
     """
 
     def __init__(
@@ -167,14 +161,8 @@ class ReplayProcess:
 class ReplayClient:
     """The recordings that clients watch.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recordings.
-    program : str
-        The module of the worker process: it calls `replay_worker.run_worker`.
-    current : callable
-        Returns the file of the recording in progress, None while nothing is recorded.
+    `program` is the module of the worker process, which calls `replay_worker.run_worker`. `current` returns the file
+    of the recording in progress, None while nothing is recorded.
     """
 
     def __init__(self, folder: Path, program: str, current: Callable[[], str | None]) -> None:
@@ -222,12 +210,7 @@ class ReplayClient:
     async def open(self, viewer: Viewer, file: str) -> OpenedRecording:
         """Show a client a recording of the folder, or the one in progress; return its description.
 
-        Parameters
-        ----------
-        viewer : Viewer
-            The client.
-        file : str
-            As listed by `recordings`.
+        The file is as listed by `recordings`.
 
         Raises
         ------

@@ -56,12 +56,8 @@ class _Index:
 class ReplayCursor:
     """Replays a recording between any two positions.
 
-    Parameters
-    ----------
-    recording : Recording
-        Open for as long as the cursor is used.
-    on_chunk : callable
-        Gets the offset in the file of each chunk that is indexed.
+    The recording is open for as long as the cursor is used. `on_chunk` gets the offset in the file of each chunk that
+    is indexed.
 
     Attributes
     ----------

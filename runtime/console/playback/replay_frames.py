@@ -16,15 +16,7 @@ from runtime.cycle.step import CycleRecord
 
 
 class ReplayFrames:
-    """Makes the frames of a recording's cycles.
-
-    Parameters
-    ----------
-    settings : Settings
-        In force in the recording.
-    emulated : bool
-        Whether the robot was emulated in the settings' world.
-    """
+    """Makes the frames of a recording's cycles."""
 
     def __init__(self, settings: Settings, *, emulated: bool) -> None:
         self._settings = settings

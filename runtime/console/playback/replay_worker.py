@@ -89,18 +89,9 @@ class MakeFrameMaker(Protocol):
 class ReplayWorker:
     """Plays a recording under the control of commands: `execute` begins one, `advance` does the work, cycle by cycle.
 
-    Parameters
-    ----------
-    cursor : ReplayCursor
-        The recording.
-    make_frames : callable
-        Returns a frame maker for the settings in force, given as the recording has them.
-    show : callable
-        Gets each frame: the number of its source, its number in the source, and its parts.
-    answer : callable
-        Gets each message that is no frame.
-    clock : callable
-        Monotonic, s.
+    `make_frames` returns a frame maker for the settings in force, given as the recording has them. `show` gets each
+    frame: the number of its source, its number there, and its parts; `answer` gets each message that is no frame. The
+    clock is monotonic.
     """
 
     def __init__(
@@ -291,15 +282,7 @@ def description_of(cursor: ReplayCursor, about: SessionInfo, started: str) -> Re
 
 
 def run_worker(file: str, make: MakeFrameMaker) -> int:
-    """Replay a recording until standard input or output is closed; return the process's exit code.
-
-    Parameters
-    ----------
-    file : str
-        The recording.
-    make : MakeFrameMaker
-        Constructs frame makers.
-    """
+    """Replay a recording until standard input or output is closed; return the process's exit code."""
     try:
         with open_recording(Path(file)) as recording:
             cursor = ReplayCursor(recording, _progress_writer(Path(file).stat().st_size, time.monotonic))

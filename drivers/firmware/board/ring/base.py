@@ -19,16 +19,8 @@ _RAMP_S = 0.2
 class Base:
     """A differential base; `tick` is called every `PERIOD_MS`, by a timer, so that nothing else can delay a stop.
 
-    Parameters
-    ----------
-    config
-        The module `robot_config`.
-    left, right
-        The wheels.
-    bumper
-        A pin that a contact pulls low, or None.
-    battery_low
-        Returns whether the battery is low.
+    `config` is the module `robot_config`, `bumper` a pin that a contact pulls low, or None; `battery_low()` says
+    whether the battery is low.
 
     Attributes
     ----------

@@ -44,14 +44,7 @@ def echo_byte(flight_us: int) -> int:
 class Firing:
     """Fires the sensors step by step, and sends what they heard when the window has closed.
 
-    Parameters
-    ----------
-    sensors
-        The ring's sensors, counter-clockwise from forward.
-    clock, encoder
-        The board's time, and where frames go.
-    scan
-        The servos; None without any.
+    Sensors are given counter-clockwise from forward; `encoder` takes the frames. `scan` is None without servos.
     """
 
     def __init__(self, sensors: tuple, clock: Clock, encoder: Encoder, scan=None) -> None:

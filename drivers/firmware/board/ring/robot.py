@@ -43,16 +43,8 @@ class ConsoleRequested(Exception):  # noqa: N818 - no error
 class Robot:
     """Everything together; call `poll` without end.
 
-    Parameters
-    ----------
-    config
-        The module `robot_config`.
-    sensors, base, line
-        The robot's parts.
-    boot_id
-        A random number, another one after each start.
-    scan
-        The ring's servos, or None.
+    `config` is the module `robot_config`, `boot_id` a random number, another one after each start; `scan` is None
+    without servos.
     """
 
     def __init__(self, config, sensors: tuple, base: Base, line, boot_id: int, scan=None) -> None:

@@ -16,12 +16,7 @@ _PERIOD_US = const(20_000)
 class Servo:
     """A servo that follows a pulse of 1 to 2 ms, 50 times a second.
 
-    Parameters
-    ----------
-    pin
-        Its signal.
-    ahead_us, left_us
-        Pulses at which its sensor looks ahead, and a quarter turn to the left.
+    At `ahead_us` its sensor looks ahead, at `left_us` a quarter turn to the left.
     """
 
     def __init__(self, pin: int, ahead_us: int, left_us: int) -> None:
@@ -61,10 +56,7 @@ class Servo:
 class Scan:
     """The servos of a ring, and which of them turn.
 
-    Parameters
-    ----------
-    servos
-        Sensor's number, pin, and the pulses of `Servo`, of each.
+    Each is the sensor's number, its pin, and the pulses of `Servo`.
     """
 
     def __init__(self, servos: tuple) -> None:
