@@ -56,57 +56,27 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> RobotConfig:
-    """Return the robot of a shipped name or a file.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be read or is invalid.
-    """
+    """Return the robot of a shipped name or a file; raise ConfigError if it is unreadable or invalid."""
     return _load("robots", name_or_path, RobotConfig)
 
 
 def load_world(name_or_path: str | os.PathLike[str]) -> WorldConfig:
-    """Return the world of a shipped name or a file.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be read or is invalid.
-    """
+    """Return the world of a shipped name or a file; raise ConfigError if it is unreadable or invalid."""
     return _load("worlds", name_or_path, WorldConfig)
 
 
 def load_model(name_or_path: str | os.PathLike[str]) -> ModelConfig:
-    """Return the object model of a shipped name or a file.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be read or is invalid.
-    """
+    """Return the object model of a shipped name or a file; raise ConfigError if it is unreadable or invalid."""
     return _load("models", name_or_path, ModelConfig)
 
 
 def load_mission(name_or_path: str | os.PathLike[str]) -> MissionConfig:
-    """Return the mission of a shipped name or a file.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be read or is invalid.
-    """
+    """Return the mission of a shipped name or a file; raise ConfigError if it is unreadable or invalid."""
     return _load("missions", name_or_path, MissionConfig)
 
 
 def load_study(name_or_path: str | os.PathLike[str]) -> StudyConfig:
-    """Return the study of a shipped name or a file.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be read or is invalid.
-    """
+    """Return the study of a shipped name or a file; raise ConfigError if it is unreadable or invalid."""
     return _load("studies", name_or_path, StudyConfig)
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import types
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
 import annotated_types
 from pydantic import BaseModel
@@ -17,7 +16,7 @@ from config.model import ModelConfig
 from config.plugins import DRIVERS, SCHEMAS, PluginError, plugged, plugged_table, plugged_use
 from config.robot import RobotConfig
 from config.settings import Settings
-from config.strict import description
+from config.strict import description, without_none
 from config.study import StudyConfig
 from config.toml_edit import inline
 from config.world import WorldConfig
@@ -114,7 +113,7 @@ def _settings(file: str, model: type[BaseModel], table: str, leave_out: set[str]
     for name, field in fields.items():
         inners = list(_models(field.annotation))
         for inner in inners:
-            is_list = get_origin(_without_none(field.annotation)[0]) in (tuple, list, Annotated)
+            is_list = get_origin(without_none(field.annotation)[0]) in (tuple, list, Annotated)
             kind = _kind(inner) if len(inners) > 1 else ""
             inner_table = f"{table}.{name}".lstrip(".") + (f"[{kind}]" if is_list else "")
             yield from _settings(file, inner, inner_table, leave_out)
@@ -125,15 +124,9 @@ def _kind(model: type[BaseModel]) -> str:
     return str(next(iter(get_args(next(iter(model.model_fields.values())).annotation)), ""))
 
 
-def _without_none(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation can be anything
-    """Return the members of a union but None, or the annotation alone."""
-    options = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
-    return tuple(option for option in options if option is not type(None))
-
-
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:  # noqa: ANN401 - an annotation can be anything
     """Return the models within an annotation: one of a table, or of a list of tables."""
-    for option in _without_none(annotation):
+    for option in without_none(annotation):
         if isinstance(option, type) and issubclass(option, BaseModel):
             yield option
         elif get_origin(option) in (Annotated, tuple, list):
@@ -142,7 +135,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:  # noqa: ANN401 - an 
 
 def type_of(annotation: Any) -> str:  # noqa: ANN401 - an annotation can be anything
     """Return a type in words: its choices, a plain type, or a list."""
-    options = _without_none(annotation)
+    options = without_none(annotation)
     if len(options) > 1:
         return " or ".join(type_of(option) for option in options)
     only = options[0]

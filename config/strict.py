@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import functools
 import sys
+import types
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -38,6 +39,12 @@ def description(model: type[BaseModel], name: str) -> str | None:
         return own
     texts = (_texts(base.__module__).get((base.__qualname__, name)) for base in model.__mro__ if base is not object)
     return next((text for text in texts if text is not None), None)
+
+
+def without_none(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation can be anything
+    """Return the members of a union but None, or the annotation alone."""
+    options = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
+    return tuple(option for option in options if option is not type(None))
 
 
 @functools.cache

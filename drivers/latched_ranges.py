@@ -18,9 +18,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.firing_pattern import firing_pattern
 from drivers.messages import Firing, Floats
 
 if TYPE_CHECKING:
+    from config.robot import RingConfig
     from drivers.driver import Received, RobotDriver
 
 INTERVALS_MAX: Final = 128
@@ -88,7 +90,7 @@ class RepeatFilter:
     """
 
     def __init__(self, sensors: int, cycle_s: float) -> None:
-        self._cycle_s = cycle_s
+        self.cycle_s = cycle_s
         self._last: Floats = np.full(sensors, np.nan)
         self._read_s: Floats = np.full(sensors, np.inf)
         """When each sensor last fired; inf before the first firing, of which nothing is known to be new."""
@@ -97,7 +99,7 @@ class RepeatFilter:
         """Return the firing with NaN for each repeated value; of the first firing, nothing is known to be new."""
         ranges, is_first = firing.ranges_m, bool(np.isposinf(self._read_s).all())
         has = ~np.isnan(ranges)
-        is_due = np.isposinf(ranges) & (firing.robot_s - self._read_s >= 0.999 * self._cycle_s)
+        is_due = np.isposinf(ranges) & (firing.robot_s - self._read_s >= 0.999 * self.cycle_s)
         is_new = has & ((ranges != self._last) | is_due) & (not is_first)
         self._last = np.where(has, ranges, self._last)
         self._read_s = np.where(is_new | is_first, firing.robot_s, self._read_s)
@@ -115,7 +117,7 @@ class FreshDriver:
 
     def __init__(self, driver: RobotDriver, sensors: int, set_size: int, cycle_s: float) -> None:
         self._driver = driver
-        self._sensors, self._set_size, self._cycle_s = sensors, set_size, cycle_s
+        self._sensors, self._set_size = sensors, set_size
         self._detector = RepeatDetector(sensors)
         self._filter = RepeatFilter(sensors, cycle_s)
         self._is_latched = False
@@ -124,6 +126,12 @@ class FreshDriver:
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - all other members are the driver's, as they are
         return getattr(self._driver, name)
 
+    def set_firing(self, ring: RingConfig) -> None:
+        """Change the firing pattern, as of `drivers.driver.RobotDriver`: silence is passed on once in its cycle."""
+        self._driver.set_firing(ring)
+        pattern = firing_pattern(ring)
+        self._set_size, self._filter.cycle_s = pattern.set_size, pattern.cycle_s
+
     def take_received(self) -> Received:
         """Return what was received since the last call, without repeats, and remove it.
 
@@ -131,7 +139,7 @@ class FreshDriver:
         """
         received = self._driver.take_received()
         if received.rebooted:
-            self._filter = RepeatFilter(self._sensors, self._cycle_s)
+            self._filter = RepeatFilter(self._sensors, self._filter.cycle_s)
         notes: tuple[str, ...] = ()
         fresh = []
         for firing in received.firings:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from config.robot import BodyConfig
 from drivers import se2
-from drivers.messages import Odometry, Pose, wrap_angle
+from drivers.messages import IDENTITY, Odometry, wrap_angle
 
 _RESET_M, _RESET_M_S = 0.5, 20.0
 """A pose that moved farther than this, m plus m/s, was reset: the robot may have restarted."""
@@ -19,7 +19,6 @@ _JUMP_M, _JUMP_RAD = 0.1, 0.1
 """Allowed difference of odometry from its own velocities, m and rad, besides a stop within one sample."""
 _STEADY_SAMPLES = 10
 """A deviation counts as a jump only after this many samples without one; otherwise it is how this base moves."""
-_IDENTITY = Pose(0.0, 0.0, 0.0)
 
 
 class OdometryJumps:
@@ -37,7 +36,7 @@ class OdometryJumps:
 
     def __init__(self, body: BodyConfig) -> None:
         self.count = 0
-        self.origin = _IDENTITY
+        self.origin = IDENTITY
         self._body = body
         self._ring_offset = 0.0
         """The same of the ring's direction, rad."""
@@ -49,7 +48,7 @@ class OdometryJumps:
     def restart(self) -> None:
         """Forget all samples: the odometry restarted at zero."""
         self._last, self._steady = None, 0
-        self.origin, self._ring_offset = _IDENTITY, 0.0
+        self.origin, self._ring_offset = IDENTITY, 0.0
 
     def rebase(self, reported: Odometry) -> None:
         """Take `reported`, the next sample, as the place of the last one: the odometry was set, and nothing moved."""
@@ -97,7 +96,7 @@ class OdometryJumps:
 
     def _from_origin(self, reported: Odometry) -> Odometry:
         """Return a sample in the frame of those before."""
-        if self.origin == _IDENTITY and self._ring_offset == 0.0:
+        if self.origin == IDENTITY and self._ring_offset == 0.0:
             return reported
         pose = self.origin.inverse().compose(reported.pose)
         return replace(reported, pose=pose, ring_yaw=reported.ring_yaw + self._ring_offset)

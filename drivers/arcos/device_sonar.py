@@ -8,14 +8,13 @@ from typing import Final
 from config.robot import SOUND_SPEED_M_S
 from drivers.arcos.firmware import Firmware
 from drivers.arcos.frames import NO_ECHO_MM, SonarReading
+from drivers.arcos.sonar import DISCS_PER_ARRAY
+from drivers.arcos.wire_units import CYCLE_MAX_MS, CYCLE_MIN_MS
 from drivers.emulator.body import Body
 from drivers.emulator.faulty_sonar import FaultySonar
 
 ARRAYS: Final = 4
 """Most arrays of a robot."""
-DISCS: Final = 8
-"""Discs of an array."""
-CYCLE_MIN_MS, CYCLE_MAX_MS = 2, 120
 FIRST_FLAG: Final = 1
 """Bit of the first array in the SIP's flags."""
 
@@ -91,7 +90,7 @@ class SonarArrays:
     def _by_array(self, numbers: Sequence[int]) -> list[list[int]]:
         """Return the numbers of each array, in order, without those that the ring does not have."""
         known = [number for number in numbers if number in self._sensor_of]
-        return [[number for number in known if number // DISCS == array] for array in range(ARRAYS)]
+        return [[number for number in known if number // DISCS_PER_ARRAY == array] for array in range(ARRAYS)]
 
 
 class SonarReadings:

@@ -14,7 +14,7 @@ from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensors
 from drivers.messages import Flags, Twist
 
-_CYCLE_MIN_MS, _CYCLE_MAX_MS = 2, 120
+CYCLE_MIN_MS, CYCLE_MAX_MS = 2, 120
 """Shortest and longest sonar cycle."""
 _STEPS_MAX: Final = 16
 """Longest polling sequence of an array."""
@@ -111,10 +111,10 @@ def _cycle_ms(pattern: FiringPattern) -> int:
         It is too short or too long for the robot.
     """
     cycle_ms = math.ceil(1e3 * pattern.step_period_s - _ROUNDING)
-    if not _CYCLE_MIN_MS <= cycle_ms <= _CYCLE_MAX_MS:
+    if not CYCLE_MIN_MS <= cycle_ms <= CYCLE_MAX_MS:
         raise FiringError(
             f"ring.firing: step_period_s {pattern.step_period_s:g}, and this robot's sonar cycle is "
-            f"{1e-3 * _CYCLE_MIN_MS:g} to {1e-3 * _CYCLE_MAX_MS:g} s; change it, or shorten window_m with it"
+            f"{1e-3 * CYCLE_MIN_MS:g} to {1e-3 * CYCLE_MAX_MS:g} s; change it, or shorten window_m with it"
         )
     return cycle_ms
 

@@ -14,8 +14,15 @@ from drivers.denning.frames import Ack, Drive, Echo, Echo2, Echo3, Frame, Hello,
 from drivers.denning.line_load import refuse_overload
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
-from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
-from drivers.denning.wire_units import finest_range_m, identity_of, newest_version, to_wire, wire_pattern, wire_scan
+from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout, echo_timeout_s
+from drivers.denning.wire_units import (
+    finest_range_m,
+    identity_of,
+    newest_version,
+    to_wire,
+    wire_pattern,
+    wire_scan,
+)
 from drivers.driver import DriverError, LineState
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.messages import Flags, LinkCounts
@@ -24,8 +31,7 @@ from drivers.session import Session
 
 _UNACKNOWLEDGED_SHARE = 0.75
 """DRIVEs unacknowledged for this share of the longest silence are not received; below 1, as cycles take time."""
-_MISSED_STEPS_MAX = 2
-"""Firings that the ring may miss, beyond the longest silence, before the robot must identify itself again."""
+
 _SETTLING_STEPS = 3
 """Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
 _SEND_ORDER = ("HALT", "HELLO", "PATTERN", "LISTEN", "SCAN", "RELEASE")
@@ -65,9 +71,7 @@ class DenningDriver(Session[PoseStamper]):
         self._flush_first = False  # whether the next write is the first on this line
         self._commands: dict[str, PendingCommand] = {}  # those without an answer, by name
         self._drive_acks = CommandAckMonitor()
-        self._echo_timeout = EchoTimeout(
-            config.link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * self._pattern.step_period_ms
-        )
+        self._echo_timeout = EchoTimeout(echo_timeout_s(config.link, self._pattern))
         self._pattern_acked_s = 0.0
         self._settling_s = 0.0  # for so long after it echoes may belong to the pattern before
         self._must_identify = False  # whether a HELLO is sent that needs no answer
@@ -167,6 +171,7 @@ class DenningDriver(Session[PoseStamper]):
         self.stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
         self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern, self._listeners = pattern, listeners
+        self._echo_timeout.timeout_s = echo_timeout_s(self._config.link, pattern)
         if self._state is LineState.READY or "PATTERN" in self._commands:
             for of_pattern_before in ("LISTEN", "SCAN"):
                 self._commands.pop(of_pattern_before, None)

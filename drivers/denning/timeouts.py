@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from collections import deque
 
+from config.robot import LinkConfig
+from drivers.denning.wire_units import WirePattern
+
 _KEPT = 128
 """DRIVEs remembered: half of the 256 sequence numbers, so that each number identifies one of them."""
+_MISSED_STEPS_MAX = 2
+"""Firings that the ring may miss, beyond the longest silence of the link."""
 
 
 class CommandAckMonitor:
@@ -52,11 +57,16 @@ class CommandAckMonitor:
         return max(0.0, odometry_s - self._sent[0][1]) if self._is_supported and self._sent else 0.0
 
 
+def echo_timeout_s(link: LinkConfig, pattern: WirePattern) -> float:
+    """Return for how long a ring may be silent before the robot must identify itself again, s."""
+    return link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * pattern.step_period_ms
+
+
 class EchoTimeout:
     """Expires when a ring that should fire has been silent for so long that the robot may have restarted."""
 
     def __init__(self, timeout_s: float) -> None:
-        self._timeout_s = timeout_s
+        self.timeout_s = timeout_s
         self._since_s = self._echo_s = 0.0
         """When the timeout started, and when the last echo came."""
         self._bad = 0
@@ -69,11 +79,11 @@ class EchoTimeout:
 
     def expired(self, run_s: float) -> bool:
         """Return True once after each `timeout_s` of silence."""
-        if run_s - self._since_s <= self._timeout_s:
+        if run_s - self._since_s <= self.timeout_s:
             return False
         self._since_s = run_s
         return True
 
     def corrupt_frames(self, run_s: float, bad: int) -> int:
         """Return how many corrupt frames came since the last echo, of `bad` so far; 0 before the timeout."""
-        return bad - self._bad if run_s - self._echo_s > self._timeout_s else 0
+        return bad - self._bad if run_s - self._echo_s > self.timeout_s else 0

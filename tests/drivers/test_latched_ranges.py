@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from config.robot import FiringConfig, RingConfig
 from drivers.driver import Received
 from drivers.latched_ranges import NOTE, FreshDriver, RepeatDetector, RepeatFilter
 from drivers.messages import Firing, Floats, Pose
@@ -77,6 +78,9 @@ class Scripted:
         self._rows = iter(rows)
         self.at_s, self.rebooted = 0.0, False
 
+    def set_firing(self, _ring: RingConfig) -> None:
+        """Take it."""
+
     def take_received(self) -> Received:
         return Received((at(self.at_s, next(self._rows)),), None, rebooted=self.rebooted)
 
@@ -117,6 +121,22 @@ def test_silence_after_a_restart_of_the_source_is_passed_on() -> None:
         source.rebooted = False
     assert np.isnan(got[0]).all(), "of a first firing nothing is known to be new"
     assert np.isposinf(got).any(axis=0).all()
+
+
+def test_silence_counts_once_in_the_cycle_of_a_changed_pattern() -> None:
+    changes = held(fresh_rows(2000, 0.001, 0.01, 2), 3)
+    source = Scripted(np.concatenate([changes, np.full((50, SENSORS), np.inf)]))
+    driver = FreshDriver(source, SENSORS, 2, 0.1)  # type: ignore[arg-type]  # only what is used
+    firing = FiringConfig(sets=((0,),), rotations=SENSORS, step_period_s=1.0 / SENSORS)
+    ring = RingConfig(count=SENSORS, radius_m=0.2, beam_half_angle_deg=10.0, resolution_m=0.0, range_min_m=0.1,
+                      range_max_m=9.0, firing=firing)  # fmt: skip
+    heard = []
+    for k in range(2050):
+        source.at_s = 0.1 * k
+        if k == 2000:
+            driver.set_firing(ring)
+        heard.append(driver.take_received().firings[0].ranges_m)
+    assert np.isposinf(heard[2000:]).sum(axis=0).tolist() == [5] * SENSORS, "5 s of silence, one cycle a second"
 
 
 def test_a_frozen_ring_that_was_fresh_is_passed_on_for_the_monitor() -> None:

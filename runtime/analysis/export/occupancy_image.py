@@ -10,7 +10,9 @@ sight, which end at what is known by then: so no beam of the first minute passes
 from __future__ import annotations
 
 import itertools
+import json
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -72,12 +74,17 @@ class OccupancyImage:
         path.write_bytes(b"P5\n%d %d\n255\n" % (columns, rows) + self.pixels.tobytes())
         beside = yaml_beside(path)
         beside.write_text(
-            f"image: {path.name}\nmode: trinary\nresolution: {RESOLUTION_M}\n"
+            f"image: {_yaml_text(path.name)}\nmode: trinary\nresolution: {RESOLUTION_M}\n"
             f"origin: [{self.x_m:.3f}, {self.y_m:.3f}, 0.0]\n"
             f"negate: 0\noccupied_thresh: {OCCUPIED_MIN}\nfree_thresh: {FREE_MAX}\n",
             encoding="utf-8",
         )
         return beside
+
+
+def _yaml_text(text: str) -> str:
+    """Return a text for YAML, in quotes where it may mean something else without them."""
+    return text if re.fullmatch(r"\w[\w.-]*\.pgm", text) else json.dumps(text, ensure_ascii=False)
 
 
 def yaml_beside(path: Path) -> Path:

@@ -7,7 +7,6 @@ file that is being opened.
 from __future__ import annotations
 
 from collections.abc import Awaitable
-from typing import TypeVar
 
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
@@ -23,12 +22,10 @@ from runtime.console.commands.messages import (
     SetSpeed,
     StepRecording,
 )
-from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl
+from runtime.console.protocols import RecordingControl, ReplayControl
 from runtime.console.sent_messages import ListedRecording, OpenedRecording
 from runtime.cycle.modes import Mode
 from runtime.timing.time_control import TimeControl
-
-Part = TypeVar("Part")
 
 
 async def load_model(call: Call, model: LoadModel) -> dict[str, str]:
@@ -113,28 +110,15 @@ async def close_recording(call: Call, _: NoArguments) -> None:
 
 
 def _time(call: Call) -> TimeControl:
-    return _available(call, call.context.time)
+    return call.available(call.context.time)
 
 
 def _recording(call: Call) -> RecordingControl:
-    return _available(call, call.context.recording)
+    return call.available(call.context.recording)
 
 
 def _replay(call: Call) -> ReplayControl:
-    return _available(call, call.context.replay)
-
-
-def _available(call: Call, part: Part | None) -> Part:
-    """Return a part of the run.
-
-    Raises
-    ------
-    CommandError
-        This run does not have it.
-    """
-    if part is None:
-        raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
-    return part
+    return call.available(call.context.replay)
 
 
 async def _refuse_if(outcome: Awaitable[str | None]) -> None:

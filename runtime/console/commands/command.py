@@ -13,12 +13,21 @@ from config.places import PlacesConfig
 from perception.edits import Edit
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
+from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.edit_history import EditHistory
 from runtime.console.commands.tuning import Tuning
-from runtime.console.protocols import FileControl, RecordingControl, ReplayControl, Run, SettingsFileControl
+from runtime.console.protocols import (
+    NOT_AVAILABLE,
+    FileControl,
+    RecordingControl,
+    ReplayControl,
+    Run,
+    SettingsFileControl,
+)
 from runtime.timing.time_control import TimeControl
 
 Arguments = TypeVar("Arguments")
+Part = TypeVar("Part")
 
 PLACES_UNDO_MAX: Final = 50
 """Changes of the places that can be undone."""
@@ -91,6 +100,18 @@ class Call(NamedTuple):
     """Of the message."""
     name: str
     """Of the command."""
+
+    def available(self, part: Part | None) -> Part:
+        """Return a part of the run.
+
+        Raises
+        ------
+        CommandError
+            This run does not have it.
+        """
+        if part is None:
+            raise CommandError(f"{self.name}: {NOT_AVAILABLE}")
+        return part
 
     def remains_valid(self) -> Callable[[], bool]:
         """Return a function that returns False once the client has lost control or the robot has been stopped."""

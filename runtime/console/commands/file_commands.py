@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from runtime.console.commands.command import Call
-from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import (
     CancelJob,
     DeleteRecording,
@@ -12,7 +11,7 @@ from runtime.console.commands.messages import (
     PinRecording,
     RenameRecording,
 )
-from runtime.console.protocols import NOT_AVAILABLE, FileControl
+from runtime.console.protocols import FileControl
 from runtime.console.sent_messages import JobMessage
 
 
@@ -52,13 +51,4 @@ def cancel_job(call: Call, given: CancelJob) -> None:
 
 
 def _files(call: Call) -> FileControl:
-    """Return the part of the run that has files.
-
-    Raises
-    ------
-    CommandError
-        It has none.
-    """
-    if call.context.files is None:
-        raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
-    return call.context.files
+    return call.available(call.context.files)

@@ -6,10 +6,9 @@ bounds, choices and descriptions of the schema.
 
 from __future__ import annotations
 
-import types
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Any, Final, Literal, TypedDict, Union, get_args, get_origin
+from typing import Any, Final, Literal, TypedDict, get_args, get_origin
 
 import annotated_types
 from pydantic import BaseModel
@@ -18,7 +17,7 @@ from pydantic.fields import FieldInfo
 from config.layers import Location
 from config.reload import Difference
 from config.settings import Settings
-from config.strict import description
+from config.strict import description, without_none
 from config.toml_edit import inline
 
 KINDS: Final = ((bool, "bool"), (int, "int"), (float, "float"), (str, "text"))
@@ -104,13 +103,13 @@ def _in_toml(location: Location, field: FieldInfo, value: Any, text: str) -> Par
 
 
 def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | None:  # noqa: ANN401 - any setting
-    """Return a field as a parameter, None if its value is not a single plain one."""
-    kinds = [kind for kind in _options(field.annotation) if kind is not type(None)]
+    """Return a field as a parameter, None if its value is not a single plain one: a choice of numbers is none."""
+    kinds = without_none(field.annotation)
     if len(kinds) != 1:
         return None
     kind, choices = kinds[0], None
-    if get_origin(kind) is Literal:
-        name, choices = "choice", [str(choice) for choice in get_args(kind)]
+    if get_origin(kind) is Literal and all(isinstance(choice, str) for choice in get_args(kind)):
+        name, choices = "choice", list(get_args(kind))
     else:
         known = next((name for plain, name in KINDS if kind is plain), None)
         if known is None:
@@ -125,7 +124,7 @@ def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | 
         "high": high,
         "kind": name,
         "choices": choices,
-        "optional": type(None) in _options(field.annotation),
+        "optional": type(None) in get_args(field.annotation),
         "help": "",
     }
 
@@ -135,11 +134,6 @@ def _label(name: str) -> str:
     ending = next((ending for ending in UNITS if name.endswith(ending)), "")
     unit = f" ({UNITS[ending]})" if ending else ""
     return name.removesuffix(ending).replace("_", " ") + unit
-
-
-def _options(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation can be anything
-    """Return the members of a union, or the annotation alone."""
-    return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
 
 
 def _bounds(field: FieldInfo) -> tuple[float | None, float | None]:

@@ -10,7 +10,7 @@ from pydantic import Field
 from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import NoArguments, Number, Scalar
-from runtime.console.protocols import NOT_AVAILABLE, SettingsFileControl
+from runtime.console.protocols import SettingsFileControl
 from runtime.console.sent_messages import SettingsCheck, SettingsRow, SettingsText
 from runtime.cycle.modes import Mode
 
@@ -92,13 +92,4 @@ async def restart_run(call: Call, _: NoArguments) -> None:
 
 
 def _settings_files(call: Call) -> SettingsFileControl:
-    """Return the part of the run that has settings files.
-
-    Raises
-    ------
-    CommandError
-        It has none.
-    """
-    if call.context.settings_files is None:
-        raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
-    return call.context.settings_files
+    return call.available(call.context.settings_files)

@@ -11,6 +11,7 @@ import contextlib
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
@@ -116,6 +117,7 @@ class Jobs:
             del self._jobs[old]
             shutil.rmtree(self._folder / str(old), ignore_errors=True)
         job.task = asyncio.create_task(self._run(job, path, folder), name=f"console job {job.number}")
+        job.task.add_done_callback(partial(self._end, job))
         return job.number
 
     def cancel(self, number: int) -> None:
@@ -129,7 +131,6 @@ class Jobs:
         job = self._jobs.get(number)
         if job is None or job.is_over or job.task is None:
             raise CommandError("there is nothing to cancel: it is over")
-        job.error = "cancelled"
         job.task.cancel()
 
     def path_of(self, number: int, name: str) -> Path | None:
@@ -148,7 +149,7 @@ class Jobs:
         self._resources.close()
 
     async def _run(self, job: Job, path: Path, folder: Path) -> None:
-        """Do a job's work in a child process; its end, however it comes, is written to the job and sent to pages."""
+        """Do a job's work in a child process."""
         targets = [folder / f"{path.stem}{suffix}" for suffix in SUFFIXES[job.kind]]
         options = ("--out",) if job.kind == "report" else ("--out", "--grid", "", "--geojson")
         words = [
@@ -177,10 +178,17 @@ class Jobs:
         except OSError as error:
             job.error = f"its process cannot be started: {error.strerror}"
         finally:
-            job.is_over, job.what = True, "done" if job.error is None else "failed"
-            self.broadcast(job.message())
             if process is not None:
                 await kill_child(process)
+
+    def _end(self, job: Job, task: asyncio.Task[None]) -> None:
+        """Write the end of a job, however it came, to it and send it to pages; also if its work never began."""
+        if task.cancelled():
+            job.error = "cancelled"
+        elif (error := task.exception()) is not None:
+            job.error = f"its process said what cannot be read: {error}"
+        job.is_over, job.what = True, "done" if job.error is None else "failed"
+        self.broadcast(job.message())
 
     async def _follow(self, job: Job, process: asyncio.subprocess.Process) -> str:
         """Pass on how far the process is; return its last other line."""

@@ -216,6 +216,19 @@ def test_another_firing_pattern_while_it_drives(harness: DriverHarness) -> None:
     assert replace(again, seq=pattern.seq) == pattern, "kept for the next line"
 
 
+def test_a_ring_that_was_slowed_down_is_waited_for(harness: DriverHarness) -> None:
+    """Its echoes come once a second: that is no silence after which the robot must identify itself."""
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="quadrants", step_period_s=1.0)})
+    harness.robot.set_firing(ring)
+    harness.answer()
+    asked = []
+    for k in range(100):
+        harness.odom(k * PERIOD_US)
+        harness.pass_time(0.02)
+        asked += only(harness.received(), Hello)
+    assert asked == []
+
+
 def test_another_firing_pattern_before_the_first_is_taken() -> None:
     """An answer to the first must not pass for one to the second."""
     harness = DriverHarness()

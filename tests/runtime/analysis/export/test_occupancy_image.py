@@ -120,6 +120,8 @@ def test_the_files_are_those_of_map_server(tmp_path: Path) -> None:
     yaml = dict(line.split(": ", 1) for line in beside.read_text().splitlines())
     assert (yaml["image"], yaml["resolution"], yaml["negate"]) == ("map.pgm", "0.05", "0")
     assert yaml["origin"] == f"[{image.x_m:.3f}, {image.y_m:.3f}, 0.0]"
+    beside = image.write(tmp_path / "hall #2: new.pgm")
+    assert beside.read_text().splitlines()[0] == 'image: "hall #2: new.pgm"', "no comment of YAML"
 
 
 def test_an_image_beyond_all_measure_is_refused() -> None:

@@ -71,6 +71,27 @@ async def test_a_job_is_cancelled_and_another_can_begin(tmp_path: Path) -> None:
         jobs.start("map", "endless.mcap", tmp_path / "endless.mcap")  # ends with the console
 
 
+async def test_a_job_that_is_cancelled_before_it_began_is_over(tmp_path: Path) -> None:
+    async with jobs_of() as (jobs, sent):
+        number = jobs.start("map", "run.mcap", tmp_path / "run.mcap")
+        jobs.cancel(number)
+        assert (await over(sent, number))["error"] == "cancelled"
+        assert (await over(sent, jobs.start("report", "a.mcap", tmp_path / "a.mcap")))["made"] == ["a.html"]
+
+
+async def test_a_job_whose_process_cannot_be_understood_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def endless_line(*_: object) -> str:
+        raise ValueError("Separator is not found, and chunk exceed the limit")
+
+    monkeypatch.setattr(Jobs, "_follow", endless_line)
+    async with jobs_of() as (jobs, sent):
+        done = await over(sent, jobs.start("map", "run.mcap", tmp_path / "run.mcap"))
+        assert (done["what"], done["made"]) == ("failed", [])
+        assert "cannot be read" in str(done["error"])
+
+
 async def test_files_of_old_jobs_are_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.console.files.jobs.KEPT", 1)
     assert KEPT == 8

@@ -39,6 +39,7 @@ class Config(Strict):
     """Counts of the left wheel over those of the right one."""
     side: Literal["left", "right"] = "left"
     """Which one."""
+    gear: Literal[1, 2] = 1
     wheels: Wheels = Wheels()
     masks: tuple[int, ...] = Field(default=(1, 2), max_length=4)
     """Which fire."""
@@ -81,10 +82,10 @@ def test_a_robot_has_the_table_of_its_driver_with_what_the_file_does_not_say() -
     (table,) = form_of("robots", 'robot.driver = "skippy"\n[skippy]\ntrim = 1.1\n')
     assert (table["title"], table["help"]) == ("skippy", 'Of the driver "skippy".')
     assert values([table]) == {
-        "skippy.trim": 1.1, "skippy.side": "left", "skippy.wheels.ratio": 2, "skippy.masks": "[1, 2]",
-        "skippy.limits": "{}", "skippy.gains": "[{ratio = 2}]",
+        "skippy.trim": 1.1, "skippy.side": "left", "skippy.gear": "1", "skippy.masks": "[1, 2]",
+        "skippy.wheels.ratio": 2, "skippy.limits": "{}", "skippy.gains": "[{ratio = 2}]",
     }  # fmt: skip
-    trim, side, _, masks, _, _ = table["fields"]
+    trim, side, _, _, masks, _, _ = table["fields"]
     assert (trim["kind"], trim["low"], trim["high"]) == ("float", 0.0, 2.0)
     assert trim["help"] == "Counts of the left wheel over those of the right one."
     assert side["choices"] == ["left", "right"]
@@ -113,6 +114,7 @@ def test_a_mission_has_each_use_of_a_schema() -> None:
     ("said", "path", "value"),
     [
         ("masks = [7]", "skippy.masks", "[3, 4]"),
+        ("gear = 1", "skippy.gear", "2"),
         ("[[skippy.gains]]\nratio = 3\n[[skippy.gains]]\nratio = 4", "skippy.gains", "[{ratio = 5}]"),
         ("limits.left = 1.0  # m/s", "skippy.limits", "{right = 2.0}"),
     ],
