@@ -376,8 +376,11 @@ def _malformed(error: ValidationError, text: str | bytes) -> MalformedMessage:
     path = [str(key) for key in first["loc"][1:]]  # the first key is the command's name
     if path[:1] == ["value"]:
         return MalformedMessage("must be a number, a text, true, false or null", _id_of(text), "value")
-    problem = first["msg"][:TEXT_MAX]
-    return MalformedMessage(problem[:1].lower() + problem[1:], _id_of(text), ".".join(path)[:FIELD_MAX] or None)
+    field = ".".join(path)[:FIELD_MAX] or None
+    what, should, rest = first["msg"][:TEXT_MAX].partition(" should ")  # as in "Input should be a valid number"
+    what = field if field is not None and should else what[:1].lower() + what[1:]
+    problem = f"{what}{should}{rest}"
+    return MalformedMessage(problem, _id_of(text), field)
 
 
 def _id_of(text: str | bytes) -> int | None:
