@@ -127,6 +127,8 @@ class Tuner:
             The present settings give no figure to compare with.
         """
         (present,) = self._run_trials([{}])
+        if present.figures is None:
+            raise UserError("nothing to compare with: a run with the present settings ended without a result", FAILED)
         if not math.isfinite(present.cost):
             raise UserError(
                 f"the present settings have no result for {self._study.objectives[0]} in every run: "

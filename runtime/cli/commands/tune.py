@@ -106,7 +106,13 @@ def tune(
             folder, console, total, unfinished, scheduler=scheduler, workers=processes, retries=retries
         ) as make,
     ):
-        tuned = Tuner(chosen, base, make).search(OptunaSearch(chosen.vary, present, SEED), trials)
+        try:
+            tuned = Tuner(chosen, base, make).search(OptunaSearch(chosen.vary, present, SEED), trials)
+        except UserError as error:
+            if not unfinished:
+                raise
+            lost = unfinished[0]
+            raise UserError(f"{error}: {lost.run.subject}: {lost.reason}", error.exit_code) from error
         write_results(name, chosen, present, tuned, folder, unfinished)
     say_results(tuned, present, folder)
     if unfinished:

@@ -104,6 +104,13 @@ def test_the_changes_and_what_they_bring_are_written(tune: Tune, capsys: pytest.
     assert tomllib.loads(Path(out[3]).read_text()) == {"perception": {"bayes": {"report_probability": 0.4}}}
 
 
+def test_why_the_present_settings_have_no_result_is_said(tune: Tune, capsys: pytest.CaptureFixture[str]) -> None:
+    assert tune(Pool(broken=0.95)) == FAILED
+    assert (
+        "a run with the present settings ended without a result: clean: MemoryError: too" in capsys.readouterr().err
+    )
+
+
 def test_a_search_that_was_stopped_makes_only_what_is_left(tune: Tune) -> None:
     stopped, second, third = Pool(7), Pool(), Pool(0)
     with ending_in_order(), pytest.raises(SystemExit):
