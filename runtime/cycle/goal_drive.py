@@ -85,52 +85,19 @@ def drive_to_goal(
     forbidden : str, optional
         The no-go line or area in which the goal lies: it is given up at once.
     """
-    behaviors, body = settings.behaviors, settings.body
     distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
     now = GoalDrive(Progress.starting_at(percept.pose, distance_m, run_s)) if before is None else before
-    progress, valley, detour, last_rad_s = now.progress, now.valley, now.detour, now.turn_rad_s
-    if forbidden is not None and progress.given_up is None:
+    if forbidden is not None and now.progress.given_up is None:
         why = f"the goal is unreachable: it lies in or beside {forbidden}"
-        progress = replace(progress, given_up=why, fault="unreachable")
-    response, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
-    around, hold_reason, room_m = None, None, None
-    if behaviors.leave_canyon.leave_canyon_gain > 0.0 and not goal.reached:
-        has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and valley.direction_rad is not None
-        stands_s = STANDS_S + math.pi / min(behaviors.move_to_goal.turn_rate_max_rad_s, body.turn_max_rad_s)
-        stood_s = run_s - progress.moved_run_s
-        around, detour = leave_canyon(
-            percept,
-            (goal.x, goal.y),
-            now.detour,
-            body.radius_m,
-            behaviors.leave_canyon,
-            waits=has_valley and stood_s < stands_s,
-            last_rad=valley.direction_rad,
-        )
-        # A detour for a robot that stands gets its own time to turn before that robot counts as stuck.
-        if now.detour.side == 0 != detour.side and stood_s >= stands_s:
-            progress = replace(progress, moved_run_s=run_s)
-    if around is not None:
-        length, direction_rad = math.hypot(around.x, around.y), math.atan2(around.y, around.x)
-        valley = Valley(valley.blocked, direction_rad)
-        driven_rad = held(percept.pose.theta, direction_rad)
-        response = Response(around.schema, length * math.cos(driven_rad), length * math.sin(driven_rad))
-        room_m = behaviors.leave_canyon.room_m
-        if detour.rounds < ROUNDS_MAX:
-            progress = replace(progress, excused_run_s=run_s)
-    elif behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
-        now = _with_search(
-            GoalDrive(progress, valley, now.search, now.searched_run_s), goal, percept, run_s, settings
-        )
-        progress = now.progress
-        response, valley = follow_valley(
-            percept, response, distance_m, valley, now.search, body.radius_m, behaviors.follow_valley
-        )
-        hold_reason = NO_VALLEY if valley.direction_rad is None else None
-        room_m = behaviors.follow_valley.safety_m
+        now = replace(now, progress=replace(now.progress, given_up=why, fault="unreachable"))
+    response, goal = move_to_goal(percept, goal, settings.behaviors.move_to_goal)
+    hold_reason, room_m = None, None
+    if not goal.reached:
+        now, response, hold_reason, room_m = _way_on(response, goal, distance_m, now, percept, run_s, settings)
     responses = (response, _pushes(percept, room_m, settings), *beside)
-    decision = _arbitrate(responses, percept, last_rad_s, settings, commitment)
+    decision = _arbitrate(responses, percept, now.turn_rad_s, settings, commitment)
     turn_rad_s = decision.twist.w if isinstance(decision, Drive) else 0.0
+    progress = now.progress
     if isinstance(decision, Drive) and not goal.reached:
         progress = observe_progress(
             progress,
@@ -138,14 +105,73 @@ def drive_to_goal(
             distance_m,
             run_s,
             hold_reason,
-            behaviors.move_to_goal,
+            settings.behaviors.move_to_goal,
             is_blocked=not now.search.reaches,
             is_occupied=_is_occupied(percept, goal, distance_m, settings),
         )
         if progress.given_up is not None:
             decision, hold_reason = Drive(STANDSTILL), progress.given_up
-    now = GoalDrive(progress, valley, now.search, now.searched_run_s, turn_rad_s, detour)
-    return goal, now, responses, decision, hold_reason
+    return goal, replace(now, progress=progress, turn_rad_s=turn_rad_s), responses, decision, hold_reason
+
+
+def _way_on(
+    straight: Response,
+    goal: Goal,
+    distance_m: float,
+    now: GoalDrive,
+    percept: Percept,
+    run_s: float,
+    settings: Settings,
+) -> tuple[GoalDrive, Response, str | None, float | None]:
+    """Return the drive, the response on the way, why the robot holds, and the room that this response keeps, m.
+
+    The way is the detour that leave-canyon leads, otherwise a free valley, and without either `straight` to the goal,
+    which keeps no room.
+    """
+    behaviors = settings.behaviors
+    if behaviors.leave_canyon.leave_canyon_gain > 0.0:
+        now, around = _with_detour(now, goal, percept, run_s, settings)
+        if around is not None:
+            length, direction_rad = math.hypot(around.x, around.y), math.atan2(around.y, around.x)
+            driven_rad = held(percept.pose.theta, direction_rad)
+            response = Response(around.schema, length * math.cos(driven_rad), length * math.sin(driven_rad))
+            progress = now.progress
+            if now.detour.rounds < ROUNDS_MAX:
+                progress = replace(progress, excused_run_s=run_s)
+            valley = Valley(now.valley.blocked, direction_rad)
+            return replace(now, progress=progress, valley=valley), response, None, behaviors.leave_canyon.room_m
+    if behaviors.follow_valley.follow_valley_gain > 0.0:
+        now = _with_search(now, goal, percept, run_s, settings)
+        response, valley = follow_valley(
+            percept, straight, distance_m, now.valley, now.search, settings.body.radius_m, behaviors.follow_valley
+        )
+        hold_reason = NO_VALLEY if valley.direction_rad is None else None
+        return replace(now, valley=valley), response, hold_reason, behaviors.follow_valley.safety_m
+    return now, straight, None, None
+
+
+def _with_detour(
+    now: GoalDrive, goal: Goal, percept: Percept, run_s: float, settings: Settings
+) -> tuple[GoalDrive, Response | None]:
+    """Return the drive, and the way that leave-canyon leads; None while it leads none."""
+    behaviors, body = settings.behaviors, settings.body
+    has_valley = behaviors.follow_valley.follow_valley_gain > 0.0 and now.valley.direction_rad is not None
+    stands_s = STANDS_S + math.pi / min(behaviors.move_to_goal.turn_rate_max_rad_s, body.turn_max_rad_s)
+    stood_s = run_s - now.progress.moved_run_s
+    around, detour = leave_canyon(
+        percept,
+        (goal.x, goal.y),
+        now.detour,
+        body.radius_m,
+        behaviors.leave_canyon,
+        waits=has_valley and stood_s < stands_s,
+        last_rad=now.valley.direction_rad,
+    )
+    progress = now.progress
+    # A detour for a robot that stands gets its own time to turn before that robot counts as stuck.
+    if now.detour.side == 0 != detour.side and stood_s >= stands_s:
+        progress = replace(progress, moved_run_s=run_s)
+    return replace(now, progress=progress, detour=detour), around
 
 
 def drive_through_valley(
