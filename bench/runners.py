@@ -15,7 +15,8 @@ from config.load import load_settings
 from config.robot import RingConfig
 from config.settings import Settings
 from drivers.messages import Firing
-from perception.pipeline import DetectedObject, Perception
+from perception.detected_object import DetectedObject
+from perception.pipeline import Perception
 from runtime.simulation.open_loop import perceive
 
 

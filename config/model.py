@@ -21,6 +21,8 @@ EXTENT_MAX_M: Final = 20.0
 EXTENT_MIN_M: Final = 0.02
 """Smallest extent of an outline, below the resolution of a range."""
 SAME_PLACE_M: Final = 1e-6
+VERTICES_MAX: Final = 64
+"""Greatest number of vertices of an outline."""
 NAME_MAX: Final = 40
 """Characters of a name, which every list of objects shows."""
 
@@ -29,7 +31,7 @@ class ModelConfig(Strict):
     """Object model: a chain of vertices, open or closed, which may approximate an arc."""
 
     name: str = Field(min_length=1, max_length=NAME_MAX, pattern=r"^[A-Za-z0-9_-]+$")
-    vertices_m: TomlList[Point] = Field(min_length=2, max_length=64)
+    vertices_m: TomlList[Point] = Field(min_length=2, max_length=VERTICES_MAX)
     """Vertices of the outline in order; the origin is the point whose position is reported."""
     closed: bool
     arc_radius_m: float | None = Field(default=None, gt=0.0, le=100.0)

@@ -27,6 +27,8 @@ SOUND_SPEED_M_S = 343.0
 SENSORS_MAX = 255
 """Largest number of sensors in a ring, and of sets in a firing pattern; bounds the memory for a faulty file."""
 
+LISTEN_MAX_M: Final = 100.0
+"""Longest range of any sensor, m."""
 ECHO_LAG_MAX_S: Final = 0.35
 """Most by which ranges may lag behind odometry, or odometry behind ranges, s."""
 
@@ -122,7 +124,7 @@ class FiringConfig(Strict):
     one for each step of a preset."""
     step_period_s: float = Field(default=0.05, ge=0.001, le=60.0)
     """Time from one firing to the next, s."""
-    window_m: float | None = Field(default=None, gt=0.0, le=100.0)
+    window_m: float | None = Field(default=None, gt=0.0, le=LISTEN_MAX_M)
     """Range up to which each firing listens, m; by default `ring.range_max_m`."""
 
     @model_validator(mode="after")
@@ -179,7 +181,7 @@ class RingConfig(Strict):
     """Quantisation step of the reported range, m; 0 = not quantised."""
     range_min_m: float = Field(ge=0.0, lt=100.0)
     """Least range that a sensor reports, m."""
-    range_max_m: float = Field(gt=0.0, le=100.0)
+    range_max_m: float = Field(gt=0.0, le=LISTEN_MAX_M)
     """Greatest range that a sensor reports, m."""
     firing: Annotated[FiringConfig, BeforeValidator(_preset_as_table)] = FiringConfig(preset="octets")
     """The firing pattern: a preset's name, or a table."""

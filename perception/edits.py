@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, TypeAlias
 
+from config.bounded import COUNT_MAX, TIME_MAX_S
 from perception.kernel import Floats, Ints
 
 
@@ -191,12 +192,8 @@ AreaEdit: TypeAlias = RejectObject | MarkVacant | LiftArea | RestoreArea
 
 Edit: TypeAlias = MapEdit | AreaEdit | PlaceRobot
 
-NUMBER_MAX: Final = 2**53
-"""Numbers of objects and segments are below this: a browser stores them as floats."""
 EDIT_COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate accepted, m; a larger one is a mistake."""
-TIME_MAX_S: Final = 1e9
-"""Latest time of a segment that is put back, s."""
 SEGMENT_ROW: Final = ("number", "x1", "y1", "x2", "y2", "normal", "time_s", "pinned")
 """The columns of `RestoreSegments.rows`."""
 NAMED_MAX: Final = 5
@@ -286,7 +283,7 @@ def invalid_rows(edit: RestoreSegments) -> str | None:
     for row in edit.rows:
         if len(row) != len(SEGMENT_ROW) or not all(abs(value) <= EDIT_COORDINATE_MAX_M for value in row[1:6]):
             return "invalid segment: expected a number, four coordinates in m, a direction, a time and a pin"
-        if not (0 < row[0] < NUMBER_MAX and row[0] == int(row[0]) and abs(row[6]) < TIME_MAX_S):
+        if not (0 < row[0] < COUNT_MAX and row[0] == int(row[0]) and abs(row[6]) < TIME_MAX_S):
             return f"invalid segment {row[0]:g} of {row[6]:g} s"
     return None
 
@@ -309,7 +306,7 @@ def invalid_number(edit: MapEdit | RejectObject) -> str | None:
             named = tuple(row.number for row in rows)
         case PlaceModel() | ClearMap() | RestoreSegments():
             return None
-    wrong = next((n for n in named if not 0 < n < NUMBER_MAX), None)
+    wrong = next((n for n in named if not 0 < n < COUNT_MAX), None)
     return None if wrong is None else f"invalid number {wrong}: expected an integer above 0 and below 2^53"
 
 

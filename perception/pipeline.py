@@ -43,7 +43,7 @@ from perception.obstacle_echoes.fresh_echoes import FreshEchoes
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
 from perception.polyline import Polyline
-from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room, place_robot
+from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room, place_robot, with_window
 from perception.ring_faults.monitor import RingMonitor
 from perception.sensor_faults.monitor import SensorMonitor
 from perception.sensor_faults.report import SensorReport
@@ -55,8 +55,6 @@ if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
     from perception.localization.submaps.echo_lag import EchoLag
     from perception.mapping.grid.evidence_grid import EvidenceGrid
-
-__all__ = ["DetectedObject", "Perception"]
 
 
 class Perception:
@@ -103,8 +101,8 @@ class Perception:
         self._reach_m, self._sensors = reach_m(ring), len(ring.mounts)
         self.vacant = VacantAreas()
         """In the frame of `method`."""
-        width_m = 2.0 * (max(math.hypot(*mount[:2]) for mount in mounts.tolist()) + PASSAGE_M)
-        self.canyon_map = CanyonMap(width_m - ENDS_M)
+        radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
+        self.canyon_map = CanyonMap(2.0 * (radius_m + PASSAGE_M) - ENDS_M)
         """The box canyons found so far, in odometry's frame."""
         if recognises:
             self.recognise(models, config)
@@ -199,9 +197,7 @@ class Perception:
 
     def localized(self) -> LocalizedPose | None:
         """Return where the robot was at the last firing in the map frame; None where that is odometry's."""
-        if self.known_room is not None:
-            return self.known_room.localized()
-        return self.map_frame.localized()
+        return (self.known_room or self.map_frame).localized()
 
     def known_map_frame(self) -> Pose | None:
         """Return the pose of the map frame in odometry's frame, None while the place is not known."""
@@ -210,9 +206,7 @@ class Perception:
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
-        if self.known_room is not None:
-            return self.known_room.odometry_from_map()
-        return self.map_frame.odometry_from_map()
+        return (self.known_room or self.map_frame).odometry_from_map()
 
     def near_objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
@@ -372,10 +366,13 @@ class Perception:
         return parts if self.echo_lag is None else (*parts, self.echo_lag)
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
-        """Expect another firing pattern of the same sensors."""
+        """Expect another firing pattern of the same sensors, and echoes from as far as it listens."""
+        before, self._ring = self._ring.window_m, ring
         self.sensor_monitor.set_firing_pattern(ring)
-        self.ring_monitor.set_reach(ring.window_m)
-        self._reach_m = reach_m(ring)
+        if ring.window_m != before:
+            self.ring_monitor.set_reach(ring.window_m)
+            self._echoes.set_reach(ring.window_m)
+            self._reach_m, self.known_room = reach_m(ring), with_window(self.known_room, self.room, ring)
 
     def sensor_reports(self) -> tuple[SensorReport, ...]:
         """Return a report on each faulty sensor."""

@@ -17,6 +17,7 @@ from perception.edits import PlaceRobot, invalid_pose
 from perception.localization.odometry_frame import OdometryFrame
 from perception.mapping.no_surfaces import NoSurfaces
 from perception.no_method import NoMethod
+from perception.snapshot import put_back, snapshot_of
 
 if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
@@ -74,6 +75,15 @@ def find_in_room(room: WorldConfig | None, ring: RingConfig) -> KnownRoom | None
     from perception.localization.room.room import room_of
 
     return KnownRoom(room_of(room), ring)
+
+
+def with_window(known_room: KnownRoom | None, room: WorldConfig | None, ring: RingConfig) -> KnownRoom | None:
+    """Return what finds the robot in the same room with a ring that listens up to another range; it knows as much."""
+    found = find_in_room(room, ring)
+    if found is not None and known_room is not None:
+        put_back(found, snapshot_of(known_room))
+        found.drop_table()
+    return found
 
 
 def place_robot(known_room: KnownRoom | None, edit: PlaceRobot) -> str | None:

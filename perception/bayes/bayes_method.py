@@ -236,7 +236,7 @@ class BayesPerception:
 
     def _sure_objects(self) -> tuple[DetectedObject, ...]:
         memory = self.memory
-        n = report_circles(memory.tracks, self._reported, self._sure)
+        n = report_circles(memory.tracks, self.settings, self._reported, self._sure)
         seen = [self._circles[t] if t >= 0 else self._report_circle(~t) for t in self._sure[:n].tolist()]
         if self._outlines:
             n = sure_polygons(memory.s, self._sure_polygon, self._sure)

@@ -14,7 +14,15 @@ from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.calibration.beam_fit import BeamFit, Looks, fit_beams
 from perception.calibration.drive import Drive, Scales, drive_of
-from perception.calibration.geometry_fit import Geometry, GeometryFit, Priors, RangeNoise, fit_geometry, sensors_at
+from perception.calibration.geometry_fit import (
+    GATE_SIGMAS,
+    Geometry,
+    GeometryFit,
+    Priors,
+    RangeNoise,
+    fit_geometry,
+    sensors_at,
+)
 from perception.calibration.surfaces import UNSURE_RAD, Beams, Echoes, Surfaces, find_surfaces, most_voted_wall
 from perception.kernel import Floats
 
@@ -40,10 +48,6 @@ SURE_RAD: Final = math.radians(5.0)
 """Off-axis bearing at which a wall answers for sure."""
 LISTENED_SHARE: Final = 0.9
 """Share of the longest range up to which silence means that nothing is there."""
-AGREE_SIGMAS: Final = 4.0
-"""A reading agrees with a surface's distance up to so many standard deviations."""
-
-
 SCALE_SHOWN: Final = 0.1
 PLACE_SHOWN: Final = 0.25
 """A drive shows a scale, or a place, if it leaves at most this share of its standard deviation before the drive.
@@ -192,7 +196,7 @@ def _looks(drive: Drive, fit: GeometryFit, angles: Floats, *, synchro: bool) -> 
     distance, bearing = geometry.surfaces.distances(beams.x, beams.y)
     turned = np.remainder(bearing - beams.axis + math.pi, 2.0 * math.pi) - math.pi
     read = fired.range_m / geometry.scales.range
-    tolerance = AGREE_SIGMAS * fit.noise.sigmas(distance)
+    tolerance = GATE_SIGMAS * fit.noise.sigmas(distance)
     answered = np.abs(read - distance) < tolerance
     near = (np.abs(turned) < LOOK_MAX_RAD) & (distance > 0.0)
     near &= (read > distance - tolerance) & (distance < LISTENED_SHARE * np.max(read[np.isfinite(read)]))

@@ -284,7 +284,7 @@ class FreshEchoes:
         self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = (), reach_m: float = math.inf
     ) -> None:
         self._mounts, self._turning = mounts, turning
-        self._heard_reach_m = reach_m - TOLERANCE_M
+        self.set_reach(reach_m)
         self._half_angle = half_angle
         self._points = np.zeros((len(mounts), LOOKS_REMEMBERED, 2))
         self._bearings = np.zeros((len(mounts), LOOKS_REMEMBERED))
@@ -298,6 +298,10 @@ class FreshEchoes:
         """What the ring has lost."""
         self._walls = BlindWalls(mounts, half_angle, turning)
         self._is_blind = has_blind_sides(mounts, half_angle)
+
+    def set_reach(self, reach_m: float) -> None:
+        """Expect echoes up to another range, m."""
+        self._heard_reach_m = reach_m - TOLERANCE_M
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
@@ -361,15 +365,7 @@ class FreshEchoes:
         size = self._times.size
         fresh, ages, points = np.empty(size), np.empty(size), np.empty((size, 2))
         sensor_ages = np.empty(len(self._times))
-        k, h = select_looks(
-            self._kept,
-            float(robot_s),
-            float(age_max_s),
-            fresh,
-            ages,
-            sensor_ages,
-            points,
-        )
+        k, h = select_looks(self._kept, float(robot_s), float(age_max_s), fresh, ages, sensor_ages, points)
         echoes = points[:h]
         if self.unheard.is_ring_silent:
             echoes = np.concatenate([echoes, self.unheard.points(ALONE)])

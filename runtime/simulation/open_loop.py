@@ -14,7 +14,8 @@ from config.model import ModelConfig
 from config.settings import Settings
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
-from perception.pipeline import DetectedObject, Perception
+from perception.detected_object import DetectedObject
+from perception.pipeline import Perception
 from runtime.simulation.evaluation import CHI2_95, DrumRow, Outcome, match_drums, nearest_pairs, place_nees
 from runtime.simulation.first_fix import FirstFix, FirstFixTracker, summarise_fixes
 from runtime.simulation.scene_names import SceneName

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing
-from perception.pipeline import DetectedObject, Perception
+from perception.detected_object import DetectedObject
+from perception.pipeline import Perception
 from tests.perception.halls import FT
 
 EARLY = 61

@@ -10,6 +10,7 @@ import pytest
 
 from config.load import load_model
 from drivers.messages import Firing
+from perception.detected_object import DetectedObject
 from perception.edits import (
     ClearMap,
     ConfirmObject,
@@ -20,7 +21,7 @@ from perception.edits import (
     PlaceModel,
     RemoveObject,
 )
-from perception.pipeline import DetectedObject, Perception
+from perception.pipeline import Perception
 from tests.perception.edited import (
     EARLY,
     SETTINGS,

@@ -11,6 +11,8 @@ from config.load import load_model, load_world, with_known_room
 from drivers.messages import Firing, Pose
 from perception.edits import PlaceRobot
 from perception.pipeline import Perception
+from perception.snapshot import bounds_of
+from runtime.recording.snapshot_bounds import check_snapshot
 from tests.perception.edited import settle
 from tests.perception.halls import drive, settings
 
@@ -49,6 +51,21 @@ def test_in_a_known_room_the_place_is_found_and_a_snapshot_continues_to_the_bit(
     again = perception.localized()
     assert again is not None
     assert again.status == "localizing"
+
+
+@pytest.mark.compiled
+def test_another_window_is_heard_as_from_the_start_and_what_is_known_stays() -> None:
+    chosen = with_known_room(settings(), "irregular")
+    firing = chosen.ring.firing.model_copy(update={"window_m": 4.0})
+    ring = chosen.ring.model_copy(update={"firing": firing})
+    changed, fresh = (Perception(one, chosen.models, chosen.perception) for one in (chosen.ring, ring))
+    assert changed.edit(PlaceRobot(1.0, 2.0, 0.5)) is None
+    before = changed.localized()
+    changed.set_firing_pattern(ring)
+    check_snapshot(changed.snapshot(), fresh.snapshot(), bounds_of(fresh))
+    assert changed.known_room is not None
+    assert changed.known_room._grid._window_m == 4.0
+    assert repr(changed.localized()) == repr(before)
 
 
 def test_the_robot_is_placed_in_a_known_room_only() -> None:

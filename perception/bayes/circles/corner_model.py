@@ -7,9 +7,8 @@ those of an arc. Only a fit of faces and edge distinguishes the two, so a drum m
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from perception.bayes.circles.alternatives import bearing_if_near
+from perception.bayes.circles.alternatives import HOPELESS_NAT, bearing_if_near
 from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line
 from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
@@ -19,7 +18,6 @@ from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
     CORNER_EDGE_LEAD_GATES,
     CORNER_FACE_READINGS_MIN,
-    CORNER_FIT_STEPS,
     CORNER_HIT_NAT,
     CORNER_LEEWAY_COS,
     CORNER_MODEL_NAT,
@@ -34,9 +32,6 @@ from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.kernel import Ints, kernel
 from perception.records import Records
-
-IMPOSSIBLE_NAT: Final = -1e9
-"""Evidence (nat) of a corner that cannot be fitted."""
 
 
 @kernel
@@ -216,7 +211,7 @@ def fit_faces(
                     (cos_may - CORNER_LEEWAY_COS, gate),
                     FIT_SOFTNESS,
                     noise,
-                    CORNER_FIT_STEPS,
+                    CORNER_ROUNDS,
                     fit,
                 )
                 face.normal_x = fit.normal_x
@@ -283,7 +278,7 @@ def score_corner(
     Returns
     -------
     float
-        Log ratio to the background, nat, less the price; `IMPOSSIBLE_NAT` where there are not two faces.
+        Log ratio to the background, nat, less the price; `HOPELESS_NAT` where there are not two faces.
     """
     scratch = s[0].scratch
     readings = scratch.readings[:n]
@@ -293,7 +288,7 @@ def score_corner(
         cos_may = GRAZING_MIN  # a ray meets a face at any angle
     count, sx, sy = find_facing(readings, scratch.own, cx, cy, gate, scratch.facing)
     if count < CORNER_READINGS_MIN:
-        return IMPOSSIBLE_NAT
+        return HOPELESS_NAT
     facing = scratch.facing[:count]
     found, has_edge = fit_faces(
         readings,
@@ -307,7 +302,7 @@ def score_corner(
         corner,
     )
     if not found:
-        return IMPOSSIBLE_NAT
+        return HOPELESS_NAT
     total = 0.0
     ends = has_edge and corner.faces[0].rays == 0  # a ray misses an edge
     first = way_of_face(readings, facing, cx, cy, corner, 0, cos_may) if ends else 1.0

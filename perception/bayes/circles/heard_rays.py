@@ -20,7 +20,7 @@ from perception.bayes.memory.parameters import (
     CIRCLE_READINGS_MIN,
     FIRST_FIT_SOFTNESS,
     FIT_SOFTNESS,
-    INITIATION_STEPS,
+    OTHER_FIT_STEPS,
     SWITCH_UNSEEN,
     TRACK_FIT_STEPS,
 )
@@ -92,7 +92,7 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
         n = keep_relevant(s, tracks, p, gather_history(s, p, x, y, radius), x, y, radius, -1)
         softness = FIT_SOFTNESS if turn == 1 else FIRST_FIT_SOFTNESS
         if n < CIRCLE_READINGS_MIN or not fit_circle(
-            scratch.readings[:n], (x, y, radius), p, softness, noise, INITIATION_STEPS, scratch.predicted, fit
+            scratch.readings[:n], (x, y, radius), p, softness, noise, OTHER_FIT_STEPS, scratch.predicted, fit
         ):  # fmt: skip
             return 0.0
     x, y = fit.x, fit.y
@@ -102,10 +102,10 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
         return 0.0
     bearing = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     assume_rays(s, p, s[0].rays)
-    best = max(best, fit_other_line(s, p, n, (x, y, radius), bearing, INITIATION_STEPS))
+    best = max(best, fit_other_line(s, p, n, (x, y, radius), bearing, OTHER_FIT_STEPS))
     for k in range(p[0].circle_count):
         other = p[0].circles[k].radius_m
-        best = max(best, fit_other_circle(s, p, n, (x, y, radius), bearing, other, INITIATION_STEPS))
+        best = max(best, fit_other_circle(s, p, n, (x, y, radius), bearing, other, OTHER_FIT_STEPS))
     return by_rays - best
 
 

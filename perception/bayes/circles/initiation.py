@@ -32,9 +32,9 @@ from perception.bayes.memory.parameters import (
     FACING_RADII,
     FIRST_FIT_SOFTNESS,
     FIT_SOFTNESS,
-    INITIATION_STEPS,
     LINE_LENGTH_MIN_M,
     NEW_LINE_HITS_MIN,
+    OTHER_FIT_STEPS,
     OUTLINE_CELL_M,
     RIVAL_OVER_UNKNOWN_NAT,
     SWITCH_LEAD_NAT,
@@ -95,7 +95,7 @@ def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
                 break
     if attracting >= ATTRACTING_MIN:
         relax_hypothesis(
-            s, p[0].circles[kind].chords[:], attracting, CIRCLE_RESTS_M, CIRCLE_RESTS_RAD, INITIATION_STEPS
+            s, p[0].circles[kind].chords[:], attracting, CIRCLE_RESTS_M, CIRCLE_RESTS_RAD, OTHER_FIT_STEPS
         )
 
 
@@ -261,7 +261,7 @@ def best_circle(
     for k in range(p[0].circle_count):
         if k != kind:
             prior = p[0].model_prior_nat if k < p[0].model_count else 0.0
-            v = fit_other_circle(s, p, n, at, bearing, p[0].circles[k].radius_m, INITIATION_STEPS) + prior
+            v = fit_other_circle(s, p, n, at, bearing, p[0].circles[k].radius_m, OTHER_FIT_STEPS) + prior
             if v > best + SWITCH_LEAD_NAT:
                 chosen, best, best_x, best_y = k, v, fit.x, fit.y
     return chosen, best, best_x, best_y
@@ -291,7 +291,7 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
         p,
         FIRST_FIT_SOFTNESS,
         noise,
-        INITIATION_STEPS,
+        OTHER_FIT_STEPS,
         scratch.predicted,
         fit,
     ):
@@ -303,7 +303,7 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
         p,
         FIT_SOFTNESS,
         noise,
-        INITIATION_STEPS,
+        OTHER_FIT_STEPS,
         scratch.predicted,
         fit,
     ):
@@ -317,7 +317,7 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     prior = p[0].model_prior_nat
     bearing = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     own = llr + (prior if kind < p[0].model_count else 0.0)
-    if fit_other_line(s, p, n, (x, y, radius), bearing, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
+    if fit_other_line(s, p, n, (x, y, radius), bearing, OTHER_FIT_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
         if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             enter_line(s, scratch.line_fit, x, y, line)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from perception.bayes.circles.alternatives import score
-from perception.bayes.memory.parameters import LATERAL_LEAD_NAT, LATERAL_PLACES, LATERAL_STEP_M
+from perception.bayes.memory.parameters import ELSEWHERE_LEAD_NAT, LATERAL_PLACES, LATERAL_STEP_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTrack, StateRecord
 from perception.kernel import kernel
@@ -64,7 +64,7 @@ def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
     n : int
         Number of its readings, the first of the scratch.
     """
-    best = score(s, p, n, track.x, track.y, track.radius) + LATERAL_LEAD_NAT
+    best = score(s, p, n, track.x, track.y, track.radius) + ELSEWHERE_LEAD_NAT
     x, y, heard = mean_hearer(s, p, n)
     dx = track.x - x
     dy = track.y - y

@@ -18,11 +18,11 @@ from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
 from perception.bayes.memory.parameters import (
+    EXPLAINED_ERROR_SIGMAS,
     OTHER_RADIUS_ERROR_M,
     OTHER_RADIUS_SAME_M,
     OTHER_RADIUS_SIGMA_M,
     OUTLINE_BEARINGS_MIN,
-    OUTLINE_CLIP_SIGMAS,
     OUTLINE_READINGS_MIN,
     OUTLINE_SCALE_RAD,
     OUTLINE_SIGMA_M,
@@ -89,8 +89,8 @@ def average_errors(bearing: BearingErrors) -> None:
     """Write the mean of a bearing's errors (m) and its accuracy, the inverse of that mean's standard deviation (1/m).
 
     It needs the errors and the sum of their variances, of `sort_errors`. An error farther from the median than
-    `OUTLINE_CLIP_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and the
-    mean is not written.
+    `EXPLAINED_ERROR_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
+    the mean is not written.
     """
     n = bearing.count
     bearing.accuracy = 0.0
@@ -98,7 +98,7 @@ def average_errors(bearing: BearingErrors) -> None:
         return
     variance = bearing.variance / n
     median = 0.5 * (bearing.errors[(n - 1) // 2] + bearing.errors[n // 2])
-    most = OUTLINE_CLIP_SIGMAS * math.sqrt(variance)
+    most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
     total = 0.0
     for k in range(n):
         total += min(most, max(-most, bearing.errors[k] - median))
@@ -180,7 +180,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         if own.ahead[j] < p[0].cos_half_angle * own.distance[j]:
             continue
         variance = var0 + rel2 * q.range_m * q.range_m
-        most = OUTLINE_CLIP_SIGMAS * math.sqrt(variance)
+        most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
         e = min(most, max(-most, e))
         ux, uy = own.slope_x[j], own.slope_y[j]
         is_slant = is_crossed(q) or own.rays > 0

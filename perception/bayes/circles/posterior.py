@@ -10,13 +10,12 @@ known well along the beam and badly across it is sampled equally in both directi
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
 from perception.bayes.inference.likelihood import level_of
 from perception.bayes.inference.prediction import predict_circle
-from perception.bayes.memory.elements import GRID_CELLS, Reading
+from perception.bayes.memory.elements import GRID_CELLS, GRID_SIDE, Reading
 from perception.bayes.memory.parameters import (
     GRID_ATTEMPTS,
     GRID_CORRELATION_MAX,
@@ -32,9 +31,6 @@ from perception.bayes.memory.scratch import CirclePosterior, LinearReading, Pred
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
 from perception.kernel import Floats, kernel
 from perception.records import Records
-
-SIDE: Final = 7
-"""Cells along a side of the grid (SIDE² is `GRID_CELLS`); odd, so that one lies on the mean."""
 
 
 @kernel
@@ -105,8 +101,8 @@ def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) ->
         Out: the cells' log likelihoods (nat), the first axis outermost.
     """
     last = float(TABLE_BINS - 2)
-    for i in range(SIDE):
-        a = float(i - SIDE // 2)
+    for i in range(GRID_SIDE):
+        a = float(i - GRID_SIDE // 2)
         s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
         for j in range(len(linear)):  # seven independent sums at a time: a single one waits for each addition
             q = linear[j]
@@ -118,7 +114,7 @@ def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) ->
             s4 += interpolated(row, last, abs(e - across) * step)
             s5 += interpolated(row, last, abs(e - 2.0 * across) * step)
             s6 += interpolated(row, last, abs(e - 3.0 * across) * step)
-        cell = SIDE * i
+        cell = GRID_SIDE * i
         cells[cell], cells[cell + 1], cells[cell + 2], cells[cell + 3] = s0, s1, s2, s3
         cells[cell + 4], cells[cell + 5], cells[cell + 6] = s4, s5, s6
     best = -math.inf
@@ -152,8 +148,8 @@ def moments(best: float, cells: Floats) -> tuple[float, float, float, float, flo
         if v < -GRID_NEGLIGIBLE_NAT:
             continue
         w = math.exp(v)
-        a = float(cell // SIDE - SIDE // 2)
-        b = float(cell % SIDE - SIDE // 2)
+        a = float(cell // GRID_SIDE - GRID_SIDE // 2)
+        b = float(cell % GRID_SIDE - GRID_SIDE // 2)
         z += w
         ma += w * a
         mb += w * b
@@ -244,9 +240,9 @@ def posterior_circle(
     for _ in range(GRID_ATTEMPTS):
         m = linearise(readings, radius, p, noise, posterior, predicted, linear)
         at, best = score_cells(linear[:m], p[0].table, cells)
-        i = at // SIDE
-        j = at % SIDE
-        rim = i == 0 or i == SIDE - 1 or j == 0 or j == SIDE - 1
+        i = at // GRID_SIDE
+        j = at % GRID_SIDE
+        rim = i == 0 or i == GRID_SIDE - 1 or j == 0 or j == GRID_SIDE - 1
         ma, mb, saa, sab, sbb = moments(best, cells)
         move_frame(ma, mb, saa, sab, sbb, GRID_GROWTH if rim else 1.0, p[0].gate_m, posterior)
         fits = min(saa, sbb) >= GRID_NARROW and max(saa, sbb) <= GRID_WIDE

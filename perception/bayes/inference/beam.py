@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.cross_path import SURFACE_NEAREST_M, circle_error, is_crossed
+from perception.bayes.inference.cross_path import LENGTH_MIN_M, circle_error, is_crossed
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import Settings
 from perception.bayes.memory.state import RAYS_MAX, State
@@ -78,8 +78,8 @@ def ray_over_circle(
     beside = abs(ux * dy - uy * dx)
     deep = math.sqrt(max(radius * radius - beside * beside, 0.0))
     r = along - deep
-    per_deep = 1.0 / max(deep, GRAZING_MIN * radius, SURFACE_NEAREST_M)
-    per_d = 1.0 / max(d, SURFACE_NEAREST_M)
+    per_deep = 1.0 / max(deep, GRAZING_MIN * radius, LENGTH_MIN_M)
+    per_d = 1.0 / max(d, LENGTH_MIN_M)
     limb = math.sqrt(max(d * d - radius * radius, 0.0))
     cos_past = (along * limb + beside * radius) * per_d  # of π − ω, times d
     sin_past = (beside * limb - along * radius) * per_d

@@ -21,8 +21,9 @@ from typing import Final
 from perception.bayes.memory.elements import Reading
 from perception.kernel import kernel, loop_kernel
 
-SURFACE_NEAREST_M: Final = 1e-6
-"""A sensor counts as at least this far from a surface, so that none is inside a body."""
+LENGTH_MIN_M: Final = 1e-6
+"""Lengths by which something is divided count as at least this, and a sensor as at least this far from a surface, so
+that none is inside a body."""
 LENGTH2_MIN: Final = 1e-200
 """Least divisor: a place without a direction gives numbers, not an error."""
 
@@ -57,8 +58,8 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
     """
     ax, ay = -dx, -dy
     bx, by = q.listener_x - dx, q.listener_y - dy
-    a = max(math.sqrt(ax * ax + ay * ay), radius + SURFACE_NEAREST_M)
-    b = max(math.sqrt(bx * bx + by * by), radius + SURFACE_NEAREST_M)
+    a = max(math.sqrt(ax * ax + ay * ay), radius + LENGTH_MIN_M)
+    b = max(math.sqrt(bx * bx + by * by), radius + LENGTH_MIN_M)
     # (b − ρ) / a and (a − ρ) / b, both times ab: only the direction counts
     share_a, share_b = b * (b - radius), a * (a - radius)
     wx, wy = share_a * ax + share_b * bx, share_a * ay + share_b * by
@@ -71,8 +72,8 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
         wy *= scale
         px, py = ax - radius * wx, ay - radius * wy
         qx, qy = bx - radius * wx, by - radius * wy
-        to_a = max(math.sqrt(px * px + py * py), SURFACE_NEAREST_M)
-        to_b = max(math.sqrt(qx * qx + qy * qy), SURFACE_NEAREST_M)
+        to_a = max(math.sqrt(px * px + py * py), LENGTH_MIN_M)
+        to_b = max(math.sqrt(qx * qx + qy * qy), LENGTH_MIN_M)
         per_a, per_b = 1.0 / to_a, 1.0 / to_b
         slope_a = radius * (ax * wy - ay * wx) * per_a
         slope_b = radius * (bx * wy - by * wx) * per_b

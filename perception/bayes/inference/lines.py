@@ -16,7 +16,6 @@ from perception.bayes.memory.elements import MAX_LINES, Reading
 from perception.bayes.memory.parameters import (
     CIRCLE_WALL_BEHIND,
     CIRCLE_WALL_BEYOND_M,
-    CIRCLE_WALL_FRONT,
     EXPLAINED_ERROR_SIGMAS,
     LINE_ANGLE_DRIFT_RAD2,
     LINE_ANGLE_VARIANCE_RAD2,
@@ -30,12 +29,13 @@ from perception.bayes.memory.parameters import (
     LINE_GROW_M,
     LINE_JOIN_M,
     LINE_LOG_ODDS_MAX,
-    LINE_SAME_COS,
     LINE_SAME_M,
     LINE_SILENCE_WITHIN_M,
     LINE_SLACK_M,
     LINE_START_LOG_ODDS,
+    PARALLEL_COS,
     WALL_ECHOES_MIN,
+    WALL_FRONT_RADII,
     WALL_LENGTH_MIN_M,
 )
 from perception.bayes.memory.scratch import ON_LINE, UNEXPLAINED, LineFit, LineScore
@@ -97,7 +97,7 @@ def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
             off, along = off_and_along(line, x, y)
             if (
                 reaches(line, along, CIRCLE_WALL_BEYOND_M)
-                and CIRCLE_WALL_BEHIND * radius < off < CIRCLE_WALL_FRONT * radius
+                and CIRCLE_WALL_BEHIND * radius < off < WALL_FRONT_RADII * radius
             ):
                 return True
     return False
@@ -126,7 +126,7 @@ def enter_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineSc
                 best = k
                 worst = -1e9
             continue
-        if line.normal_x * nx + line.normal_y * ny > LINE_SAME_COS:
+        if line.normal_x * nx + line.normal_y * ny > PARALLEL_COS:
             off, along = off_and_along(line, ox + c * nx, oy + c * ny)
             if abs(off) < LINE_SAME_M and reaches(line, along, LINE_JOIN_M):
                 return

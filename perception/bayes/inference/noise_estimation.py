@@ -14,13 +14,13 @@ from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
+    CERTAIN_PROBABILITY,
     CURVATURE_VARIANCE_M2,
     ELSEWHERE_PER_M,
     EXPLAINED_ERROR_SIGMAS,
     RANGE_VARIANCE_MIN_M2,
     RESIDUAL_EVERY,
     RESIDUAL_HITS_MIN,
-    RESIDUAL_PROBABILITY_MIN,
     ROUGHNESS_MEMORY,
     SAME_SURFACE_SHARE,
     TRIPLE_MAX_M,
@@ -103,7 +103,7 @@ def add_residuals(
         track.noise_nat[h] = 0.0
     if track.is_named == 0 and careful:
         return
-    if track.probability < RESIDUAL_PROBABILITY_MIN or track.hits < RESIDUAL_HITS_MIN:
+    if track.probability < CERTAIN_PROBABILITY or track.hits < RESIDUAL_HITS_MIN:
         return
     own = s[0].scratch.own
     for j in range(n):

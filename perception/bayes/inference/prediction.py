@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from perception.bayes.inference.beam import ray_over_circle
-from perception.bayes.inference.cross_path import SURFACE_NEAREST_M, over_circle
+from perception.bayes.inference.cross_path import LENGTH_MIN_M, over_circle
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import Predictions
 from perception.kernel import Floats, kernel, loop_kernel
@@ -30,7 +30,7 @@ def predict_echoes(readings: Records[Reading], x: float, y: float, radius: float
         dx = x - q.x
         dy = y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        per_d = 1.0 / max(d, SURFACE_NEAREST_M)
+        per_d = 1.0 / max(d, LENGTH_MIN_M)
         out.error[j] = q.range_m - (d - radius)
         out.slope_x[j] = dx * per_d
         out.slope_y[j] = dy * per_d
@@ -78,7 +78,7 @@ def predict_any(
         d = math.sqrt(dx * dx + dy * dy)
         half, half_x, half_y = over_circle(q, dx, dy, radius)
         is_echo = q.listener_x == 0.0 and q.listener_y == 0.0
-        per_d = 1.0 / max(d, SURFACE_NEAREST_M)
+        per_d = 1.0 / max(d, LENGTH_MIN_M)
         error[j] = q.range_m - (d - radius if is_echo else half)
         slope_x[j] = dx * per_d if is_echo else half_x
         slope_y[j] = dy * per_d if is_echo else half_y

@@ -12,8 +12,6 @@ from perception.bayes.memory.settings_record import CIRCLES_MAX
 from perception.bounds import RANGE, Bound, Count, Finite, Place
 from perception.records import Record
 
-MAX_TRACKS: Final = 48
-"""Default number of circle tracks."""
 BEARING_BINS: Final = 36
 """Bins of a track's reservoir, by the bearing from the object to the sensor: 10° each."""
 
@@ -51,8 +49,9 @@ PAIRS_PER_SENSOR: Final = 8
 """Greatest number of outline segments from one reading."""
 ALTERNATIVES_MAX: Final = CIRCLES_MAX + 2
 """Explanations of a circle track: radii, a line, a corner."""
-GRID_CELLS: Final = 49
-"""Cells of the grid on which a circle's posterior is summed."""
+GRID_SIDE: Final = 7
+"""Cells along a side of the grid on which a circle's posterior is summed; odd, so that one lies on the mean."""
+GRID_CELLS: Final = GRID_SIDE * GRID_SIDE
 
 
 RADIUS: Final = Bound(0.0, 1e3)

@@ -14,7 +14,7 @@ from perception.bayes.memory.elements import (
     LowerTriangle,
     Pose,
 )
-from perception.bayes.memory.polygon_parameters import AXES, LATTICE_ATTEMPTS
+from perception.bayes.memory.polygon_parameters import LATTICE_ATTEMPTS
 from perception.bayes.memory.settings_record import NOISES, POLYGONS_MAX
 from perception.bounds import FINITE, POSITIVE, Bound, Count, Finite, Flag, Place, index_of, up_to
 from perception.records import Record
@@ -23,12 +23,12 @@ NO_JOB, INITIATION, REFINEMENT = range(3)
 """Values of `PolygonJob.kind`."""
 ASSIGN, SEARCH_WIDE, RESTART, SEARCH_NEAR, JUDGE, LATTICE = range(6)
 """Stages of a refinement, values of `PolygonJob.stage`. The stages of an initiation are fewer."""
+ALONG, ACROSS, TURN, AXES = range(4)
+"""Axes of a search: along and across the body, and turn; and their number."""
 JOB_READINGS: Final = POLYGON_BEARING_BINS * POLYGON_BIN_CAPACITY
 """Readings of the track that is refined."""
 STEPS_MAX: Final = 4096
-"""The longest stage of a job has a few hundred steps."""
-ROUNDS_MAX: Final = 1000
-"""A search has a few dozen rounds."""
+"""The longest stage of a job has a few hundred steps, a search a few dozen rounds."""
 
 
 class PolygonRequest(Record):
@@ -53,7 +53,7 @@ class PoseSearch(Record):
     step_m: Place
     trial: Annotated[int, Bound(-1, 2 * AXES - 1)]
     """The next trial; −1 before the first score."""
-    rounds_left: Annotated[int, up_to(ROUNDS_MAX)]
+    rounds_left: Annotated[int, up_to(STEPS_MAX)]
     has_gained: Flag
     """1 where this round gained."""
 

@@ -65,13 +65,11 @@ SAME_SURFACE_SHARE: Final = 0.8
 ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else."""
 RANGE_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Least variance of a range, so that perfect ones do not divide by zero."""
+"""Least variance of a range, and of a fitted centre, so that perfect ones do not divide by zero."""
 EXPLAINED_ERROR_SIGMAS: Final = 3.0
-"""Greatest error of an explained range, in σ, beyond half its rounding."""
-RESIDUAL_PROBABILITY_MIN: Final = 0.95
-"""An object's residuals count from this probability on, …"""
+"""Greatest error of an explained range, in σ, beyond half its rounding; farther ones count as that far in a mean."""
 RESIDUAL_HITS_MIN: Final = 25.0
-"""… from this many hits on, …"""
+"""A certain object's residuals count from this many hits on, …"""
 RESIDUAL_EVERY: Final = 3
 """… and in every third of its refinements."""
 
@@ -113,10 +111,11 @@ HYPOTHESES_PER_FIRING: Final = 2
 
 # --- Lines and walls -----------------------------------------------------------------------------------------------
 
-LINE_SAME_COS: Final = 0.98
+PARALLEL_COS: Final = 0.98
 LINE_SAME_M: Final = 0.4 * FOOT_M
 LINE_JOIN_M: Final = 1.0 * FOOT_M
-"""A new line this parallel, this near and this little beyond the end of a known one is that one."""
+"""A new line this parallel, this near and this little beyond the end of a known one is that one. A segment this
+parallel to another one makes the same request."""
 LINE_ANGLE_VARIANCE_RAD2: Final = 0.02
 LINE_DISTANCE_VARIANCE_M2: Final = 0.01 * FOOT_M * FOOT_M
 """Variance of a new line."""
@@ -169,11 +168,11 @@ FACING_RADII: Final = 0.6
 """A segment attracts where the body's centre lies at least this many radii behind it."""
 ATTRACTING_MIN: Final = 3
 """Fewer segments than this do not move a hypothesis."""
-INITIATION_STEPS: Final = 4
-"""Steps of the relaxation, and of each fit, of a new circle."""
-CIRCLE_RESTS_M: Final = 0.005 * FOOT_M
+OTHER_FIT_STEPS: Final = 4
+"""Steps of the relaxation of a new circle, and of the fit of any other explanation."""
 CIRCLE_RESTS_RAD: Final = 0.005
-"""The relaxation ends with increments below both."""
+CIRCLE_RESTS_M: Final = CIRCLE_RESTS_RAD * FOOT_M
+"""The relaxation ends with increments below both: a turn, and the shift that it makes a foot away."""
 FIT_SOFTNESS: Final = 9.0
 """Robustness of the fits: squared residual, in σ², at which the weight has fallen to a quarter."""
 FIRST_FIT_SOFTNESS: Final = 16.0
@@ -192,7 +191,8 @@ CIRCLE_READINGS_MIN: Final = 5
 CIRCLE_EVIDENCE_MIN_NAT: Final = 10.0
 """Least readings and evidence of a new track."""
 SWITCH_LEAD_NAT: Final = 6.0
-"""Lead required of another explanation."""
+"""Lead required of another explanation: of a circle or a line over a circle, of an unknown object, at which a track
+ends, and of an established polygon over a circle in its place."""
 RIVAL_OVER_UNKNOWN_NAT: Final = 3.0
 """Lead required of a rival over an unknown object."""
 CENTRE_VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
@@ -226,26 +226,19 @@ FITTED_REFINEMENTS: Final = 2
 LOST_NAT: Final = 2.0
 """Loss of evidence at the mean, against the start, at which it has left the beams that heard the object."""
 ROOT_CORRELATION_MAX: Final = 0.9
-ROOT_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Bounds of the covariance assumed for a fit."""
+"""Greatest correlation assumed for a fit."""
 SWITCH_ROOT_M: Final = 0.02 * FOOT_M
 """Least root of the covariance with which the pose is searched after a change of kind."""
 SWITCH_UNSEEN: Final = 4
-"""Unseen readings that a change of kind counts as."""
-RADIUS_CHANGED_UNSEEN: Final = 4
-"""Unseen readings added to a track whose radius becomes a model's own, so that it is refined."""
-ALTERNATIVE_STEPS: Final = 4
-"""Steps of an alternative's fit."""
+"""Unseen readings that a change of kind, or of the radius, counts as, so that the track is refined."""
 CORNER_MISS_SHARE: Final = 0.5
 """Share of the evidence of missed echoes against the circle that also counts against a corner."""
 CIRCLE_WALL_BEYOND_M: Final = 8.0 * FOOT_M
 CIRCLE_WALL_BEHIND: Final = -0.85
-CIRCLE_WALL_FRONT: Final = 0.7
+WALL_FRONT_RADII: Final = 0.7
 """A centre lies in a wall this far beyond its ends, and this many radii behind its face or before it; …"""
 IN_WALL_NAT: Final = -8.0
 """… log prior of such a body."""
-UNKNOWN_LEAD_NAT: Final = 6.0
-"""Lead of an unknown object at which a track ends."""
 ESTABLISH_PROBABILITY: Final = 0.7
 ESTABLISH_HITS: Final = 8.0
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
@@ -257,8 +250,8 @@ APART_RADII: Final = 0.8
 LATERAL_PLACES: Final = 3
 LATERAL_STEP_M: Final = 0.12 * FOOT_M
 """Positions on either side, and their spacing: together half a foot, a beam's edge at two and a half feet."""
-LATERAL_LEAD_NAT: Final = 1.0
-"""Evidence by which another position must lead; a smaller lead is chance."""
+ELSEWHERE_LEAD_NAT: Final = 1.0
+"""Evidence by which another position, or another maximum of a polygon, must lead; a smaller lead is chance."""
 
 # --- The corner as an explanation ----------------------------------------------------------------------------------
 
@@ -267,9 +260,7 @@ CORNER_READINGS_MIN: Final = 8
 CORNER_FACE_READINGS_MIN: Final = 3
 """… and of one face: two to fix it and one to test it."""
 CORNER_ROUNDS: Final = 3
-"""Rounds of assigning readings to the faces and fitting both."""
-CORNER_FIT_STEPS: Final = 3
-"""Steps of a face's fit."""
+"""Rounds of assigning readings to the faces and fitting both, and steps of each fit."""
 CORNER_LEEWAY_COS: Final = 0.02
 """Cosine by which a face's fit extends the beam, so that a face started at a wrong angle keeps its readings."""
 CORNER_OUT_OF_BEAM_GATES: Final = 2.0
@@ -337,9 +328,7 @@ OUTLINE_SCALE_RAD: Final = 0.45
 OUTLINE_SURFACE_M: Final = 0.005
 """Deviation of a model's own surface, and of the poses from which it was heard."""
 OUTLINE_READINGS_MIN: Final = 3
-"""Least readings of a bearing that counts, so that their median ignores an outlier, …"""
-OUTLINE_CLIP_SIGMAS: Final = 3.0
-"""… from which errors count as no farther than this."""
+"""Least readings of a bearing that counts, so that their median ignores an outlier."""
 OUTLINE_BEARINGS_MIN: Final = 4
 """Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
 OTHER_RADIUS_SIGMA_M: Final = 0.2
@@ -348,7 +337,7 @@ OTHER_RADIUS_SAME_M: Final = 0.015
 OTHER_RADIUS_ERROR_M: Final = 0.04
 """Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
 ROOM_MARGIN_M: Final = 0.2
-"""They explain as far as this beyond the ends of their spans."""
+"""Mapped walls explain as far as this beyond the ends of their spans, and a thin object there is the wall's edge."""
 MODEL_CHECK_EVERY: Final = 4
 """A named object is checked in every fourth of its refinements."""
 SILENCE_MEMORY: Final = 0.999

@@ -62,19 +62,16 @@ RESTART_ROLLS_MAX: Final = 12
 RESTART_STEP_M: Final = 0.1 * FOOT_M
 RESTART_ROUNDS: Final = 5
 """First step and rounds of their searches."""
-RESTART_GAIN_NAT: Final = 1.0
-"""Gain required of another maximum."""
 
 # --- New polygon tracks --------------------------------------------------------------------------------------------
 
 REQUEST_SAME_M: Final = 0.25 * FOOT_M
-REQUEST_SAME_COS: Final = 0.98
-"""A segment this near to another one, and this parallel, makes the same request."""
+"""A segment this near to a parallel one makes the same request."""
 POLYGON_AROUND_M: Final = 0.3 * FOOT_M
-"""Segments up to this far off the farthest vertex may attract the body."""
+"""Segments up to this far off the farthest vertex may attract the body; circles up to there stand in its place."""
 POLYGON_RELAXATION_STEPS: Final = 3
-POLYGON_RESTS_M: Final = 0.01 * FOOT_M
 POLYGON_RESTS_RAD: Final = 0.01
+POLYGON_RESTS_M: Final = POLYGON_RESTS_RAD * FOOT_M
 """Greatest number of relaxation steps; the relaxation ends with increments below both limits."""
 SIDE_SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
@@ -99,9 +96,6 @@ POLYGONS_APART: Final = 0.5
 """… and no like track starts this near, in inner radii; for any other track the distance is less."""
 CHALLENGE_UNSEEN: Final = 8
 """Unseen readings that a challenger counts as."""
-
-AXES: Final = 3
-"""Axes of a search: along and across the body, and turn."""
 
 # --- The lattice of a polygon's posterior --------------------------------------------------------------------------
 
@@ -134,13 +128,12 @@ FIRST_SIGMA_RAD: Final = 0.02
 POLYGON_EVIDENCE_MIN_NAT: Final = 5.0
 POLYGON_UNKNOWN_LEAD_NAT: Final = 8.0
 """A track ends with evidence below the first, or below an unknown object's by the second."""
-POLYGON_ESTABLISH_PROBABILITY: Final = 0.9
 POLYGON_ESTABLISH_HITS: Final = 10.0
 POLYGON_ESTABLISH_SURE: Final = 3.0
-"""Least probability, hits and sure hits to establish a track: corners alone fit anywhere. …"""
+"""Least hits and sure hits to establish a track: corners alone fit anywhere. …"""
 MANY_HITS: Final = 20.0
 MANY_HITS_SURE: Final = 2.0
-"""… From so many hits on, so many sure ones suffice."""
+"""… From so many hits on, so many sure ones suffice, and it may be reported."""
 POLYGON_DOUBT_PROBABILITY: Final = 0.3
 POLYGON_DOUBT_SHARE: Final = 0.75
 """A track less probable, or that explains less of its near readings, is tentative again."""
@@ -156,32 +149,25 @@ POLYGON_WALL_ECHOES_MIN: Final = 12.0
 POLYGON_WALL_LENGTH_RADII: Final = 3.0
 """Least length of such a wall, in inner radii."""
 POLYGON_WALL_BEHIND: Final = -1.15
-POLYGON_WALL_FRONT: Final = 0.7
-"""A body whose centre is this many inner radii behind a wall's face, or before it, is the wall, …"""
+"""A body whose centre is this many inner radii behind a wall's face, or before it like a circle's, is the wall, …"""
 POLYGON_WALL_SHARE: Final = 0.6
 """… if the wall explains this many readings per hit of the body. (Bodies in a row have a line in common.)"""
 POLYGON_WALL_BEYOND_M: Final = 2.0 * FOOT_M
 """Distance beyond the ends of a line at which a body may still be a part of it."""
-CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
-"""Circles whose centres lie no farther than this off the farthest vertex stand in the same place."""
-OVER_CIRCLE_LEAD_NAT: Final = 6.0
-"""Lead at which an established polygon removes a circle in its place."""
-CIRCLE_FIT_STEPS: Final = 4
-"""Steps of such a circle's fit."""
 
 # --- Which polygons are reported, and how --------------------------------------------------------------------------
 
 POLYGON_PROBABILITY: Final = 0.9
-"""A polygon is reported from this probability on, or from the user's `report_probability` if that is less."""
+"""A polygon is established from this probability on, and reported, or from the user's `report_probability` if that is
+less."""
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_DISPERSION_MIN: Final = 0.02
 """Nearest sensor, and least dispersion of the axes: a single face seen from afar may belong to any wall."""
 POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 """Greatest standard deviation of its position along either axis."""
-POLYGON_NAMED_HITS: Final = 20.0
 POLYGON_NAMED_HITS_SWEPT: Final = 12.0
 POLYGON_SWEPT_READINGS: Final = 80
-"""Least hits; fewer suffice where so many readings, silences included, bear on it and fit it."""
+"""Hits fewer than `MANY_HITS` suffice where so many readings, silences included, bear on it and fit it."""
 POLYGON_INFLATION: Final = 1.15
 """Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
 POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)

@@ -13,6 +13,7 @@ from perception.bayes.memory.elements import (
     COMPARED_MAX,
     CROSS_HISTORY,
     GRID_CELLS,
+    MAX_LINES,
     PAIRS_PER_SENSOR,
     MappedSegment,
     Pose,
@@ -24,8 +25,8 @@ from perception.records import Record, Records
 
 UNEXPLAINED: Final = -1
 ON_LINE: Final = -2
-PROPOSED: Final = -100
-POLYGON: Final = 1000
+PROPOSED: Final = ON_LINE - MAX_LINES
+POLYGON: Final = TRACKS_MAX
 """Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
 Other values are circle tracks."""
 TAKES_NOTHING, TAKES_BETTER, TAKES_ALL = range(3)

@@ -9,29 +9,28 @@ from __future__ import annotations
 import math
 from typing import Annotated, Final, TypeAlias
 
+from config.model import VERTICES_MAX
+from config.robot import LISTEN_MAX_M
 from config.units import FOOT_M
+from perception.bayes.memory.parameters import NOISE_ABSOLUTE_M, NOISE_RELATIVE
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
 
 CIRCLES_MAX: Final = 64
 """Greatest number of radii: round models and their rivals."""
-POLYGONS_MAX: Final = 64
+POLYGONS_MAX: Final = CIRCLES_MAX
 """Polygon models."""
-VERTICES_MAX: Final = 64
-"""Vertices of one of them; `config.model` allows no more."""
 CHORDS: Final = 10
 """Chords by which a circle is relaxed onto the map."""
 TABLE_LEVELS: Final = 24
 """Noise levels of the table, spaced geometrically: 32 % apart over .001 to .6 ft, finer than the accuracy of σ."""
 TABLE_BINS: Final = 129
 """Bins of an error in the table; see `perception.bayes.inference.likelihood`."""
-NOISES: Final = 20
-"""Noise hypotheses: five absolute ones times four relative ones."""
-RANGE_MAX_M: Final = 100.0
-"""Longest range of any ring; `config.robot` allows no longer one."""
+NOISES: Final = len(NOISE_ABSOLUTE_M) * len(NOISE_RELATIVE)
+"""Noise hypotheses: each absolute one with each relative one."""
 RANGE_BINS_PER_M: Final = 2.0 / FOOT_M
 """Range bins per metre; within a bin a noise hypothesis has one level."""
-RANGE_BINS: Final = math.ceil(RANGE_MAX_M * RANGE_BINS_PER_M)
+RANGE_BINS: Final = math.ceil(LISTEN_MAX_M * RANGE_BINS_PER_M)
 """Ranges that are distinguished in a table of noise levels."""
 
 

@@ -22,7 +22,6 @@ from perception.bayes.memory.elements import (
     HISTORY,
     MAX_LINES,
     MAX_POLYGONS,
-    MAX_TRACKS,
     POLYGON_BEARING_BINS,
     POLYGON_BIN_CAPACITY,
     RADIUS,
@@ -311,7 +310,7 @@ class Memory:
     """Views of the same memory, left out of snapshots."""
     BOUNDS: Final = bounds({"state.room.edges.second": FLAG}, state=State.BOUNDS, circles=CircleTrack.BOUNDS)
 
-    def __init__(self, sensors: int, tracks: int = MAX_TRACKS) -> None:
+    def __init__(self, sensors: int, tracks: int) -> None:
         self.state = zeros(State, 1)
         self.circles = zeros(CircleTrack, tracks)
         self.s = records(State, self.state)

@@ -6,20 +6,15 @@ explanation move to the explanation's new index, and are compared with the new e
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from perception.bayes.memory.elements import REJECTIONS_MAX
-from perception.bayes.memory.parameters import RADIUS_CHANGED_UNSEEN
+from perception.bayes.memory.parameters import SWITCH_UNSEEN
 from perception.bayes.memory.scratch import POLYGON
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import FREE, Memory
 from perception.kernel import Floats, Ints
 from perception.records import Structured, column
-
-EQUAL_RADIUS_M: Final = 1e-9
-"""Radii nearer than this are one."""
 
 
 def radii_of(p: SettingsRecord) -> Floats:
@@ -55,13 +50,13 @@ def _migrate_circles(circles: Structured, old: Floats, new: Floats, index: Ints)
     for k, to in enumerate(index.tolist()):
         leads[:, to] = circles["leads"][:, k]
     leads[:, len(new) : len(new) + 2] = circles["leads"][:, len(old) : len(old) + 2]
-    is_changed = np.abs(new[index] - old) > EQUAL_RADIUS_M
+    is_changed = new[index] != old
     for t in np.flatnonzero(circles["status"] != FREE).tolist():
         kind = int(circles["kind"][t])
         circles["kind"][t], circles["alternative"][t] = index[kind], 0
         if is_changed[kind]:  # a rival as near as this to a model is that model
             circles["radius"][t] = new[index[kind]]
             circles["refinements"][t] = 0
-            circles["unseen"][t] += RADIUS_CHANGED_UNSEEN
+            circles["unseen"][t] += SWITCH_UNSEEN
         leads[t, index[kind]] = 0.0
     circles["leads"] = leads

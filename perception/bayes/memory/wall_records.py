@@ -25,14 +25,12 @@ WALL_BIN_M: Final = 0.06
 SPANS_MAX: Final = 6
 """Spans of one wall, with openings between them."""
 CORNERS_MAX: Final = 24
-EDGES_MAX: Final = 24
+EDGES_MAX: Final = CORNERS_MAX
 RECENT_MAX: Final = 768
 """Spaced readings of all sensors that are remembered for new walls."""
 REMEMBERED_MAX: Final = 8192
 """Spaced readings of all sensors by which walls are reviewed: those of some 25 m."""
-IS_KNOWN: Final = 0
-IS_FREE: Final = 1
-IS_TAKEN: Final = 2
+IS_KNOWN, IS_FREE, IS_TAKEN = range(3)
 """Values of `RecentReading.is_free`; the last is that of a candidate's echoes while it is fitted."""
 EXTENT: Final = Bound(-0.5 * WALL_BINS * WALL_BIN_M, 0.5 * WALL_BINS * WALL_BIN_M)
 """Of the ends of a wall's spans, which become indices of its bins, m."""

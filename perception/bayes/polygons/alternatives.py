@@ -11,15 +11,12 @@ from perception.bayes.inference.lines import off_and_along, reaches
 from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.inference.range_fit import fit_circle, score_circle
 from perception.bayes.memory.elements import MAX_LINES, Reading
-from perception.bayes.memory.parameters import FIT_SOFTNESS
+from perception.bayes.memory.parameters import FIT_SOFTNESS, OTHER_FIT_STEPS, SWITCH_LEAD_NAT, WALL_FRONT_RADII
 from perception.bayes.memory.polygon_parameters import (
-    CIRCLE_FIT_STEPS,
-    CIRCLE_NEAR_M,
-    OVER_CIRCLE_LEAD_NAT,
+    POLYGON_AROUND_M,
     POLYGON_WALL_BEHIND,
     POLYGON_WALL_BEYOND_M,
     POLYGON_WALL_ECHOES_MIN,
-    POLYGON_WALL_FRONT,
     POLYGON_WALL_LENGTH_RADII,
     POLYGON_WALL_SHARE,
 )
@@ -78,7 +75,7 @@ def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> b
             off, along = off_and_along(line, track.x, track.y)
             if (
                 reaches(line, along, POLYGON_WALL_BEYOND_M)
-                and POLYGON_WALL_BEHIND * inner < off < POLYGON_WALL_FRONT * inner
+                and POLYGON_WALL_BEHIND * inner < off < WALL_FRONT_RADII * inner
             ):
                 tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * off * off)
                 if count_on_line(readings, line, p[0].cos_may_answer, tight) >= POLYGON_WALL_SHARE * track.hits:
@@ -130,7 +127,7 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float
             p,
             FIT_SOFTNESS,
             (var0, rel2),
-            CIRCLE_FIT_STEPS,
+            OTHER_FIT_STEPS,
             scratch.predicted,
             scratch.circle_fit,
         ):
@@ -163,7 +160,7 @@ def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, tra
         Updated.
     """
     own = track.log_likelihood_ratio + p[0].model_prior_nat
-    around = p[0].polygons[track.model].outer_radius_m + CIRCLE_NEAR_M
+    around = p[0].polygons[track.model].outer_radius_m + POLYGON_AROUND_M
     total = 1.0 + bounded_exp(-own)
     total += bounded_exp(p[0].unknown_polygon_nat * track.near + p[0].model_prior_nat - own)
     total += bounded_exp(best_circle(s, p, track) - own)
@@ -172,7 +169,7 @@ def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, tra
         if circle.status != FREE and math.hypot(circle.x - track.x, circle.y - track.y) < around:
             prior = p[0].model_prior_nat if circle.kind < p[0].model_count else 0.0
             v = circle.log_likelihood_ratio + prior
-            if v < own - OVER_CIRCLE_LEAD_NAT and track.status == ESTABLISHED and circle.marks == 0:
+            if v < own - SWITCH_LEAD_NAT and track.status == ESTABLISHED and circle.marks == 0:
                 circle.status = FREE
             elif circle.status == ESTABLISHED:
                 total += bounded_exp(v - own)

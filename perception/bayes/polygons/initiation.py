@@ -14,7 +14,7 @@ from perception.bayes.inference.reservoir import copy_reading, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
 from perception.bayes.memory.job_records import INITIATION
-from perception.bayes.memory.parameters import OUTLINE_CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M, PARALLEL_COS
 from perception.bayes.memory.polygon_parameters import (
     APART_WHOLE,
     CHALLENGE_UNSEEN,
@@ -27,7 +27,6 @@ from perception.bayes.memory.polygon_parameters import (
     POLYGON_RESTS_M,
     POLYGON_RESTS_RAD,
     POLYGONS_APART,
-    REQUEST_SAME_COS,
     REQUEST_SAME_M,
     SIDE_SHIFTS,
     TRIAL_EVIDENCE_MIN_NAT,
@@ -261,7 +260,7 @@ def request_polygon(s: StateRecord, model: int, x: float, y: float, nx: float, n
         if (
             it.model == model
             and math.hypot(x - it.x, y - it.y) < REQUEST_SAME_M
-            and nx * it.normal_x + ny * it.normal_y > REQUEST_SAME_COS
+            and nx * it.normal_x + ny * it.normal_y > PARALLEL_COS
         ):
             return 0
     request = s[0].requests[job.requests_made % REQUESTS_MAX]

@@ -14,10 +14,9 @@ import math
 from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.memory.elements import Reading
-from perception.bayes.memory.job_records import PoseSearch
+from perception.bayes.memory.job_records import ACROSS, ALONG, AXES, TURN, PoseSearch
 from perception.bayes.memory.parameters import DROP_OUT_NAT, DROP_OUT_SHARE
 from perception.bayes.memory.polygon_parameters import (
-    AXES,
     GRAZING_COS,
     SEARCH_FINEST_M,
     SEARCH_GAIN_MIN_NAT,
@@ -30,9 +29,6 @@ from perception.bayes.memory.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.polygons.cross_path import NO_ANSWER_M, corner_nat, score_crosses
 from perception.kernel import kernel
 from perception.records import Records
-
-ALONG, ACROSS, TURN = range(3)
-"""Axes of a search: along and across the body, and turn."""
 
 
 @kernel

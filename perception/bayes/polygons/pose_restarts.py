@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.memory.job_records import JUDGE, SEARCH_NEAR, SEARCH_WIDE
+from perception.bayes.memory.job_records import ACROSS, ALONG, JUDGE, SEARCH_NEAR, SEARCH_WIDE
 from perception.bayes.memory.polygon_parameters import (
     COARSE_READINGS,
     FITTING_SHARE,
@@ -29,7 +29,7 @@ from perception.bayes.memory.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.bayes.polygons.initiation import lay_side, ways_to_lie
 from perception.bayes.polygons.job import start_search
-from perception.bayes.polygons.likelihood import ACROSS, ALONG, moved
+from perception.bayes.polygons.likelihood import moved
 from perception.kernel import kernel
 from perception.records import Records
 

@@ -8,10 +8,10 @@ wall that answers at its range, and to no object that is hidden by a wall.
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
+from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory
@@ -19,9 +19,6 @@ from perception.bayes.walls.contact import CORNER_SLACK_M, EXPLAINED_SIGMAS
 from perception.bayes.walls.report import has_mirrors
 from perception.kernel import Floats, Ints
 from perception.records import Structured
-
-POINT_M: Final = 1e-9
-"""Length of a surface that is a point."""
 
 
 def own_echoes(circles: Structured, surfaces: Floats, memory: Memory, p: SettingsRecord) -> Ints:
@@ -57,7 +54,7 @@ def own_echoes(circles: Structured, surfaces: Floats, memory: Memory, p: Setting
 def _nearest(sensors: Floats, axes: Floats, surfaces: Floats, are_mirrors: bool, p: SettingsRecord) -> Floats:
     """Return the range at which each surface answers each sensor, m, (m, n); +inf where it is not in the beam."""
     tx, ty = (surfaces[:, 2:] - surfaces[:, :2]).T
-    length = np.maximum(np.hypot(tx, ty), POINT_M)
+    length = np.maximum(np.hypot(tx, ty), LENGTH_MIN_M)
     tx, ty = tx / length, ty / length
     dx, dy = (surfaces[:, k] - sensors[:, k, None] for k in range(2))
     along = np.clip(-(dx * tx + dy * ty), 0.0, length)

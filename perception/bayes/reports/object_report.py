@@ -15,6 +15,7 @@ from perception.bayes.memory.parameters import (
     GATE_M,
     PLACED_SIGMA_M,
     ROOM_CORNER_M,
+    ROOM_MARGIN_M,
     UNKNOWN_HITS_MIN,
     WALL_ECHOES_MIN,
     WALL_LENGTH_MIN_M,
@@ -44,10 +45,9 @@ CIRCLE_FIELDS: Final = (
 READINGS: Final = "readings"
 """Field of an archived circle."""
 NO_SURFACES: Final = np.empty((0, 4))
-WALL_END_M: Final = 0.2
 WALL_OFF_M: Final = 0.05
-"""A post this near to the end of a sure wall, and this near to touching its line, is the edge in which the wall ends:
-their ranges differ by less than the noise, and every wall ends somewhere."""
+"""A post at the end of a sure wall, within `ROOM_MARGIN_M`, and this near to touching its line is the edge in which
+the wall ends: their ranges differ by less than the noise, and every wall ends somewhere."""
 Row = tuple[float, ...]
 
 
@@ -221,7 +221,7 @@ def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[floa
     along, across = tx * dx + ty * dy, tx * dy - ty * dx
     beyond = np.abs(np.maximum(-along, along - length))
     beyond[np.abs(across) > radius + WALL_OFF_M] = math.inf
-    if not (beyond < WALL_END_M).any():
+    if not (beyond < ROOM_MARGIN_M).any():
         return None
     k = int(beyond.argmin())
     return x + float(across[k] * ty[k]), y - float(across[k] * tx[k])

@@ -8,14 +8,11 @@ start from the surest.
 from __future__ import annotations
 
 import math
-from typing import Final
 
+from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import PairSegment
 from perception.kernel import kernel
-
-LENGTH_MIN_M: Final = 1e-6
-"""A segment counts as at least this long where the σ of its direction is computed."""
 
 
 @kernel

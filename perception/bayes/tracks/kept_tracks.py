@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from perception.bayes.inference.track_labels import free_track
 from perception.bayes.memory.state import FREE, Memory
 from perception.bayes.tracks.manual_tracks import leave_job
 from perception.bounds import Bound, check_values
@@ -46,7 +47,7 @@ def kept_walls(memory: Memory) -> str:
 
 
 def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -> str | None:
-    """Put a track back, in place of the one of its number or of a free one; return None, or why that is impossible.
+    """Put a track back in its own place, a free or a hypothesis' one; return None, or why that is impossible.
 
     Parameters
     ----------
@@ -66,14 +67,13 @@ def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -
         return not_restorable(row.number)
     if row.number > int(memory.state["objects_numbered"][0]) or track["status"][0] == FREE:
         return not_restorable(row.number)
-    is_free = tracks["status"] == FREE
-    places = np.flatnonzero(~is_free & (tracks["number"] == row.number))
-    places = places if len(places) else np.flatnonzero(is_free)
-    if not len(places):
+    places = np.flatnonzero((tracks["status"] != FREE) & (tracks["number"] == row.number))
+    t = int(places[0]) if len(places) else free_track(memory.tracks if kind == CIRCLE else memory.s[0].polygons)
+    if t < 0:
         return f"no room to put object {row.number} back: reject another one first"
     if kind == POLYGON:
-        leave_job(memory.s, int(places[0]))
-    tracks[places[0]] = track[0]
+        leave_job(memory.s, t)
+    tracks[t] = track[0]
     return None
 
 

@@ -78,15 +78,15 @@ def edit_memory(
 def _edit_object(memory: Memory, p: SettingsRecord, row: int, edit: ObjectEdit) -> str | None:
     """Apply an edit of the object in a row, circles first, then polygons; return why it cannot be done, or None."""
     t = row - len(memory.circles)
+    if isinstance(edit, MoveObject | ConfirmObject) and t < 0 and memory.circles["kind"][row] >= p[0].model_count:
+        return f"object {edit.object} matches no model: place the right model there instead"
     match edit:
         case MoveObject(_, x, y, theta):
             if t < 0:
                 move_circle(memory.s, memory.tracks, p, row, x, y)
             else:
                 move_polygon(memory.s, p, t, x, y, theta)
-        case ConfirmObject(number):
-            if t < 0 and memory.circles["kind"][row] >= p[0].model_count:
-                return f"object {number} matches no model: place the right model there instead"
+        case ConfirmObject():
             (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] |= CONFIRMED
         case WithdrawConfirmation():
             (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] &= ~CONFIRMED

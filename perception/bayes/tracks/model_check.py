@@ -20,12 +20,12 @@ from perception.bayes.memory.elements import BEARING_BINS, Reading
 from perception.bayes.memory.parameters import (
     APART_RADII,
     CERTAIN_PROBABILITY,
-    CIRCLE_WALL_FRONT,
     CONFIRMED_SIDES,
     IN_WALL_NAT,
     ROOM_MARGIN_M,
     SILENCE_MEMORY,
     TRUSTED_M,
+    WALL_FRONT_RADII,
 )
 from perception.bayes.memory.polygon_parameters import POLYGON_WALL_LENGTH_RADII
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
@@ -218,7 +218,7 @@ def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
             dx = track.x - q.x
             dy = track.y - q.y
             sides[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * BEARING_BINS) % BEARING_BINS] = 1
-    if cuts_circle(room, track.x, track.y, CIRCLE_WALL_FRONT * track.radius):
+    if cuts_circle(room, track.x, track.y, WALL_FRONT_RADII * track.radius):
         lead = max(lead, 0.0)  # no body stands in a wall, however well it fits
     track.room_lead = lead
     track.sides = 0

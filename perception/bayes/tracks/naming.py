@@ -23,8 +23,8 @@ from perception.bayes.memory.parameters import (
     NO_WALL_LEAD_NAT,
 )
 from perception.bayes.memory.polygon_parameters import (
+    MANY_HITS,
     POLYGON_DISPERSION_MIN,
-    POLYGON_NAMED_HITS,
     POLYGON_NAMED_HITS_SWEPT,
     POLYGON_NEAR_M,
     POLYGON_SIGMA_MAX_M,
@@ -169,15 +169,16 @@ def withdraw_overlapping(tracks: CircleTracks, t: int) -> None:
 
 
 @kernel
-def report_circles(tracks: CircleTracks, reported: Records[Reported], sure: Ints) -> int:
-    """Write the circles that are objects to `sure`, changed ones as ~t; return the number of circles written.
+def report_circles(tracks: CircleTracks, p: SettingsRecord, reported: Records[Reported], sure: Ints) -> int:
+    """Write the circles that are models to `sure`, changed ones as ~t; return the number of circles written.
 
-    A circle is an object by its readings or by a user's mark.
+    A model is reported for its readings or for a user's mark. A mark on a circle of another kind, which only a
+    damaged file has, does not count.
 
     Parameters
     ----------
-    tracks : (n,) CircleTrack
-        The circles.
+    tracks, p
+        The circles, and how many of their kinds are models.
     reported : (n,) Reported
         The values each was last reported with; updated.
     sure : (≥ n,) int
@@ -187,7 +188,8 @@ def report_circles(tracks: CircleTracks, reported: Records[Reported], sure: Ints
     for t in range(len(tracks)):
         track = tracks[t]
         is_named = track.status == ESTABLISHED and track.is_named == 1
-        if is_named or (track.status != FREE and track.marks != 0):
+        is_marked = track.status != FREE and track.marks != 0 and track.kind < p[0].model_count
+        if is_named or is_marked:
             sure[n] = ~t if update_reported(track, reported[t]) else t
             n += 1
     return n
@@ -242,7 +244,7 @@ def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
                 x += q.axis_x
                 y += q.axis_y
                 heard += 1
-    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= POLYGON_SWEPT_READINGS else POLYGON_NAMED_HITS):
+    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= POLYGON_SWEPT_READINGS else MANY_HITS):
         return False
     return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_DISPERSION_MIN
 

@@ -22,7 +22,7 @@ from perception.bayes.memory.job_records import (
     SEARCH_NEAR,
     SEARCH_WIDE,
 )
-from perception.bayes.memory.parameters import PLACED_STRAY_MAX_M
+from perception.bayes.memory.parameters import ELSEWHERE_LEAD_NAT, PLACED_STRAY_MAX_M
 from perception.bayes.memory.polygon_parameters import (
     FITTING_SHARE,
     LATTICE_ATTEMPTS,
@@ -32,13 +32,11 @@ from perception.bayes.memory.polygon_parameters import (
     POLYGON_DOUBT_PROBABILITY,
     POLYGON_DOUBT_SHARE,
     POLYGON_ESTABLISH_HITS,
-    POLYGON_ESTABLISH_PROBABILITY,
     POLYGON_ESTABLISH_SURE,
     POLYGON_EVIDENCE_MIN_NAT,
     POLYGON_PROBABILITY,
     POLYGON_UNKNOWN_LEAD_NAT,
     QUANTUM_COST,
-    RESTART_GAIN_NAT,
     TWIN_RADII,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -97,7 +95,7 @@ def update_polygon_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack
         is_fitting = track.hits > FITTING_SHARE * track.near
         sure = POLYGON_ESTABLISH_SURE if track.hits < MANY_HITS else MANY_HITS_SURE
         is_heard = track.hits >= POLYGON_ESTABLISH_HITS and track.sure_hits >= sure
-        if track.probability > POLYGON_ESTABLISH_PROBABILITY and is_fitting and is_heard:
+        if track.probability > POLYGON_PROBABILITY and is_fitting and is_heard:
             s[0].job.stage = LATTICE
             if track.covariance.xx > 0.0:
                 track.status = ESTABLISHED
@@ -252,7 +250,7 @@ def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
                 copy_pose(job.best, job.middle)
                 job.stage = RESTART
                 job.next_step = 0
-            elif job.search.log_likelihood_ratio > job.best_nat + RESTART_GAIN_NAT:
+            elif job.search.log_likelihood_ratio > job.best_nat + ELSEWHERE_LEAD_NAT:
                 keep_best(s)
             next_restart(s, p, t)
         return spent

@@ -25,7 +25,6 @@ from perception.bayes.inference.range_fit import fit_circle, score_circle
 from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
 from perception.bayes.inference.track_labels import drop_track, hold, may_become, merge_duplicates
 from perception.bayes.memory.parameters import (
-    ALTERNATIVE_STEPS,
     CENTRE_VARIANCE_MAX_M2,
     CERTAIN_PROBABILITY,
     CORNER_MISS_SHARE,
@@ -43,17 +42,17 @@ from perception.bayes.memory.parameters import (
     LINE_PRIOR_NAT,
     LOST_NAT,
     MODEL_CHECK_EVERY,
+    OTHER_FIT_STEPS,
     PLACED_STRAY_MAX_M,
+    RANGE_VARIANCE_MIN_M2,
     REPLACING_LINE_HITS_MIN,
     ROOT_CORRELATION_MAX,
-    ROOT_VARIANCE_MIN_M2,
     SWITCH_LEAD_NAT,
     SWITCH_ROOT_M,
     SWITCH_UNSEEN,
     TENTATIVE_FIT_STEPS,
     TRACK_FIT_STEPS,
     TRACK_READINGS_MIN,
-    UNKNOWN_LEAD_NAT,
     UNSURE_ROOT_M,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -110,7 +109,7 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
         limit = ROOT_CORRELATION_MAX * math.sqrt(c00 * c11)
         track.root_xx = math.sqrt(c00)
         track.root_yx = min(limit, max(-limit, -h01 / det)) / track.root_xx
-        track.root_yy = math.sqrt(max(c11 - track.root_yx**2, ROOT_VARIANCE_MIN_M2))
+        track.root_yy = math.sqrt(max(c11 - track.root_yx**2, RANGE_VARIANCE_MIN_M2))
 
 
 @kernel
@@ -238,7 +237,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
         circle = (track.x, track.y, track.radius)
         own_prior = prior if track.kind < p[0].model_count else 0.0
         if k < line:
-            v = fit_other_circle(s, p, n, circle, bearing, p[0].circles[k].radius_m, ALTERNATIVE_STEPS)
+            v = fit_other_circle(s, p, n, circle, bearing, p[0].circles[k].radius_m, OTHER_FIT_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
             leads = (
                 v + (prior if k < p[0].model_count else 0.0)
@@ -249,7 +248,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
                 predict_circle(scratch.readings[:n], track.x, track.y, track.radius, scratch.own)
                 break
         elif k == line:
-            v = fit_other_line(s, p, n, circle, bearing, ALTERNATIVE_STEPS)
+            v = fit_other_line(s, p, n, circle, bearing, OTHER_FIT_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score
@@ -343,7 +342,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         track.round_lead = round_lead(s, p, n)
     track.probability = existence_probability(s, p, track, prior)
     evidence = track.log_likelihood_ratio
-    if (evidence < 0.0 or evidence < track.unknown_nat - UNKNOWN_LEAD_NAT) and drop_track(track):
+    if (evidence < 0.0 or evidence < track.unknown_nat - SWITCH_LEAD_NAT) and drop_track(track):
         return
     update_circle_status(track, p)
     if track.status == ESTABLISHED and track.kind < p[0].model_count and is_due:

@@ -27,8 +27,6 @@ DISTANCE_SLACK_M: Final = 0.1
 """Tolerance of distances beyond the segments' own, m."""
 SLIDE_M: Final = 0.15
 """Distance of the places that are tried along a wall, m."""
-WALLS_MIN: Final = 2
-"""Least number of walls of a leaf; two that are not parallel fix a place."""
 CROSSING_MIN: Final = math.sin(math.radians(20.0))
 """Sine of the least angle between two walls that fix a pose."""
 
@@ -119,7 +117,7 @@ def _binary_masks(segments: Sequence[ContourSegment], sides: _Sides) -> list[lis
 
 def _pose(chosen: Sequence[tuple[ContourSegment, int]], sides: _Sides) -> Interpretation | None:
     """Return the pose of a leaf: heading from directions, place by least squares over the walls' normals."""
-    if len(chosen) < WALLS_MIN:
+    if len(chosen) < 2:  # it takes two walls that are not parallel
         return None
     index = [i for _, i in chosen]
     normals, weight = sides.normals[index], np.array([1.0 / s.alpha_slack**2 for s, _ in chosen])

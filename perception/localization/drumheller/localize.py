@@ -171,7 +171,8 @@ def _refined(stand: Stand, starts: Floats) -> list[_Mode]:
     """Return the modes of the posterior near some starts, that of the largest evidence first."""
     turns = np.array([FINE_TURN_RAD * (k - FINE_TURNS // 2) for k in range(FINE_TURNS)])
     fit = fit_poses(stand, starts, turns, FINE_FIT_STEPS)
-    log_cell = math.log(FINE_TURN_RAD / (2.0 * math.pi * stand.room.area_m2))
+    area_m2 = max(stand.room.area_m2, SAME_POSE_M**2)  # a single wall along an axis has none
+    log_cell = math.log(FINE_TURN_RAD / (2.0 * math.pi * area_m2))
     log_density = fit.log_ratio + fit.log_area + log_cell
     log_evidence = np.logaddexp.reduce(log_density, axis=1)
     poses = np.stack([fit.x, fit.y, fit.theta], axis=2)

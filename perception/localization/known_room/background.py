@@ -14,8 +14,8 @@ import numpy as np
 
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats
-from perception.localization.known_room.mixed_reflection import LATE_M, LearnedShares
-from perception.localization.known_room.pose_grid import GRID_DIRECTIONS, SILENT_CODE, fill_cell
+from perception.localization.known_room.mixed_reflection import LATE_M, MEMORY_READINGS, LearnedShares
+from perception.localization.known_room.pose_grid import GRID_DIRECTIONS, RANGE_STEPS, SILENT_CODE, fill_cell
 from perception.localization.known_room.surroundings import Surroundings
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
@@ -26,8 +26,6 @@ SMOOTH_M: Final = 0.1
 """Standard deviation of the smoothing of their distribution."""
 EVEN_SHARE: Final = 0.1
 """So much of it is the same at all ranges."""
-MEMORY_READINGS: Final = 300.0
-"""Readings over which it is learned how often the sensors hear something."""
 HEARD_SHARE_MIN: Final = 0.1
 """Least share, and with its complement the greatest."""
 
@@ -86,7 +84,7 @@ class Background:
             (1.0 - share.specular) * cone + share.specular * smooth
         )
         heard = ranges_m[np.isfinite(ranges_m)]
-        codes = np.minimum(heard * (254.0 / self._window_m) + 0.5, 254.0).astype(np.int64)
+        codes = np.minimum(heard * (RANGE_STEPS / self._window_m) + 0.5, RANGE_STEPS).astype(np.int64)
         silent = len(ranges_m) - len(heard)
         found = np.log(density[codes] * (self._window_m * self.heard_share / HEARD_PRIOR)).sum()
         return float(found) + silent * math.log((1.0 - self.heard_share) / (1.0 - HEARD_PRIOR))
@@ -108,24 +106,19 @@ def _range_densities(room: Room, surroundings: Surroundings, clear_m: float) -> 
     for i, at_x in enumerate(x.tolist()):
         for j, at_y in enumerate(y.tolist()):
             fill_cell(surroundings, table, free, i, j, at_x, at_y, clear_m)
-    step_m = float(surroundings.sensor[0].window_m) / 254.0
-    near = np.arange(-254, 255) * step_m
+    step_m = float(surroundings.sensor[0].window_m) / RANGE_STEPS
+    near = np.arange(-RANGE_STEPS, RANGE_STEPS + 1) * step_m
     blur = np.exp(-0.5 * (near / SMOOTH_M) ** 2)
     late = ((near > 0.0) & (near <= LATE_M)).astype(np.float64)
-    cone, mirror = (
-        np.bincount(codes[:, free == 1].ravel(), minlength=256)[:SILENT_CODE].astype(np.float64) for codes in table
-    )
+    heard = (np.bincount(codes[:, free == 1].ravel(), minlength=SILENT_CODE)[:SILENT_CODE] for codes in table)
+    cone, mirror = (counts.astype(np.float64) for counts in heard)
     rows = [_density(ranges, kernel, step_m) for ranges, kernel in ((cone, blur), (mirror, blur), (cone, late))]
     return np.array(rows)
 
 
 def _density(ranges: Floats, kernel: Floats, step_m: float) -> Floats:
     """Return a density (1/m) of codes from how often each occurs, blurred."""
-    blurred = (
-        np.convolve(ranges, kernel, mode="same")
-        if len(kernel) == len(ranges)
-        else np.convolve(ranges, kernel)[254:509]
-    )
+    blurred = np.convolve(ranges, kernel)[RANGE_STEPS : RANGE_STEPS + len(ranges)]
     total = blurred.sum() * step_m
     even = 1.0 / (len(ranges) * step_m)
     return np.asarray(

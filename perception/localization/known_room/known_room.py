@@ -265,6 +265,10 @@ class KnownRoom:
         """Discard cached results, after the memory was restored from a snapshot."""
         self._grid.drop_caches()
 
+    def drop_table(self) -> None:
+        """Discard cached results and the table of the whole room, which takes quanta to compute."""
+        self._grid.drop_table()
+
     def _is_window_long(self) -> bool:
         """Return whether the window may begin with a later keyframe."""
         most_m = WINDOW_M if self._keyframes.count - self._window_begin > WINDOW_LEAST else WINDOW_FAR_M

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.kernel import kernel
 from perception.localization.known_room.surroundings import Corner, Expected, Surroundings, is_surface_hidden
-from perception.localization.room.expected_ranges import EDGE_REACH_M
 
 Mirrors = tuple[Expected, Expected]
 """Of the nearest mirror point in the beam, and of a nearer one beside it."""

@@ -47,7 +47,7 @@ class Shares(Record):
 
 
 MEMORY_READINGS: Final = 300.0
-"""Readings over which the shares are learned."""
+"""Readings over which shares are learned."""
 MEMORY_BESIDE: Final = 60.0
 """Readings of smooth surfaces beside the beam over which it is learned how many answer: they are few."""
 

@@ -9,7 +9,7 @@ it belongs to no snapshot: after a snapshot was restored, what is missing of it 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,9 @@ from perception.bounds import CONSTANT, COUNT, PLACE, SHARE, Bound, bounds, up_t
 from perception.kernel import Floats, kernel
 from perception.localization.known_room.mirror_points import expect_specular
 from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
+from perception.localization.known_room.particle_update import COLUMNS
 from perception.localization.known_room.pose_starts import PROFILES_MAX, STARTS_MAX, Starts, offer
 from perception.localization.known_room.surroundings import Surroundings, expect_cone, look_around
-from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros
@@ -40,14 +40,16 @@ SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
 GRID_DROPOUT: Final = 0.2
-WILD_MIN: Final = 0.2
+WILD_MIN: Final = GRID_DROPOUT
 """Shares of expected echoes that are not heard, and at least of readings that are anything: it is coarse."""
 OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""
 FACTORS: Final = 24
 """Ratios that are multiplied before their logarithm is taken: neither too small nor too large for a float."""
-SILENT_CODE: Final = 255
-"""Code of silence in the table; a range is a share of 254 of the window."""
+RANGE_STEPS: Final = 254
+"""Steps of a range in the table, up to the window."""
+SILENT_CODE: Final = RANGE_STEPS + 1
+"""Code of silence in the table."""
 START_LOG: Final = 40.0
 """A start less likely than the best one by more than this, nat, is not the place."""
 COMPLETE_LOG: Final = 20.0
@@ -87,6 +89,7 @@ def fill_cell(s: Surroundings, table: Bytes, free: Bytes, i: int, j: int, x: flo
     """
     look_around(s, x, y, 0.0)
     near, window_m = s.near[0], s.sensor[0].window_m
+    per_m = RANGE_STEPS / window_m
     is_free = near.wall_count == 0 or near.wall_m[0] > clear_m
     free[i, j] = 1 if is_free and (near.circle_count == 0 or near.circle_m[0] > clear_m) else 0
     for d in range(GRID_DIRECTIONS):
@@ -94,8 +97,8 @@ def fill_cell(s: Surroundings, table: Bytes, free: Bytes, i: int, j: int, x: flo
         cone_m, _, _ = expect_cone(s, x, y, cos, sin)
         inside, beside = expect_specular(s, x, y, cos, sin, s.sensor[0].cos_fringe)
         specular_m = min(inside[0], beside[0])
-        table[0, d, i, j] = int(cone_m * (254.0 / window_m) + 0.5) if cone_m <= window_m else SILENT_CODE
-        table[1, d, i, j] = int(specular_m * (254.0 / window_m) + 0.5) if specular_m <= window_m else SILENT_CODE
+        table[0, d, i, j] = int(cone_m * per_m + 0.5) if cone_m <= window_m else SILENT_CODE
+        table[1, d, i, j] = int(specular_m * per_m + 0.5) if specular_m <= window_m else SILENT_CODE
 
 
 @kernel
@@ -242,7 +245,7 @@ class PoseGrid:
         self._found["least"] = -math.inf
         self.starts = records(Starts, self._found)
         self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
-        self._readings = np.zeros((GRID_READINGS_MAX, 5))
+        self._readings = np.zeros((GRID_READINGS_MAX, COLUMNS))
         self._count = self._searches = 0
         self._profiles = 1
         self._shares = np.zeros((PROFILES_MAX, 3))
@@ -344,16 +347,10 @@ class PoseGrid:
         """Discard what was computed for a search, after another state was restored."""
         self._likely_search = 0
 
-    def expected(self, reflection: Reflection) -> Floats:
-        """Return the ranges of one model's table, m; inf for silence, shape (directions, cells, cells)."""
-        self._due = self.shape[0] * self.shape[1]
-        self._fill()
-        codes = self._table[("cone", "specular").index(reflection)]
-        return np.where(codes == SILENT_CODE, np.inf, codes * (self._window_m / 254.0))
-
-    def places(self, i: NDArray[Any], j: NDArray[Any]) -> Floats:
-        """Return the middles of cells, m, shape (n, 2)."""
-        return np.asarray(self._origin + GRID_CELL_M * np.column_stack([i, j]))
+    def drop_table(self) -> None:
+        """Let searches compute the whole table again, quantum by quantum."""
+        self._due = 0
+        self.drop_caches()
 
     @property
     def _window_m(self) -> float:
@@ -376,7 +373,7 @@ class PoseGrid:
         `cone`, where `specular` is silent.
         """
         measured = self._readings[: self._count, 4:5]
-        expected = np.append(np.arange(SILENT_CODE) * (self._window_m / 254.0), np.inf)
+        expected = np.append(np.arange(SILENT_CODE) * (self._window_m / RANGE_STEPS), np.inf)
         answers, heard = np.isfinite(expected), np.isfinite(measured)
         specular, late, wild = self._shares[profile].tolist()
         wild = max(WILD_MIN, wild)

@@ -11,9 +11,10 @@ from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.kernel import Floats, Ints, kernel
 from perception.localization.known_room.surface_index import CIRCLES, CORNERS, WALLS, Bins, listed, make_index
-from perception.localization.room.expected_ranges import EDGE_REACH_M, SIGHT_SLACK_M
+from perception.localization.room.expected_ranges import SIGHT_SLACK_M
 from perception.localization.room.range_likelihood import RangeModel
 from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros

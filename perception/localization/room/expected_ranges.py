@@ -12,14 +12,13 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.kernel import Floats
-from perception.localization.room.room import Room
+from perception.localization.room.room import JOIN_M, Room
 
 Reflection = Literal["cone", "specular"]
 
-EDGE_REACH_M: Final = 1.0
-"""Farthest distance at which a convex edge is expected to answer, m."""
-SIGHT_SLACK_M: Final = 1e-3
+SIGHT_SLACK_M: Final = JOIN_M
 """A wall nearer than this to a reflecting point does not hide it, m."""
 
 

@@ -30,7 +30,7 @@ def fresh_report(perception: BayesPerception) -> list[DetectedObject]:
     """Return every sure circle as a report from its track, without the reports before."""
     memory, sure = perception.memory, np.zeros(len(perception.memory.circles), np.int64)
     reported = records(naming.Reported, zeros(naming.Reported, len(sure)))
-    n = naming.report_circles(memory.tracks, reported, sure)
+    n = naming.report_circles(memory.tracks, perception.settings, reported, sure)
     name = SETTINGS.models[0].name
     rows = [t if t >= 0 else ~t for t in sure[:n].tolist()]
     circles = memory.circles

@@ -13,8 +13,9 @@ from config.world import WallConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
+from perception.detected_object import DetectedObject
 from perception.paper.paper_method import PaperPerception
-from perception.pipeline import DetectedObject, Perception
+from perception.pipeline import Perception
 from tests.perception.halls import FT, drive, drums, settings
 
 TABLE_2_MEAN_FT = 0.25

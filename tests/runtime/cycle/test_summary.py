@@ -12,9 +12,10 @@ import pytest
 
 from config.errors import FAILED, UserError
 from drivers.messages import Pose
+from perception.detected_object import DetectedObject
 from perception.localization.localized_pose import LocalizedPose
 from perception.percept import Canyon
-from perception.pipeline import DetectedObject, Perception
+from perception.pipeline import Perception
 from perception.polyline import Polyline
 from runtime.cycle.summary import (
     LinkRow,

@@ -8,7 +8,7 @@ import pytest
 
 from config.load import load_model, load_settings
 from config.world import AcousticsConfig, BoxConfig
-from perception.pipeline import DetectedObject
+from perception.detected_object import DetectedObject
 from runtime.simulation.evaluation import DrumRow
 from runtime.simulation.open_loop import (
     angle_error,

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.circles.corner_model import IMPOSSIBLE_NAT, score_corner
+from perception.bayes.circles.alternatives import HOPELESS_NAT
+from perception.bayes.circles.corner_model import score_corner
 from perception.bayes.memory.state import Memory
 from tests import naive_bayes
 from tests.perception.bayes.random_tracks import (
@@ -34,7 +35,7 @@ def test_a_corners_score_equals_its_oracle(examples: int) -> None:
         got = score_corner(memory.s, case.p, case.n, *case.place, case.rho, case.var0, case.rel2)
         want = naive_bayes.corner(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
         if want is None:
-            assert got == IMPOSSIBLE_NAT
+            assert got == HOPELESS_NAT
         else:
             found += 1
             assert got == pytest.approx(want, abs=1e-6)

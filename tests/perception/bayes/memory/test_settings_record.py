@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from config.load import load_settings
+from config.robot import LISTEN_MAX_M
 from perception.bayes.inference.kernel_settings import make_settings
-from perception.bayes.memory.parameters import NOISE_ABSOLUTE_M, NOISE_RELATIVE
-from perception.bayes.memory.settings_record import NOISES, RANGE_BINS, RANGE_BINS_PER_M, RANGE_MAX_M, Settings
+from perception.bayes.memory.settings_record import RANGE_BINS, RANGE_BINS_PER_M, Settings
 from perception.records import array_of
 
 
@@ -18,7 +18,6 @@ def test_settings_of_different_libraries_have_one_layout_so_that_kernels_are_com
     assert shapes == {(Settings.DTYPE, (1,))}
 
 
-def test_every_range_of_the_longest_ring_has_a_bin_and_every_noise_a_place() -> None:
-    assert int(RANGE_MAX_M * RANGE_BINS_PER_M) in {RANGE_BINS - 1, RANGE_BINS}
-    assert RANGE_BINS >= RANGE_MAX_M * RANGE_BINS_PER_M
-    assert len(NOISE_ABSOLUTE_M) * len(NOISE_RELATIVE) == NOISES
+def test_every_range_of_the_longest_ring_has_a_bin() -> None:
+    assert int(LISTEN_MAX_M * RANGE_BINS_PER_M) in {RANGE_BINS - 1, RANGE_BINS}
+    assert RANGE_BINS >= LISTEN_MAX_M * RANGE_BINS_PER_M

@@ -121,6 +121,6 @@ def test_a_quantum_says_whether_there_was_work_and_the_work_ends() -> None:
 
 
 def test_an_empty_memory_leaves_nothing_to_do() -> None:
-    memory = Memory(24)
+    memory = Memory(24, 1)
     assert not quantum(memory)
     assert not memory.polygons.view(np.uint8).any()

@@ -50,7 +50,7 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
     assert LATTICE.tolist() == [list(z) for z in ball]
     normal = np.exp(-0.5 * LATTICE_PITCH**2 * np.sum(np.square(ball), axis=1))
     assert pytest.approx(LATTICE_PITCH**2 * np.average(LATTICE[:, 0] ** 2, weights=normal)) == CUT_OFF
-    memory = Memory(24)
+    memory = Memory(24, 1)
     job, state = memory.s[0].job, memory.state["job"]
     covariance_of, root_of = numbers(state["covariance"])[0], numbers(state["root"])[0]
     for _ in range(2):
@@ -107,7 +107,7 @@ def test_the_covariance_is_honest(rule: int, examples: int) -> None:
     deviations are added to the limits of the long form.
     """
     rng = np.random.default_rng(6)
-    memory = Memory(24)
+    memory = Memory(24, 1)
     noise = [(it.absolute_m, it.relative) for it in S.noises].index((NOISE_M, 0.0))
     place, whole = [], []
     for _ in range(examples):
@@ -132,7 +132,7 @@ def test_the_covariance_is_honest(rule: int, examples: int) -> None:
 
 def test_a_lattice_is_the_same_however_often_it_is_interrupted() -> None:
     rng = np.random.default_rng(7)
-    memory = Memory(24)
+    memory = Memory(24, 1)
     w = heard(rng, np.zeros(3), 8, NOISE_M, 1)
     whole = spread_of(memory, w, np.zeros(3), 10_000_000)
     for left in (1, 1_000):

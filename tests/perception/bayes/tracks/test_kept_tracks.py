@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 import pytest
 
-from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
+from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE, Memory
 from perception.bayes.tracks.kept_tracks import kept_track, kept_walls, restore_track, restore_walls
 from perception.edits import ObjectRow
 from perception.snapshot import bounds_of
@@ -44,6 +44,15 @@ def test_a_track_comes_back_whole(memory: Memory, *, is_there: bool) -> None:
     assert restore_track(memory, row(kept), bounds_of(Owner(memory))) is None
     place = 2 if is_there else 0
     assert memory.circles[place] == before[2]
+
+
+def test_of_two_maps_full_of_tracks_that_of_hypotheses_has_room(memory: Memory) -> None:
+    kept, circles = kept_track(memory, 2), memory.circles
+    circles["status"], circles["number"], circles["log_likelihood_ratio"] = ESTABLISHED, 4, np.arange(8)
+    assert "no room to put object 3 back" in str(restore_track(memory, row(kept), bounds_of(Owner(memory))))
+    circles["status"] = TENTATIVE
+    assert restore_track(memory, row(kept), bounds_of(Owner(memory))) is None
+    assert circles["number"].tolist() == [3, *7 * [4]], "in place of the one of the least evidence"
 
 
 @pytest.mark.parametrize("field", ["kind", "status", "x", "hits", "radius"])

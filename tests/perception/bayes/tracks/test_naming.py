@@ -30,7 +30,7 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
     circles, reported = memory.circles, records(naming.Reported, zeros(naming.Reported, TRACKS))
 
     def report() -> list[int]:
-        n = naming.report_circles(memory.tracks, reported, out)
+        n = naming.report_circles(memory.tracks, P, reported, out)
         return [t if t >= 0 else ~t for t in out[:n].tolist()]
 
     for _ in range(examples):
@@ -75,7 +75,8 @@ def test_sure_and_marked_circles_are_reported(examples: int) -> None:
         assert report() == want
         sure += len(want)
         circles["marks"] = rng.choice([0, CONFIRMED, PLACED], TRACKS)
-        marked = np.flatnonzero((circles["status"] != FREE) & (circles["marks"] > 0)).tolist()
+        is_marked = (circles["status"] != FREE) & (circles["marks"] > 0) & (circles["kind"] < S.model_count)
+        marked = np.flatnonzero(is_marked).tolist()
         assert report() == sorted({*want, *marked})
     assert sure > 0.05 * examples
 
@@ -153,7 +154,7 @@ def test_only_a_changed_circle_is_reported_as_changed() -> None:
         circles["status"] = 0
         circles["status"][list(tracks)] = ESTABLISHED
         sure = np.full(8, 99, np.int64)
-        n = naming.report_circles(memory.tracks, reported, sure)
+        n = naming.report_circles(memory.tracks, P, reported, sure)
         assert sure[n:].tolist() == [99] * (8 - n)
         found: list[int] = sure[:n].tolist()
         return found
@@ -169,3 +170,5 @@ def test_only_a_changed_circle_is_reported_as_changed() -> None:
     for name in ("number", "marks"):
         circles[name][2] += 1
         assert report(2, 5) == [~2, 5], name
+    circles["is_named"], circles["marks"], circles["kind"] = 0, PLACED, S.model_count
+    assert report(2, 5) == [], "a mark makes no model of another circle"

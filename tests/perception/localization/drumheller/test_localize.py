@@ -20,6 +20,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.drumheller.localize import PoseCandidate, localize
 from perception.localization.room.expected_ranges import Reflection
+from perception.localization.room.room import make_room
 from tests.perception.localization.rooms import CROOKED, RECTANGLE, RING, stand, world_of
 
 pytestmark = pytest.mark.compiled
@@ -75,6 +76,17 @@ def test_readings_without_an_echo_are_lost() -> None:
     room, firing = stand(world_of(RECTANGLE, noisy("cone")), Pose(1.5, 1.2, 0.0))
     for nothing in (math.inf, math.nan):
         assert localize([dataclasses.replace(firing, ranges_m=np.full(24, nothing))], room, RING, "cone") == ()
+
+
+@REFLECTIONS
+def test_a_room_of_one_wall_has_an_area(reflection: Reflection) -> None:
+    ranges_m = np.full(len(RING.mounts), 1.0)
+    localize(
+        [Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges_m)],
+        make_room(np.array([[0.0, 0.0, 5.0, 0.0]])),
+        RING,
+        reflection,
+    )
 
 
 def test_no_firing_is_refused() -> None:

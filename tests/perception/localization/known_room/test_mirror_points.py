@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.localization.known_room.mirror_points import expect_specular
 from perception.localization.known_room.surroundings import look_around, make_surroundings
-from perception.localization.room.expected_ranges import EDGE_REACH_M
 from perception.localization.room.range_likelihood import RangeModel
 from perception.localization.room.room import make_room
 from tests.perception.localization.rooms import HALF_ANGLE, RING

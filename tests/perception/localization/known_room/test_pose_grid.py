@@ -12,7 +12,13 @@ from bench.trials.random_rooms import ACOUSTICS
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.known_room.mixed_reflection import ROOMS, LearnedShares
-from perception.localization.known_room.pose_grid import GRID_CELL_M, GRID_STEP_RAD, PoseGrid
+from perception.localization.known_room.pose_grid import (
+    GRID_CELL_M,
+    GRID_STEP_RAD,
+    RANGE_STEPS,
+    SILENT_CODE,
+    PoseGrid,
+)
 from perception.localization.known_room.surroundings import FRINGE_RAD, make_surroundings
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
 from perception.localization.room.range_likelihood import RangeModel
@@ -43,8 +49,11 @@ def test_the_table_holds_the_expected_ranges(reflection: Reflection) -> None:
     grid = grid_of(room)
     x, y = np.array([(i, j) for i in range(0, grid.shape[0], 3) for j in range(0, grid.shape[1], 3)]).T
     direction = np.arange(len(x)) % 60
-    table = grid.expected(reflection)[direction, x, y]
-    place_x, place_y = grid.places(x, y).T
+    grid._due = grid.shape[0] * grid.shape[1]
+    grid._fill()
+    codes = grid._table[("cone", "specular").index(reflection)][direction, x, y]
+    table = np.where(codes == SILENT_CODE, np.inf, codes * (RING.window_m / RANGE_STEPS))
+    place_x, place_y = (grid._origin + GRID_CELL_M * np.column_stack([x, y])).T
     beams = Beams(place_x, place_y, direction.astype(np.float64) * GRID_STEP_RAD)
     half = HALF_ANGLE + (FRINGE_RAD if reflection == "specular" else 0.0)
     exact = expected_ranges(room, beams, half, reflection).range_m

@@ -12,7 +12,8 @@ from bench.trials.random_rooms import random_room
 from config.world import WorldConfig
 from drivers.emulator.acoustics import SIGHT_SLACK_M
 from drivers.messages import Pose
-from perception.localization.room.expected_ranges import EDGE_REACH_M, Beams, Reflection, crossed, expected_ranges
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
+from perception.localization.room.expected_ranges import Beams, Reflection, crossed, expected_ranges
 from perception.localization.room.room import make_room, room_of
 from tests import naive_acoustics
 from tests.perception.localization.rooms import HALF_ANGLE, RING, beams_of, panorama_of, stand

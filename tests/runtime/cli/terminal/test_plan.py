@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Floats, Pose
-from perception.pipeline import DetectedObject
+from perception.detected_object import DetectedObject
 from runtime.cli.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
 
 NO_SEGMENTS: Floats = np.zeros((0, 5))
