@@ -18,6 +18,8 @@ from typing import Annotated, Any, Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from config.bounded import COUNT_MAX
+
 
 class Bound(NamedTuple):
     """The values that a number may have."""
@@ -34,9 +36,9 @@ class Bound(NamedTuple):
 
 
 FLAG: Final = Bound(0, 1)
-COUNT: Final = Bound(0, 2**53)
+COUNT: Final = Bound(0, COUNT_MAX)
 """Of a count, which becomes an index only after it was reduced to one; it does not overflow in a robot's lifetime."""
-SIGNED: Final = Bound(-(2**53), 2**53)
+SIGNED: Final = Bound(-COUNT_MAX, COUNT_MAX)
 SHARE: Final = Bound(0.0, 1.0 + 1e-9)
 """Of a share or a probability; parts may exceed the whole by rounding."""
 RANGE: Final = Bound(0.0, 1e7)

@@ -134,6 +134,7 @@ def _path_function(kind: Kind, radius_m: float, t: np.ndarray, listener: np.ndar
     """Return the half paths of a kind as a function of its bearing and range; places are complex numbers."""
 
     def paths(bearing: float, range_m: float) -> Floats:
+        """Return the half paths, m, over a surface whose nearest point is there; see the module's formulas."""
         out = complex(math.cos(bearing), math.sin(bearing))
         if kind == "plane":
             beyond = 2.0 * range_m - 2.0 * (listener * out.conjugate()).real

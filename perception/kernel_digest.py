@@ -94,6 +94,7 @@ class KernelDigests:
         return digest.hexdigest()
 
     def _of_one(self, kernel: Any) -> bytes:  # noqa: ANN401 - as above
+        """Return the digest of a kernel without those that it calls, which it notes."""
         function = cast("FunctionType", kernel.py_func)
         if function not in self._own:
             digest = hashlib.sha256(repr(sorted(kernel.targetoptions.items())).encode())

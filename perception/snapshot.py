@@ -86,6 +86,7 @@ def _refuse_contradictions(owner: object, path: str) -> None:
 
 
 def _declared(owner: object, path: str, found: dict[str, Bound]) -> None:
+    """Add the bounds of an object's numbers, its parts' included, to `found`; `path` leads to the object."""
     declared: Mapping[str, Declared] = getattr(type(owner), "BOUNDS", {})
     for name, value in _parts(owner):
         if not isinstance(value, np.ndarray | bool | int | float):
@@ -157,6 +158,7 @@ def _bytes_of(records: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _put(owner: object, path: str, snapshot: Snapshot) -> None:
+    """Overwrite an object's numbers, its parts' included, which `put_back` has checked."""
     for name, value in _parts(owner):
         if name == GROWING:
             setattr(owner, name, snapshot[path + name].copy())

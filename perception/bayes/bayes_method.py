@@ -235,6 +235,7 @@ class BayesPerception:
         return min(self._config.report_probability, POLYGON_PROBABILITY)
 
     def _sure_objects(self) -> tuple[DetectedObject, ...]:
+        """Return the models that are reported, best first; an unchanged circle is the same object as before."""
         memory = self.memory
         n = report_circles(memory.tracks, self.settings, self._reported, self._sure)
         seen = [self._circles[t] if t >= 0 else self._report_circle(~t) for t in self._sure[:n].tolist()]
@@ -248,6 +249,7 @@ class BayesPerception:
         return tuple(sorted(seen, key=attrgetter("score"), reverse=True))
 
     def _report_circle(self, t: int) -> DetectedObject:
+        """Return a changed circle as an object, from the values that `report_circles` has written."""
         x, y, xx, xy, yy, hits, probability, kind, number, marks = self._last_reported[t].item()
         seen = circle_object((x, y, xx, xy, yy, hits, number, marks), self._round[int(kind)], probability)
         self._circles[t] = seen

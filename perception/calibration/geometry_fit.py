@@ -139,6 +139,7 @@ class _Vector:
         self.common = 3 + 2 * self.walls + 3 * self.drums + len(geometry.bends)
 
     def pack(self, geometry: Geometry) -> Floats:
+        """Return the parameters of a geometry with as many surfaces and sensors as the first."""
         surfaces = geometry.surfaces
         return np.concatenate(
             [
@@ -246,6 +247,7 @@ def fit_geometry(
 
 
 def _prior_sigmas(vector: _Vector, start: Geometry, priors: Priors) -> Floats:
+    """Return what each parameter may differ by from the first guess; a surface may be anywhere within 10 m or rad."""
     drums = np.tile([10.0, 10.0, priors.radius_m], vector.drums)
     bend = priors.bend_rad_per_sqrt_m * math.sqrt(KNOT_M)
     return np.concatenate(

@@ -146,6 +146,7 @@ def most_voted_wall(beams: Beams, ranges: Floats, half_angle: float) -> tuple[in
 def _most_voted_drum(
     beams: Beams, ranges: Floats, half_angle: float, radius: float
 ) -> tuple[int, tuple[float, float, float]]:
+    """Return how many readings vote for the cell that has most of them, and a round object there: x, y, radius, m."""
     if not len(ranges):
         return 0, (0.0, 0.0, radius)
     angle = beams.axis[:, None] + half_angle * np.linspace(-1.0, 1.0, BEARINGS)

@@ -14,6 +14,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from config.settings import ITERATIONS_MAX, RelaxationConfig
+from drivers.messages import wrap_angle
 from perception.bounds import COUNT, FLAG, PLACE, bounds, index_of, up_to
 from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
@@ -243,4 +244,4 @@ class Rejections:
 def wrapped_pose(pose: Floats) -> tuple[float, float, float]:
     """Return a pose (m, rad) with its heading wrapped into [−π, π)."""
     x, y, theta = (float(v) for v in pose)
-    return x, y, (theta + math.pi) % (2.0 * math.pi) - math.pi
+    return x, y, wrap_angle(theta)

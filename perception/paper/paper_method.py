@@ -335,6 +335,7 @@ class PaperPerception:
         return refused
 
     def _reject(self, number: int) -> str | None:
+        """Remove an object; only segments that come later can bring one like it back. Return why not, or None."""
         k = self.placements.find(number)
         found = self.candidates.find(number)
         if k is not None:

@@ -47,15 +47,14 @@ def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
     face : LineFit
         Unit normal and distance of the face from the origin.
     """
-    if face.rays > 0 and not is_crossed(q):
-        away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
-        half, _ = ray_over_line(q, face.normal_x, face.normal_y, away, face.half_angle, face.rays)
-        return q.range_m - half
+    if face.rays == 0 and not is_crossed(q):
+        return q.range_m - face.distance + face.normal_x * (q.x - cx) + face.normal_y * (q.y - cy)
+    away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
     if is_crossed(q):
-        away = face.distance - face.normal_x * (q.x - cx) - face.normal_y * (q.y - cy)
         half, _, _ = over_line(q, face.normal_x, face.normal_y, away)
-        return q.range_m - half
-    return q.range_m - face.distance + face.normal_x * (q.x - cx) + face.normal_y * (q.y - cy)
+    else:
+        half, _ = ray_over_line(q, face.normal_x, face.normal_y, away, face.half_angle, face.rays)
+    return q.range_m - half
 
 
 @kernel

@@ -110,7 +110,7 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
 
 
 @kernel
-def best_circle(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, rays: int) -> float:
+def evidence_by_rays(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, rays: int) -> float:
     """Return the evidence of the circle that best explains a track's readings, heard by so many rays, nat.
 
     Parameters
@@ -152,7 +152,7 @@ def lead_of_track(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: in
     assume_rays(s, p, s[0].rays)
     n = keep_relevant(s, tracks, p, n, track.x, track.y, track.radius, t)
     here = score(s, p, n, track.x, track.y, track.radius)
-    return best_circle(s, p, track, n, rays) - here
+    return evidence_by_rays(s, p, track, n, rays) - here
 
 
 @kernel
@@ -170,7 +170,7 @@ def compare_rays(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     """
     track.other_rays = next_rays(track.other_rays, s[0].rays)
     here = score(s, p, n, track.x, track.y, track.radius)
-    track.rays_leads[track.other_rays] = best_circle(s, p, track, n, track.other_rays) - here
+    track.rays_leads[track.other_rays] = evidence_by_rays(s, p, track, n, track.other_rays) - here
     assume_rays(s, p, s[0].rays)
 
 

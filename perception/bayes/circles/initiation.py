@@ -16,7 +16,12 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.lines import enter_line
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
-from perception.bayes.inference.outline_map import enter_attracting, relax_hypothesis, segments_near
+from perception.bayes.inference.outline_map import (
+    enter_attracting,
+    relax_hypothesis,
+    segments_near,
+    set_hypothesis,
+)
 from perception.bayes.inference.range_fit import fit_circle
 from perception.bayes.inference.reservoir import gather_history, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
@@ -219,9 +224,7 @@ def initiate_circle(
     """
     radius = p[0].circles[kind].radius_m
     hypothesis = s[0].scratch.hypothesis
-    hypothesis.x = x + radius * nx
-    hypothesis.y = y + radius * ny
-    hypothesis.heading = 0.0
+    set_hypothesis(s, x + radius * nx, y + radius * ny, 0.0)
     if is_known(tracks, p, hypothesis.x, hypothesis.y, radius, nx, ny):
         return 0
     relax_onto_map(s, p, kind)

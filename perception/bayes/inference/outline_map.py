@@ -120,6 +120,23 @@ def enter_attracting(segment: MappedSegment, row: Floats) -> None:
 
 
 @kernel
+def set_hypothesis(s: StateRecord, x: float, y: float, heading: float) -> None:
+    """Set the scratch's hypothesis to a pose.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory; its scratch is updated.
+    x, y, heading : float
+        The pose, m, rad.
+    """
+    hypothesis = s[0].scratch.hypothesis
+    hypothesis.x = x
+    hypothesis.y = y
+    hypothesis.heading = heading
+
+
+@kernel
 def relax_hypothesis(
     s: StateRecord, sides: Floats, attracting: int, negligible_m: float, negligible_rad: float, steps: int
 ) -> None:

@@ -46,6 +46,10 @@ def migrate(memory: Memory, archived: Structured, before: SettingsRecord, after:
 
 
 def _migrate_circles(circles: Structured, old: Floats, new: Floats, index: Ints) -> None:
+    """Move circles from the old radii (m) to those of `index` among the new ones.
+
+    A circle whose radius becomes another one, as a rival's that is too near a model, is refined anew.
+    """
     leads = np.zeros_like(circles["leads"])
     for k, to in enumerate(index.tolist()):
         leads[:, to] = circles["leads"][:, k]
@@ -54,7 +58,7 @@ def _migrate_circles(circles: Structured, old: Floats, new: Floats, index: Ints)
     for t in np.flatnonzero(circles["status"] != FREE).tolist():
         kind = int(circles["kind"][t])
         circles["kind"][t], circles["alternative"][t] = index[kind], 0
-        if is_changed[kind]:  # a rival as near as this to a model is that model
+        if is_changed[kind]:
             circles["radius"][t] = new[index[kind]]
             circles["refinements"][t] = 0
             circles["unseen"][t] += SWITCH_UNSEEN

@@ -84,7 +84,7 @@ def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> b
 
 
 @kernel
-def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float:
+def evidence_of_circles(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float:
     """Return the log ratio (nat, prior included) of the circle that best explains the job's readings.
 
     An edge, a post or a drum seen from a few places looks like a polygon's corner, and the circle track in that place
@@ -163,7 +163,7 @@ def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, tra
     around = p[0].polygons[track.model].outer_radius_m + POLYGON_AROUND_M
     total = 1.0 + bounded_exp(-own)
     total += bounded_exp(p[0].unknown_polygon_nat * track.near + p[0].model_prior_nat - own)
-    total += bounded_exp(best_circle(s, p, track) - own)
+    total += bounded_exp(evidence_of_circles(s, p, track) - own)
     for k in range(len(tracks)):
         circle = tracks[k]
         if circle.status != FREE and math.hypot(circle.x - track.x, circle.y - track.y) < around:

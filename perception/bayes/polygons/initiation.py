@@ -9,7 +9,12 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.inference.outline_map import enter_attracting, relax_hypothesis, segments_near
+from perception.bayes.inference.outline_map import (
+    enter_attracting,
+    relax_hypothesis,
+    segments_near,
+    set_hypothesis,
+)
 from perception.bayes.inference.reservoir import copy_reading, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
@@ -43,6 +48,7 @@ from perception.bayes.polygons.job import (
     advance_search,
     end_job,
     is_search_over,
+    keep_best,
     score_pose,
     start_search,
 )
@@ -154,10 +160,7 @@ def lay_side(
     heading = math.atan2(-ny, -nx) - math.atan2(-tx, ty)
     c = math.cos(heading)
     sn = math.sin(heading)
-    hypothesis = s[0].scratch.hypothesis
-    hypothesis.x = x - (c * side_x - sn * side_y)
-    hypothesis.y = y - (sn * side_x + c * side_y)
-    hypothesis.heading = heading
+    set_hypothesis(s, x - (c * side_x - sn * side_y), y - (sn * side_x + c * side_y), heading)
 
 
 @kernel
@@ -357,10 +360,7 @@ def advance_initiation(s: StateRecord, p: SettingsRecord, left: int) -> int:
     if job.stage == TRY:
         job.stage = LAY
         if found.log_likelihood_ratio > job.best_nat:
-            job.best.x = found.x
-            job.best.y = found.y
-            job.best.heading = found.heading
-            job.best_nat = found.log_likelihood_ratio
+            keep_best(s)
         return spent
     evidence = score_pose(s, p, model, found.x, found.y, found.heading)
     score = s[0].scratch.score

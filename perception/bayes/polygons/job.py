@@ -97,6 +97,16 @@ def advance_search(s: StateRecord, p: SettingsRecord, model: int, left: int) -> 
 
 
 @kernel
+def keep_best(s: StateRecord) -> None:
+    """Store the search's pose as the job's best, with its evidence."""
+    job = s[0].job
+    job.best.x = job.search.x
+    job.best.y = job.search.y
+    job.best.heading = job.search.heading
+    job.best_nat = job.search.log_likelihood_ratio
+
+
+@kernel
 def score_pose(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> float:
     """Return the log ratio (nat) of all the job's readings at a pose; write the scratch's score.
 

@@ -67,16 +67,6 @@ def search_near(s: StateRecord) -> None:
 
 
 @kernel
-def keep_best(s: StateRecord) -> None:
-    """Store the search's pose as the best."""
-    job = s[0].job
-    job.best.x = job.search.x
-    job.best.y = job.search.y
-    job.best.heading = job.search.heading
-    job.best_nat = job.search.log_likelihood_ratio
-
-
-@kernel
 def facing_side(s: StateRecord, sides: Records[PolygonSide], is_closed: bool) -> tuple[int, float]:
     """Return the side that faces the job's readings most, at the pose of the job's middle, and its face, ±1.
 

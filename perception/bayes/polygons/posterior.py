@@ -31,7 +31,7 @@ from perception.bayes.memory.polygon_parameters import (
 )
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import StateRecord
-from perception.bayes.polygons.job import cost, score_pose
+from perception.bayes.polygons.job import copy_pose, cost, score_pose
 from perception.bayes.polygons.likelihood import score_polygon
 from perception.kernel import kernel
 
@@ -243,9 +243,7 @@ def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None
     """
     job = s[0].job
     track = s[0].polygons[t]
-    job.middle.x = job.best.x
-    job.middle.y = job.best.y
-    job.middle.heading = job.best.heading
+    copy_pose(job.best, job.middle)
     copy_triangle(track.covariance, job.covariance)
     if track.covariance.xx <= 0.0:
         job.covariance.xx = FIRST_SIGMA_M**2

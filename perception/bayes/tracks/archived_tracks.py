@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.memory.state import CircleTrack, PolygonTrack
+from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, PolygonTrack
 from perception.bounds import COUNT, FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
 from perception.map_moves import MapMoves
@@ -22,6 +22,24 @@ ARCHIVED_READINGS: Final = 48
 """Readings of an archived track: one of each bearing, and some more."""
 BINS: Final = "bins"
 """The field of a track that holds its readings, which an archived one keeps in another form."""
+
+
+def free_row(tracks: Structured) -> int:
+    """Return a free track's row, else that of the unmarked tentative one with the least evidence, else −1.
+
+    It is `track_labels.free_track` for what no kernel calls.
+
+    Parameters
+    ----------
+    tracks : (n,) record of `CircleTrack` or `PolygonTrack`
+        The tracks.
+    """
+    status = tracks["status"]
+    free = np.flatnonzero(status == FREE)
+    if len(free):
+        return int(free[0])
+    tentative = np.flatnonzero((status == TENTATIVE) & (tracks["marks"] == 0))
+    return int(tentative[tracks["log_likelihood_ratio"][tentative].argmin()]) if len(tentative) else -1
 
 
 def archived_dtype(track: type[CircleTrack | PolygonTrack]) -> np.dtype[Any]:

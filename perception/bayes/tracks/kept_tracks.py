@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from perception.bayes.inference.track_labels import free_track
 from perception.bayes.memory.state import FREE, Memory
+from perception.bayes.tracks.archived_tracks import free_row
 from perception.bayes.tracks.manual_tracks import leave_job
 from perception.bounds import Bound, check_values
 from perception.edits import ObjectRow, not_restorable
@@ -68,7 +68,7 @@ def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -
     if row.number > int(memory.state["objects_numbered"][0]) or track["status"][0] == FREE:
         return not_restorable(row.number)
     places = np.flatnonzero((tracks["status"] != FREE) & (tracks["number"] == row.number))
-    t = int(places[0]) if len(places) else free_track(memory.tracks if kind == CIRCLE else memory.s[0].polygons)
+    t = int(places[0]) if len(places) else free_row(tracks)
     if t < 0:
         return f"no room to put object {row.number} back: reject another one first"
     if kind == POLYGON:

@@ -16,6 +16,7 @@ from perception.bayes.circles.initiation import (
 )
 from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.occlusion import keep_relevant
+from perception.bayes.inference.outline_map import set_hypothesis
 from perception.bayes.inference.reservoir import copy_reservoir, gather_history
 from perception.bayes.inference.track_labels import assign_number, free_track
 from perception.bayes.memory.job_records import REFINEMENT
@@ -31,23 +32,6 @@ from perception.bayes.polygons.initiation import relax_polygon, restart_polygon
 from perception.bayes.polygons.job import end_job
 from perception.bayes.polygons.readings import gather_polygon_history
 from perception.kernel import kernel
-
-
-@kernel
-def set_hypothesis(s: StateRecord, x: float, y: float, heading: float) -> None:
-    """Set the scratch's hypothesis to a pose.
-
-    Parameters
-    ----------
-    s : (1,) State
-        Memory; its scratch is updated.
-    x, y, heading : float
-        The pose, m, rad.
-    """
-    hypothesis = s[0].scratch.hypothesis
-    hypothesis.x = x
-    hypothesis.y = y
-    hypothesis.heading = heading
 
 
 @kernel

@@ -101,6 +101,7 @@ def _edit_object(memory: Memory, p: SettingsRecord, row: int, edit: ObjectEdit) 
 
 
 def _pin(memory: Memory, pins: Pins, numbers: Sequence[int], *, pinned: bool) -> str | None:
+    """Pin or unpin segments; of several, what can be done is done. Return why the rest cannot be, or None."""
     if not pinned:
         missing = pins.remove(numbers)
         return no_such_segments(missing) if missing else None
@@ -116,6 +117,7 @@ def _pin(memory: Memory, pins: Pins, numbers: Sequence[int], *, pinned: bool) ->
 def _place(
     memory: Memory, p: SettingsRecord, rounds: Sequence[str], outlines: Sequence[str], edit: PlaceModel
 ) -> str | None:  # fmt: skip
+    """Start a track of a model where the user places it; return why that is impossible, or None."""
     if edit.model in outlines:
         t = place_polygon(memory.s, p, outlines.index(edit.model), edit.x, edit.y, edit.theta)
     elif edit.model in rounds:

@@ -58,11 +58,11 @@ from perception.bayes.polygons.job import (
     cost,
     end_job,
     is_search_over,
+    keep_best,
     score_pose,
 )
 from perception.bayes.polygons.pose_restarts import (
     begin_pose_search,
-    keep_best,
     next_restart,
 )
 from perception.bayes.polygons.posterior import advance_lattice, begin_lattice, copy_triangle

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from perception.bayes.memory.settings_record import SettingsRecord
-from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE, CircleTrack, Memory, PolygonTrack
-from perception.bayes.tracks.archived_tracks import archived_bounds, archived_dtype, move_rows, pack, unpack
+from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTrack, Memory, PolygonTrack
+from perception.bayes.tracks.archived_tracks import archived_bounds, archived_dtype, free_row, move_rows, pack, unpack
 from perception.bayes.tracks.manual_tracks import leave_job
 from perception.bayes.tracks.naming import sure_polygons
 from perception.bounds import COUNT, PLACE, bounds
@@ -152,7 +152,7 @@ class TrackArchive:
         for kind in self._kinds(memory, p, 1.0):
             row = kind.archive.find(number)
             if row is not None:
-                t = max(kind.free(), 0)
+                t = max(free_row(kind.tracks), 0)
                 track = kind.tracks[t : t + 1]
                 before = track.copy()
                 unpack(row, track)
@@ -176,16 +176,6 @@ class _Kind(ABC):
     def __init__(self, archive: Archive, memory: Memory, tracks: Structured, submap: int) -> None:
         self.archive, self.memory, self.tracks, self.submap = archive, memory, tracks, submap
         self.waiting = 0
-
-    def free(self) -> int:
-        """Return a free track, else the tentative one with the least evidence, else −1."""
-        status = self.tracks["status"]
-        free = np.flatnonzero(status == FREE)
-        if len(free):
-            return int(free[0])
-        tentative = np.flatnonzero((status == TENTATIVE) & (self.tracks["marks"] == 0))
-        evidence = self.tracks["log_likelihood_ratio"][tentative]
-        return int(tentative[evidence.argmin()]) if len(tentative) else -1
 
     @abstractmethod
     def is_reported(self, t: int) -> bool:
@@ -245,7 +235,7 @@ class _Kind(ABC):
 
     def make_room(self, x: float, y: float) -> bool:
         """Archive the farthest object if no track is free; return whether none was."""
-        if self.free() >= 0:
+        if free_row(self.tracks) >= 0:
             return False
         held = self.held()
         self.put_away(int(held[self.distances(held, x, y).argmax()]))
@@ -262,7 +252,7 @@ class _Kind(ABC):
 
     def take_up(self, number: int) -> None:
         """Make an archived object a track."""
-        t = self.free()
+        t = free_row(self.tracks)
         if t >= 0:
             self.leave(t)
             unpack(self.archive.take(number), self.tracks[t : t + 1])

@@ -10,6 +10,7 @@ from perception.bayes.memory.elements import REJECTIONS_MAX
 from perception.bayes.memory.parameters import CENTRE_VARIANCE_MAX_M2
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.bayes.tracks import refine
+from perception.bayes.tracks.archived_tracks import free_row
 from tests.perception.bayes.random_tracks import (
     RADII,
     TRACKS,
@@ -37,7 +38,8 @@ def test_the_free_track_is_the_first_free_one_or_the_unmarked_tentative_one_with
         tentative = np.flatnonzero((circles["status"] == TENTATIVE) & (circles["marks"] == 0))
         evidence = circles["log_likelihood_ratio"][tentative]
         weakest = int(tentative[np.argmin(evidence)]) if len(tentative) else -1
-        assert track_labels.free_track(memory.tracks) == (free[0] if len(free) else weakest)
+        row = int(free[0]) if len(free) else weakest
+        assert (track_labels.free_track(memory.tracks), free_row(circles)) == (row, row)
 
 
 def test_every_new_track_gets_the_next_number_and_no_mark() -> None:

@@ -86,10 +86,10 @@ def test_the_best_circle_is_the_likeliest_of_all_radii_on_the_jobs_readings() ->
     want = naive_bayes.score_circle(
         w, np.zeros(2), RADII[0], COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noise
     )["llr"]
-    assert alternatives.best_circle(memory.s, P, track) == pytest.approx(want + S.model_prior_nat, abs=1.0)
+    assert alternatives.evidence_of_circles(memory.s, P, track) == pytest.approx(want + S.model_prior_nat, abs=1.0)
     w[:, 4] = 2 * FAR
     enter_job(memory, w, LEVEL)
-    assert alternatives.best_circle(memory.s, P, track) == -math.inf, "nothing was heard"
+    assert alternatives.evidence_of_circles(memory.s, P, track) == -math.inf, "nothing was heard"
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_a_polygons_probability_counts_the_circles_in_its_place_and_removes_the_
     circles["x"][1] = S.polygons[0].outer_radius_m + 0.1
     alternatives.compare_circles(memory.s, memory.tracks, P, track)
     assert circles["status"][:2].tolist() == [left, ESTABLISHED], "the other one stands farther away"
-    best = alternatives.best_circle(memory.s, P, track)
+    best = alternatives.evidence_of_circles(memory.s, P, track)
     others = [0.0, S.unknown_polygon_nat * 5.0 + S.model_prior_nat, best]
     others += [own - lead] if left == ESTABLISHED else []
     weights = np.exp(np.clip(np.array(others) - own, -60.0, 60.0))

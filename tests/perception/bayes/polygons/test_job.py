@@ -15,7 +15,7 @@ from perception.bayes.memory.job_records import INITIATION, NO_JOB, REFINEMENT
 from perception.bayes.memory.polygon_parameters import COLLECTING_COST, QUANTUM_COST
 from perception.bayes.memory.state import FREE, Memory
 from perception.bayes.polygons.initiation import advance_initiation, next_request
-from perception.bayes.polygons.job import cost
+from perception.bayes.polygons.job import cost, keep_best
 from perception.bayes.tracks.polygon_tracks import advance_refinement, begin_refinement, polygon_quantum
 from perception.pipeline import Perception
 from runtime.simulation.open_loop import perceive
@@ -124,3 +124,11 @@ def test_an_empty_memory_leaves_nothing_to_do() -> None:
     memory = Memory(24, 1)
     assert not quantum(memory)
     assert not memory.polygons.view(np.uint8).any()
+
+
+def test_the_best_pose_is_that_of_the_search() -> None:
+    memory = Memory(24, 1)
+    job = memory.s[0].job
+    job.search.x, job.search.y, job.search.heading, job.search.log_likelihood_ratio = 1.0, 2.0, 3.0, 4.0
+    keep_best(memory.s)
+    assert (job.best.x, job.best.y, job.best.heading, job.best_nat) == (1.0, 2.0, 3.0, 4.0)

@@ -125,11 +125,3 @@ def test_restarts_are_shifts_turns_rolls_and_the_challenger_and_then_a_search_ne
     assert np.array(poses[: len(expected)]) == pytest.approx(np.array(expected), abs=1e-12)
     assert poses[-2] == (7.0, 8.0, 0.9)
     assert (job.stage, track.has_challenger) == (SEARCH_NEAR, 0)
-
-
-def test_the_best_pose_is_that_of_the_search() -> None:
-    memory = Memory(SENSORS, TRACKS)
-    job = memory.s[0].job
-    job.search.x, job.search.y, job.search.heading, job.search.log_likelihood_ratio = 1.0, 2.0, 3.0, 4.0
-    restarts.keep_best(memory.s)
-    assert (job.best.x, job.best.y, job.best.heading, job.best_nat) == (1.0, 2.0, 3.0, 4.0)
