@@ -320,11 +320,9 @@ class PaperPerception:
         k = self.placements.find(number)
         if k is not None:
             row = self.placements.rows[k]
-            was_confirmed = bool(row["is_confirmed"])
             at = wrapped_pose(row["pose"]) if pose is None else pose
-            return self._put(
-                number, int(row["model"]), at, confirmed=was_confirmed if confirmed is None else confirmed
-            )
+            stays = bool(row["is_confirmed"]) if confirmed is None else confirmed
+            return self._put(number, int(row["model"]), at, confirmed=stays)
         found = self.candidates.find(number)
         if found is None:
             return no_such_object(number)
