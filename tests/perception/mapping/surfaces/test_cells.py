@@ -85,7 +85,7 @@ def test_an_echo_is_shared_as_the_map_says() -> None:
         dx, dy = 2.0 * math.cos(q.axis + off * HALF), 2.0 * math.sin(q.axis + off * HALF)
         i, j = (math.floor(v / CELL_M) + CELLS // 2 for v in (q.x + dx, q.y + dy))
         b = math.floor(math.atan2(dy, dx) / (2 * math.pi / DIRECTIONS)) % DIRECTIONS
-        likelihoods.append(naive_probability(hits, passes, i, j, b) * (1 - 0.5 * off**2))
+        likelihoods.append(naive_probability(hits, passes, i, j, b))
     cells.lay_arc(view, q, HALF)
     cells.share_echo(view, q)
     expected = np.array(likelihoods) / (sum(likelihoods) + 0.005)
