@@ -53,14 +53,7 @@ SETTINGS: Final = (
 class DaskPool:
     """A `runtime.batch.dispatch.Pool` of the workers of a Dask scheduler.
 
-    Parameters
-    ----------
-    client : distributed.Client
-        Connected to the scheduler.
-    completed : distributed.as_completed
-        Empty: gets the futures, and yields them as they end.
-    make : callable
-        Makes a run on a worker.
+    `completed` is empty: it gets the futures, and yields them as they end. `make` makes a run on a worker.
     """
 
     def __init__(self, client: Client, completed: as_completed, make: Callable[[Run], Row] = run_one) -> None:

@@ -45,13 +45,7 @@ COUNTS: Final = frozenset({"truth", "found", "false", "objects", "stops"})
 
 
 class RowFolder:
-    """The files of finished runs.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the sweep; it exists.
-    """
+    """The files of finished runs in the folder of a sweep."""
 
     def __init__(self, folder: Path) -> None:
         self._rows = folder / ROWS

@@ -38,14 +38,7 @@ class Search(Protocol):
 class OptunaSearch:
     """Optuna's tree-structured Parzen estimator (Bergstra et al. 2011), with all settings in one density.
 
-    Parameters
-    ----------
-    varied : sequence of VaryConfig
-        The settings.
-    present : mapping
-        Their present values, which are tried first if they are among those allowed.
-    seed : int
-        Of the search.
+    The present values are tried first if they are among those allowed.
 
     Raises
     ------
@@ -58,7 +51,9 @@ class OptunaSearch:
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
         self._varied = varied
-        self._whole = {one.setting: _whole_ends(one) for one in varied if one.range and _is_whole(present, one)}
+        self._whole = {
+            one.setting: _whole_ends(one) for one in varied if one.range and isinstance(present.get(one.setting), int)
+        }
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Optuna calls this option experimental
             sampler = optuna.samplers.TPESampler(seed=seed, n_startup_trials=RANDOM_TRIALS, multivariate=True)
@@ -88,10 +83,6 @@ class OptunaSearch:
             self._study.tell(number, cost)
         else:
             self._study.tell(number, state=self._failed)
-
-
-def _is_whole(present: Mapping[str, Value], one: VaryConfig) -> bool:
-    return isinstance(present.get(one.setting), int)
 
 
 def _whole_ends(one: VaryConfig) -> tuple[int, int]:

@@ -103,17 +103,7 @@ def trial_runs(study: StudyConfig, base: Path, values: Sequence[Values], *, held
 
 
 class Tuner:
-    """A search in a study.
-
-    Parameters
-    ----------
-    study : StudyConfig
-        What is run, and its objectives.
-    base : Path
-        Folder of the study.
-    make : callable
-        Makes runs.
-    """
+    """A search in a study with the folder `base`; `make` makes its runs."""
 
     def __init__(self, study: StudyConfig, base: Path, make: Make) -> None:
         self._study, self._base, self._make = study, base, make

@@ -341,13 +341,7 @@ def keyframe_cycle(message: RawMessage) -> int | None:
 
 
 class KeyframeFinder:
-    """Collects the positions of keyframes from a recording's messages.
-
-    Parameters
-    ----------
-    recording : Recording
-        Whose messages are given to `find`.
-    """
+    """Collects the positions of keyframes from a recording's messages."""
 
     def __init__(self, recording: Recording) -> None:
         self._settings = recording.info.settings

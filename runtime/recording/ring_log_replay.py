@@ -18,14 +18,7 @@ from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
 class FiringReplayer:
-    """An iterator over firings that runs perception on each of them before it yields it.
-
-    Parameters
-    ----------
-    settings : Settings
-        Ring, models and constants.
-    firings : iterable of Firing
-        In order of time.
+    """An iterator over firings, in order of time, that runs perception on each of them before it yields it.
 
     Attributes
     ----------

@@ -35,13 +35,7 @@ class FirstFix(TypedDict):
 
 
 class FirstFixTracker:
-    """Finds the first fix of each drum of one straight drive.
-
-    Parameters
-    ----------
-    drums : sequence of DrumConfig
-        The drums.
-    """
+    """Finds the first fix of each drum of one straight drive."""
 
     def __init__(self, drums: Sequence[DrumConfig]) -> None:
         self._drums = drums

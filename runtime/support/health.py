@@ -63,13 +63,7 @@ class Worker(threading.Thread):
 
 
 class Health:
-    """The health of all parts of the process.
-
-    Parameters
-    ----------
-    log : structlog logger
-        Receives a line with the traceback when a part ends or fails.
-    """
+    """The health of all parts of the process; the log gets a line with the traceback when one ends or fails."""
 
     def __init__(self, log: FilteringBoundLogger) -> None:
         self._log = log

@@ -37,19 +37,7 @@ def post(url: str, body: bytes) -> None:
 
 
 class Webhook:
-    """Collects warnings and sends them.
-
-    Parameters
-    ----------
-    url : str
-        Where to.
-    period_s : float
-        Least time from one message to the next, s.
-    robot : str
-        What the robot is called.
-    send : callable
-        Sends a body to an address.
-    """
+    """Collects warnings, and sends them at intervals of `period_s` at least, with the name of the robot."""
 
     def __init__(self, url: str, period_s: float, robot: str, send: Post = post) -> None:
         self._url, self._period_s, self._robot, self._send = url, period_s, robot, send

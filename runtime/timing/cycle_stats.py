@@ -42,10 +42,7 @@ def worst_of(runs: Sequence[Quantiles]) -> Quantiles:
 class Series:
     """The newest `KEPT_MAX` of a series of times, and the largest and the sum of all.
 
-    Parameters
-    ----------
-    is_touched : bool
-        Allocate the memory now rather than page by page as it is used.
+    `is_touched`: allocate the memory now rather than page by page as it is used.
     """
 
     def __init__(self, *, is_touched: bool = False) -> None:

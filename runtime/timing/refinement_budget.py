@@ -34,10 +34,7 @@ class RefinementBudget(Protocol):
 class QuantumBudget:
     """A number of quanta a cycle; with a quarter, one in every fourth cycle.
 
-    Parameters
-    ----------
-    per_cycle : float
-        Whole quanta that are not used in a cycle are lost.
+    Whole quanta that are not used in a cycle are lost.
     """
 
     def __init__(self, per_cycle: float) -> None:

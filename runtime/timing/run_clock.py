@@ -25,13 +25,7 @@ LEASE_MIN_S: Final = 0.0005
 
 
 class RunClock:
-    """The host's clock, unchanged.
-
-    Parameters
-    ----------
-    host : callable
-        Monotonic, s.
-    """
+    """The host's monotonic clock, unchanged."""
 
     def __init__(self, host: Callable[[], float] = time.monotonic) -> None:
         self.host = host

@@ -42,12 +42,7 @@ class Timer(Protocol):
 
 
 class TimerFd:
-    """A timer of the kernel: exact, and Linux only.
-
-    Parameters
-    ----------
-    callback : callable
-        Called in the running loop when the timer fires.
+    """A timer of the kernel, exact, and Linux only; the callback is called in the loop that runs now.
 
     Raises
     ------

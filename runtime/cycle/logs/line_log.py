@@ -47,12 +47,7 @@ ANOTHER: Final = (
 class LineLog:
     """Logs what is new about the line, each fact once and at a bounded rate.
 
-    Parameters
-    ----------
-    log : structlog logger
-        Of the run.
-    messages : LineMessages
-        Words messages for what is at the other end of the line.
+    `messages` words what is at the other end of the line.
     """
 
     def __init__(self, log: FilteringBoundLogger, messages: LineMessages) -> None:

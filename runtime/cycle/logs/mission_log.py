@@ -43,11 +43,6 @@ class MissionRow(TypedDict):
 class MissionLog:
     """Logs how a mission goes on.
 
-    Parameters
-    ----------
-    log : structlog logger
-        Of the run.
-
     Attributes
     ----------
     row

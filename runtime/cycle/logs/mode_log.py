@@ -25,13 +25,6 @@ STOP_REASONS_MAX: Final = 1000
 class ModeLog:
     """Logs each mode that is entered, and reports it to the service manager.
 
-    Parameters
-    ----------
-    log : structlog logger
-        Of the run.
-    notifier : SdNotifier
-        Gets each mode with its reason.
-
     Attributes
     ----------
     stop_reasons

@@ -55,13 +55,7 @@ def _is_at(one: DetectedObject, gone: DetectedObject) -> bool:
 
 
 class ObjectLog:
-    """Logs why objects that were sure are gone, at a bounded rate.
-
-    Parameters
-    ----------
-    log : structlog logger
-        Of the run.
-    """
+    """Logs why objects that were sure are gone, at a bounded rate."""
 
     def __init__(self, log: FilteringBoundLogger) -> None:
         self._log = log
