@@ -169,7 +169,8 @@ FACING_RADII: Final = 0.6
 ATTRACTING_MIN: Final = 3
 """Fewer segments than this do not move a hypothesis."""
 OTHER_FIT_STEPS: Final = 4
-"""Steps of the relaxation of a new circle, and of the fit of any other explanation."""
+"""Steps of the relaxation and of the fits of a circle that has no track yet, and of an explanation other than a
+track's own."""
 CIRCLE_RESTS_RAD: Final = 0.005
 CIRCLE_RESTS_M: Final = CIRCLE_RESTS_RAD * FOOT_M
 """The relaxation ends with increments below both: a turn, and the shift that it makes a foot away."""
