@@ -43,6 +43,13 @@ async def test_a_wrong_token_is_reported_and_the_right_one_is_hidden(server: Fak
     assert "token" not in opened.page.url
 
 
+async def test_a_message_is_too_long_by_its_bytes(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    refusal = "connection.request({ type: 'read_mission', toml: 'ä'.repeat(40000) }).catch((error) => error.message)"
+    assert await opened.world(f"await {refusal}") == "the message is too long"
+    assert server.connections == 1, "it is not sent, which would end the connection"
+
+
 async def test_a_command_carries_the_newest_challenge(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     newest = 2**52 - 1

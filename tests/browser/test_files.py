@@ -94,6 +94,19 @@ async def test_long_work_says_how_far_it_is_and_what_it_made(server: FakeServer,
     await expect(page.locator("#panel-time")).to_be_visible()
 
 
+async def test_the_jobs_of_another_run_are_others(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await files_of(opened)
+    await server.send(job(over=True, share=1.0, what="done", made=["first.toml"]))
+    await opened.says("#made", f"Map of {FIRST}")
+    await server.drop()
+    await opened.run_for(300)
+    await server.wait_for_clients(1)
+    await expect(opened.page.locator("#made-part")).to_be_hidden()
+    await server.send(job(over=True, error="holds no cycle"))
+    await opened.says("#toasts", "holds no cycle")
+
+
 async def test_who_only_watches_can_look_but_change_nothing(server: FakeServer, opener: Opener) -> None:
     server.controller = 99
     opened = await opener.open(server.url)

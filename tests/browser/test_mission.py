@@ -14,6 +14,7 @@ from config.load import load_mission
 from runtime.console.frames.mission_rows import MissionRows
 from tests.browser.fake_server import FakeServer
 from tests.browser.open_page import Opened, Opener
+from tests.browser.synthetic_run import NO_PLACES, greeting
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -133,6 +134,28 @@ async def test_a_route_is_saved_and_loaded_as_a_mission_file(server: FakeServer,
     await page.locator("#route-file").set_input_files(chosen)  # type: ignore[arg-type]
     await page.get_by_role("button", name="Start it").click()
     assert await server.wait("run_mission") == {"toml": "name = 1"}
+
+
+async def test_what_is_not_changed_in_the_form_of_a_place_is_not_rounded(server: FakeServer, opener: Opener) -> None:
+    place = {"name": "dock", "x_m": 1.2345, "y_m": -0.5678, "heading_deg": None}
+    server.session = greeting() | {"places": NO_PLACES | {"place": [place]}}
+    server.data["read_mission"] = {"name": "r", "about": "", "waypoints": [[1.2345, -0.5678, None]], "frame": "odom"}
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.tab("Drive")
+    await page.locator("#places-row-place-0").click()
+    await page.locator("#places-name").fill("charger")
+    await page.locator("#places-name").press("Enter")
+    assert (await server.wait("set_places"))["places"]["place"] == [place | {"name": "charger"}]
+
+    chosen = {"name": "r.toml", "mimeType": "text/plain", "buffer": b"name = 1"}
+    await page.locator("#route-file").set_input_files(chosen)  # type: ignore[arg-type]
+    await page.locator("#route-row-0").click()
+    await page.locator("#route-x").fill("7")
+    await page.locator("#route-x").press("Enter")
+    await page.locator("#route-drive").press("Enter")
+    ((x, y, _),) = (await server.wait("set_route"))["waypoints"]
+    assert (x, y) == (pytest.approx(7 * 0.3048), -0.5678)
 
 
 async def drag(opened: Opened, start: tuple[float, float], end: tuple[float, float]) -> None:

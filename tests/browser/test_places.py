@@ -100,11 +100,13 @@ async def operate(case: ConsoleCase, opener: Opener, folder: Path) -> None:
     await until_row(opened, "ward at most 0.1 m/s")
     await page.locator("#places-kind").select_option("place")
     await drag(opened, (3.0, 0.0), (3.0, 0.8))
+
     await page.locator("#places-name").fill("charger")
     await page.locator("#places-name").press("Enter")
     await until_row(opened, "charger")
     there = settings.current.places.place[0]
     assert (there.x_m, there.y_m, there.heading_deg) == pytest.approx((3.0, 0.0, 90.0), abs=1.0)
+
     await opened.save_screenshot("places")
 
     await page.locator("#places-name").fill("A name")

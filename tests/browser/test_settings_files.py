@@ -50,6 +50,29 @@ async def test_a_file_is_changed_checked_and_saved(server: FakeServer, opener: O
     await expect(page.locator("#settings")).to_be_hidden()
 
 
+async def test_the_text_of_a_file_that_was_left_is_not_shown(server: FakeServer, opener: Opener) -> None:
+    server.data |= {
+        "list_settings": [{"kind": "robot", "name": name, "shipped": False} for name in ("a.toml", "b.toml")],
+        "read_settings": {"text": TEXT, "digest": "a" * 64, "form": []},
+    }
+    opened = await opener.open(server.url)
+    page, text = opened.page, opened.page.locator("#settings-text")
+    await page.click("#tab-tune")
+    await page.click("#settings-open")
+    await expect(text).to_have_value(TEXT)
+    server.holds = {"read_settings"}
+    server.data["read_settings"] = {"text": "# b\n", "digest": "b" * 64, "form": []}
+    await page.locator("#settings-file").select_option("1")
+    await server.wait("read_settings", 2)
+    server.data["read_settings"] = {"text": "# a\n", "digest": "c" * 64, "form": []}
+    await page.locator("#settings-file").select_option("0")
+    await server.wait("read_settings", 3)
+    server.held.reverse()
+    await server.release()
+    await opened.sync()
+    await expect(text).to_have_value("# a\n")
+
+
 async def test_a_change_is_not_lost_and_a_restart_waits_for_a_robot_that_stands(
     server: FakeServer, opener: Opener
 ) -> None:

@@ -11,7 +11,7 @@ const SILENCE_MAX_MS = 10_000;
 // A HALT without an answer for this long is reported as not confirmed, and sent again over a new connection.
 const HALT_CONFIRM_MS = 500;
 const HALT_ANSWER_MS = 3000;
-const MESSAGE_MAX = 65_536;
+const MESSAGE_MAX = 65_536; // bytes: a longer message ends the connection
 // Refused while a recording is shown: its object numbers and poses are not those of the live run.
 /** @type {Set<keyof Commands>} */
 const LIVE_ONLY = new Set([
@@ -36,6 +36,9 @@ const LIVE_ONLY = new Set([
   "evidence",
   "place_robot",
   "load_map",
+  "set_places",
+  "undo_places",
+  "go_to_place",
 ]);
 // Carried out by a cycle, so that in a paused run they wait for the next one, however long that takes.
 /** @type {Set<keyof Commands>} */
@@ -228,7 +231,7 @@ export class Connection extends Emitter {
     }
     const id = this.#next++;
     const text = JSON.stringify({ id, challenge: this.#challenge, ...message });
-    if (text.length > MESSAGE_MAX) {
+    if (new TextEncoder().encode(text).length > MESSAGE_MAX) {
       refuse(new RequestError("the message is too long"));
       return null;
     }

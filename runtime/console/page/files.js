@@ -70,6 +70,8 @@ export class Files extends Panel {
     on("report", () => void this.#makeOfRun("report").then((started) => started && parts.showFiles()));
     byId("file-rename").addEventListener("submit", (event) => this.#rename(event));
     connection.on("job", (job) => this.#follow(job));
+    connection.on("closed", () => this.#forgetJobs());
+    connection.on("open", () => byId("panel-files").hidden || this.shown());
     connection.on("opening", ({ share }) => setText(byId("file-opening"), `Opening: ${Math.round(100 * share)} %`));
     connection.on("replay_problem", ({ error }) => this.#showProblem(error));
     run.on("state", () => this.#refresh());
@@ -273,6 +275,13 @@ export class Files extends Panel {
     this.#showJob({ text: `${LONG[kind]} of ${base(file)}: ${what}${done}`, share, cancel });
   }
 
+  // The next connection may be to another run, whose jobs have the same numbers.
+  #forgetJobs() {
+    this.#jobs.clear();
+    this.#showRunning();
+    this.#showMade();
+  }
+
   // Returns whether there is a recording of this run.
   /** @param {JobMessage["kind"]} kind */
   async #makeOfRun(kind) {
@@ -295,19 +304,19 @@ export class Files extends Panel {
     this.#jobs.set(job.job, job);
     this.#showRunning();
     if (!job.over || was?.over) return;
-    byId("made").replaceChildren(
-      ...[...this.#jobs.values()]
-        .filter(({ made }) => made.length > 0)
-        .reverse()
-        .map((done) => this.#made(done)),
-    );
-    byId("made-part").hidden = byId("made").children.length === 0;
+    this.#showMade();
     if (quiet) return;
     this.notifications.toast(
       job.error === null
         ? `${LONG[job.kind]} of ${base(job.file)}: ready in the tab Files`
         : `${LONG[job.kind]} of ${base(job.file)}: ${job.error}`,
     );
+  }
+
+  #showMade() {
+    const made = [...this.#jobs.values()].filter((job) => job.made.length > 0);
+    byId("made").replaceChildren(...made.reverse().map((done) => this.#made(done)));
+    byId("made-part").hidden = made.length === 0;
   }
 
   /** @param {JobMessage} done */

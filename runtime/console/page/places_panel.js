@@ -204,8 +204,8 @@ export class PlacesPanel extends Panel {
     const [kind, i] = this.places.selected;
     const row = { ...this.places.all[kind][i], name: byId("places-name").value.trim() };
     if ("x_m" in row) {
-      row.x_m = this.units.parse(byId("places-x").value) ?? Number.NaN;
-      row.y_m = this.units.parse(byId("places-y").value) ?? Number.NaN;
+      row.x_m = this.units.parse(byId("places-x").value, row.x_m) ?? Number.NaN;
+      row.y_m = this.units.parse(byId("places-y").value, row.y_m) ?? Number.NaN;
       row.heading_deg = numberIn(byId("places-heading").value);
     }
     if ("speed_max_m_s" in row) row.speed_max_m_s = numberIn(byId("places-speed").value) ?? 0;

@@ -332,7 +332,9 @@ export class Plots {
     const { from, to } = this.#span,
       paths = this.#fields;
     const columns = paths.map((path) => seriesOf(this.#history, path, from, to));
-    const rows = (columns[0] ?? []).map(([t], i) => [Number(t.toFixed(6)), ...columns.map((column) => column[i][1] ?? "")].join());
+    const rows = (columns[0] ?? []).map(([t], i) =>
+      [Number(t.toFixed(6)), ...columns.map((column) => column[i][1] ?? "")].join(),
+    );
     download(
       "echolocate-plot.csv",
       new Blob([[["robot_s", ...paths].join(), ...rows, ""].join("\n")], { type: "text/csv" }),

@@ -93,14 +93,16 @@ export class RoutePanel extends Panel {
   /** @param {SubmitEvent} event */
   #set(event) {
     event.preventDefault();
-    const [x, y] = [byId("route-x"), byId("route-y")].map((input) => this.units.parse(input.value));
+    const { selected, waypoints } = this.route,
+      was = selected === null ? null : waypoints[selected];
+    const x = this.units.parse(byId("route-x").value, was?.[0]),
+      y = this.units.parse(byId("route-y").value, was?.[1]);
     const heading = numberIn(byId("route-heading").value);
     const isWrong = x === null || y === null || (heading !== null && !(Math.abs(heading) <= 360));
     setText(
       byId("route-error"),
       isWrong ? "two numbers are wanted, and a heading from -360 to 360 degrees or none" : "",
     );
-    const { selected } = this.route;
     if (x !== null && y !== null && !isWrong && selected !== null) void this.route.set(selected, [x, y, heading]);
   }
 

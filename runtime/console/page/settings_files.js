@@ -79,9 +79,10 @@ export class SettingsFiles extends Panel {
     byId("settings-text").value = "";
     byId("settings-text").readOnly = true; // what is typed before the text is here would be lost
     try {
-      this.#hold(await this.connection.request({ type: "read_settings", file: number }));
+      const held = await this.connection.request({ type: "read_settings", file: number });
+      if (number === this.#at) this.#hold(held); // not that of a file that was left meanwhile
     } catch (error) {
-      setText(byId("settings-state"), messageOf(error));
+      if (number === this.#at) setText(byId("settings-state"), messageOf(error));
     }
   }
 

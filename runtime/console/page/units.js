@@ -46,8 +46,10 @@ export class Units extends Emitter {
     return `${this.number(x, digits)}, ${this.number(y, digits)} ${this.name}`;
   }
 
-  /** @param {string} text */
-  parse(text) {
+  // The length in a field, m; null where that is none. A field that still shows `was` has not rounded it.
+  /** @param {string} text @param {number | null} [was] */
+  parse(text, was = null) {
+    if (was !== null && text.trim() === this.number(was)) return was;
     const value = numberIn(text);
     return value === null || !Number.isFinite(value) ? null : value * this.metres;
   }
