@@ -33,6 +33,9 @@ async def test_a_recording_is_described_renamed_pinned_and_deleted(server: FakeS
     opened = await opener.open(server.url)
     page = opened.page
     await files_of(opened)
+    server.controller = 2  # the page gets the control that it had
+    await page.reload()  # the panel is shown before there is a connection to ask
+    await opened.says("#files", FIRST)
     await opened.says("#file-row-0", "this run, up to now")
     await opened.says("#file-row-1", "1 h 02 min, 1.5 MB, complete")
     await page.locator("#file-row-0").press("Enter")

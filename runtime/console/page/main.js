@@ -339,6 +339,10 @@ watchKeyboard({
   notifications,
   drivingByKeys: () => byId("teleop-keys").checked,
 });
+// What a panel lists when it is shown is asked for again once there is a run to answer: a reload shows it before that.
+connection.on("open", () => {
+  for (const name of [tabs.shown, tabs.beside]) panelShown(name);
+});
 connection.connect();
 tabs.restore(preferred("tab", ""));
 new Beside({ tabs, shown: panelShown });
