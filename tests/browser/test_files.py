@@ -168,6 +168,10 @@ async def test_a_robot_is_described_with_a_picture_of_its_ring_and_saved(server:
     assert await beams.nth(0).get_attribute("d") != before, "it is drawn as it is edited"
     await page.get_by_role("button", name="Remove sensor 7").press("Enter")
     await page.locator("#new-name").fill("Ring 7!")
+    await page.get_by_label("x (m) of sensor 3").fill("0.1x")
+    await page.locator("#robot-save").press("Enter")
+    await opened.says("#robot-error", "sensor 3: three numbers are wanted")
+    await page.get_by_label("x (m) of sensor 3").fill("0.1")
     server.data["robot_file"] = "# A robot\n"
     for name, size in {"1440": DESKTOP, "1024": SMALL, "390": PHONE}.items():
         await page.set_viewport_size({"width": size[0], "height": size[1]})

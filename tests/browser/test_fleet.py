@@ -72,6 +72,20 @@ async def test_the_page_fits_a_phone(opener: Opener) -> None:
             assert box["x"] + box["width"] <= PHONE[0]
 
 
+async def test_a_halt_that_was_not_sent_stays_said_until_one_is(opener: Opener) -> None:
+    async with fleet_page([]) as url:
+        opened = await opener.open(url, real_time=True, live=False, expected_errors="Failed to load resource")
+        page, alarm = opened.page, opened.page.locator("#fleet-alarm")
+        await page.route("**/halt", lambda route: route.fulfill(status=500, body="broken"))
+        await page.locator("#halt-all").click()
+        await expect(alarm).to_contain_text("HALT was not sent (broken)")
+        await asyncio.sleep(0.5)  # the page has asked for the runs again, and got them
+        await expect(alarm).to_contain_text("HALT was not sent (broken)")
+        await page.unroute("**/halt")
+        await page.locator("#halt-all").click()
+        await expect(alarm).to_be_hidden()
+
+
 async def drives(one: Run, card: Locator) -> None:
     """Arm a robot until the page shows that it drives; a busy machine may stop any robot at any time."""
 

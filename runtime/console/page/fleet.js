@@ -25,7 +25,8 @@ const cards = new Map();
 let rows = /** @type {FleetRow[]} */ ([]),
   heard_ms = performance.now(),
   halt_ms = -Infinity,
-  problem = "connecting";
+  problem = "connecting",
+  refused = ""; // why the last HALT was not sent: it stays until another one is
 
 /** @param {string} path @param {object} [body] @returns {Promise<unknown>} */
 async function ask(path, body) {
@@ -42,10 +43,16 @@ async function ask(path, body) {
 /** @param {string | null} address */
 function halt(address) {
   halt_ms = performance.now();
-  ask("/halt", { address }).then(refresh, (error) => {
-    problem = `HALT was not sent (${error.message}): use the robots' own stops`;
-    show();
-  });
+  ask("/halt", { address }).then(
+    () => {
+      refused = "";
+      return refresh();
+    },
+    (error) => {
+      refused = `HALT was not sent (${error.message}): use the robots' own stops`;
+      show();
+    },
+  );
 }
 
 /** @param {string} address */
@@ -115,7 +122,7 @@ function show() {
       : "";
   const alarm = [
     open.length > 0 ? `HALT not confirmed: use the own stop of ${open.join(", ")}` : "",
-    unsent,
+    refused || unsent,
     silent || problem,
   ]
     .filter(Boolean)

@@ -60,7 +60,8 @@ export class RobotForm extends Panel {
   // x, y (m) and direction (rad) of each sensor as the form has it now.
   /** @returns {Triple[]} */
   mounts() {
-    if (this.#sensors !== null) return this.#sensors.map(([x, y, turn]) => [x, y, (turn * Math.PI) / 180]);
+    if (this.#sensors !== null)
+      return this.#sensors.map(([x, y, turn]) => [x || 0, y || 0, ((turn || 0) * Math.PI) / 180]);
     const count = Math.min(SENSORS_MAX, Math.max(0, Math.floor(number("count")) || 0)),
       radius = number("radius_m") || 0;
     return Array.from({ length: count }, (_, i) => {
@@ -137,10 +138,10 @@ export class RobotForm extends Panel {
         class: "number",
         inputmode: "decimal",
         autocomplete: "off",
-        value: String(sensor[k]),
+        value: Number.isNaN(sensor[k]) ? "" : String(sensor[k]),
         "aria-label": `${name} of sensor ${i}`,
         oninput: (/** @type {InputEvent} */ { target }) => {
-          if (target instanceof HTMLInputElement) sensor[k] = numberIn(target.value) || 0;
+          if (target instanceof HTMLInputElement) sensor[k] = numberIn(target.value) ?? Number.NaN;
         },
       });
     return el(
@@ -194,6 +195,11 @@ export class RobotForm extends Panel {
     if (wrong) {
       setText(byId("robot-error"), `${input(wrong).labels?.[0].firstChild?.textContent?.trim()}: a number is wanted`);
       input(wrong).focus();
+      return;
+    }
+    const odd = this.#sensors?.findIndex((sensor) => !sensor.every(Number.isFinite)) ?? -1;
+    if (odd >= 0) {
+      setText(byId("robot-error"), `sensor ${odd}: three numbers are wanted`);
       return;
     }
     try {
