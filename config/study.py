@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
+from config.settings import MODELS_MAX
 from config.strict import Strict, TomlList
 
 Value: TypeAlias = bool | int | float | str
@@ -76,7 +77,7 @@ class StudyConfig(Strict):
     """Run file; recordings (MCAP) keep their own settings."""
     robot: str | None = None
     """Robot file instead of the run file's."""
-    models: TomlList[str] = Field(default=(), max_length=64)
+    models: TomlList[str] = Field(default=(), max_length=MODELS_MAX)
     """Object models instead of the run file's."""
     sets: TomlList[str] = Field(default=(), max_length=100)
     """Settings of all runs, each `path=value` as after `--set`."""

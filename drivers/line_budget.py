@@ -37,14 +37,13 @@ def refuse_slow_line(link: LinkConfig, fixed_bytes_s: float, firing_bytes: float
     if needed <= SHARE_MAX * held:
         return
     bauds = [baud for baud in BAUDS if needed <= SHARE_MAX * baud / BITS_PER_BYTE]
-    remedy = f"set link.baud to {bauds[0]} or more, here and at the robot" if bauds else "fire less often"
-    left = SHARE_MAX * held - fixed_bytes_s
-    slower = (
-        f", or ring.firing.step_period_s to {-(-1e3 * firing_bytes // left) * 1e-3:g} or more" if left > 0 else ""
-    )
+    fits = [f"link.baud to {bauds[0]} or more, here and at the robot"] if bauds else []
+    if (left := SHARE_MAX * held - fixed_bytes_s) > 0.0:
+        fits.append(f"ring.firing.step_period_s to {-(-1e3 * firing_bytes // left) * 1e-3:g} or more")
+    remedy = f"set {', or '.join(fits)}" if fits else "no speed carries that much besides the ranges"
     raise FiringError(
         f"ring.firing, link.baud: echoes and odometry are {needed:.0f} bytes a second; a line of {link.baud} baud "
-        f"carries {held:.0f}, of which at most {100 * SHARE_MAX:.0f} % may be used; {remedy}{slower}"
+        f"carries {held:.0f}, of which at most {100 * SHARE_MAX:.0f} % may be used; {remedy}"
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 from config.load import load_robot
 from config.robot import LinkConfig, RobotConfig
 from drivers.firing_pattern import FiringError
-from drivers.line_budget import BURST_BYTES, NETWORK_BYTES_S, ReceiveBudget
+from drivers.line_budget import BURST_BYTES, NETWORK_BYTES_S, ReceiveBudget, refuse_slow_line
 from drivers.registry import make_driver
 from runtime.cli.app import run_command
 
@@ -28,6 +28,23 @@ def test_a_line_too_slow_for_its_traffic_is_refused(name: str, too_slow: int, en
     with pytest.raises(FiringError, match=rf"a line of {too_slow} baud carries .*set link.baud to {enough} or more"):
         make_driver(at(name, too_slow))
     make_driver(at(name, too_slow, "socket://robot:7000"))
+
+
+@pytest.mark.parametrize(
+    ("fixed_bytes_s", "firing_bytes", "remedy"),
+    [
+        (
+            100.0,
+            400.0,
+            r"; set link\.baud to 9600 or more, .* robot, or ring\.firing\.step_period_s to 1\.205 or more$",
+        ),
+        (100.0, 1e7, r"; set ring\.firing\.step_period_s to [\d.]+ or more$"),
+        (1e7, 10.0, r"; no speed carries that much besides the ranges$"),
+    ],
+)
+def test_what_would_do_is_a_sentence(fixed_bytes_s: float, firing_bytes: float, remedy: str) -> None:
+    with pytest.raises(FiringError, match=remedy):
+        refuse_slow_line(LinkConfig(port="/dev/ttyUSB0", baud=4800), fixed_bytes_s, firing_bytes, 1.0)
 
 
 def test_check_says_so(capsys: pytest.CaptureFixture[str]) -> None:
