@@ -42,6 +42,9 @@ SURE_NAT: Final = 2.0 * HIT_NAT
 """Two echoes are as sure as it gets, so that a wall that has left is soon forgotten."""
 KEPT_M: Final = 2.5
 """A look counts while the robot is within this of where it looked, m; as `behaviors.memory.near_memory`."""
+NARROW_M: Final = 1.0
+"""A wall in a gap narrower than a beam counts within this of where the ring heard it, m: a `p3at` touched one .6 m
+on, and a drum .9 m beside its way would stand in it after 1.2 m."""
 AGAIN_SHARE: Final = 0.5
 """Once a direction ahead is unknown, those count as unknown, too, that were looked in farther away than this share of
 `KEPT_M`: so the robot looks round in one place."""
@@ -189,6 +192,7 @@ class BlindWalls:
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
         has_gaps=CONSTANT,
+        _kept_m=CONSTANT,
         _radius_m=CONSTANT,
         _walls=BlindWall.BOUNDS,
     )
@@ -199,6 +203,7 @@ class BlindWalls:
         self.records = records(BlindWall, self._walls)
         self.has_gaps = widest_gap(mounts) > 2.0 * half_angle + ROUNDING_RAD
         """Whether there are directions that no beam holds."""
+        self._kept_m = math.inf if has_blind_sides(mounts, half_angle) else NARROW_M
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.has_looked_round = False
         """Whether the robot was to look everywhere in this silence."""
@@ -247,7 +252,8 @@ class BlindWalls:
         away = self._walls["offset"] - pose.x * c - pose.y * s
         is_known = self._walls["is_known"] == 1
         is_wall = is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
-        stands = is_wall & (nearest > self._half_angle)
+        looked_m = np.hypot(self._walls["x"] - pose.x, self._walls["y"] - pose.y)
+        stands = is_wall & (nearest > self._half_angle) & (looked_m <= self._kept_m)
         # What lies partly in a beam is seen as the robot turns a little; beams that touch miss nothing between them.
         is_unseen = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
         # At the edge of what is unseen it is looked at whole: else the robot would turn to and fro between two edges.
@@ -255,7 +261,7 @@ class BlindWalls:
         is_edge &= np.roll(is_unseen, 1) | np.roll(is_unseen, -1)
         is_unknown = is_ahead & (is_unseen | is_edge)
         feet = np.stack([pose.x + away * c, pose.y + away * s], axis=1)
-        is_presumed = stands & (np.hypot(self._walls["x"] - pose.x, self._walls["y"] - pose.y) > SILENT_WAY_M)
+        is_presumed = stands & (looked_m > SILENT_WAY_M)
         return feet[stands], directions[is_unknown], feet[is_presumed]
 
     def look_again(self, x: float, y: float, is_lasting: bool) -> None:

@@ -374,6 +374,8 @@ class FreshEchoes:
     def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats, Floats]:
         """Return echoes with those of remembered walls, the directions of which nothing is known, and presumed feet.
 
+        Of a ring with narrow gaps only, the walls in these are presumed, and nothing is unknown.
+
         Parameters
         ----------
         points : (h, 2) float
@@ -384,7 +386,9 @@ class FreshEchoes:
         if not self._walls.has_gaps:
             return points, np.zeros(0), np.zeros((0, 2))
         walls, unknown, presumed = self._walls.sides(pose, axes_rad)
-        return np.concatenate([points, walls]), unknown if self._is_blind else unknown[:0], presumed
+        if not self._is_blind:  # schemas do not see what a turn by a few degrees shows: it only limits the speed
+            return points, unknown[:0], walls
+        return np.concatenate([points, walls]), unknown, presumed
 
     def clear(self) -> None:
         """Remove all readings."""

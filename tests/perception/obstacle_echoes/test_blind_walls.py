@@ -11,6 +11,7 @@ from config.load import load_robot
 from drivers.messages import Firing, Floats, Pose
 from perception.obstacle_echoes.blind_walls import (
     KEPT_M,
+    NARROW_M,
     SILENT_WAY_M,
     TURN_DIRECTIONS,
     WALL_ECHO_M,
@@ -220,6 +221,8 @@ def test_a_mirror_between_two_beams_stands_where_it_was_heard_before_the_robot_t
         true_m = offset - pose.x * math.cos(normal) - pose.y * math.sin(normal)
         assert np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y).min() == pytest.approx(true_m, abs=0.15)
         assert not len(unknown), "it need not look into so narrow a gap"
+    beyond = Pose(2.0 * NARROW_M * math.cos(pose.theta), 2.0 * NARROW_M * math.sin(pose.theta), pose.theta)
+    assert not len(walls.sides(beyond, pose.theta + mounts[:, 2])[0]), "a drum that was passed is no wall for long"
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 0.4, 3.0, 7.0])

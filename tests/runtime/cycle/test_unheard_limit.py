@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,13 @@ def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() ->
     assert twist.v == pytest.approx(CREEP_M_S)
     assert reason == LOST
     assert limited(Twist(0.0, 1.0), (0.5, 0.0), silent=True) == (Twist(0.0, 1.0), None)
+
+
+def test_before_what_is_presumed_in_a_narrow_gap_it_creeps() -> None:
+    view = replace(EVERYWHERE, presumed=np.array([[1.0 + RIM_M + 0.1, 0.0]]))
+    percept, unheard = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), view), UnheardEchoes(np.zeros((3, 3)))
+    assert limit_unheard(Twist(0.3, 0.0), percept, unheard, SETTINGS, None)[0].v == pytest.approx(CREEP_M_S)
+    assert limit_unheard(Twist(-0.3, 0.0), percept, unheard, SETTINGS, None)[0].v == -0.3
 
 
 @pytest.mark.parametrize("v", [0.3, -0.3])
