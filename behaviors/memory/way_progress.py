@@ -74,9 +74,10 @@ class WayProgress:
         goes_on = (outbound, part) == (self.outbound, self.part) and requested_run_s <= self.run_s
         if not goes_on or self.best_m is None:
             return WayProgress(outbound, remaining_m, run_s, part, (run_s,))
-        steps = min(STEPS, int((self.best_m - remaining_m) / due_m * STEPS + STEP_TOLERANCE))
-        if steps < 1:
+        gained = (self.best_m - remaining_m) / due_m * STEPS + STEP_TOLERANCE
+        if not gained >= 1.0:  # nor is a pose that is not finite
             return self
+        steps = int(min(STEPS, gained))
         return WayProgress(outbound, remaining_m, run_s, part, (*self.steps_run_s, *[run_s] * steps)[-STEPS:])
 
     def stalled_s(self, run_s: float) -> float:
