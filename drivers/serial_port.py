@@ -67,7 +67,7 @@ def explain(config: LinkConfig, error: BaseException) -> str:
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
         return (
             f"no such port {port}; likely the robot is not plugged in or the name is another: look for it with "
-            f"`ls /dev/tty* /dev/serial/by-id`, and give it as --port or link.port"
+            f"`ls /dev/tty* /dev/serial/by-id`, and name that one"
         )
     if number in (errno.EACCES, errno.EPERM):
         return (

@@ -56,4 +56,19 @@ def parse_whole_number(_type: type, tokens: Sequence[Token]) -> int:
     return int(text)
 
 
+def parse_port(_type: type, tokens: Sequence[Token]) -> int:
+    """Return a TCP port, 0 for any that is free.
+
+    Raises
+    ------
+    ValueError
+        There is no such port.
+    """
+    port = parse_whole_number(_type, tokens)
+    if port >= 1 << 16:
+        raise ValueError(f"{port}: a TCP port is a whole number from 0 to 65535.")
+    return port
+
+
 Count = Annotated[int, Parameter(converter=parse_whole_number)]
+TcpPort = Annotated[int, Parameter(converter=parse_port)]

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import Final, NamedTuple, NoReturn
 
-VARIABLE: Final = "ECHOLOCATE_CONSOLE"
+VARIABLE: Final = "ECHOLOCATE_RESTART"
 """Hands port and token of the console over to the program after a restart."""
 
 
@@ -16,6 +16,11 @@ class ConsoleBefore(NamedTuple):
 
     port: int
     token: str
+
+
+def is_restart() -> bool:
+    """Return whether this program was started again by itself; no longer once `console_before` was asked."""
+    return VARIABLE in os.environ
 
 
 def console_before() -> ConsoleBefore | None:
@@ -72,4 +77,5 @@ def _restart(console: ConsoleBefore) -> NoReturn:
     sys.stdout.flush()
     sys.stderr.flush()
     os.environ[VARIABLE] = f"{console.port} {console.token}"
-    os.execv(sys.executable, [sys.executable, *(word for word in sys.orig_argv[1:] if word != "--arm")])  # noqa: S606 - this very program
+    words = [word for word in sys.orig_argv[1:] if word.partition("=")[0] != "--arm"]
+    os.execv(sys.executable, [sys.executable, *words])  # noqa: S606 - this very program

@@ -7,7 +7,7 @@ import time
 
 from config.errors import DONE
 from runtime.cli.commands.ros2 import until_interrupted
-from runtime.cli.options import Count
+from runtime.cli.options import TcpPort
 from runtime.support.console_address import find_consoles
 from runtime.support.user_folders import state_folder
 
@@ -15,7 +15,7 @@ from runtime.support.user_folders import state_folder
 def fleet(
     *urls: str,
     host: str = "127.0.0.1",
-    port: Count = 8764,
+    port: TcpPort = 8764,
 ) -> int:
     """Serve one page for several runs: mode, battery and place of each, HALT for one and for all.
 

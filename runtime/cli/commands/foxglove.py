@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.commands.offline_io import require_package
 from runtime.cli.commands.ros2 import console_finder, until_interrupted
-from runtime.cli.options import Connect, Count, Flag
+from runtime.cli.options import Connect, Flag, TcpPort
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def foxglove(
     *,
     connect: Connect = None,
     host: str = "127.0.0.1",
-    port: Count = 8766,
+    port: TcpPort = 8766,
     allow_set: Annotated[bool, Flag] = False,
     print_layout: Annotated[bool, Flag] = False,
 ) -> int:
@@ -75,7 +75,9 @@ def check_foxglove(*, no_console: bool) -> None:
         The package is missing, or there is no console to be a client of.
     """
     if no_console:
-        raise UserError("--foxglove needs the console: leave out --no-console", WRONG_CALL)
+        raise UserError(
+            "--foxglove needs the console: leave out --no-console, or set console.enabled=true", WRONG_CALL
+        )
     require_package(*PACKAGE)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 from cyclopts import App, Parameter
 
-from runtime.cli.options import Flag, Force
+from runtime.cli.options import Count, Flag, Force
 
 Yes = Annotated[bool, Parameter(negative="", show_default=False, help="Ask nothing; take the defaults.")]
 
@@ -34,7 +34,7 @@ class RobotOptions:
             "which is asked for each."
         ),
     ] = None
-    sensors: Annotated[int | None, Parameter(help="Number of sensors.")] = None
+    sensors: Annotated[Count | None, Parameter(help="Number of sensors.")] = None
     spacing: Annotated[float | None, Parameter(help="Of sensors in front, degrees from one to the next.")] = None
     ring_radius: Annotated[float | None, Parameter(help="Distance of the sensors from the middle, m.")] = None
     beam_half_angle: Annotated[float | None, Parameter(help="Half the width of a sensor's beam, degrees.")] = None
@@ -45,7 +45,7 @@ class RobotOptions:
     speed_max: Annotated[float | None, Parameter(help="Largest speed, m/s.")] = None
     turn_max: Annotated[float | None, Parameter(help="Largest turning rate, rad/s.")] = None
     synchro: Annotated[bool, Flag, Parameter(help="The wheels turn, the body with its ring does not.")] = False
-    baud: Annotated[int | None, Parameter(help="Speed of the line, bits per second.")] = None
+    baud: Annotated[Count | None, Parameter(help="Speed of the line, bits per second.")] = None
     port: Annotated[
         str | None, Parameter(help="Serial port of the robot, as /dev/ttyUSB0; by default a run names it.")
     ] = None
@@ -77,7 +77,7 @@ def world(
     *,
     width: float | None = None,
     depth: float | None = None,
-    drums: int | None = None,
+    drums: Count | None = None,
     drum_radius: float | None = None,
     surfaces: Literal["cone", "specular", "rays"] | None = None,
     yes: Yes = False,

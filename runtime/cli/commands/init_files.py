@@ -166,7 +166,8 @@ def write_run(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     robot = ask.text("robot", "Robot file, or the name of a shipped one", "denning")
     world = ask.text("world", "World file for the emulator, or the name of a shipped one", "hallway")
-    fitting, note = models_for(world)
+    near = Path(file).parent / world  # a path in a file counts from the file's folder
+    fitting, note = models_for(str(near) if near.exists() else world)
     models = [one.strip() for one in ask.text("models", f"Models, separated by commas{note}", fitting).split(",")]
     mission = ask.text("mission", "Mission file or name (-: none)", "-")
     text = f"""# A run of your own. `echolocate run` drives the emulated robot; with --port, the real one.

@@ -78,7 +78,7 @@ def map_run(
         else (view.objects, view.walls, view.polylines)
     )
     if len(objects) + len(walls) + sum(len(one.points) - 1 for one in polylines) > ITEMS_MAX:
-        raise UserError(f"{file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
+        raise UserError(f"{file}: a world file holds at most {ITEMS_MAX} objects, walls and pieces together", FAILED)
     world = world_of(objects, walls, settings.models, polylines if view is None else ())
     echoes = timeline.echoes if timeline.known_echoes is None else timeline.known_echoes
     half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)

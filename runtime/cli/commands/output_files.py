@@ -59,7 +59,7 @@ def check_outputs(
             raise UserError(
                 f"{shown}: is an input itself: {one_line(str(read[found]))}; choose another name", WRONG_CALL
             )
-        is_device = Path(path).exists() and not Path(path).is_file()
+        is_device = _exists(path) and not Path(path).is_file()
         if found in written:
             raise UserError(f"{shown}: is the same file as {written[found]}; choose another name", WRONG_CALL)
         if found is not None and not is_device:
@@ -118,7 +118,7 @@ def make_output_folder(path: str) -> Path:
         The path is a file, or the folder cannot be created.
     """
     folder = Path(path)
-    if folder.exists() and not folder.is_dir():
+    if _exists(folder) and not folder.is_dir():
         raise UserError(f"--out {path}: is a file; name a folder", WRONG_CALL)
     with writing("--out", path):
         folder.mkdir(parents=True, exist_ok=True)
@@ -144,10 +144,18 @@ def _existing(path: PathLike) -> FileId | None:
     return (info.st_dev, info.st_ino, "") if is_file else None
 
 
+def _exists(path: PathLike) -> bool:
+    """Return whether there is something at a path; a name that is too long or hidden is refused when it is opened."""
+    try:
+        return Path(path).exists()
+    except OSError:
+        return False
+
+
 def _identity(path: PathLike) -> FileId | None:
     """Return the identity of a file that may not exist yet; None for a pipe, a folder, or one that cannot be made."""
     found = _existing(path)
-    if found is not None or Path(path).exists():
+    if found is not None or _exists(path):
         return found
     target = Path(os.path.realpath(path))  # where a link leads that names no file yet
     try:

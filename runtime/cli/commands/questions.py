@@ -36,7 +36,10 @@ class Questions:
         return self._answer(name, question, default, str)
 
     def number(self, name: str, question: str, default: float, low: float, high: float) -> float:
-        """Return a number from `low` to `high`; another answer is asked for again, another option refused."""
+        """Return a number from `low` to `high`; another answer is asked for again, another option refused.
+
+        A default outside of them is the nearest one inside.
+        """
 
         def parse(answer: str) -> float:
             problem = f"expected a number from {low:g} to {high:g}"
@@ -48,7 +51,7 @@ class Questions:
                 raise ValueError(problem)
             return value
 
-        return self._answer(name, question, default, parse)
+        return self._answer(name, question, min(max(default, low), high), parse)
 
     def count(self, name: str, question: str, default: int, low: int, high: int) -> int:
         """Return a whole number from `low` to `high`."""
@@ -63,7 +66,7 @@ class Questions:
                 raise ValueError(problem)
             return value
 
-        return self._answer(name, question, default, parse)
+        return self._answer(name, question, min(max(default, low), high), parse)
 
     def choice(self, name: str, question: str, choices: tuple[str, ...]) -> str:
         """Return one of the choices, the first by default."""

@@ -97,10 +97,11 @@ def service(
     """
     from config.load import load_settings
 
-    port = port or load_settings(config, sets).link.port
+    settings = load_settings(config, sets)
+    port = port or settings.link.port
     if port is None:
         raise UserError("a service needs the robot's serial port: set --port or link.port", WRONG_CALL)
-    if any(not text.isprintable() for text in (port, user or "", *sets)):
+    if any(not text.isprintable() for text in (port, user or "", config or "", *sets)):
         raise UserError("a unit file may contain printable characters only: choose other names", WRONG_CALL)
     if own and user is not None:
         raise UserError("--own is a unit for the manager of the user who installs it: leave out --user", WRONG_CALL)

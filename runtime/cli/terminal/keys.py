@@ -77,7 +77,10 @@ def keys(
             # The terminal is gone, and with it the keys that halt the robot.
             loop.remove_reader(fd)
             on_quit()
+        is_sequence = pressed.startswith(b"\x1b")  # a key of several letters, which mean nothing by themselves
         for key in pressed.decode(errors="replace"):
+            if is_sequence and KEYS.get(key) is not Request.HALT:
+                continue
             if key in KEYS:
                 on_request(KEYS[key])
             elif key == "q":

@@ -84,6 +84,16 @@ WRONG: Calls = [
     (["ros2", "--connect"], "--connect"),
     (["ros2-robot", "--out", "x.toml"], "--radius"),
     (["foxglove", "--port", "many"], "many"),
+    (["foxglove", "--port", "70000"], "65535"),
+    (["fleet", "--port", "99999"], "65535"),
+    (["run", "--port", "/dev/null", "--world", "office"], "--world"),
+    (["run", "--port", "/dev/null", "--trace", "x.csv", "--faults", "x.toml"], "--trace, --faults"),
+    (["run", "--record", "x.mcap", "--no-record"], "exclude"),
+    (["run", "--foxglove", "--set", "console.enabled=false"], "console.enabled"),
+    (["experiment", "budget", "--out", "x"], "--out"),
+    (["service", "nosuch", "--port", "/dev/ttyUSB0"], "nosuch"),
+    (["service", "--port", "/dev/ttyUSB0", "--set", "ring.nosuch=3"], "nosuch"),
+    (["init", "robot", "x.toml", "--sensors", "12.7"], "12.7"),
     (["ros2-robot", "--radius", "0.3"], "--out"),
     (["ros2-robot", "--radius", "0", "--out", "x.toml"], "--radius"),
     (["firmware"], "--board"),
@@ -98,6 +108,7 @@ def test_a_wrong_call(arguments: list[str], cause: str, capfd: pytest.CaptureFix
 
 
 FAILING: Calls = [
+    (["settings", "--out", 300 * "a"], "too long"),
     (["run", "--headless", "--json", "nowhere/x.json"], "nowhere/x.json"),
     (["run", "--headless", "--record", "nowhere/x.csv"], "nowhere/x.csv"),
     (["run", "--headless", "--record", "regular/x.csv"], "regular/x.csv"),

@@ -14,7 +14,7 @@ PROGRAM = """
 import os, sys
 from runtime.support.restart import ConsoleBefore, Restart, console_before
 before = console_before()
-print(os.getpid(), sys.argv[1:], before, os.environ.get("ECHOLOCATE_CONSOLE"))
+print(os.getpid(), sys.argv[1:], before, os.environ.get("ECHOLOCATE_RESTART"))
 if before is None:
     restart = Restart(None)
     restart.if_requested()
@@ -24,11 +24,11 @@ if before is None:
 
 
 def test_the_same_process_begins_again_with_the_console_where_it_was() -> None:
-    words = [sys.executable, "-P", "-c", PROGRAM, "run", "--arm", "--port", "x"]
+    words = [sys.executable, "-P", "-c", PROGRAM, "run", "--arm", "--arm=true", "--port", "x"]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     first, second = done.stdout.splitlines()
     assert first.split()[0] == second.split()[0]
-    assert "['run', '--arm', '--port', 'x'] None None" in first
+    assert "['run', '--arm', '--arm=true', '--port', 'x'] None None" in first
     assert "['run', '--port', 'x'] ConsoleBefore(port=8765, token='secret') None" in second
 
 

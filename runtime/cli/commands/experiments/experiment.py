@@ -49,8 +49,8 @@ class Experiment:
 
     @property
     def sets(self) -> tuple[str, ...]:
-        """Settings that override the experiment's, its method among them."""
-        return (*self.overrides, f"perception.method={self.method}")
+        """Settings that override the experiment's, its method among them; single settings have the last word."""
+        return (f"perception.method={self.method}", *self.overrides)
 
 
 ONE_SEED: Final = Experiment()
@@ -103,8 +103,11 @@ def experiment(
     if name == "budget":
         from runtime.cli.commands.experiments.budget import run_budgets
 
-        if scene is not None or world is not None:
-            raise UserError("experiment budget has a hall of its own: leave out --scene and --world", WRONG_CALL)
+        if scene is not None or world is not None or out is not None:
+            raise UserError(
+                "experiment budget has a hall of its own and records nothing: leave out --scene, --world and --out",
+                WRONG_CALL,
+            )
         return run_budgets(common, budget_ms, quanta)
     if name == "drift":
         from runtime.cli.commands.experiments.drift import run_drift

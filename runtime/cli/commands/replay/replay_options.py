@@ -32,7 +32,9 @@ class ReplayOptions:
 class RecordingOptions:
     """The part of a recording that is replayed, in seconds after its first cycle, and how."""
 
-    verify: Annotated[bool, Flag, Parameter(help="Fail unless every cycle is reproduced bit by bit.")] = False
+    verify: Annotated[
+        bool, Flag, Parameter(help="Fail unless every cycle that can be replayed is reproduced bit by bit.")
+    ] = False
     other: Annotated[
         str | None,
         Parameter(name="--with", help="Compare with the run under the settings of this run file. So does --set."),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.load import load_settings, override_settings
+from config.load import load_robot, load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.commands.replay.replay_options import RecordingOptions, ReplayOptions
@@ -79,9 +79,12 @@ def other_settings(
     other, sets, robot, models
         As of `runtime.cli.commands.replay.replay.replay`.
     """
-    if other is not None or models or robot is not None:
+    if other is not None:
         return load_settings(other, sets, robot=robot, models=models)
-    return override_settings(recording.settings, str(recording.path), sets)
+    changes: dict[str, object] = {"models": load_settings(None, models=models).models} if models else {}
+    if robot is not None:
+        changes |= dict(load_robot(robot))
+    return override_settings(recording.settings.model_copy(update=changes), str(recording.path), sets)
 
 
 def replay_again(
@@ -106,7 +109,7 @@ def replay_again(
         There is no cycle to replay, or with `verify` the replay differs.
     """
     from runtime.recording.recorder import software_versions
-    from runtime.recording.verification import refused_lines, verify_recording
+    from runtime.recording.verification import verify_recording
 
     prepare_kernels(recording.settings, console)
     now, then = software_versions(), recording.info.versions
@@ -140,11 +143,7 @@ def replay_again(
         output.print(walls_table(summary["walls"], units))
     if summary["polylines"]:
         output.print(polylines_line(summary["polylines"], units))
-    for region in recording.corrupt_regions:
-        console.print(str(region))
-    for first, last in result.missing:
-        console.print(f"cycles {first} to {last} are missing in the recording; replay continues at the next keyframe")
-    for line in refused_lines(result.refused):
+    for line in _what_is_not_compared(recording, result):
         console.print(line)
     stops = sorted(result.refinement_stops.items())
     causes = ", ".join(f"{'nothing to refine' if cause == 'nothing' else cause} {count}" for cause, count in stops)
@@ -158,6 +157,21 @@ def replay_again(
             raise UserError(f"{recording.path}: the replay differs, first in {result.first_difference}", FAILED)
         console.print(f"the replay differs, first in {result.first_difference}")
     return DONE
+
+
+def _what_is_not_compared(recording: Recording, result: ReplayResult) -> list[str]:
+    """Return a line for each part of the recording that is damaged, is missing, or was passed over."""
+    from runtime.recording.verification import refused_lines
+
+    lines = [str(region) for region in recording.corrupt_regions]
+    lines += [
+        f"cycles {first} to {last} are missing in the recording; replay continues at the next keyframe"
+        for first, last in result.missing
+    ]
+    lines += refused_lines(result.refused)
+    if result.skipped:
+        lines.append(f"{result.skipped} cycles of the recording could not be replayed and are not compared")
+    return lines
 
 
 def replay_summary(recording: Recording, result: ReplayResult) -> ReplaySummary:

@@ -81,6 +81,11 @@ def calibrate(
     if settings.ring.turning:
         which = f"{robot or file}: only some of its sensors turn with the wheels"
         raise UserError(f"{which}; calibrate each of its rings by a robot file of its own", WRONG_CALL)
+    if settings.ring.has_servo:
+        which = f"{robot or file}: a sensor on a servo looks in many directions"
+        raise UserError(
+            f"{which}; calibrate sensors that are fixed, and measure the servo's axis by hand", WRONG_CALL
+        )
     lag, what = _echo_lag(firings, settings.ring, options)
     firings = list(at_heard_poses(firings, lag))
     found = find_calibration(firings, settings.ring, drum, way, synchro=settings.body.synchro)
@@ -206,6 +211,7 @@ def robot_text(settings: Settings, found: Calibration, source: str, echo_lag_s: 
     from config.robot import RobotConfig
 
     parts = {name: getattr(settings, name) for name in RobotConfig.model_fields}
+    parts |= settings.model_extra or {}  # of an installed driver
     tables = RobotConfig(**parts).model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     ring = tables.pop("ring")
     for name in ("count", "radius_m", "sensors", "echo_lag_s"):

@@ -10,6 +10,8 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import one_line
 from runtime.cli.options import Force
 
+MADE_BY: Final = "made by `echolocate firmware`"
+"""In the first line of a robot file of its own."""
 ROBOT_NAME: Final = "robot.toml"
 
 
@@ -59,12 +61,13 @@ def firmware(*, board: Literal["pico", "esp32"], out: str, force: Force = False)
 
 
 def _refuse_changed(folder: Path, files: dict[str, str], *, force: bool) -> None:
-    """Raise if a file would lose its changes; the robot file is made anew each time, and says so."""
-    changed = [
-        name
-        for name, text in files.items()
-        if name != ROBOT_NAME and (folder / name).exists() and (folder / name).read_text("utf-8") != text
-    ]
+    """Raise if a file would lose its changes; a robot file that this command wrote is made anew each time."""
+    changed = []
+    for name, text in files.items():
+        before = (folder / name).read_text("utf-8") if (folder / name).exists() else text
+        is_own = name == ROBOT_NAME and MADE_BY in before.partition("\n")[0]
+        if before != text and not is_own:
+            changed.append(name)
     if changed and not force:
         names = ", ".join(changed)
         raise UserError(

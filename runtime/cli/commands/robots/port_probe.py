@@ -18,7 +18,7 @@ from drivers.driver import LineState
 from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
-from drivers.registry import make_driver, other_robot
+from drivers.registry import line_options, make_driver, other_robot
 from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
@@ -146,7 +146,7 @@ async def _try(port: str, config: RobotConfig, *, again: bool = False) -> _Answe
         heard.received(data)
         driver.receive(data, clock())
 
-    link = Link(config.link, opened, received, lambda _reason: driver.line_closed())
+    link = Link(config.link, opened, received, lambda _reason: driver.line_closed(), **line_options(config))
     try:
         await _open(link, AGAIN_MAX_S if again else 0.0, clock)
     except LinkError as error:

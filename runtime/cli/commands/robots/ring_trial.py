@@ -306,7 +306,9 @@ class RingTest:
         """Ask for a hand before each sensor, and write which of them does not answer in its place."""
         ring = self._config.ring
         if ring.has_servo:
-            self._write("--hand: a sensor on a servo looks everywhere; move a hand round it and watch the page\n")
+            self._write(
+                "--hand: a sensor on a servo looks everywhere; `echolocate stand` lists what a turn of it hears\n"
+            )
             return True
         watch = HandWatch([statistics.median(each) if each else math.inf for each in ranges])
         answered: list[int | None] = []

@@ -58,6 +58,6 @@ def other_runs(own_url: str, folder: Path) -> list[dict[str, Any]]:
         urls = find_consoles(folder)
     except UserError:
         return []
-    own = urlsplit(own_url).port
-    ports = sorted({port for url in urls if (port := urlsplit(url).port) is not None and port != own})
-    return [{"name": NAME, "mode": "", "url": f"http://127.0.0.1:{port}/", "version": ""} for port in ports]
+    own = urlsplit(own_url).netloc
+    places = sorted({place for url in urls if (place := urlsplit(url).netloc) != own})
+    return [{"name": NAME, "mode": "", "url": f"http://{place}/", "version": ""} for place in places]

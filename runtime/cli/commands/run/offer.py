@@ -23,10 +23,12 @@ class Offered(NamedTuple):
 
 
 def plugged_in() -> list[str]:
-    """Return the serial ports of USB devices: one of them may be a robot."""
+    """Return the serial ports of USB devices, each of which may be a robot; after a restart none: it asks nothing."""
     from serial.tools.list_ports import comports
 
-    return sorted(one_line(found.device) for found in comports() if found.vid is not None)
+    from runtime.support.restart import is_restart
+
+    return [] if is_restart() else sorted(one_line(found.device) for found in comports() if found.vid is not None)
 
 
 def ask_for_robot(ports: list[str], chosen: RobotConfig | None, console: Console, answers: TextIO) -> Offered | None:

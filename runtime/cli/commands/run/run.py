@@ -142,9 +142,9 @@ def run(
     from runtime.support.restart import Restart, restart_refusal
     from runtime.timing.run_clock import RunClock, ScaledClock
 
-    check_options(seconds, foxglove=foxglove, no_console=files.no_console)
     files, json, force = replace(files, config=config), outputs.json, outputs.force
     settings = files.read_unchecked()
+    check_options(seconds, outputs, foxglove=foxglove, no_console=not settings.console.enabled)
     console = EscapingConsole(stderr=True)
     live = not headless and console.can_draw
     if live:
@@ -158,6 +158,7 @@ def run(
         settings = files.read_unchecked()
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
+        refuse_emulated(files, emulator)
         settings = with_port(settings, port)
     own_files = {"--record": outputs.record, "--json": json}
     restart = Restart(
@@ -197,8 +198,7 @@ def run(
             _write_json(json, failed_start(str(error)))  # else the file that is locked stays empty
             raise
         recording.on_summary(summary)
-    if recording.summary_row is not None:
-        summary["recording"] = recording.summary_row
+    summary |= {} if recording.summary_row is None else {"recording": recording.summary_row}
     summary["log"] = {"lost": plan.log_status.lost, "last_error": plan.log_status.last_error}
     _write_json(json, summary)
     _print_summary(summary, outputs.units)
@@ -209,14 +209,38 @@ def run(
     return DONE
 
 
-def check_options(seconds: float | None, *, foxglove: bool, no_console: bool) -> None:
-    """Raise an error if a run can't last so long, or be served to Foxglove."""
+def check_options(seconds: float | None, outputs: OutputOptions, *, foxglove: bool, no_console: bool) -> None:
+    """Raise an error if a run can't last so long, be recorded so, or be served to Foxglove."""
     from runtime.cli.commands.foxglove import check_foxglove
 
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
+    if outputs.no_record and outputs.record is not None:
+        raise UserError("--record and --no-record exclude each other: leave one of them out", WRONG_CALL)
     if foxglove:
         check_foxglove(no_console=no_console)
+
+
+def refuse_emulated(files: SettingsFiles, emulator: EmulatorOptions) -> None:
+    """Refuse the emulated robot's options for a run that has a port: they would do nothing, or set a world's goal.
+
+    Raises
+    ------
+    UserError
+        There is one.
+    """
+    given = {
+        "--world": files.world is not None,
+        "--seed": emulator.seed != UNDISTURBED.seed,
+        "--trace": emulator.trace is not None,
+        "--faults": emulator.faults is not None,
+    }
+    if named := [option for option, is_given in given.items() if is_given]:
+        raise UserError(
+            f"{', '.join(named)}: of the emulated robot, and this run has a port; leave out the port, or give them "
+            "to `echolocate emulate`. A run file needs no option, as in `echolocate run office --port …`",
+            WRONG_CALL,
+        )
 
 
 def _given(files: Mapping[str, str | None]) -> list[tuple[str, str]]:

@@ -31,6 +31,18 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_a_run_files_world_is_named_as_seen_from_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("sub").mkdir()
+    assert run_command(["init", "world", "sub/room.toml"]) == DONE
+    assert run_command(["init", "run", "sub/r.toml", "--world", "room.toml"]) == DONE, capsys.readouterr().err
+    assert run_command(["check", "sub/r.toml"]) == DONE, capsys.readouterr().err
+
+
+def test_defaults_keep_to_what_the_other_answers_allow() -> None:
+    assert run_command(["init", "world", "small.toml", "--width", "1", "--depth", "1"]) == DONE
+    assert {drum["radius_m"] for drum in tomllib.loads(Path("small.toml").read_text())["drum"]} == {0.1}
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -43,6 +43,16 @@ async def test_keys_arm_halt_and_quit_and_leave_the_terminal_as_it_was(keyboard:
     assert termios.tcgetattr(sys.stdin.fileno()) == before
 
 
+async def test_letters_of_a_key_that_sends_several_do_not_arm(keyboard: int) -> None:
+    """Alt+a is ESC a, and Shift+Up of some terminals ends in a; the space bar halts whatever came before it."""
+    asked: list[Request] = []
+    with keys(asked.append, lambda: pytest.fail("q of a sequence")):
+        for pressed in (b"\x1ba", b"\x1b[a", b"\x1bq", b"\x1b "):
+            os.write(keyboard, pressed)
+            await asyncio.sleep(0.02)
+    assert asked == [Request.HALT]
+
+
 async def test_after_it_was_stopped_and_continued_it_takes_keys_again(
     keyboard: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from runtime.analysis.plots import animation
 from runtime.cli.app import run_command
+from runtime.cli.commands.experiments.experiment import Experiment
 from runtime.recording.reader import open_recording
 from runtime.simulation.evaluation import stop_at_leg_end
 from runtime.simulation.scenes import halls
@@ -27,6 +28,10 @@ def experiment(tmp_path: Path, *arguments: str) -> dict[str, Any]:
     got = json.loads(path.read_bytes())
     assert isinstance(got, dict)
     return got
+
+
+def test_a_single_setting_has_the_last_word_on_the_method() -> None:
+    assert Experiment(overrides=("perception.method=paper",)).sets[-1] == "perception.method=paper"
 
 
 def found(rows: list[dict[str, Any]]) -> int:

@@ -12,7 +12,8 @@ from config.errors import DONE, WRONG_CALL
 from runtime.analysis.comparison import RunOutcome
 from runtime.cli.app import run_command
 from runtime.cli.commands.replay import replay_recording
-from runtime.cli.commands.replay.replay_recording import errors_line
+from runtime.cli.commands.replay.replay_recording import errors_line, other_settings
+from runtime.recording.reader import open_recording
 from runtime.recording.replayer import GAP_MAX_S
 from tests.polylines import BEND, report_bend
 from tests.recorded import SECONDS, spoil, write_with_gap
@@ -107,6 +108,17 @@ def test_other_settings_are_compared(run: Path, capsys: pytest.CaptureFixture[st
         err = capsys.readouterr().err
         assert option[0] in err
         assert "for the recorded settings only" in err
+
+
+def test_another_model_or_robot_leaves_the_other_recorded_settings(run: Path) -> None:
+    with open_recording(run) as recording:
+        recorded = recording.settings
+        models = other_settings(recording, None, (), robot=None, models=["box"])
+        robot = other_settings(recording, None, ("perception.method=paper",), robot="p3dx", models=())
+    assert [model.name for model in models.models] == ["box"]
+    assert models == recorded.model_copy(update={"models": models.models})
+    assert (robot.ring.sensor_count, robot.perception.method) == (16, "paper")
+    assert (robot.goal, robot.mission, robot.world) == (recorded.goal, recorded.mission, recorded.world)
 
 
 def test_errors_in_one_line() -> None:

@@ -38,6 +38,13 @@ def test_the_users_pins_are_kept_and_the_robot_file_follows_them(tmp_path: Path)
     assert load_robot(str(tmp_path / "robot.toml")).ring.radius_m == 0.12
 
 
+def test_a_robot_file_of_another_robot_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "robot.toml").write_text("# my Pioneer\n")
+    assert run_command(["firmware", "--board", "esp32", "--out", str(tmp_path)]) == WRONG_CALL
+    assert "robot.toml" in capsys.readouterr().err
+    assert (tmp_path / "robot.toml").read_text() == "# my Pioneer\n"
+
+
 def test_changes_of_the_firmware_are_overwritten_with_force_only(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

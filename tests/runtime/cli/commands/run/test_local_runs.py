@@ -23,6 +23,9 @@ def test_the_own_run_and_tokens_are_left_out(tmp_path: Path) -> None:
         assert row["url"] == "http://127.0.0.1:8766/"
         assert "secret" not in str(row)
         assert other_runs("http://127.0.0.1:8766/?token=secret", tmp_path) == []
+    with announced("http://192.168.1.5:8765/?token=secret", tmp_path):
+        (row,) = other_runs(OWN, tmp_path)
+        assert row["url"] == "http://192.168.1.5:8765/", "another address, though the port is the same"
 
 
 def test_they_are_shown_when_they_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,6 +19,7 @@ from runtime.cli.commands.run import offer
 from runtime.cli.commands.run.offer import Offered, ask_for_robot, plugged_in
 from runtime.cli.commands.run.run_plan import RunPlan
 from runtime.cli.terminal.escaping_console import EscapingConsole
+from runtime.support.restart import VARIABLE
 
 FOUND = {
     "/dev/ttyUSB0": Finding("p3dx", ("robot 'Anna', 16 sensors; battery 12.6 V",)),
@@ -46,6 +47,13 @@ def ask(*ports: str, answer: str = "", chosen: RobotConfig | None = None) -> tup
     return ask_for_robot(
         list(ports), chosen, EscapingConsole(screen, soft_wrap=True), io.StringIO(answer)
     ), screen.getvalue()
+
+
+def test_nothing_is_offered_after_a_restart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The person who pressed the button on the page does not sit at the terminal."""
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: pytest.fail("it looks for robots"))
+    monkeypatch.setenv(VARIABLE, "8765 secret")
+    assert plugged_in() == []
 
 
 @pytest.mark.usefixtures("tried")
