@@ -34,11 +34,17 @@ class FiringReplayer:
         self._cycle_stats = CycleStats(late_after_s=float("inf"))
 
     def __iter__(self) -> Iterator[Firing]:
-        """Yield each firing after perception has taken it in, and refined as a cycle would."""
+        """Yield each firing after perception has taken it in, and refined as a cycle would.
+
+        The map frame comes before and takes none of a cycle's quanta, as a log has time for all that can be known: so
+        a log without drift gives the same with and without its correction.
+        """
         perception = self.perception
         for firing in self._firings:
             started_s = time.perf_counter()
             perception.observe(firing)
+            while perception.map_frame.can_refine:
+                perception.map_frame.refine()
             quanta = 0
             while perception.can_refine and within_quanta_per_cycle(quanta):
                 perception.refine()
@@ -93,8 +99,6 @@ def replay_localized(
     perception = replayer.perception
     frame, taken = perception.map_frame, []
     for firing in replayer:
-        while frame.can_refine:  # a log has time for all that can be known
-            frame.refine()
         here = perception.localized()
         if here is not None:
             on_pose(firing.robot_s, here)

@@ -99,6 +99,17 @@ def test_walls_are_recognised_from_the_path_as_known_at_the_end() -> None:
 
 
 @pytest.mark.compiled
+def test_without_drift_its_correction_changes_nothing() -> None:
+    """The map frame took quanta of a cycle, so that walls and outlines were refined in another order."""
+    settings = load_settings(None).model_copy(update={"ring": RING})
+    firings, _ = driven(0.0, 0.0)
+    corrected, plain = replay_localized(settings, firings, lambda *_: None), replay_firings(settings, firings)
+    assert plain["walls"]
+    for name in ("walls", "corners", "polylines", "objects"):
+        assert corrected[name] == plain[name]
+
+
+@pytest.mark.compiled
 def test_in_a_run_walls_move_with_their_maps_of_the_way_and_a_snapshot_goes_on_to_the_bit() -> None:
     settings = load_settings(None, ["perception.localization.correct_drift=true"]).of_log()
     settings = settings.model_copy(update={"ring": RING})
