@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from importlib.metadata import EntryPoint, entry_points
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -56,8 +57,12 @@ def load_plugin(entry: EntryPoint) -> object:
     except (ImportError, AttributeError, SyntaxError) as error:
         why = str(error)
     except Exception as error:  # noqa: BLE001 - a package's module may raise anything
-        at = traceback.extract_tb(error.__traceback__)[-1]
-        why = f"{type(error).__name__}: {error}, at {at.filename}:{at.lineno}"
+        frames = traceback.extract_tb(error.__traceback__)
+        package = entry.module.partition(".")[0]
+        at = next(
+            (one for one in reversed(frames) if package in Path(one.filename).with_suffix("").parts), frames[-1]
+        )
+        why = f"{type(error).__name__}: {' '.join(str(error).split())}, at {at.filename}:{at.lineno}"
     if why is not None:
         raise PluginError(
             f'the plug-in "{entry.name}" cannot be loaded from {entry.value} ({why}); reinstall or update the '

@@ -7,7 +7,10 @@ from drivers.messages import Twist
 
 
 def obeyed(before: Twist, asked: Twist, body: BodyConfig, lasted_s: float) -> Twist:
-    """Return the velocity of a base, `before` at first, after a command `asked` has lasted for a time."""
+    """Return the velocity of a base, `before` at first, after a command `asked` has lasted for a time.
+
+    `body` has its greatest velocities and accelerations.
+    """
     return Twist(
         _approach(before.v, asked.v, body.speed_max_m_s, body.acceleration_max_m_s2 * lasted_s),
         _approach(before.w, asked.w, body.turn_max_rad_s, body.turn_acceleration_max_rad_s2 * lasted_s),

@@ -52,7 +52,7 @@ class RepeatDetector:
         self._counts: NDArray[np.int64] = np.zeros(INTERVALS_MAX + 1, dtype=np.int64)
 
     def add(self, ranges_m: Floats) -> None:
-        """Count what a firing says; entries that are NaN did not fire."""
+        """Count what a firing says: ranges of all sensors, shape (sensors,), m; NaN did not fire."""
         was, has = self._last, ~np.isnan(ranges_m)
         known = has & ~np.isnan(was)
         same = known & (ranges_m == was)

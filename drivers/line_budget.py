@@ -40,7 +40,9 @@ def refuse_slow_line(link: LinkConfig, fixed_bytes_s: float, firing_bytes: float
     fits = [f"link.baud to {bauds[0]} or more, here and at the robot"] if bauds else []
     if (left := SHARE_MAX * held - fixed_bytes_s) > 0.0:
         fits.append(f"ring.firing.step_period_s to {-(-1e3 * firing_bytes // left) * 1e-3:g} or more")
-    remedy = f"set {', or '.join(fits)}" if fits else "no speed carries that much besides the ranges"
+    remedy = (
+        f"set {', or '.join(fits)}" if fits else "have the robot send odometry less often, or connect it by a network"
+    )
     raise FiringError(
         f"ring.firing, link.baud: echoes and odometry are {needed:.0f} bytes a second; a line of {link.baud} baud "
         f"carries {held:.0f}, of which at most {100 * SHARE_MAX:.0f} % may be used; {remedy}"

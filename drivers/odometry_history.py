@@ -35,7 +35,7 @@ class OdometryHistory:
     def at(self, robot_s: float, gap_max_s: float) -> tuple[Pose, float] | None:
         """Return the pose and ring yaw at a time, interpolated between the samples around it.
 
-        Both are None where the time is outside the samples, or the two around it are more than `gap_max_s` apart.
+        None where the time is outside the samples, or the two around it are more than `gap_max_s` apart.
         """
         newest = self.newest
         if newest is None or robot_s > newest.robot_s:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class TokenBucket:
-    """Limits a rate of events: on average, and to `burst` at once, as which it starts."""
+    """Limits a rate of events: `rate_per_s` tokens come each second, and a bucket that starts full holds `burst`."""
 
     def __init__(self, rate_per_s: float, burst: float) -> None:
         self._rate_per_s = rate_per_s

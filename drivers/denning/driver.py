@@ -15,14 +15,7 @@ from drivers.denning.line_load import refuse_overload
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout, echo_timeout_s
-from drivers.denning.wire_units import (
-    finest_range_m,
-    identity_of,
-    newest_version,
-    to_wire,
-    wire_pattern,
-    wire_scan,
-)
+from drivers.denning.wire_units import finest_range_m, identity_of, newest_version, to_wire, wire_pattern, wire_scan
 from drivers.driver import DriverError, LineState
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.messages import Flags, LinkCounts
@@ -31,7 +24,6 @@ from drivers.session import Session
 
 _UNACKNOWLEDGED_SHARE = 0.75
 """DRIVEs unacknowledged for this share of the longest silence are not received; below 1, as cycles take time."""
-
 _SETTLING_STEPS = 3
 """Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
 _SEND_ORDER = ("HALT", "HELLO", "PATTERN", "LISTEN", "SCAN", "RELEASE")

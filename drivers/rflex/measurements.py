@@ -50,7 +50,7 @@ def _difference(now: int, before: int) -> int:
 class Measurements(Stamper):
     """Gives samples of the odometry their poses, and firings theirs.
 
-    Each sensor of the ring has its id.
+    `ids` has the robot's number of each sensor of the ring.
     """
 
     # Set by a restart; see `_reset` and `break_off`.

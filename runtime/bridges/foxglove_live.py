@@ -93,7 +93,8 @@ class _Bridge(ServerListener):
                         self._keep(message["parameters"])
                 # Control may come unasked, as to the first client of a run, or late, from a page that had it before.
                 if message["type"] in {"session", "role"} and client.has_control and not self._changes:
-                    await client.request("release_control")
+                    with contextlib.suppress(UserError):  # another request has released it
+                        await client.request("release_control")
         finally:
             self._client = None
 

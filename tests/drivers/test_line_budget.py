@@ -39,7 +39,7 @@ def test_a_line_too_slow_for_its_traffic_is_refused(name: str, too_slow: int, en
             r"; set link\.baud to 9600 or more, .* robot, or ring\.firing\.step_period_s to 1\.205 or more$",
         ),
         (100.0, 1e7, r"; set ring\.firing\.step_period_s to [\d.]+ or more$"),
-        (1e7, 10.0, r"; no speed carries that much besides the ranges$"),
+        (1e7, 10.0, r"; have the robot send odometry less often, or connect it by a network$"),
     ],
 )
 def test_what_would_do_is_a_sentence(fixed_bytes_s: float, firing_bytes: float, remedy: str) -> None:

@@ -14,7 +14,7 @@ from config.load import list_shipped, load_any, load_model, load_world
 from config.robot import SENSORS_MAX
 from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
 from config.settings import Settings
-from drivers.firing_pattern import FiringError
+from drivers.firing_pattern import FiringError, time_of_flight_s
 from drivers.registry import driver_names
 from runtime.cli.commands.init_ring import Described, ask_mounting
 from runtime.cli.commands.output_files import check_outputs, writing
@@ -23,7 +23,6 @@ from runtime.support.config_lint import lint_settings
 from runtime.support.pattern_check import refuse_undrivable
 
 AT_A_TIME: Final = ((8, "octets"), (4, "quadrants"), (3, "thirds"), (2, "opposite_pairs"), (1, "single"))
-SOUND_M_S: Final = 343.0
 CORNERS: Final = 16
 """Of the outline of a round model."""
 
@@ -74,7 +73,7 @@ def _robot_draft(file: str, ask: Questions) -> RobotDraft:
     baud = ask.count("baud", "Speed of the line, bits per second", usual, 300, 4000000)
     port = "" if driver == "ros2" else ask.text("port", "Serial port (empty: named when it runs)", "")
     preset = _preset(driver, sensors) if mounting.sensors is None else "single"
-    step_s = max(0.05 if driver == "denning" else 0.041, math.ceil(1100.0 * 2.0 * high / SOUND_M_S) * 1e-3)
+    step_s = max(0.05 if driver == "denning" else 0.041, math.ceil(1100.0 * time_of_flight_s(high)) * 1e-3)
     return RobotDraft(
         name,
         driver,
@@ -166,8 +165,8 @@ def write_run(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     robot = ask.text("robot", "Robot file, or the name of a shipped one", "denning")
     world = ask.text("world", "World file for the emulator, or the name of a shipped one", "hallway")
-    near = Path(file).parent / world  # a path in a file counts from the file's folder
-    fitting, note = models_for(str(near) if near.exists() else world)
+    is_path = "/" in world or world.endswith(".toml")  # which counts from the folder of the file that names it
+    fitting, note = models_for(str(Path(file).parent / world) if is_path else world)
     models = [one.strip() for one in ask.text("models", f"Models, separated by commas{note}", fitting).split(",")]
     mission = ask.text("mission", "Mission file or name (-: none)", "-")
     text = f"""# A run of your own. `echolocate run` drives the emulated robot; with --port, the real one.

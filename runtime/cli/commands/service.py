@@ -93,7 +93,8 @@ def service(
     Raises
     ------
     UserError
-        No port is given, or a name contains characters that a unit file cannot hold.
+        The run file or a setting is wrong (the service would start for ever and fail), no port is given, or a name
+        contains characters that a unit file cannot hold.
     """
     from config.load import load_settings
 

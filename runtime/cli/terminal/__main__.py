@@ -1,7 +1,7 @@
 """Draw the live view: `python -m runtime.cli.terminal` shows on standard output what standard input asks for.
 
 Standard input takes pickles: a `Scale` first, then a `Snapshot` for each picture, and text for a line above it. In
-the background no picture is drawn: the terminal shows what the shell's next command prints.
+the background no picture is drawn, and a line erases nothing: the terminal shows what the shell's commands print.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def received() -> Iterator[Scale | Snapshot | str]:
 def main() -> None:
     """Draw until standard input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent process, too, which ends this one
-    console, picture = EscapingConsole(), None
+    console, plain, picture = EscapingConsole(), EscapingConsole(sys.stdout), None
     with Live(console=console, auto_refresh=False, screen=False) as live:
         for message in received():
             if isinstance(message, Scale):
@@ -37,7 +37,8 @@ def main() -> None:
             elif isinstance(message, Snapshot) and picture is not None and in_foreground(sys.stdout.fileno()):
                 live.update(picture.draw(message), refresh=True)
             elif isinstance(message, str):
-                live.console.print(message, markup=False, highlight=False, soft_wrap=True)
+                shown = live.console if in_foreground(sys.stdout.fileno()) else plain
+                shown.print(message, markup=False, highlight=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

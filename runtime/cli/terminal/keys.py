@@ -88,25 +88,26 @@ def keys(
             else:
                 on_other(key)
 
-    def take_keys() -> bool:
+    def take_keys(when: int) -> bool:
         if not in_foreground(fd):
             return False
         with contextlib.suppress(termios.error):
-            tty.setcbreak(fd, termios.TCSANOW)  # which keeps a key that was pressed meanwhile
+            tty.setcbreak(fd, when)
         loop.add_reader(fd, read)
         return True
 
     def wait_for_foreground() -> None:
         nonlocal look
         loop.remove_reader(fd)
-        if take_keys():
+        if look is not None:
+            look.cancel()
+        if take_keys(termios.TCSANOW):  # which keeps a key that was pressed meanwhile
             on_return()
         else:
-            if look is not None:
-                look.cancel()
             look = loop.call_later(BACKGROUND_S, wait_for_foreground)
 
-    if not take_keys():  # started in the background
+    # What was typed before anything could be seen is dropped: it was for the shell.
+    if not take_keys(termios.TCSAFLUSH):  # started in the background
         wait_for_foreground()
     loop.add_signal_handler(signal.SIGCONT, wait_for_foreground)  # the shell sets its own mode meanwhile
     try:

@@ -177,16 +177,18 @@ class Jobs:
             job.error = f"it was not done within {JOB_MAX_S / 60.0:.0f} min: use `echolocate {job.kind}`"
         except OSError as error:
             job.error = f"its process cannot be started: {error.strerror}"
+        except ValueError as error:  # a line that is too long
+            job.error = f"its process said what cannot be read: {error}"
         finally:
             if process is not None:
                 await kill_child(process)
 
     def _end(self, job: Job, task: asyncio.Task[None]) -> None:
         """Write the end of a job, however it came, to it and send it to pages; also if its work never began."""
-        if task.cancelled():
-            job.error = "cancelled"
-        elif (error := task.exception()) is not None:
-            job.error = f"its process said what cannot be read: {error}"
+        if task.cancelled() and not job.made:
+            job.error = job.error or "cancelled"
+        elif not task.cancelled() and (error := task.exception()) is not None:
+            job.error = f"{type(error).__name__}: {error}, which is a bug in this program: report it"
         job.is_over, job.what = True, "done" if job.error is None else "failed"
         self.broadcast(job.message())
 

@@ -63,8 +63,8 @@ def _read(path: str, text: str) -> TomlValue:
     """
     try:
         said = parse_toml(f"value = {text}", "the value")
-    except ConfigError as error:
-        raise CommandError(f"{path}: not a value in TOML ({error}); write it as [1, 2] or [{{name = 1}}]") from None
+    except ConfigError:
+        raise CommandError(f"{path}: not a value in TOML; write it as [1, 2] or [{{name = 1}}]") from None
     if len(said) > 1:
         raise CommandError(f"{path}: more than one value; write it as [1, 2] or [{{name = 1}}]")
     value: TomlValue = said["value"]

@@ -97,6 +97,8 @@ export class Connection extends Emitter {
   /** @type {number | undefined} */
   #unconfirmed = undefined;
   #probing = false;
+  /** @type {Promise<Answers["list_recordings"]> | null} */
+  #recordings = null; // the list that is on its way
   refused = false; // the run has refused this page's token
   showsRecording = () => false;
   isPaused = () => false;
@@ -167,6 +169,15 @@ export class Connection extends Emitter {
       this.#pending.set(id, { resolve: (data) => resolve(/** @type {Answers[K]} */ (data)), refuse, timer, waits });
       if (waits) this.#countWaiting();
     });
+  }
+
+  // Resolves to the list of recordings: one answer for all panels that ask at once, as the run takes one request of this
+  // kind from a page at a time.
+  recordings() {
+    this.#recordings ??= this.request({ type: "list_recordings" }).finally(() => {
+      this.#recordings = null;
+    });
+    return this.#recordings;
   }
 
   #countWaiting() {

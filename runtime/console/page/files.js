@@ -71,7 +71,6 @@ export class Files extends Panel {
     byId("file-rename").addEventListener("submit", (event) => this.#rename(event));
     connection.on("job", (job) => this.#follow(job));
     connection.on("closed", () => this.#forgetJobs());
-    connection.on("open", () => byId("panel-files").hidden || this.shown());
     connection.on("opening", ({ share }) => setText(byId("file-opening"), `Opening: ${Math.round(100 * share)} %`));
     connection.on("replay_problem", ({ error }) => this.#showProblem(error));
     run.on("state", () => this.#refresh());
@@ -91,7 +90,7 @@ export class Files extends Panel {
   /** @param {(error: unknown) => void} refused */
   async list(refused = () => {}) {
     try {
-      this.#rows = await this.connection.request({ type: "list_recordings" });
+      this.#rows = await this.connection.recordings();
     } catch (error) {
       refused(error);
       return;

@@ -136,7 +136,7 @@ export class Time extends Panel {
       chosen = chooser.value;
     let list;
     try {
-      list = await this.connection.request({ type: "list_recordings" });
+      list = await this.connection.recordings();
     } catch (error) {
       refused(error);
       return;

@@ -237,8 +237,8 @@ def refuse_emulated(files: SettingsFiles, emulator: EmulatorOptions) -> None:
     }
     if named := [option for option, is_given in given.items() if is_given]:
         raise UserError(
-            f"{', '.join(named)}: of the emulated robot, and this run has a port; leave out the port, or give them "
-            "to `echolocate emulate`. A run file needs no option, as in `echolocate run office --port …`",
+            f"{', '.join(named)}: of the emulated robot, and this run has a port (--port or link.port); leave out "
+            "one, or give them to `echolocate emulate`. A run file needs no option: `echolocate run office --port …`",
             WRONG_CALL,
         )
 

@@ -118,3 +118,17 @@ async def test_without_a_terminal_there_are_no_keys(monkeypatch: pytest.MonkeyPa
         with keys(asked.append, lambda: asked.append(Request.HALT)):
             await asyncio.sleep(0)
         assert asked == []
+
+
+async def test_what_was_typed_before_it_took_the_terminal_is_dropped(keyboard: int) -> None:
+    """An a that was meant for the shell arms no robot."""
+    asked: list[Request] = []
+    os.write(keyboard, b"aq")
+    await asyncio.sleep(0.05)
+    with keys(asked.append, lambda: pytest.fail("it was typed before")):
+        await asyncio.sleep(0.05)
+        os.write(keyboard, b" ")
+        async with asyncio.timeout(TIMEOUT_S):
+            while not asked:
+                await asyncio.sleep(0.01)
+    assert asked == [Request.HALT]

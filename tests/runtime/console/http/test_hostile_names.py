@@ -79,7 +79,7 @@ async def test_no_name_in_a_command_on_recordings_is_an_error_of_the_program(nam
         files.find(name), files.pin(name, pinned=True), files.delete(name), files.make("map", name),
         files.rename(name, "x"), files.rename("run.mcap", name),
     ):  # fmt: skip
-        with pytest.raises(CommandError):
+        with pytest.raises((CommandError, UserError)):
             await command
     assert (folder / "run.mcap").exists()
     assert (tmp_path / "secret.mcap").exists()
