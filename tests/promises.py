@@ -77,7 +77,7 @@ LIMITS: Sequence[str] = (
     "it heard, and presumes that they go on; a wall that begins between two looks is not known. A ring that does not "
     "turn with the wheels cannot look: a goal or mission that leads to its blind side is refused. Nor does a ring "
     "all round hear such a wall between two beams that do not touch, as 10° at 70° from ahead of a `p3at`: what "
-    "it heard of the wall before counts there, what it never heard does not.",
+    "it heard of the wall before counts there for a metre, what it never heard does not.",
     "A robot's clock that is wrong by less than a twentieth, or by little more: a note after a minute, no stop.",
     "Odometry that is wrong by less than a quarter: the map suffers, and the distances that are kept do not.",
 )

@@ -78,7 +78,10 @@ class WayProgress:
         if not gained >= 1.0:  # nor is a pose that is not finite
             return self
         steps = int(min(STEPS, gained))
-        return WayProgress(outbound, remaining_m, run_s, part, (*self.steps_run_s, *[run_s] * steps)[-STEPS:])
+        best_m = (
+            remaining_m if steps == STEPS else self.best_m - steps * due_m / STEPS
+        )  # the rest counts with the next
+        return WayProgress(outbound, best_m, run_s, part, (*self.steps_run_s, *[run_s] * steps)[-STEPS:])
 
     def stalled_s(self, run_s: float) -> float:
         """Return for how long the robot has gained less than is due, s."""

@@ -165,7 +165,7 @@ def enter_looks(
             elif may_hear and math.isfinite(r) and (one.odds <= 0.0 or r < away):  # what is nearer hides the wall
                 one.odds = HIT_NAT
                 one.offset = along + r
-            elif misses_all_of(one, off, half_angle):
+            elif (one.odds <= 0.0 or r > away + WALL_ECHO_M) and misses_all_of(one, off, half_angle):
                 one.odds = max(0.0, one.odds + MISS_NAT)
             else:
                 continue

@@ -374,7 +374,7 @@ class FreshEchoes:
     def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats, Floats]:
         """Return echoes with those of remembered walls, the directions of which nothing is known, and presumed feet.
 
-        Of a ring with narrow gaps only, the walls in these are presumed, and nothing is unknown.
+        A ring with narrow gaps only need not look into them: nothing is unknown or presumed.
 
         Parameters
         ----------
@@ -386,8 +386,8 @@ class FreshEchoes:
         if not self._walls.has_gaps:
             return points, np.zeros(0), np.zeros((0, 2))
         walls, unknown, presumed = self._walls.sides(pose, axes_rad)
-        if not self._is_blind:  # schemas do not see what a turn by a few degrees shows: it only limits the speed
-            return points, unknown[:0], walls
+        if not self._is_blind:
+            unknown, presumed = unknown[:0], presumed[:0]
         return np.concatenate([points, walls]), unknown, presumed
 
     def clear(self) -> None:

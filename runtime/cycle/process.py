@@ -232,9 +232,11 @@ class RobotProcess:
                 await self._preparation.close()
                 process_row = footprint.close()
             finally:  # whatever failed, the base is halted and the line closed
-                await self._shut_down(link_task)
-                await self._preparation.close()
-                self._scheduler.close()
+                try:
+                    await self._shut_down(link_task)
+                finally:
+                    await self._preparation.close()
+                    self._scheduler.close()
         return run_summary(
             self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row, self._mode_log
         )

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from behaviors.teleoperation import Teleoperate
 from config.robot import PASSAGE_M
@@ -67,7 +65,7 @@ def limit_unheard(
 ) -> tuple[Twist, str | None]:
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
 
-    So it is where a wall goes on that a ring with blind sides heard before it heard nothing, and everywhere for a
+    So it is where a wall goes on that the ring heard before it heard nothing, and everywhere for a
     reason that `EchoWatch` gives.
 
     Parameters
@@ -98,8 +96,7 @@ def limit_unheard(
 def _limit_ahead(pose: Pose, percept: Percept, unheard: UnheardEchoes, settings: Settings) -> tuple[float, str]:
     """Return the speed from which a robot stops before what was lost in the direction of a pose, m/s, and why."""
     body, arbiter, limit, reason = settings.body, settings.behaviors.arbiter, math.inf, UNHEARD
-    points = np.concatenate([unheard.points(), percept.field_of_view.presumed])
-    if len(points):
+    if len(points := unheard.points()):
         ahead = Percept(pose, points, percept.field_of_view)
         limit = stoppable_speed_m_s(ahead, body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
     to_wall_m = unheard.presumed_way_m(pose, body.radius_m + PASSAGE_M)

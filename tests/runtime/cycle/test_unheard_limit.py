@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from behaviors.arbiter import Drive, arbitrate
+from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.memory.commitment import Commitment
 from behaviors.move_to_goal import Goal
+from behaviors.response import Response
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from behaviors.teleoperation import Teleoperate
 from config.load import load_settings
 from config.robot import PASSAGE_M
-from drivers.messages import Twist
+from drivers.messages import Firing, Twist
 from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, BlindWalls
+from perception.obstacle_echoes.fresh_echoes import FreshEchoes
 from perception.obstacle_echoes.unheard_echoes import ALONE, UnheardEchoes
-from perception.percept import Percept, Pose
+from perception.percept import FieldOfView, Percept, Pose
+from perception.sensor_mounts import mounts_array
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.echo_watch import NOTHING_YET
 from runtime.cycle.unheard_limit import CREEP_M_S, LOST, UNHEARD, limit_unheard, lost_ahead
 from tests.behaviors.views import EVERYWHERE
+from tests.perception.obstacle_echoes.test_blind_walls import heard
 
 SETTINGS = load_settings("room", robot="denning")
 RIM_M = SETTINGS.body.radius_m
@@ -73,13 +79,6 @@ def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() ->
     assert limited(Twist(0.0, 1.0), (0.5, 0.0), silent=True) == (Twist(0.0, 1.0), None)
 
 
-def test_before_what_is_presumed_in_a_narrow_gap_it_creeps() -> None:
-    view = replace(EVERYWHERE, presumed=np.array([[1.0 + RIM_M + 0.1, 0.0]]))
-    percept, unheard = Percept(Pose(1.0, 0.0, 0.0), np.empty((0, 2)), view), UnheardEchoes(np.zeros((3, 3)))
-    assert limit_unheard(Twist(0.3, 0.0), percept, unheard, SETTINGS, None)[0].v == pytest.approx(CREEP_M_S)
-    assert limit_unheard(Twist(-0.3, 0.0), percept, unheard, SETTINGS, None)[0].v == -0.3
-
-
 @pytest.mark.parametrize("v", [0.3, -0.3])
 def test_it_slows_down_before_a_wall_that_a_silent_ring_presumes(v: float) -> None:
     """Until it creeps, also where the wall's line is less exact than that and was crossed."""
@@ -115,3 +114,34 @@ def test_before_what_a_silent_ring_heard_a_robot_stops_unless_it_is_about_to_loo
     assert stops(Goal(3.0, 0.0), has_unknown=False)
     assert stops(Goal(3.0, 0.0), has_unknown=True) == settings.body.synchro
     assert stops(Teleoperate(0.1, 0.0), has_unknown=True), "an operator's robot does not look by itself"
+
+
+@pytest.mark.parametrize("offset_m", [0.5, 0.7])
+def test_a_robot_beside_a_mirror_between_two_beams_drives_on_and_does_not_touch_it(offset_m: float) -> None:
+    """A wall that only slowed a `p3at` down had it stand, or creep into the wall."""
+    settings = load_settings("hallway", robot="p3at")
+    ring, body, behaviors = settings.ring, settings.body, settings.behaviors
+    mounts, half, course = mounts_array(ring.mounts), math.radians(ring.beam_half_angle_deg), math.radians(70.0)
+    echoes, commitment = FreshEchoes(mounts, half, ring.turning, ring.window_m), Commitment()
+    pose = moved = Pose(0.0, 0.0, 0.0)
+    for k in range(311):
+        pose = Pose(0.0, 0.0, math.radians(30.0 + 4.0 * k)) if k <= 10 else pose.compose(moved)
+        run_s = 0.05 * k
+        echoes.update(Firing(run_s, pose, pose.theta, heard(pose, 0.0, offset_m, mounts)))
+        bearings, ages, sensor_ages, points = echoes.looks(run_s, 1.5)
+        points, *sides = echoes.with_blind_sides(points, pose, axes := pose.theta + mounts[:, 2])
+        view = FieldOfView(bearings, ages, axes, sensor_ages, half, ring.window_m, 1.5, *sides)
+        percept = Percept(pose, points, view)
+        schemas = (
+            Response("way", math.cos(course), math.sin(course)),
+            avoid_static_obstacle(percept, body.radius_m, behaviors.avoid_static_obstacle),
+        )
+        names = [one.schema for one in schemas]
+        decision = arbitrate(schemas, percept, body, behaviors.arbiter, names, commitment=commitment, run_s=run_s)
+        assert isinstance(decision, Drive)
+        twist, commitment = commitment.commit(
+            limit_unheard(decision.twist, percept, echoes.unheard, settings, None)[0], run_s
+        )
+        moved = Pose(0.05 * twist.v, 0.0, 0.05 * twist.w)
+        assert pose.x < offset_m - body.radius_m, "it touches the wall"
+    assert math.hypot(pose.x, pose.y) > 1.0

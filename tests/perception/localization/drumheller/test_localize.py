@@ -81,12 +81,13 @@ def test_readings_without_an_echo_are_lost() -> None:
 @REFLECTIONS
 def test_a_room_of_one_wall_has_an_area(reflection: Reflection) -> None:
     ranges_m = np.full(len(RING.mounts), 1.0)
-    localize(
+    places = localize(
         [Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges_m)],
         make_room(np.array([[0.0, 0.0, 5.0, 0.0]])),
         RING,
         reflection,
     )
+    assert all(0.0 <= place.probability <= 1.0 for place in places)
 
 
 def test_no_firing_is_refused() -> None:
