@@ -13,8 +13,8 @@ from config.errors import FAILED, UserError
 SOURCE: Final = Path(__file__).with_name("figures.toml")
 PAGE: Final = Path(__file__).parents[1] / "docs" / "figures.md"
 ROW: Final = re.compile(r"^  (\[.*\]),$", re.MULTILINE)
-COLUMNS: Final = ("what", "asked", "measured", "command")
-"""Of a group that names no others. A row that a bench measures goes on with its result file and how it is shown."""
+COLUMNS: Final = 4
+"""Figure, asked, measured, command; a row that a bench measures goes on with its result file and how it is shown."""
 MEASURED: Final = 2
 RESULT: Final = 4
 SHOWN: Final = 5
@@ -37,10 +37,9 @@ def page(source: str) -> str:
     """
     parts = [HEADER]
     for group in tomllib.loads(source)["group"]:
-        columns = group.get("columns", COLUMNS)
-        rows = ["| " + " | ".join(row) + " |" for row in (columns, *(row[: len(columns)] for row in group["rows"]))]
-        rows.insert(1, "|---" * len(columns) + "|")
-        parts.append("\n".join([f"## {group['title']}", "", group["text"], "", *rows, ""]))
+        rows = ["| " + " | ".join(row[:COLUMNS]) + " |" for row in group["rows"]]
+        head = ["| what | asked | measured | command |", "|---|---|---|---|"]
+        parts.append("\n".join([f"## {group['title']}", "", group["text"], "", *head, *rows, ""]))
     return "\n".join(parts)
 
 

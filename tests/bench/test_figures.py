@@ -31,9 +31,9 @@ def test_each_line_of_the_source_is_a_figure() -> None:
     rows = [row for group in tomllib.loads(source)["group"] for row in group["rows"]]
     assert [json.loads(line) for line in ROW.findall(source)] == rows
     for row in rows:
-        assert len(row) in {len(COLUMNS), SHOWN + 1}, row
+        assert len(row) in {COLUMNS, SHOWN + 1}, row
         assert all(row), row
-        if len(row) > RESULT:
+        if len(row) > COLUMNS:
             assert row[RESULT].endswith(".json")
             assert [field for _, field, _, _ in Formatter().parse(row[SHOWN]) if field]
 
@@ -60,7 +60,7 @@ def test_what_the_page_shows_is_what_the_benches_write() -> None:
     }
     rows = [json.loads(line) for line in ROW.findall(SOURCE.read_text("utf-8"))]
     for row in rows:
-        if len(row) > RESULT:
+        if len(row) > COLUMNS:
             names = set(re.findall(r"\[([^\]]+)\]", row[SHOWN]))
             bare = {name.removesuffix(timing.CONTROL) for name in names}
             assert bare & known[row[RESULT]], row
