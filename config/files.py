@@ -94,6 +94,11 @@ def _shipped_files(kind: Kind) -> dict[str, Traversable]:
     return {entry.name.removesuffix(".toml"): entry for entry in found if entry.name.endswith(".toml")}
 
 
+def names_a_path(name: str | os.PathLike[str]) -> bool:
+    """Return whether a name is the path of a file, not that of a shipped one."""
+    return not isinstance(name, str) or name.endswith(".toml") or "/" in name or os.sep in name
+
+
 def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | None = None) -> Document:
     """Return the parsed TOML file of a shipped name or a path.
 
@@ -112,8 +117,7 @@ def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | N
     ConfigError
         The file does not exist, cannot be read, or is not TOML.
     """
-    is_path = not isinstance(name, str) or name.endswith(".toml") or "/" in name or os.sep in name
-    if not is_path:
+    if not names_a_path(name):
         return _read_shipped(kind, str(name), named_by)
     path = (Path() if named_by is None else named_by.base) / name
     shown = one_line(str(path))

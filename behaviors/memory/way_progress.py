@@ -78,9 +78,8 @@ class WayProgress:
         if not gained >= 1.0:  # nor is a pose that is not finite
             return self
         steps = int(min(STEPS, gained))
-        best_m = (
-            remaining_m if steps == STEPS else self.best_m - steps * due_m / STEPS
-        )  # the rest counts with the next
+        # What is more than whole steps counts with the next one.
+        best_m = remaining_m if steps == STEPS else self.best_m - steps * due_m / STEPS
         return WayProgress(outbound, best_m, run_s, part, (*self.steps_run_s, *[run_s] * steps)[-STEPS:])
 
     def stalled_s(self, run_s: float) -> float:

@@ -192,7 +192,7 @@ class BlindWalls:
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
         has_gaps=CONSTANT,
-        _kept_m=CONSTANT,
+        is_blind=CONSTANT,
         _radius_m=CONSTANT,
         _walls=BlindWall.BOUNDS,
     )
@@ -203,7 +203,8 @@ class BlindWalls:
         self.records = records(BlindWall, self._walls)
         self.has_gaps = widest_gap(mounts) > 2.0 * half_angle + ROUNDING_RAD
         """Whether there are directions that no beam holds."""
-        self._kept_m = math.inf if has_blind_sides(mounts, half_angle) else NARROW_M
+        self.is_blind = has_blind_sides(mounts, half_angle)
+        """Whether the robot must look into them; of narrower ones nothing is unknown or presumed."""
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
         self.has_looked_round = False
         """Whether the robot was to look everywhere in this silence."""
@@ -247,20 +248,21 @@ class BlindWalls:
         directions = WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         off = np.abs(np.remainder(directions[:, None] - axes_rad + math.pi, math.tau) - math.pi)
         nearest = off.min(axis=1)
-        is_ahead = np.cos(directions - pose.theta) > 0.0
         c, s = np.cos(directions), np.sin(directions)
         away = self._walls["offset"] - pose.x * c - pose.y * s
         is_known = self._walls["is_known"] == 1
         is_wall = is_known & (self._walls["odds"] > 0.0) & (away > self._radius_m)
         looked_m = np.hypot(self._walls["x"] - pose.x, self._walls["y"] - pose.y)
-        stands = is_wall & (nearest > self._half_angle) & (looked_m <= self._kept_m)
+        stands = is_wall & (nearest > self._half_angle) & (looked_m <= (math.inf if self.is_blind else NARROW_M))
+        feet = np.stack([pose.x + away * c, pose.y + away * s], axis=1)
+        if not self.is_blind:
+            return feet[stands], np.zeros(0), np.zeros((0, 2))
         # What lies partly in a beam is seen as the robot turns a little; beams that touch miss nothing between them.
         is_unseen = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
         # At the edge of what is unseen it is looked at whole: else the robot would turn to and fro between two edges.
         is_edge = (nearest > self._half_angle - 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
         is_edge &= np.roll(is_unseen, 1) | np.roll(is_unseen, -1)
-        is_unknown = is_ahead & (is_unseen | is_edge)
-        feet = np.stack([pose.x + away * c, pose.y + away * s], axis=1)
+        is_unknown = (np.cos(directions - pose.theta) > 0.0) & (is_unseen | is_edge)
         is_presumed = stands & (looked_m > SILENT_WAY_M)
         return feet[stands], directions[is_unknown], feet[is_presumed]
 

@@ -25,7 +25,7 @@ from drivers.messages import Firing, Pose
 from perception.angles import wrapped
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
-from perception.obstacle_echoes.blind_walls import BlindWalls, has_blind_sides
+from perception.obstacle_echoes.blind_walls import BlindWalls
 from perception.obstacle_echoes.unheard_echoes import (
     ALONE,
     SILENT,
@@ -276,7 +276,6 @@ class FreshEchoes:
         _bearings=PLACE,
         _times=PLACE._replace(infinite=True),
         _heard_reach_m=CONSTANT,
-        _is_blind=CONSTANT,
         _radius_m=CONSTANT,
     )
 
@@ -297,7 +296,6 @@ class FreshEchoes:
         self.unheard = UnheardEchoes(mounts)
         """What the ring has lost."""
         self._walls = BlindWalls(mounts, half_angle, turning)
-        self._is_blind = has_blind_sides(mounts, half_angle)
 
     def set_reach(self, reach_m: float) -> None:
         """Expect echoes up to another range, m."""
@@ -332,9 +330,9 @@ class FreshEchoes:
         )
         if self.unheard.falls_silent(SILENT) or self.unheard.falls_silent(UNCHANGED):
             since = float(firing.robot_s) - STEADY_S if self.unheard.falls_silent(SILENT) else math.inf
-            heard = self._in_beams(pose, mounts) if self._is_blind else self._heard
+            heard = self._in_beams(pose, mounts) if self._walls.is_blind else self._heard
             keep_sudden(self._points, self._times, heard, self._steady, since, pose[0], pose[1], self.unheard.records)
-        if self._is_blind:
+        if self._walls.is_blind:
             if self.unheard.is_ring_silent:
                 self._walls.look_again(pose[0], pose[1], self.unheard.has_been_silent)
             elif not self.unheard.has_been_silent:
@@ -374,8 +372,6 @@ class FreshEchoes:
     def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats, Floats]:
         """Return echoes with those of remembered walls, the directions of which nothing is known, and presumed feet.
 
-        A ring with narrow gaps only need not look into them: nothing is unknown or presumed.
-
         Parameters
         ----------
         points : (h, 2) float
@@ -386,8 +382,6 @@ class FreshEchoes:
         if not self._walls.has_gaps:
             return points, np.zeros(0), np.zeros((0, 2))
         walls, unknown, presumed = self._walls.sides(pose, axes_rad)
-        if not self._is_blind:
-            unknown, presumed = unknown[:0], presumed[:0]
         return np.concatenate([points, walls]), unknown, presumed
 
     def clear(self) -> None:

@@ -40,7 +40,7 @@ SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
 GRID_DROPOUT: Final = 0.2
-WILD_MIN: Final = GRID_DROPOUT
+WILD_MIN: Final = 0.2
 """Shares of expected echoes that are not heard, and at least of readings that are anything: it is coarse."""
 OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""

@@ -10,6 +10,7 @@ from typing import Final
 import orjson
 
 from config.errors import DONE, WRONG_CALL, UserError
+from config.files import names_a_path
 from config.load import list_shipped, load_any, load_model, load_world
 from config.robot import SENSORS_MAX
 from config.robot_file import ARCOS_BAUD, ARRAY, BAUD, RobotDraft, robot_text
@@ -165,8 +166,8 @@ def write_run(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     robot = ask.text("robot", "Robot file, or the name of a shipped one", "denning")
     world = ask.text("world", "World file for the emulator, or the name of a shipped one", "hallway")
-    is_path = "/" in world or world.endswith(".toml")  # which counts from the folder of the file that names it
-    fitting, note = models_for(str(Path(file).parent / world) if is_path else world)
+    # A path counts from the folder of the file that names it.
+    fitting, note = models_for(str(Path(file).parent / world) if names_a_path(world) else world)
     models = [one.strip() for one in ask.text("models", f"Models, separated by commas{note}", fitting).split(",")]
     mission = ask.text("mission", "Mission file or name (-: none)", "-")
     text = f"""# A run of your own. `echolocate run` drives the emulated robot; with --port, the real one.

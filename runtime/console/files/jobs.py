@@ -185,9 +185,10 @@ class Jobs:
 
     def _end(self, job: Job, task: asyncio.Task[None]) -> None:
         """Write the end of a job, however it came, to it and send it to pages; also if its work never began."""
-        if task.cancelled() and not job.made:
-            job.error = job.error or "cancelled"
-        elif not task.cancelled() and (error := task.exception()) is not None:
+        if task.cancelled():
+            if not job.made:  # else it was done in that moment
+                job.error = job.error or "cancelled"
+        elif (error := task.exception()) is not None:
             job.error = f"{type(error).__name__}: {error}, which is a bug in this program: report it"
         job.is_over, job.what = True, "done" if job.error is None else "failed"
         self.broadcast(job.message())
