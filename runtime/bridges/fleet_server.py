@@ -13,7 +13,7 @@ from typing import Any, Final
 import orjson
 from aiohttp import web
 
-from config.errors import UserError
+from config.errors import WRONG_CALL, UserError
 from runtime.bridges.fleet import Fleet
 from runtime.console.http.auth import Auth, new_token, url_host
 from runtime.console.http.server import local_address
@@ -37,7 +37,7 @@ async def serve_fleet(fleet: Fleet, host: str, port: int, urls: Sequence[str], t
     """
     for url in urls:
         if (problem := fleet.add(url)) is not None:
-            raise UserError(f"{url.partition('?')[0]}: {problem}")
+            raise UserError(f"{url.partition('?')[0]}: {problem}", WRONG_CALL)
     handler = _Handler(fleet)
     server = web.Server(handler.answer, access_log=None)
     try:

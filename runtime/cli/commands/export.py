@@ -76,7 +76,7 @@ def export(
         files = [target / f"{name}.{to}" for name in NAMES]
     elif to == "rosbag2":
         if target.exists():
-            raise UserError(f"--out {out}: exists; a bag needs a new folder", FAILED)
+            raise UserError(f"--out {out}: exists; a bag needs a new folder: name another one", WRONG_CALL)
         files = []
     timeline = read_timeline(source, console, partial(check_outputs, {"--out": files}, source.inputs, force=force))
     with progress(console, "writing"), writing("--out", target):

@@ -39,7 +39,9 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     while True:
         try:
-            return _write(file, robot_text(_robot_draft(file, ask)), force=force)
+            draft = _robot_draft(file, ask)
+            ask.refuse_unused("--layout, --sensors or --driver")
+            return _write(file, robot_text(draft), force=force)
         except UserError as error:
             if not ask.asks:
                 raise
@@ -104,6 +106,7 @@ def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:
     drums = ask.count("drums", "Number of drums", 4, 0, 12)
     radius = ask.number("drum_radius", "Radius of a drum, m", 0.3048, 0.02, 0.1 * min(width, depth)) if drums else 0.0
     surfaces = ask.choice("surfaces", "How surfaces reflect", ("cone", "specular", "rays"))
+    ask.refuse_unused("--drums")
     x, y = 0.5 * width, 0.5 * depth
     corners = [(-x, -y), (x, -y), (x, y), (-x, y)]
     walls = "".join(
@@ -135,13 +138,6 @@ def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     name = ask.text("name", "What such an object is called", Path(file).stem)
     is_round = ask.choice("shape", "Its shape", ("round", "box")) == "round"
-    for option in ("length", "width") if is_round else ("radius",):
-        if given.get(option) is not None:
-            raise UserError(
-                f"--{option}: a {'round object' if is_round else 'box'} has none; leave it out, or give --shape "
-                f"{'box' if is_round else 'round'}",
-                WRONG_CALL,
-            )
     if is_round:
         radius = ask.number("radius", "Its radius, m", 0.3048, 0.02, 10.0)
         turns = [2.0 * math.pi * k / CORNERS for k in range(CORNERS)]
@@ -151,6 +147,7 @@ def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
         x = 0.5 * ask.number("length", "Its length, m", 0.6, 0.02, 20.0)
         y = 0.5 * ask.number("width", "Its width, m", 0.4, 0.02, 20.0)
         points, arc = [(x, -y), (x, y), (-x, y), (-x, -y)], ""
+    ask.refuse_unused("--shape")
     rows = "".join(f"  [{x:.6g}, {y:.6g}],\n" for x, y in points)
     text = f"""# An object of your own; the origin is the point whose position is reported.
 name = {_json(name)}
@@ -201,7 +198,8 @@ def models_for(world: str) -> tuple[str, str]:
 
 def _questions(file: str, given: Given, *, yes: bool, force: bool) -> Questions:
     check_outputs({"FILE": file}, force=force)  # before any question
-    return Questions(given, asks=not yes and sys.stdin.isatty())
+    answers = {name: value for name, value in given.items() if name not in {"file", "yes", "force"}}
+    return Questions(answers, asks=not yes and sys.stdin.isatty())
 
 
 def _preset(driver: str, sensors: int) -> str:

@@ -30,6 +30,7 @@ class Questions:
         """Whether a person is asked."""
         self._answers: dict[str, Any] = {}
         self._asked = 0
+        self._used: set[str] = set()
 
     def text(self, name: str, question: str, default: str) -> str:
         """Return a text."""
@@ -80,7 +81,30 @@ class Questions:
 
     def is_given(self, name: str) -> bool:
         """Return whether an option is given that is a flag."""
+        self._used.add(name)
         return bool(self._given.get(name))
+
+    def refuse_unused(self, depends_on: str) -> None:
+        """Refuse options that no question has asked for: what is described has no such thing.
+
+        Parameters
+        ----------
+        depends_on : str
+            The options on which it depends what is asked for.
+
+        Raises
+        ------
+        UserError
+            There is such an option.
+        """
+        given = (name for name, value in self._given.items() if value is not None and value is not False)
+        unused = [f"--{name.replace('_', '-')}" for name in given if name not in self._used]
+        if unused:
+            raise UserError(
+                f"{', '.join(unused)}: no meaning beside the other options and answers; leave out, or choose another "
+                f"{depends_on}",
+                WRONG_CALL,
+            )
 
     def again(self, refusal: str) -> None:
         """Say why the answers together are refused, and keep them as the defaults of the next round.
@@ -96,6 +120,7 @@ class Questions:
         sys.stderr.write(f"{one_line(refusal)}\nOnce more: Enter keeps an answer.\n")
 
     def _answer(self, name: str, question: str, default: T, parse: Callable[[str], T]) -> T:
+        self._used.add(name)
         given = self._given.get(name)
         if given is not None:
             try:

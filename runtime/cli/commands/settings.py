@@ -28,10 +28,14 @@ def settings(text: str = "", /, *, out: str | None = None, force: Force = False)
     Raises
     ------
     UserError
-        No key contains the text, or the file cannot be written.
+        No key contains the text, the page was asked for a part of the keys, or the file cannot be written.
     """
     from config.reference import FILES, markdown, settings_of
 
+    if out is not None and text:
+        raise UserError(
+            f"--out writes the page of all keys, not of those with {text!r}: leave out either of them", WRONG_CALL
+        )
     if out is not None:
         check_outputs({"--out": out}, (), force=force)
         try:

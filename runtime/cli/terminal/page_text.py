@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 BEHIND_M: Final = 0.1
 """An object in front of a wall may touch it."""
+SPREAD_DIGITS: Final = 4
+"""A standard error has at most so many decimals: a tenth of a millimetre."""
 
 
 def number(metres: float, units: Units, digits: int = 2) -> str:
@@ -32,12 +34,14 @@ def length(metres: float, units: Units, digits: int = 2) -> str:
 
 
 def spread(sigma_m: float, units: Units) -> str:
-    """Return a standard error with its unit; in millimetres where it is less than one."""
+    """Return a standard error in the unit of the page, with two digits that count, or the last of `SPREAD_DIGITS`."""
     if not sigma_m < 10_000.0:
         return "± more than 10 km"
-    if sigma_m >= 0.001:
-        return f"± {length(sigma_m, units, 3)}"
-    return f"± {number(1e3 * sigma_m, 'm', 1)} mm" if sigma_m >= 0.00005 else "± less than 0.1 mm"
+    shown = sigma_m if units == "m" else sigma_m / FOOT_M
+    digits = sum(shown < 9.95 * 0.1**k for k in range(SPREAD_DIGITS))
+    least = 0.1**SPREAD_DIGITS
+    said = length(sigma_m, units, digits) if shown >= 0.5 * least else f"less than {least:.{SPREAD_DIGITS}f} {units}"
+    return f"± {said}"
 
 
 def place(x: float, y: float, units: Units) -> str:

@@ -377,10 +377,11 @@ def _malformed(error: ValidationError, text: str | bytes) -> MalformedMessage:
     if path[:1] == ["value"]:
         return MalformedMessage("must be a number, a text, true, false or null", _id_of(text), "value")
     field = ".".join(path)[:FIELD_MAX] or None
-    what, should, rest = first["msg"][:TEXT_MAX].partition(" should ")  # as in "Input should be a valid number"
-    what = field if field is not None and should else what[:1].lower() + what[1:]
-    problem = f"{what}{should}{rest}"
-    return MalformedMessage(problem, _id_of(text), field)
+    problem = first["msg"][:TEXT_MAX].removeprefix("Value error, ")
+    what, should, rest = problem.partition(" should ")
+    if field is not None and should and " " not in what:  # as in "Input should be a valid number"
+        problem = f"{field}{should}{rest}"
+    return MalformedMessage(problem[:1].lower() + problem[1:], _id_of(text), field)
 
 
 def _id_of(text: str | bytes) -> int | None:

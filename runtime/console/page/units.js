@@ -4,6 +4,8 @@
 import { Emitter } from "./emitter.js";
 
 const METRES_A_FOOT = 0.3048;
+// A standard error has at most so many decimals: a tenth of a millimetre.
+const SPREAD_DIGITS = 4;
 
 /** @extends {Emitter<{ changed: [] }>} */
 export class Units extends Emitter {
@@ -33,12 +35,16 @@ export class Units extends Emitter {
     return `${this.number(metres, digits)} ${this.name}`;
   }
 
-  // A standard error, in millimetres where it is less than one.
+  // A standard error in the unit of the page, with two digits that count, or the last of SPREAD_DIGITS.
   /** @param {number} sigma */
   spread(sigma) {
     if (!(sigma < 10000)) return "± more than 10 km";
-    if (sigma >= 0.001) return `± ${this.length(sigma, 3)}`;
-    return sigma >= 0.00005 ? `± ${(1000 * sigma).toFixed(1)} mm` : "± less than 0.1 mm";
+    const shown = sigma / this.metres;
+    const least = 10 ** -SPREAD_DIGITS;
+    if (!(shown >= 0.5 * least)) return `± less than ${least.toFixed(SPREAD_DIGITS)} ${this.name}`;
+    let digits = 0;
+    while (digits < SPREAD_DIGITS && shown < 9.95 * 0.1 ** digits) digits += 1;
+    return `± ${this.length(sigma, digits)}`;
   }
 
   /** @param {number} x @param {number} y */

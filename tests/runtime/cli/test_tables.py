@@ -58,7 +58,9 @@ def test_result_line() -> None:
     assert outcome_line(nothing, "m").startswith("0 of 1 drums found, 1 false; 79 times real time; ")
 
 
-@pytest.mark.parametrize(("sigma_m", "said"), [(0.02, "± 0.020 m"), (0.0004, "± 0.4 mm"), (0.0, "less than 0.1 mm")])
+@pytest.mark.parametrize(
+    ("sigma_m", "said"), [(0.02, "± 0.020 m"), (0.001, "± 0.0010 m"), (0.0, "less than 0.0001 m")]
+)
 def test_no_place_is_known_to_nothing(sigma_m: float, said: str) -> None:
     covariance = [[sigma_m**2, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1e-6]]
     here: PoseRow = {

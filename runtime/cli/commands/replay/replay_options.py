@@ -97,7 +97,9 @@ class LocalizeOptions:
     ] = None
     path: Annotated[
         str | None,
-        Parameter(help="The same as known at the end: later matches of the map correct earlier poses, too."),
+        Parameter(
+            help="The same as known at the end: later matches of the map correct earlier poses, too. Not with --map."
+        ),
     ] = None
     map_file: Annotated[
         str | None,
@@ -114,8 +116,14 @@ class LocalizeOptions:
         Raises
         ------
         UserError
-            One has a meaning with --localize only.
+            One has a meaning with --localize only, or without --map only.
         """
+        if self.localize and self.path is not None and self.map_file is not None:
+            raise UserError(
+                "--path gives the poses that later matches correct; in a known room (--map) none is corrected later: "
+                "give --trajectory",
+                WRONG_CALL,
+            )
         if self.localize:
             return
         for option, file in (("--trajectory", self.trajectory), ("--path", self.path)):

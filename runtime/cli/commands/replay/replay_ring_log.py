@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -42,13 +43,15 @@ def replay_log(
     console = EscapingConsole(stderr=True)
     check_outputs({"--json": both.json, "--trajectory": trajectory, "--path": path}, (log,), force=force)
     corrects_drift = localized.localize and map_file is None
-    prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.conventions.reading import open_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
 
+    warnings: list[str] = []
+    heard = open_ring_log(Path(log), settings, options, warnings.append)
+    first = next(heard)  # reports an invalid file before kernels are compiled
+    prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     rows: list[str] = []
     path_rows: list[str] = []
-    warnings: list[str] = []
 
     def on_pose(t: float, here: LocalizedPose) -> None:
         rows.append(trajectory_row(t, here))
@@ -57,7 +60,7 @@ def replay_log(
         path_rows.append(trajectory_row(t, here))
 
     with progress(console, "replaying") as step:
-        firings = _each(open_ring_log(Path(log), settings, options, warnings.append), step)
+        firings = _each(itertools.chain((first,), heard), step)
         if map_file is not None:
             summary = replay_in_known_room(settings, firings, on_pose)
         elif corrects_drift:
@@ -66,7 +69,7 @@ def replay_log(
             summary = replay_firings(settings, firings)
     for warning in warnings:
         console.print(f"echolocate: {warning}")
-    for option, file, poses in (("--trajectory", trajectory, rows), ("--path", path, path_rows or rows)):
+    for option, file, poses in (("--trajectory", trajectory, rows), ("--path", path, path_rows)):
         if file is not None:
             with writing(option, file):
                 Path(file).write_text("\n".join([TRAJECTORY_HEADER, *poses, ""]), "utf-8")

@@ -79,5 +79,5 @@ def test_outputs_that_are_refused(hall_run: Path, tmp_path: Path, capsys: pytest
     assert "is a file" in error_line(capsys)
     assert export_to("csv", hall_run, tmp_path / "file" / "deeper") == FAILED
     assert "cannot be written" in error_line(capsys)
-    assert export_to("rosbag2", hall_run, tmp_path) == FAILED
+    assert export_to("rosbag2", hall_run, tmp_path) == WRONG_CALL
     assert "exists; a bag needs a new folder" in error_line(capsys)

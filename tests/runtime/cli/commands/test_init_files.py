@@ -98,8 +98,11 @@ def test_a_robot_that_is_described_with_the_defaults_can_be_driven(driver: str) 
         (("robot", "--layout", "behind"), "--layout"),
         (("run", "--robot", "absent.toml"), "absent.toml"),
         (("model", "--name", "a b"), "nothing was written"),
-        (("model", "--length", "2", "--width", "1"), "--length: a round object has none"),
-        (("model", "--shape", "box", "--radius", "1"), "--radius: a box has none"),
+        (("model", "--length", "2", "--width", "1"), "--length, --width: no meaning beside"),
+        (("model", "--shape", "box", "--radius", "1"), "another --shape"),
+        (("robot", "--layout", "all-round", "--spacing", "30"), "--spacing: no meaning beside"),
+        (("robot", "--driver", "ros2", "--port", "/dev/ttyUSB0"), "--port: no meaning beside"),
+        (("world", "--drums", "0", "--drum-radius", "0.3"), "choose another --drums"),
     ],
 )
 def test_a_wrong_option_writes_nothing(words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,6 +25,12 @@ def test_a_text_that_no_setting_contains(capsys: pytest.CaptureFixture[str]) -> 
     assert "no setting contains 'warp_drive'" in capsys.readouterr().err
 
 
+def test_the_page_of_all_keys_is_not_written_for_a_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["settings", "clearance_m", "--out", str(tmp_path / "page.md")]) == WRONG_CALL
+    assert "leave out either" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_page_is_written_and_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "settings.md"
     assert run_command(["settings", "--out", str(page)]) == DONE

@@ -23,6 +23,7 @@ from runtime.cli.commands.replay.replay_options import LocalizeOptions, Recordin
         (LocalizeOptions(trajectory="poses.csv"), "--trajectory"),
         (LocalizeOptions(path="poses.csv"), "--path"),
         (LocalizeOptions(map_file="hallway"), "--map"),
+        (LocalizeOptions(localize=True, path="poses.csv", map_file="hallway"), "--path"),
     ],
 )
 def test_what_cannot_be_is_refused(part: RecordingOptions | LocalizeOptions, option: str) -> None:
@@ -33,4 +34,5 @@ def test_what_cannot_be_is_refused(part: RecordingOptions | LocalizeOptions, opt
 
 def test_what_can_be_is_accepted() -> None:
     RecordingOptions(since_s=1.0, until_s=2.0, speed=0.5).validate()
-    LocalizeOptions(localize=True, path="poses.csv", map_file="hallway").validate()
+    LocalizeOptions(localize=True, trajectory="poses.csv", map_file="hallway").validate()
+    LocalizeOptions(localize=True, path="poses.csv").validate()

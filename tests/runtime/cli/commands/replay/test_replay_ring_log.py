@@ -68,6 +68,18 @@ def test_a_replay_in_a_known_room_starts_without_a_pose() -> None:
 
 
 @pytest.mark.usefixtures("bad_files")
+@pytest.mark.parametrize("file", ["nowhere.csv", "broken.toml"])
+def test_a_log_that_cannot_be_read_is_refused_before_kernels_are_compiled(
+    file: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compiled(*_: object) -> None:
+        raise AssertionError("kernels were prepared first")
+
+    monkeypatch.setattr("runtime.cli.commands.replay.replay_ring_log.prepare_kernels", compiled)
+    assert run_command(["replay", file]) == WRONG_CALL
+
+
+@pytest.mark.usefixtures("bad_files")
 def test_a_replay_of_one_firing(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["replay", "good.csv", "--model", "drum", "--model", "box", "--json", "x.json"]) == DONE
     captured = capsys.readouterr()
