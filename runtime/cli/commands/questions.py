@@ -85,7 +85,7 @@ class Questions:
         return bool(self._given.get(name))
 
     def refuse_unused(self, depends_on: str) -> None:
-        """Refuse options that no question has asked for: what is described has no such thing.
+        """Refuse options that no question has asked for: they have no effect.
 
         Parameters
         ----------
