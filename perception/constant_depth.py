@@ -20,9 +20,11 @@ from perception.echo_kind import EchoKind
 DEPTH_NOISE_M: Final = 3e-3
 """Standard deviation of a range of ultrasonic modules; with the resolution it says which ranges are the same."""
 SAME_DEPTH_SIGMAS: Final = 3.0
+"""Ranges of one surface differ by at most so many standard deviations, beside the resolution."""
 WIDTH_MIN: Final = 0.5
 """A region is at least so many beams wide; narrower ones are strays and ends of others."""
 _UNDECIDED: Final = (0.25, 0.25, 0.25, 0.25)
+"""Probabilities of the four kinds of surfaces: a depth alone shows none."""
 
 
 def constant_depths(ring: RingConfig, firings: Sequence[Firing]) -> list[tuple[EchoKind, int]]:

@@ -33,6 +33,7 @@ SURE_KIND: Final = 0.95
 _STARTS: Final = np.radians(np.arange(-24.0, 24.1, 6.0))
 """Bearings beside that of the nearest reading from which a fit may start."""
 _STEPS_MAX: Final = 12
+"""Steps of a fit, at most."""
 _DELTA: Final = 1e-5
 """Step of the derivatives, m and rad."""
 

@@ -21,8 +21,9 @@ from perception.kernel import Floats
 from perception.sensor_mounts import mounts_array, mounts_at
 
 STAND_STILL_M: Final = 2e-3
+"""A robot whose odometry shifts by less than this …"""
 STILL_RAD: Final = math.radians(0.2)
-"""A robot whose odometry differs by less stands."""
+"""… and turns by less than this stands."""
 HALF_PATH_GATE_M: Final = 0.06
 """Half paths that differ by more from those over the surface's nearest point are of another surface. A wall's differ
 by 4 cm at the shortest range and the longest baseline."""

@@ -40,7 +40,7 @@ TURN_STARTS_APART: Final = 0.015
 """They are at least so far apart."""
 SURFACE_SHARE: Final = 0.05
 """Share of the readings that one surface more must explain: a wrong turn scale shows ghosts of a wall."""
-ECHOES_MAX: Final = 3000
+FIT_ECHOES_MAX: Final = 3000
 """Echoes that are enough for that."""
 LOOK_MAX_RAD: Final = math.radians(45.0)
 """Greatest bearing of a surface off a sensor's axis at which its reading is a look at that surface."""
@@ -49,10 +49,11 @@ SURE_RAD: Final = math.radians(5.0)
 LISTENED_SHARE: Final = 0.9
 """Share of the longest range up to which silence means that nothing is there."""
 SCALE_SHOWN: Final = 0.1
+"""A drive shows a scale if it leaves at most this share of its standard deviation before the drive. Suitable drives
+leave 0.004 to 0.03. Drives without a whole turn left 0.2 to 1 of that of the turn's scale, and found it by up to 12 %
+wrong."""
 PLACE_SHOWN: Final = 0.25
-"""A drive shows a scale, or a place, if it leaves at most this share of its standard deviation before the drive.
-Suitable drives leave 0.004 to 0.03 of the scales' and 0.04 to 0.24 of the places', the latter if they are quick.
-Drives without a whole turn left 0.2 to 1 of that of the turn's scale, and found it by up to 12 % wrong."""
+"""The same of a place. Suitable drives leave 0.04 to 0.24, the latter if they are quick."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +158,7 @@ def _first_guess(
     wins.
     """
     bends = np.zeros(drive.knots)
-    few = echoes.chosen(slice(None, None, 1 + len(echoes.sensor) // ECHOES_MAX))
+    few = echoes.chosen(slice(None, None, 1 + len(echoes.sensor) // FIT_ECHOES_MAX))
 
     def beams(turn: float, readings: Echoes) -> Beams:
         path = drive.path(Scales(turn=turn), bends, synchro=synchro)

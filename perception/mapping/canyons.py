@@ -25,9 +25,11 @@ from perception.records import Structured
 SURFACE_REACH_M: Final = 9.0
 """Surfaces farther from the place than this do not count."""
 WIDTH_MAX_M: Final = 5.0
+"""Widest mouth of a canyon: what is wider is a room."""
 DEPTH_MIN_M: Final = 0.8
+"""Least depth of a canyon: what is shallower is a niche; …"""
 DEPTH_SHARE: Final = 0.3
-"""Widest mouth; least depth, also as a share of the width. What is wider or shallower is a room or a niche."""
+"""… also as a share of its width."""
 BACK_SHARE: Final = 0.7
 """At half its depth a canyon is still as wide as this share of its mouth: the corner of a room is none."""
 CLIPPED: Final = 1.25
@@ -35,7 +37,9 @@ CLIPPED: Final = 1.25
 BRIDGE_WEIGHT: Final = 0.85
 """Weight of a gap that is too narrow, in place of the surface's probability."""
 SURFACE_PROBABILITY_MIN: Final = 0.5
+"""Surfaces less probable than this do not bound a canyon."""
 SURFACES_MIN: Final = 3
+"""With fewer surfaces in reach no canyon is looked for."""
 SURFACES_MAX: Final = 16
 """Walls, and other objects, that count, the nearest to the robot: time must not grow with the room."""
 BRIDGES_MAX: Final = 24
@@ -53,12 +57,15 @@ NUDGE_RAD: Final = 1e-4
 CLEAR_M: Final = 0.3
 """A place nearer to a surface than this is none of the robot's."""
 SAME_MOUTH_M: Final = 1.0
+"""Mouths nearer to each other than this, …"""
 SAME_MOUTH_RAD: Final = math.radians(40.0)
-"""Mouths nearer than this, of canyons that point alike, are of the same canyon."""
+"""… of canyons whose directions differ by less than this, are of the same canyon."""
 CANYONS_MAX: Final = 16
+"""Canyons that are remembered at most."""
 DOUBT: Final = 0.6
+"""The probability of a canyon that is not found again falls by this factor, …"""
 FORGOTTEN: Final = 0.3
-"""The probability of a canyon that is not found again falls by this factor, down to where it is forgotten."""
+"""… down to where it is forgotten."""
 EVERY_FIRINGS: Final = 10
 """One place is examined after so many firings: half a second."""
 

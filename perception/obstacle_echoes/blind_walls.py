@@ -29,6 +29,7 @@ TURN_DIRECTIONS: Final = 36
 """Directions of a turn that are distinguished: a wall's normal is known to about the width of a beam."""
 WIDTH_RAD: Final = math.tau / TURN_DIRECTIONS
 ROUNDING_RAD: Final = 1e-9
+"""Angles that differ by less are the same but for rounding."""
 WALL_ECHO_M: Final = 0.15
 """A range this near to that of the wall is its echo: half a direction's width on a way of 1.7 m."""
 HIT_NAT: Final = math.log(0.92 / 0.03)

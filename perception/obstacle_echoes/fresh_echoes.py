@@ -47,8 +47,9 @@ neighbour fails, and the oldest, as the beams of those between lie within its ow
 EQUAL_RAD: Final = 1e-6
 """A look replaces an older one whose direction differs by less, which rounding does."""
 STEADY_M: Final = 0.3
+"""An echo is steady if another look, by the same sensor or another one, put one this near …"""
 STEADY_S: Final = 1.5
-"""An echo is steady if another look, by the same sensor or another one, put one this near no longer ago than this."""
+"""… no longer ago than this."""
 
 TOLERANCE_M: Final = 0.005
 """A reading within this of the ring's reach is a silence: so some rings report it, m."""

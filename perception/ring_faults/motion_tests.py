@@ -64,14 +64,16 @@ MOVES: Final = 1.2
 MISSED: Final = 0.9
 """Share of looks that miss a known echo, if readings do not depend on what is there."""
 HONEST_MISS_MIN: Final = 0.04
+"""An honest ring misses no less of its known echoes than this share: all surfaces end, …"""
 HONEST_MISS_MAX: Final = 0.6
-"""An honest ring misses no less and no more of its known echoes than this: all surfaces end, and some are heard."""
+"""… and no more than this one: some are heard."""
 STEADY, TURNING, AGAIN, DOUBTED = range(LOOK_KINDS)
 """Kinds of looks: at an echo that agreed with the one before, from the same direction or another; the second look at
 one that was missed; and at one that agreed with nothing. After that, silence is as honest: it was a stray."""
 HONEST_MISSES: Final = (2.0, 8.0, 8.0, 10.0)
+"""Misses of each kind that stand for what is known of rings before a run, …"""
 HONEST_LOOKS: Final = 20.0
-"""Misses of each kind, and looks, that stand for what is known of rings before a run."""
+"""… in so many looks."""
 MEMORY_LOOKS: Final = 500.0
 """Looks over which the rates of misses are learned; older ones count half."""
 

@@ -25,7 +25,7 @@ LATER: Final = 8
 """A look is judged after so many later ones: others have looked there before it, or since."""
 LOOK_FIELDS: Final = 4
 """The ring's direction (rad) and place x, y (m), and the reading, m; below zero without an echo."""
-PLACE_M: Final = 0.15
+LOOKS_PLACE_M: Final = 0.15
 """Looks from places that are no farther apart are compared, m."""
 AXIS_SHARE: Final = 0.35
 """Looks whose axes differ by no more than this share of half the beam are compared."""
@@ -33,12 +33,12 @@ TURN_AXIS_SHARE: Final = 0.5
 """The same for a whole turn, whose looks are half a beam apart or little more: so almost every one has another
 sensor's beside it. With .35 those of three sensors 25° apart fell between each other's: 16 of 24 exchanges were
 named, and 24 with this."""
-SAME_M: Final = 0.08
+HEARD_ALIKE_M: Final = 0.08
 """Echoes from such places that differ by no more are of the same object, m."""
 AGREES: Final = 0.45
-SILENT: Final = 0.3
-"""Of an honest sensor's looks where another heard an echo, the share that hears the same, and the share that hears
-none; where the other heard none, …"""
+"""Of an honest sensor's looks where another heard an echo, the share that hears the same, …"""
+SILENT_WHERE_HEARD: Final = 0.3
+"""… and the share that hears none; where the other heard none, …"""
 SILENT_TOO: Final = 0.75
 """… the share that does not either. In eight drives of a minute, of four robots, they were .83 and .11 of 1,459 looks
 and .91 of 1,958; they are taken for less, as looks in succession are alike."""
@@ -73,9 +73,9 @@ def density(r: float, heard: float, reach: float) -> float:
     if heard < 0.0:
         return SILENT_TOO if r < 0.0 else (1.0 - SILENT_TOO) / reach
     if r < 0.0:
-        return SILENT
-    same = SAME_M + NOISE_SHARE * heard
-    return (1.0 - AGREES - SILENT) / reach + (AGREES / (2.0 * same) if abs(r - heard) <= same else 0.0)
+        return SILENT_WHERE_HEARD
+    same = HEARD_ALIKE_M + NOISE_SHARE * heard
+    return (1.0 - AGREES - SILENT_WHERE_HEARD) / reach + (AGREES / (2.0 * same) if abs(r - heard) <= same else 0.0)
 
 
 @kernel
@@ -141,7 +141,7 @@ def find_near(i: int, judged: Floats, mounts: Floats, wiring: Wiring, near: Floa
             hears = hears or (k != i and wiring.looks[k, m, 3] >= 0.0)
         for m in range(seen):
             look = wiring.looks[k, m]
-            if hears and math.hypot(look[1] - judged[1], look[2] - judged[2]) <= PLACE_M:
+            if hears and math.hypot(look[1] - judged[1], look[2] - judged[2]) <= LOOKS_PLACE_M:
                 near[count, 0], near[count, 1] = k, (look[0] + mounts[k, 2]) % math.tau
                 near[count, 2] = beyond(look[3], offset)
                 count += 1

@@ -9,14 +9,8 @@ from typing import Final, Literal, TypeAlias
 
 SensorFault: TypeAlias = Literal["failing", "stuck", "too_near", "silent", "crosstalk"]
 
-STUCK: Final = 1
-SILENT: Final = 2
-FAILING: Final = 4
-CROSSTALK: Final = 8
-TOO_NEAR: Final = 16
+STUCK, SILENT, FAILING, CROSSTALK, TOO_NEAR = (1 << bit for bit in range(5))
 """Bits of a sensor's fault word. A sensor may have several faults; the most severe one is reported."""
-
-
 ODDS_DIGITS_MAX: Final = 12
 """Greater odds say no more: the looks are not independent."""
 

@@ -17,23 +17,30 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
-from perception.bayes.memory.parameters import (
-    EXPLAINED_ERROR_SIGMAS,
-    OTHER_RADIUS_ERROR_M,
-    OTHER_RADIUS_SAME_M,
-    OTHER_RADIUS_SIGMA_M,
-    OUTLINE_BEARINGS_MIN,
-    OUTLINE_READINGS_MIN,
-    OUTLINE_SCALE_RAD,
-    OUTLINE_SIGMA_M,
-    OUTLINE_SURFACE_M,
-)
+from perception.bayes.memory.parameters import EXPLAINED_ERROR_SIGMAS
 from perception.bayes.memory.scratch import BearingErrors
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTrack, StateRecord
 from perception.kernel import kernel
 
-BIN_RAD: Final = 2.0 * math.pi / BEARING_BINS
+OUTLINE_SIGMA_M: Final = 0.05
+"""Deviation of an unknown outline from a model's, that of boxes of its size, …"""
+OUTLINE_SCALE_RAD: Final = 0.45
+"""… and the bearing over which it changes."""
+OUTLINE_SURFACE_M: Final = 0.005
+"""Deviation of a model's own surface, and of the poses from which it was heard."""
+OUTLINE_READINGS_MIN: Final = 3
+"""Least readings of a bearing that counts, so that their median ignores an outlier."""
+OUTLINE_BEARINGS_MIN: Final = 4
+"""Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
+OTHER_RADIUS_SIGMA_M: Final = 0.2
+"""Deviation of other round bodies' radii from a model's; …"""
+OTHER_RADIUS_SAME_M: Final = 0.015
+"""… below this a radius is the model's own."""
+OTHER_RADIUS_ERROR_M: Final = 0.04
+"""Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
+BIN_RAD: Final = math.tau / BEARING_BINS
+"""Bearing between two bins of a track's reservoir."""
 DETERMINANT_MIN: Final = 1e-9
 """Least determinant of the centre's information, as a share of its diagonal: with less there is one bearing only."""
 

@@ -78,11 +78,13 @@ RESIDUAL_EVERY: Final = 3
 HISTORY_SPACING_M: Final = 0.2 * FOOT_M
 """Least distance between consecutive readings of a sensor's history."""
 STILL_M: Final = 0.05 * FOOT_M
+"""A reading is redundant if its range is the same and its sensor moved less than this …"""
 STILL_COS: Final = 0.9998
-"""A reading is redundant if its sensor moved and turned less than this (1°) and its range is the same."""
+"""… and turned less than by this cosine (1°)."""
 ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
+"""Distance outside a beam at which a centre may lie for the reading to be associated …"""
 KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
-"""Distance outside a beam at which a centre may lie for the reading to be associated and kept."""
+"""… and for it to be kept in the object's reservoir."""
 HYPOTHESIS_MARGIN_M: Final = 0.02 * FOOT_M
 """A hypothesis' centre this far outside a beam may still move into it during the fit."""
 
@@ -97,11 +99,13 @@ PAIR_GAP_S: Final = 30.0
 BASELINE_MIN_M: Final = 0.5 * FOOT_M
 """Shortest baseline of one sensor; the longer ones are twice and four times this."""
 BASELINES: Final = 3
+"""Number of baselines that are tried, …"""
 BASELINE_MAX_M: Final = 2.6 * FOOT_M
-"""Number of baselines, and the longest that is tried."""
+"""… and the longest."""
 NEIGHBOUR_BASELINE_MIN_M: Final = 0.3 * FOOT_M
+"""Shortest baseline of neighbours that did not fire together …"""
 NEIGHBOUR_BASELINE_MAX_M: Final = 1.0 * FOOT_M
-"""Range of baselines of neighbours that did not fire together."""
+"""… and the longest."""
 MAPPED_LENGTH_MIN_M: Final = 0.2 * FOOT_M
 """Least length of a mapped segment: a shorter one's direction is too uncertain for the relaxation."""
 HYPOTHESIS_SIGMA_MAX_M: Final = 0.7 * FOOT_M
@@ -112,16 +116,20 @@ HYPOTHESES_PER_FIRING: Final = 2
 # --- Lines and walls -----------------------------------------------------------------------------------------------
 
 PARALLEL_COS: Final = 0.98
+"""Two lines or segments are parallel from this cosine (11°) on: lines that are may be one, segments make the same
+request."""
 LINE_SAME_M: Final = 0.4 * FOOT_M
+"""A parallel new line is a known one if it lies this near to it, across …"""
 LINE_JOIN_M: Final = 1.0 * FOOT_M
-"""A new line this parallel, this near and this little beyond the end of a known one is that one. A segment this
-parallel to another one makes the same request."""
+"""… and no farther beyond its ends than this."""
 LINE_ANGLE_VARIANCE_RAD2: Final = 0.02
+"""Variance of a new line's direction, rad²: a standard deviation of 8° …"""
 LINE_DISTANCE_VARIANCE_M2: Final = 0.01 * FOOT_M * FOOT_M
-"""Variance of a new line."""
+"""… and of its distance."""
 LINE_ANGLE_DRIFT_RAD2: Final = 1e-8
+"""Variance that each echo adds to the direction, rad², so that the line keeps following, …"""
 LINE_DISTANCE_DRIFT_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Variance that each echo adds, so that the line keeps following."""
+"""… and to the distance."""
 LINE_FRONT_COS: Final = 0.8
 """Least cosine between a sensor's axis and a line's normal at which it observes the line."""
 LINE_SLACK_M: Final = 0.02 * FOOT_M
@@ -131,8 +139,9 @@ LINE_GROW_M: Final = 0.5 * FOOT_M
 LINE_SILENCE_WITHIN_M: Final = 0.2 * FOOT_M
 """Silence counts this far inside its ends."""
 LINE_EDGE_SLACK_M: Final = 0.05 * FOOT_M
+"""More slack of an explained range for echoes from where a beam's edge meets the line, …"""
 LINE_EDGE_GROW_M: Final = 0.7 * FOOT_M
-"""The same slack and growth for echoes from where a beam's edge meets the line, …"""
+"""… their growth, …"""
 LINE_EDGE_COS: Final = 0.1
 """… which count up to this cosine beyond the beam's edge."""
 LINE_START_LOG_ODDS: Final = 3.0
@@ -142,15 +151,17 @@ LINE_LOG_ODDS_MAX: Final = 6.0
 LINE_ECHO_LOG_ODDS: Final = 0.5
 """… and what an echo adds to them."""
 LINE_LENGTH_MIN_M: Final = 0.8 * FOOT_M
+"""Least length of a line that is kept, …"""
 NEW_LINE_HITS_MIN: Final = 8.0
-"""Least length and hits of a line that is kept."""
+"""… and its least hits."""
 REPLACING_LINE_HITS_MIN: Final = 6.0
 """Least hits of a line that is kept when it replaces a circle."""
 ASSOCIATING_LINE_M: Final = 4.0 * FOOT_M
 """Least length of a line that takes readings from other explanations."""
 WALL_ECHOES_MIN: Final = 10.0
+"""A line that explained more echoes than this …"""
 WALL_LENGTH_MIN_M: Final = 2.0 * FOOT_M
-"""A line that explained more echoes than this and is longer than this is called a wall."""
+"""… and is longer than this is called a wall."""
 
 # --- New circle tracks ---------------------------------------------------------------------------------------------
 
@@ -172,8 +183,9 @@ OTHER_FIT_STEPS: Final = 4
 """Steps of the relaxation and of the fits of a circle that has no track yet, and of an explanation other than a
 track's own."""
 CIRCLE_RESTS_RAD: Final = 0.005
+"""A circle's relaxation ends with turns below this …"""
 CIRCLE_RESTS_M: Final = CIRCLE_RESTS_RAD * FOOT_M
-"""The relaxation ends with increments below both: a turn, and the shift that it makes a foot away."""
+"""… and shifts below what such a turn makes a foot away."""
 FIT_SOFTNESS: Final = 9.0
 """Robustness of the fits: squared residual, in σ², at which the weight has fallen to a quarter."""
 FIRST_FIT_SOFTNESS: Final = 16.0
@@ -189,8 +201,9 @@ FIT_TURN_MAX_RAD: Final = 0.2
 FIT_TURN_MIN_RAD: Final = 1e-5
 """A turn below this ends a line's fit."""
 CIRCLE_READINGS_MIN: Final = 5
+"""Least readings of a new track …"""
 CIRCLE_EVIDENCE_MIN_NAT: Final = 10.0
-"""Least readings and evidence of a new track."""
+"""… and its least evidence."""
 SWITCH_LEAD_NAT: Final = 6.0
 """Lead required of another explanation: of a circle or a line over a circle, of an unknown object, at which a track
 ends, and of an established polygon over a circle in its place."""
@@ -218,8 +231,9 @@ FAR_NAT_PER_M: Final = 2.0 / FOOT_M
 TRACK_READINGS_MIN: Final = 3
 """A track with fewer readings ends."""
 TRACK_FIT_STEPS: Final = 2
+"""Steps of the fit that precedes the posterior, …"""
 TENTATIVE_FIT_STEPS: Final = 3
-"""Steps of the fit that precedes the posterior; of a tentative track."""
+"""… and of that of a tentative track."""
 FIT_LEAD_SIGMAS2: Final = 6.0
 """A robust fit this many σ² off replaces the pose, …"""
 FITTED_REFINEMENTS: Final = 2
@@ -235,22 +249,27 @@ SWITCH_UNSEEN: Final = 4
 CORNER_MISS_SHARE: Final = 0.5
 """Share of the evidence of missed echoes against the circle that also counts against a corner."""
 CIRCLE_WALL_BEYOND_M: Final = 8.0 * FOOT_M
+"""A centre lies in a wall up to this far beyond its ends, …"""
 CIRCLE_WALL_BEHIND: Final = -0.85
+"""… from this many radii on (negative: behind the wall's face) …"""
 WALL_FRONT_RADII: Final = 0.7
-"""A centre lies in a wall this far beyond its ends, and this many radii behind its face or before it; …"""
+"""… to this many radii before the face; …"""
 IN_WALL_NAT: Final = -8.0
 """… log prior of such a body."""
 ESTABLISH_PROBABILITY: Final = 0.7
+"""Least probability at which a track is established, …"""
 ESTABLISH_HITS: Final = 8.0
+"""… least hits, …"""
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
-"""Least probability and hits, and greatest standard deviation, at which a track is established."""
+"""… and greatest standard deviation."""
 DOUBT_PROBABILITY: Final = 0.2
 """Probability below which an established track is tentative again."""
 APART_RADII: Final = 0.8
 """Two centres nearer than this many of the larger radius are one object: bodies do not overlap."""
 LATERAL_PLACES: Final = 3
+"""Positions on either side that are tried, …"""
 LATERAL_STEP_M: Final = 0.12 * FOOT_M
-"""Positions on either side, and their spacing: together half a foot, a beam's edge at two and a half feet."""
+"""… and their spacing: together half a foot, a beam's edge at two and a half feet."""
 ELSEWHERE_LEAD_NAT: Final = 1.0
 """Evidence by which another position, or another maximum of a polygon, must lead; a smaller lead is chance."""
 
@@ -284,8 +303,9 @@ GRID_NEGLIGIBLE_NAT: Final = 30.0
 GRID_OFF_CENTRE: Final = 1.2
 """The grid is laid again when the mean is this many pitches off its middle."""
 GRID_NARROW: Final = 0.3
+"""Variance, in squared pitches, below which the grid is too coarse: 1 is as expected; …"""
 GRID_WIDE: Final = 2.2
-"""Variances, in squared pitches, beyond which the grid is too coarse or too small: 1 is as expected."""
+"""… and beyond which it is too small."""
 GRID_THINNEST: Final = 0.06
 """Least variance, in squared pitches, that the next grid assumes: a narrower peak falls between the cells."""
 GRID_CORRELATION_MAX: Final = 0.95
@@ -298,8 +318,9 @@ GRID_SIGMA_MIN_GATES: Final = 2e-4
 # --- Which tracks are reported, and how ----------------------------------------------------------------------------
 
 NAMED_OVER_UNKNOWN: Final = 1.25
+"""Least ratio of the evidence to that of an unknown object for a name, …"""
 NAMED_OVER_UNKNOWN_ALONE: Final = 1.1
-"""Least ratio of the evidence to that of an unknown object; less where every alternative is far behind."""
+"""… less where every alternative is far behind."""
 ALONE_LEAD_NAT: Final = -20.0
 """Lead of the best alternative at which it counts as far behind."""
 NO_WALL_LEAD_NAT: Final = -4.0
@@ -323,20 +344,6 @@ UNKNOWN_HITS_MIN: Final = 5.0
 
 # --- Whether a model is right where it is the best explanation ----------------------------------------------------
 
-OUTLINE_SIGMA_M: Final = 0.05
-OUTLINE_SCALE_RAD: Final = 0.45
-"""Deviation of an unknown outline from a model's, and over which bearing it changes: those of boxes of its size."""
-OUTLINE_SURFACE_M: Final = 0.005
-"""Deviation of a model's own surface, and of the poses from which it was heard."""
-OUTLINE_READINGS_MIN: Final = 3
-"""Least readings of a bearing that counts, so that their median ignores an outlier."""
-OUTLINE_BEARINGS_MIN: Final = 4
-"""Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
-OTHER_RADIUS_SIGMA_M: Final = 0.2
-OTHER_RADIUS_SAME_M: Final = 0.015
-"""Deviation of other round bodies' radii from a model's; below the second a radius is the model's own."""
-OTHER_RADIUS_ERROR_M: Final = 0.04
-"""Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
 ROOM_MARGIN_M: Final = 0.2
 """Mapped walls explain as far as this beyond the ends of their spans, and a thin object there is the wall's edge."""
 MODEL_CHECK_EVERY: Final = 4
@@ -360,8 +367,9 @@ REJECTED_MAX_NAT: Final = 40.0
 PLACED_ROUNDS: Final = 3
 """Relaxations of a placed model onto the map, a few steps each."""
 PLACED_STRAY_MAX_M: Final = 0.5
+"""Greatest shift of a placed model by a relaxation, …"""
 PLACED_STRAY_MAX_RAD: Final = 0.8
-"""Greatest displacement of a relaxation: one that moves farther has found something else."""
+"""… and its greatest turn: one that moves farther has found something else."""
 
 # --- Which track is refined next -----------------------------------------------------------------------------------
 
@@ -372,8 +380,9 @@ IDLE_FIRINGS: Final = 12
 FINAL_REFINEMENTS: Final = 6
 """Number of final refinements of an idle track."""
 UNSURE_FACTOR: Final = 4.0
+"""Factor on the evidence of an object that is refined earlier, …"""
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""Factor on the evidence of an object whose position is less certain than this, and perhaps wrong, …"""
+"""… as its position is less certain than this, and perhaps wrong, …"""
 CERTAIN_PROBABILITY: Final = 0.95
 """… or of an object less probable than this."""
 RESERVOIR_OFFSET: Final = 8.0

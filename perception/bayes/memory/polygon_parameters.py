@@ -41,18 +41,21 @@ SEARCH_FINEST_M: Final = 0.005 * FOOT_M
 SEARCH_EVERY: Final = 4
 """A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
 WIDE_SEARCHES_FIRST: Final = 4
+"""The search is wide in this many first refinements, …"""
 WIDE_SEARCH_EVERY: Final = 8
-"""The search is wide in this many first refinements, then once in this many, …"""
+"""… then once in this many, …"""
 FITTING_SHARE: Final = 0.85
 """… and every other time while less than this share of the near readings is explained."""
 COARSE_READINGS: Final = 96
 """Greatest number of readings that a wide search scores."""
 WIDE_STEP_M: Final = 0.3 * FOOT_M
+"""First step of a wide search …"""
 WIDE_ROUNDS: Final = 14
-"""First step and rounds of a wide search."""
+"""… and its rounds."""
 NARROW_STEP_M: Final = 0.05 * FOOT_M
+"""First step of a search near by …"""
 NARROW_ROUNDS: Final = 6
-"""First step and rounds of a search near by."""
+"""… and its rounds."""
 RESTART_SHIFTS: Final = (0.5, -0.5, 1.0, -1.0)
 """Shifts of the restarts along and across, in inner radii, …"""
 RESTART_TURNS: Final = (-0.5, 0.5)
@@ -60,8 +63,9 @@ RESTART_TURNS: Final = (-0.5, 0.5)
 RESTART_ROLLS_MAX: Final = 12
 """… and greatest number of other sides that they are rolled onto."""
 RESTART_STEP_M: Final = 0.1 * FOOT_M
+"""First step of the restarts' searches …"""
 RESTART_ROUNDS: Final = 5
-"""First step and rounds of their searches."""
+"""… and their rounds."""
 
 # --- New polygon tracks --------------------------------------------------------------------------------------------
 
@@ -70,9 +74,11 @@ REQUEST_SAME_M: Final = 0.25 * FOOT_M
 POLYGON_AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may attract the body; circles up to there stand in its place."""
 POLYGON_RELAXATION_STEPS: Final = 3
+"""Greatest number of a polygon's relaxation steps; …"""
 POLYGON_RESTS_RAD: Final = 0.01
+"""… they end with turns below this …"""
 POLYGON_RESTS_M: Final = POLYGON_RESTS_RAD * FOOT_M
-"""Greatest number of relaxation steps; the relaxation ends with increments below both limits."""
+"""… and shifts below what such a turn makes a foot away."""
 SIDE_SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
 TRIAL_READINGS_MIN: Final = 8
@@ -80,20 +86,23 @@ TRIAL_READINGS_MIN: Final = 8
 TRIAL_READINGS_MAX: Final = 80
 """Greatest number of readings that a trial scores: it is only compared with the other trials."""
 TRIAL_STEP_M: Final = 0.2 * FOOT_M
+"""First step of a trial's search …"""
 TRIAL_ROUNDS: Final = 8
-"""First step and rounds of a trial's search."""
+"""… and its rounds."""
 TRIAL_EVIDENCE_MIN_NAT: Final = 15.0
 """Least evidence of the best trial."""
 FINE_STEP_M: Final = 0.1 * FOOT_M
+"""First step of the search from the best trial …"""
 FINE_ROUNDS: Final = 10
-"""First step and rounds of the search from the best trial."""
+"""… and its rounds."""
 POLYGON_HITS_MIN: Final = 6.0
 """Least hits of a new track."""
 WHOLE_SHARE: Final = 0.9
 """A track that explains this share of its near readings keeps its place …"""
 APART_WHOLE: Final = 1.5
+"""… and no like track starts this near, in inner radii; …"""
 POLYGONS_APART: Final = 0.5
-"""… and no like track starts this near, in inner radii; for any other track the distance is less."""
+"""… for any other track this near."""
 CHALLENGE_UNSEEN: Final = 8
 """Unseen readings that a challenger counts as."""
 
@@ -110,33 +119,40 @@ LATTICE_LEAD_MAX_NAT: Final = 40.0
 LATTICE_OFF_CENTRE: Final = 0.7
 """The lattice is laid again when the mean is this many pitches off its middle, …"""
 LATTICE_NARROW: Final = 0.7
+"""… or a variance, as a share of the expected one, is below this …"""
 LATTICE_WIDE: Final = 1.4
-"""… or a variance lies outside these shares of the expected one."""
+"""… or above this."""
 LATTICE_THINNEST: Final = 0.1
 """Least variance that the next lattice assumes, in the same shares: a narrower peak falls between the points."""
 LATTICE_CORRELATION_SHARE: Final = 0.95
 """Share of a correlation that the next lattice assumes, so that it never collapses."""
 LATTICE_PITCHES_M: Final = (1e-4, 0.15)
+"""Least and greatest pitch of the place …"""
 LATTICE_PITCHES_RAD: Final = (1e-4, 0.4)
-"""Least and greatest pitch."""
+"""… and of the turn."""
 FIRST_SIGMA_M: Final = 0.01
+"""Standard deviation of the place assumed for a track's first lattice …"""
 FIRST_SIGMA_RAD: Final = 0.02
-"""Standard deviations assumed for a track's first lattice."""
+"""… and of the turn."""
 
 # --- The life of a polygon track -----------------------------------------------------------------------------------
 
 POLYGON_EVIDENCE_MIN_NAT: Final = 5.0
+"""A track ends with less evidence than this, …"""
 POLYGON_UNKNOWN_LEAD_NAT: Final = 8.0
-"""A track ends with evidence below the first, or below an unknown object's by the second."""
+"""… or if an unknown object's leads it by this."""
 POLYGON_ESTABLISH_HITS: Final = 10.0
+"""Least hits to establish a track …"""
 POLYGON_ESTABLISH_SURE: Final = 3.0
-"""Least hits and sure hits to establish a track: corners alone fit anywhere. …"""
+"""… and least sure hits: corners alone fit anywhere. …"""
 MANY_HITS: Final = 20.0
+"""… From so many hits on it may be reported, …"""
 MANY_HITS_SURE: Final = 2.0
-"""… From so many hits on, so many sure ones suffice, and it may be reported."""
+"""… and so many sure ones suffice to establish it."""
 POLYGON_DOUBT_PROBABILITY: Final = 0.3
+"""A track less probable than this is tentative again, …"""
 POLYGON_DOUBT_SHARE: Final = 0.75
-"""A track less probable, or that explains less of its near readings, is tentative again."""
+"""… and so is one that explains less than this share of its near readings."""
 TWIN_RADII: Final = 0.4
 """Two bodies whose centres are nearer than this, in inner radii, are one."""
 OVERLAP_RADII: Final = 1.8
@@ -161,13 +177,15 @@ POLYGON_PROBABILITY: Final = 0.9
 """A polygon is established from this probability on, and reported, or from the user's `report_probability` if that is
 less."""
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
+"""Greatest distance of the nearest sensor that heard it, …"""
 POLYGON_DISPERSION_MIN: Final = 0.02
-"""Nearest sensor, and least dispersion of the axes: a single face seen from afar may belong to any wall."""
+"""… and least dispersion of the axes: a single face seen from afar may belong to any wall."""
 POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 """Greatest standard deviation of its position along either axis."""
 POLYGON_NAMED_HITS_SWEPT: Final = 12.0
+"""Hits fewer than `MANY_HITS`, but so many, suffice …"""
 POLYGON_SWEPT_READINGS: Final = 80
-"""Hits fewer than `MANY_HITS` suffice where so many readings, silences included, bear on it and fit it."""
+"""… where so many readings, silences included, bear on it and fit it."""
 POLYGON_INFLATION: Final = 1.15
 """Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
 POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)

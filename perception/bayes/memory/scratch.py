@@ -19,16 +19,18 @@ from perception.bayes.memory.elements import (
     Pose,
     Reading,
 )
-from perception.bayes.memory.wall_records import RECENT_MAX, WALL_BINS
+from perception.bayes.memory.wall_records import RECENT_READINGS_MAX, WALL_BINS
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
 
 UNEXPLAINED: Final = -1
-ON_LINE: Final = -2
+"""Value of `Scratch.explained_by` of a reading that nothing explains; circle tracks have their own numbers."""
+ON_LINE: Final = UNEXPLAINED - 1
+"""This minus k: line k explains it."""
 PROPOSED: Final = ON_LINE - MAX_LINES
+"""A hypothesis was tried on it."""
 POLYGON: Final = TRACKS_MAX
-"""Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
-Other values are circle tracks."""
+"""This plus k: polygon k explains it."""
 TAKES_NOTHING, TAKES_BETTER, TAKES_ALL = range(3)
 """Values of `OtherCircle.takes`: none, as a part of the same body; the readings that it explains better; all that it
 explains, as it has a name and that circle has none."""
@@ -83,15 +85,15 @@ class Predictions(Record):
 class NearReadings(Record):
     """The recent readings that may bear on a new wall, field by field, and what each says of a line."""
 
-    x: Annotated[Floats, RECENT_MAX]
+    x: Annotated[Floats, RECENT_READINGS_MAX]
     """As in `Reading`."""
-    y: Annotated[Floats, RECENT_MAX]
-    axis_x: Annotated[Floats, RECENT_MAX]
-    axis_y: Annotated[Floats, RECENT_MAX]
-    range_m: Annotated[Floats, RECENT_MAX]
-    is_free: Annotated[Floats, RECENT_MAX]
+    y: Annotated[Floats, RECENT_READINGS_MAX]
+    axis_x: Annotated[Floats, RECENT_READINGS_MAX]
+    axis_y: Annotated[Floats, RECENT_READINGS_MAX]
+    range_m: Annotated[Floats, RECENT_READINGS_MAX]
+    is_free: Annotated[Floats, RECENT_READINGS_MAX]
     """1 for an echo that nothing explains, 0 for others."""
-    weight: Annotated[Floats, RECENT_MAX]
+    weight: Annotated[Floats, RECENT_READINGS_MAX]
     """For a line, or against it."""
 
 
@@ -208,7 +210,7 @@ class Scratch(Record):
     fired_sensors: Annotated[Ints, SENSORS_MAX]
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""
-    near_recent: Annotated[Ints, RECENT_MAX]
+    near_recent: Annotated[Ints, RECENT_READINGS_MAX]
     """Places of the recent readings that may bear on a new wall, …"""
     near_readings: NearReadings
     """… and those readings."""

@@ -62,8 +62,7 @@ RAYS_MAX: Final = 3
 points; and 5 in an office led by 58 nat, where nearest points are heard."""
 FREE, TENTATIVE, ESTABLISHED = range(3)
 """Values of `Track.status`."""
-CONFIRMED: Final = 1
-PLACED: Final = 2
+CONFIRMED, PLACED = (1 << bit for bit in range(2))
 """Bits of `Track.marks`: a user confirmed the object; a user placed it, and readings do not support it yet."""
 
 

@@ -17,16 +17,19 @@ from perception.kernel import Floats
 from perception.records import Record, Records
 
 MAX_WALLS: Final = 16
+"""Tracked walls at a time; where there are too many, a new one replaces a light one."""
 CANDIDATE: Final = MAX_WALLS
 """The place behind them, in which a new wall is fitted."""
 WALL_BINS: Final = 192
 """Bins along a wall, the origin in the middle: 11.5 m; the frame moves along the wall as it grows."""
 WALL_BIN_M: Final = 0.06
+"""Width of a bin along a wall."""
 SPANS_MAX: Final = 6
 """Spans of one wall, with openings between them."""
 CORNERS_MAX: Final = 24
+"""Corners and, apart from them, edges at a time."""
 EDGES_MAX: Final = CORNERS_MAX
-RECENT_MAX: Final = 768
+RECENT_READINGS_MAX: Final = 768
 """Spaced readings of all sensors that are remembered for new walls."""
 REMEMBERED_MAX: Final = 8192
 """Spaced readings of all sensors by which walls are reviewed: those of some 25 m."""
@@ -186,7 +189,7 @@ class WallMap(Record):
     """Where walls end alone."""
     lines: PointInformation
     """From a corner's walls, while it is located."""
-    recent: Annotated[Records[RecentReading], RECENT_MAX]
+    recent: Annotated[Records[RecentReading], RECENT_READINGS_MAX]
     recent_count: Count
     """Readings ever put there."""
     kept_x: Annotated[Floats, SENSORS_MAX, PLACE]

@@ -15,6 +15,7 @@ from perception.bayes.walls.contact import BEAM_EDGE, edge_direction, range_sigm
 from perception.kernel import kernel
 
 HALF: Final = WALL_BINS // 2
+"""Bins of a wall on either side of its frame's origin."""
 BIN_WEIGHT_MAX: Final = 40.0
 """Weight of a bin at which older readings fade."""
 EDGE_WEIGHT: Final = 0.5
@@ -24,6 +25,7 @@ PASSES_KEPT: Final = 0.7
 WEIGHT_KEPT: Final = 0.85
 """… and of the weight after a pass."""
 PASSES_MAX: Final = 8.0
+"""Passes of a bin beyond which more of them say nothing new."""
 SILENT_PASS: Final = 0.7
 """Weight of a silence as a pass: some echoes drop out."""
 

@@ -16,9 +16,7 @@ from perception.bayes.memory.state import ESTABLISHED, CircleTracks
 from perception.bayes.memory.wall_records import CORNERS_MAX, MAX_WALLS, Wall, WallMap
 from perception.kernel import kernel
 
-NOWHERE: Final = 0
-FOOT: Final = 1
-BEAM_EDGE: Final = 2
+NOWHERE, FOOT, BEAM_EDGE = range(3)
 """Where an echo comes from."""
 EXPLAINED_SIGMAS: Final = 3.2
 """Greatest error of an explained range, in σ of range and wall together."""
@@ -29,20 +27,23 @@ SPAN_MARGIN_M: Final = 0.09
 CIRCLE_MARGIN_M: Final = 0.05
 """Distance of a circle's centre outside the beam at which it may still answer."""
 END_SLACK_M: Final = 0.05
+"""Uncertainty of the place of a wall's end …"""
 CORNER_SLACK_M: Final = 0.03
-"""Uncertainty of an end's and of a corner's place."""
+"""… and of a corner's."""
 HIDING_PROBABILITY: Final = 0.9
 """Least probability of a round object without a name that hides what lies behind it."""
 ONLY_NAMED: Final = 2.0
 """A probability that only named circles have."""
 STRAIGHT_CHI2: Final = 60.0
+"""A span of more evidence than this …"""
 STRAIGHT_WEIGHT: Final = 20.0
-"""A span of more evidence than this and of this weight is straight beyond doubt."""
+"""… and of more weight than this is straight beyond doubt."""
 MIRRORS_SILENCES: Final = 20.0
 """So many silences of beam edges, with so few echoes, show mirrors."""
 HEARD_REACH_M: Final = 3.0
 """Farthest beyond the ends of its wall that a corner is looked for among the echoes."""
 EDGES_LEAD: Final = 4.0
+"""See `EDGES_SHARE`: a lead in echoes, so that the first few decide nothing."""
 EDGES_SHARE: Final = 0.25
 """Edges count if their echoes exceed this share of their silences by this lead. Mirrors leave 1 %; of surfaces that
 answer at any angle, half: drop-outs, and walls that are not yet known well. Where hardly a beam is silent they count

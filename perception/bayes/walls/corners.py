@@ -43,6 +43,7 @@ from perception.kernel import kernel
 from perception.records import Records
 
 SAME_CORNER_M: Final = 0.2
+"""Corners and edges nearer to each other than this are one."""
 CORNER_ECHOES_MIN: Final = 3.0
 """Echoes of a sure corner, which must also outnumber its passes."""
 EDGE_SIGMA_M: Final = 0.1
@@ -65,8 +66,7 @@ PASS_SLACK_M: Final = 0.1
 """A range this much longer than to a point passed it."""
 ALONE_LEAD: Final = 2.0
 """So many times its passes have the echoes of a point between mirrors that is sure whatever its walls are."""
-KEPT: Final = 1
-PENDING: Final = 2
+KEPT, PENDING = range(1, 3)
 """Values of `RoomCorner.is_used` while points are found again: found, and not yet found."""
 
 

@@ -16,12 +16,15 @@ from perception.bayes.walls.contact import wall_normal, wall_point
 from perception.kernel import kernel
 
 BARREL_RADIUS_M: Final = 0.7
+"""Radius of the largest barrel, a round object that a wall must explain better than, …"""
 DRUM_RADIUS_M: Final = 0.3
-"""Radii of the round objects that a wall must exceed: the largest barrel, and a drum."""
+"""… and that of a drum."""
 RIVAL_STEPS: Final = 4
+"""Steps of the fit of a rival."""
 RIVAL_OFF_M: Final = 0.2
+"""Standard deviation of its nearest point across the line, before the echoes …"""
 RIVAL_ALONG_M: Final = 0.5
-"""Steps of the fit of a rival, and how far from the line's middle its nearest point is expected."""
+"""… and along it, from the line's middle."""
 STRAY_CHI2: Final = 16.0
 """χ² of an echo that neither explains: the greatest that one counts."""
 EXACT_BELOW_CHI2: Final = 200.0
@@ -29,8 +32,9 @@ EXACT_BELOW_CHI2: Final = 200.0
 OUT_OF_BEAM_CHI2: Final = 4.0
 """Evidence of an echo whose beam does not contain the round object's centre."""
 FLAT_BINS_MIN: Final = 4
+"""With fewer bins a curve does not stand out from noise."""
 MISFIT_UNKNOWN: Final = 1e9
-"""Of fewer bins."""
+"""The misfit of fewer bins."""
 SYSTEMATIC_M: Final = 0.005
 """Error that the mean of many readings keeps."""
 SPAN_CHI2_MIN: Final = -2.0

@@ -22,13 +22,15 @@ OFFSET_INFORMATION: Final = 1e-3
 WALL_WEIGHT_MIN: Final = 3.0
 """A wall of less weight ends."""
 GAP_MAX_M: Final = 0.75
+"""Longest gap without readings inside a span; …"""
 ROUGH_GAP_MAX_M: Final = 0.3
-"""Longest gap without readings inside a span; where everything echoes, a wall leaves none so long."""
+"""… where everything echoes, a wall leaves none longer than this."""
 ROUGH_WEIGHT_MIN: Final = 0.6
 """There a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near the line too."""
 LONE_GAP_M: Final = 0.35
+"""Beyond a gap as wide as this …"""
 LONE_WEIGHT_MAX: Final = 1.0
-"""An end of so little weight beyond such a gap is left out: at so long a lever one outlier would prove any line."""
+"""… an end of so little weight is left out: at so long a lever one outlier would prove any line."""
 OPENING_MIN_M: Final = 0.3
 """Least width of an opening."""
 OPENING_PASSES_MIN: Final = 1.0
@@ -38,19 +40,23 @@ CRACK_PASSES_MIN: Final = 3.0
 STRAY_BINS: Final = 2
 """Neighbours on either side with which a bin is compared with the line."""
 STRAY_SIGMAS: Final = 3.0
+"""Echoes whose mean lies behind the line by so many standard deviations …"""
 STRAY_SLACK_M: Final = 0.012
-"""Echoes whose mean lies this far behind the line come from something else: from the ends of an opening, mostly."""
+"""… and this come from something else: from the ends of an opening, mostly."""
 STRAY_BEFORE_M: Final = 0.03
 """… and so do those that lie this far before it: from another wall at its corner, before that was known."""
 PASSED_MIN: Final = 1.5
+"""Passes there that make it open, …"""
 PASSED_SHARE: Final = 0.4
-"""Passes there that make it open: so many, and of so great a share of the weight."""
+"""… and their least share of the weight."""
 TRIM_BINS_MAX: Final = 13
+"""Fewer bins than this may be left out at an end of a span."""
 TRIM_GAIN_NAT: Final = 0.5
 """Gain required of each earlier end."""
 TRIM_FAR_NAT: Final = 2.0
+"""Loss for each bin that is left out although its echoes are from where an end between mirrors is not heard; …"""
 TRIM_REACH_SLACK_M: Final = 0.2
-"""Loss for each bin that is left out although its echoes are from where an end between mirrors is not heard."""
+"""… that is this much farther than such an end was heard."""
 TRIM_SYSTEMATIC_M: Final = 0.005
 """Error that the mean of many readings keeps."""
 

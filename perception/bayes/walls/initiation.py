@@ -22,7 +22,7 @@ from perception.bayes.memory.wall_records import (
     IS_KNOWN,
     IS_TAKEN,
     MAX_WALLS,
-    RECENT_MAX,
+    RECENT_READINGS_MAX,
     WALL_BINS,
 )
 from perception.bayes.walls.bins import SILENT_PASS, bin_of, clear_wall, enter_reading
@@ -46,8 +46,9 @@ from perception.records import Structured
 CANDIDATES_MAX: Final = 8
 """Lines that are scored for one echo."""
 PAIR_MIN_M: Final = 0.25
+"""Least distance between the sensors of a pair, …"""
 PAIR_MAX_M: Final = 2.5
-"""Distances between the sensors of a pair."""
+"""… and the greatest."""
 PAIR_MIN_COS: Final = 0.75
 """Least cosine between their axes."""
 TANGENT_MAX_COS: Final = 0.9
@@ -55,19 +56,26 @@ TANGENT_MAX_COS: Final = 0.9
 EDGE_NORMAL_MIN_COS: Final = 0.8
 """Least cosine between the axis and the normal of a wall from two beam edges."""
 SCORE_MIN: Final = 6.0
+"""Least score of a candidate, in echoes: the support of `perception.bayes.walls.support`."""
 NEW_WALL_ECHOES_MIN: Final = 6
+"""A new wall has a span of so many echoes, …"""
 NEW_WALL_WEIGHT_MIN: Final = 6.0
+"""… of this weight, …"""
 NEW_WALL_CHI2_MIN: Final = 9.0
+"""… of this evidence, …"""
 NEW_WALL_MISFIT_MAX: Final = 2.5
+"""… of this χ² for each degree of freedom at most, …"""
 NEW_WALL_PASSES_MAX: Final = 0.35
-"""A new wall has a span of this evidence and χ² for each degree of freedom, and this share of passes at most."""
+"""… and this share of passes at most."""
 NEW_WALL_VARIANCE_M2: Final = 0.03**2
+"""Variance of a candidate's offset before the first fit, m² …"""
 NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
-"""Uncertainty of a candidate before the first fit."""
+"""… and of its slope."""
 KNOWN_SIGMA_M: Final = 0.06
 """Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
 turn it, by a long lever."""
 FIT_ROUNDS: Final = 3
+"""Fits of a new wall, each with the readings that the one before explains."""
 REPLACED_WEIGHT_MAX: Final = 12.0
 """A wall of less weight gives way to a new one where there are too many."""
 
@@ -132,7 +140,7 @@ def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
     least = 0.0 if edges_answer(room) else 2.0 * p[0].cos_half_angle ** 2 - 1.0
     n = 0
     free = 1
-    for j in range(min(room.recent_count, RECENT_MAX)):
+    for j in range(min(room.recent_count, RECENT_READINGS_MAX)):
         other = room.recent[j].reading
         if j != newest and other.axis_x * q.axis_x + other.axis_y * q.axis_y >= least:
             s[0].scratch.near_recent[n] = j
@@ -218,7 +226,7 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
     least = SLANTING_MIN_COS if edges else p[0].cos_half_angle
     echoes = 0
     clear_wall(wall)
-    for j in range(min(room.recent_count, RECENT_MAX)):
+    for j in range(min(room.recent_count, RECENT_READINGS_MAX)):
         recent = room.recent[j]
         if recent.is_free == IS_TAKEN:
             recent.is_free = IS_FREE
@@ -255,7 +263,7 @@ def end_candidate(s: StateRecord, is_new: bool) -> None:
     """
     room = s[0].room
     room.walls[CANDIDATE].weight = 0.0
-    for j in range(RECENT_MAX):
+    for j in range(RECENT_READINGS_MAX):
         if room.recent[j].is_free == IS_TAKEN:
             room.recent[j].is_free = IS_KNOWN if is_new else IS_FREE
 

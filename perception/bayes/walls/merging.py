@@ -14,7 +14,7 @@ from perception.bayes.memory.wall_records import (
     CANDIDATE,
     IS_FREE,
     MAX_WALLS,
-    RECENT_MAX,
+    RECENT_READINGS_MAX,
     WALL_BIN_M,
     WALL_BINS,
     Wall,
@@ -46,8 +46,9 @@ SAME_TURN_RAD: Final = 0.14
 SAME_WITHIN_M: Final = 1.0
 """Distance from the other's spans within which they are compared."""
 SAME_SIGMAS: Final = 2.5
+"""Greatest distance between two walls that are one: so many standard deviations …"""
 SAME_SLACK_M: Final = 0.025
-"""Greatest distance between them, in σ, and beyond."""
+"""… and this."""
 SAME_SHARE: Final = 2
 """So many times more bins must agree than differ."""
 EXPLAINED_SHARE: Final = 0.6
@@ -63,8 +64,9 @@ FRAME_TURN_MAX: Final = 0.02
 BARREL_PROBABILITY: Final = 0.9
 """Least probability of a round object without a name that explains a wall's echoes."""
 HIDDEN_M: Final = 0.05
+"""A range this much longer than to another wall …"""
 HIDDEN_WITHIN_M: Final = 0.1
-"""A range this much longer than to another wall, this far inside its ends, cannot come from behind it."""
+"""… that it would touch this far inside its ends cannot come from behind it."""
 
 
 @kernel
@@ -216,7 +218,7 @@ def release(room: WallMap, wall: Wall, p: SettingsRecord) -> None:
     room, wall, p
         The recent readings, updated, the wall and the settings.
     """
-    for j in range(min(room.recent_count, RECENT_MAX)):
+    for j in range(min(room.recent_count, RECENT_READINGS_MAX)):
         q = room.recent[j].reading
         kind, expected, along, dot = contact(wall, q, p)
         if kind != NOWHERE and abs(q.range_m - expected) < tolerance(room, wall, along, expected, dot):

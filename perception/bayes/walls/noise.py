@@ -19,8 +19,9 @@ from perception.bayes.walls.contact import line_variance, range_sigma
 from perception.kernel import kernel
 
 PRIOR_ECHOES: Final = 6.0
+"""The estimate of recognition counts as so many echoes …"""
 PRIOR_RANGES_M: Final = (0.5, 1.5, 3.0)
-"""The estimate of recognition counts as so many echoes at each of these ranges."""
+"""… at each of these ranges."""
 MEMORY: Final = 0.999
 """Factor on the sums after each echo: they remember a thousand."""
 SURE_SHARE: Final = 0.1

@@ -56,9 +56,11 @@ ECHOES_MIN: Final = 8
 SPREAD_MIN_RAD: Final = 0.2
 """… if they come from bearings so far apart: those of another wall lie within half a beam of its normal."""
 SIGMAS: Final = 2.5
+"""A range is a point's echo within so many standard deviations, and passed it beyond."""
 LONGER_SIGMAS: Final = 1.3
 """An edge's echo is longer than its wall's own by more than this, which one in ten of those is by chance."""
 LINE_CELL_M: Final = 0.05
+"""Edge of a cell along a wall's line in which echoes of a point are counted."""
 EDGE_CUTS_MIN: Final = 2
 """Cuts in one cell for which an edge is looked for there."""
 PLACED_TIMES: Final = 3
@@ -74,8 +76,9 @@ SLANT_MIN: Final = 0.35
 KNOWN_POINT_M: Final = 0.3
 """Least distance from a corner or an edge that is known better."""
 APART_CELLS: Final = 3
+"""Places that are looked at are so many cells apart."""
 TRIES_MAX: Final = 4
-"""Greatest number of places that are looked at for each kind, the likeliest first, and how far apart they are."""
+"""Greatest number of places that are looked at for each kind, the likeliest first."""
 FIRST_M: Final = -HALF * WALL_BIN_M - HEARD_REACH_M
 LINE_CELLS: Final = int((WALL_BINS * WALL_BIN_M + 2.0 * HEARD_REACH_M) / LINE_CELL_M) + 1
 """Cells along the line of a wall, and where the first one begins, m."""

@@ -28,10 +28,11 @@ SPAN_WEIGHT_MIN: Final = 3.0
 HEAVIEST_SPAN_MIN: Final = 12.0
 """… and weight of the first wall's heaviest one."""
 REPORTED_MISFIT_MAX: Final = 2.5
+"""Greatest χ² of a reported wall's line for each degree of freedom, …"""
 LIGHT_MISFIT_MAX: Final = 2.0
+"""… and that of a lighter wall, which may be the side of a barrel that was heard from a few places: …"""
 LIGHT_WEIGHT: Final = 20.0
-"""Greatest χ² of a wall's line for each degree of freedom, and that of a wall of less weight, which may be the side
-of a barrel that was heard from a few places."""
+"""… of one of less weight than this."""
 TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
@@ -41,8 +42,9 @@ PROVEN_WEIGHT_MIN: Final = 6.0
 SPAN_DENSITY: Final = 4.0
 """… and least weight for each metre."""
 PROOF_ECHOES: Final = 5.0
+"""Echoes of a corner that proves its walls, …"""
 PROOF_LEAD: Final = 3.0
-"""Echoes of a corner that proves its walls, and so many times its passes; …"""
+"""… which are also so many times its passes; …"""
 PROOF_SINE: Final = 0.8
 """… least sine of the angle between them: a line across a corner meets its walls at half of theirs."""
 THROUGH: Final = 0.8

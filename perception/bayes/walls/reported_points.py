@@ -27,18 +27,19 @@ EDGE_NEAR_M: Final = 0.18
 CORNER_MET_M: Final = 0.3
 """A corner is reported if both walls come so near it, …"""
 ALONE_ECHOES: Final = 8.0
+"""… or if so many echoes come from it, whatever is known of its walls: from an inside corner between mirrors, from
+afar, …"""
 ALONE_EDGE_ECHOES: Final = 5.0
+"""… or so many from an edge, of which between mirrors fewer are enough, as it is heard from near alone; …"""
 ROUGH_LEAD: Final = 5.0
-"""… or if so many echoes come from it, and so many times its passes, whatever is known of its walls: from an inside
-corner between mirrors, from afar, or from an edge, of which between mirrors fewer are enough: it is heard from near
-alone. Where slanting walls answer, some of them may be a wall's."""
-POINT_PRIOR_NAT: Final = 0.0
+"""… and if they are so many times its passes where slanting walls answer: some of them may be a wall's."""
 POINT_ECHO_NAT: Final = 1.0
-"""Log prior odds of a corner where walls end, and evidence of each echo."""
+"""Evidence of each echo for a corner where walls end, of which the prior odds are even."""
 ONE_WAY_SIGMA_M: Final = 0.1
-ONE_WAY_NAT_MAX: Final = 1.0
 """An edge that its own echoes place no better than this along some axis was heard from one direction: so the wall
-answers where it goes on. In the rooms of `bench standing` four of seven such edges were true."""
+answers where it goes on. …"""
+ONE_WAY_NAT_MAX: Final = 1.0
+"""… Greatest log odds of such an edge. In the rooms of `bench standing` four of seven were true."""
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed: readings are not independent."""
 
@@ -162,7 +163,7 @@ def is_one_way(heard: Structured) -> bool:
 
 def _point(corner: Structured, signs: float) -> tuple[float, ...]:
     """Return a corner as `CornerPoint` has it; `signs` of it, as an echo is one, against the ranges that passed."""
-    log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (signs - float(corner["passes"]))
+    log_odds = POINT_ECHO_NAT * (signs - float(corner["passes"]))
     place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))
     greatest = ONE_WAY_NAT_MAX if corner["is_edge"] == 1 and is_one_way(corner["heard"]) else EVIDENCE_MAX_NAT
     clipped = min(max(log_odds, -EVIDENCE_MAX_NAT), greatest)

@@ -48,16 +48,18 @@ REMEMBERED_FIRST: Final = 1024
 """So many are remembered, those of some 3 m, before a wall is known and whether slanting walls answer, or are
 mirrors: then readings show corners and edges. Where no wall stands, more of them would only fill recordings."""
 REVIEWED_WEIGHT_MIN: Final = 20.0
+"""A wall of less weight than this is not reviewed, …"""
 REVIEWED_CHI2_MIN: Final = 14.0
-"""A wall of less weight or evidence is not reviewed."""
+"""… nor one of less evidence than this."""
 ECHO_NAT: Final = 4.0
 """Evidence of an echo without error for the place where it touches the wall: its density against that of any range.
 It is no more than against an end of a span: those echo in the mouth of a doorway."""
 EDGE_SHARE: Final = 0.75
 """This share of it is believed where it comes from a beam's edge."""
 PASS_NAT: Final = 2.5
+"""Evidence of a range that went on against the place, …"""
 SILENCE_NAT: Final = 2.0
-"""Evidence of a range that went on, and of a silence, against the place."""
+"""… and of a silence."""
 PLACE_NAT: Final = 10.0
 """Greatest evidence of one place: the errors of its readings are not independent."""
 GRAZING_MIN_COS: Final = 0.05
@@ -67,8 +69,9 @@ AS_WELL: Final = 0.3
 FORGOTTEN_NAT: Final = 2.0
 """Evidence for a place that was covered when its readings were still remembered."""
 SURE_WEIGHT: Final = 6.0
+"""A place on a span of so much weight …"""
 SURE_PASSES: Final = 0.1
-"""A place on a span of so much weight, and of so small a share of passes, is its wall's."""
+"""… and of so small a share of passes is its wall's."""
 UNHEARD_NAT: Final = 0.35
 """Evidence against a place without readings."""
 SWITCH_NAT: Final = 4.0

@@ -26,9 +26,10 @@ from perception.sensor_mounts import RingPose
 
 STANDING_RAD: Final = math.acos(STILL_COS)
 STOPPED_M: Final = 0.001
+"""A robot that moved by less than this between two firings …"""
 STOPPED_RAD: Final = 0.001
-"""A robot that moved and turned by less between two firings has stopped: bases count their way in millimetres. Later
-it stands while its sensors are where they were, as `placement` has it."""
+"""… and turned by less than this has stopped: bases count their way in millimetres. Later it stands while its sensors
+are where they were, as `placement` has it."""
 
 
 def keep_while_standing(memory: Memory, pose: RingPose) -> None:

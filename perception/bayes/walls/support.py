@@ -18,15 +18,19 @@ from perception.kernel import kernel, loop_kernel
 TOUCH_REACH_M: Final = 3.0
 """Readings that touch a candidate farther away than this do not count."""
 SCORE_SIGMAS: Final = 2.5
+"""Errors of a range that support a candidate: so many standard deviations, …"""
 SCORE_LEVER: Final = 0.03
+"""… and, as its direction is uncertain, so much across the pair's distance for each metre along it, m, …"""
 SCORE_LEVER_MAX_M: Final = 1.5
-"""Errors that support a candidate: in σ, and growing with the distance along it as its direction is uncertain."""
+"""… up to this far along it."""
 SCORE_EDGE: Final = 0.6
+"""Weight of an echo from the beam's edge …"""
 SCORE_PASS: Final = 0.7
-"""Weights of an echo from the beam's edge, and of a range that passed through."""
+"""… and of a range that passed through."""
 PASS_M: Final = 0.3
+"""A range this much longer passed through a candidate …"""
 PASS_WITHIN_M: Final = 0.5
-"""A range this much longer passed through a candidate, where it touches it this near the echo."""
+"""… where it touches it this near the echo."""
 
 
 @kernel

@@ -27,7 +27,7 @@ from perception.bayes.memory.wall_records import (
     IS_FREE,
     IS_KNOWN,
     MAX_WALLS,
-    RECENT_MAX,
+    RECENT_READINGS_MAX,
     WALL_BINS,
     RoomCorner,
     WallMap,
@@ -64,8 +64,9 @@ from perception.kernel import kernel
 GROWTH_M: Final = 0.75
 """A wall may continue this far beyond its spans."""
 RECENT_SPACING_M: Final = 0.08
+"""Least distance between the recent readings of a sensor, of echoes that nothing explains …"""
 KNOWN_SPACING_M: Final = 0.24
-"""Least distance between the recent readings of a sensor, of echoes that nothing explains and of others."""
+"""… and of others."""
 FIT_FIRINGS: Final = 2
 """Each wall is fitted again at every second firing."""
 TIDY_FIRINGS: Final = 8
@@ -73,17 +74,19 @@ TIDY_FIRINGS: Final = 8
 REVIEW_FIRINGS: Final = 4
 """Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
+"""Walls of this weight show …"""
 EDGE_WITHIN_M: Final = 0.15
-"""Walls of this weight show, this far inside their ends, whether slanting walls answer from the beam's edge."""
+"""… this far inside their ends whether slanting walls answer from the beam's edge."""
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 EDGE_SLACK_M: Final = 0.05
+"""A range this much longer than to where the beam's edge meets the wall, beyond its error, went on."""
 LOUD_SHARE: Final = 1.2
-LOUD_SILENCES_MIN: Final = 16.0
 """Slanting walls are taken to answer where beams are silent less often than so many times the share that asks for
-care with names, until walls are known that show it; and only where so many silences are expected: wide beams hear
-mirrors, too. Between drums a fifth of the beams is silent, or more; in rooms of walls that answer at any angle a
-seventh at most."""
+care with names, until walls are known that show it; …"""
+LOUD_SILENCES_MIN: Final = 16.0
+"""… and only where so many silences are expected: wide beams hear mirrors, too. Between drums a fifth of the beams is
+silent, or more; in rooms of walls that answer at any angle a seventh at most."""
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
 
@@ -186,7 +189,7 @@ def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
     room.kept[sensor] = 1.0
     room.kept_x[sensor] = q.x
     room.kept_y[sensor] = q.y
-    slot = room.recent_count % RECENT_MAX
+    slot = room.recent_count % RECENT_READINGS_MAX
     copy_reading(q, room.recent[slot].reading)
     room.recent[slot].is_free = is_free
     room.recent_count += 1

@@ -38,26 +38,32 @@ from perception.sensor_mounts import mounts_array
 LOST_SHARE: Final = 0.25
 """With fewer than this the robot is lost."""
 FIRST_LANDMARK_SIGMA_M: Final = 0.05
+"""Standard deviation of the place relative to the ring, which is perception's from a drifting path, of the first
+landmarks, …"""
 NEW_SIGMA_M: Final = 0.04
+"""… of later ones, …"""
 MOVED_SIGMA_M: Final = 0.1
-"""Standard deviation of a landmark's place relative to the ring, which is perception's from a drifting path: of the
-first landmarks, of later ones, and of one that has moved."""
+"""… and of one that has moved."""
 FAILURES_MAX: Final = 3
 """A landmark that fails so often in succession, while others answer, has moved."""
 FIRST_LANDMARKS: Final = 3
+"""The filter begins with so many landmarks, …"""
 FIRST_WAY_M: Final = 2.5
+"""… after this way with one, …"""
 LONGEST_WAY_M: Final = 5.0
-"""The filter begins with so many landmarks, after the first of these ways with one, after the second with none."""
+"""… after this one with none."""
 WAITING_MAX: Final = 240
 """Firings that can wait."""
 CATCHING_UP: Final = 8
 """Waiting firings that are entered with each new one: bounds the work."""
 NOT_FIRED: Final = -1.0
+"""What a waiting firing holds in place of NaN, for a sensor that did not fire, …"""
 SILENT_M: Final = 1e6
-"""What a waiting firing holds in place of NaN and infinity: numbers, as everything that a recording holds."""
+"""… and of infinity, for silence: numbers, as everything that a recording holds."""
 CYCLE_FIRINGS: Final = 3
+"""Firings from one check for a slip to the next one, …"""
 CYCLE_FIRINGS_MAX: Final = 24
-"""Firings from one check for a slip to the next one, and the most firings of which one looks at the echoes."""
+"""… and the most firings of which one looks at the echoes."""
 TURN_PER_M: Final = math.radians(1.0)
 SHIFT_PER_M: Final = 0.02
 """The map frame turns (rad/m) and shifts (m/m) no faster as the robot drives: it does not jump."""

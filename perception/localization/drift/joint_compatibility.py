@@ -19,26 +19,31 @@ from drivers.messages import IDENTITY, Pose, wrap_angle
 from perception.kernel import Floats
 
 PLACE_SIGMA_M: Final = 0.4
+"""Standard deviation of a slip's shift before the echoes …"""
 SLIP_TURN_SIGMA: Final = math.radians(15.0)
-"""Standard deviations of the displacement before the echoes."""
+"""… and of its turn, rad."""
 BEARING_SHARE: Final = 0.6
 """Standard deviation of a heard landmark's bearing from the sensor's axis, as a share of half the beam."""
 RANGE_SHARE: Final = 0.015
+"""Standard deviation of a range with the landmark's place: a share of it …"""
 RANGE_M: Final = 0.02
-"""Standard deviation of a range with the landmark's place: a share of it, and one that does not depend on it."""
+"""… and a part that does not depend on it."""
 PAIR_GATE: Final = 9.2
 """χ² of two degrees of freedom that a true pair exceeds in one of a hundred cases."""
 JOINT_GATE: Final = (0.0, 9.2, 13.3, 16.8, 20.1, 23.2, 26.2, 29.1, 32.0, 34.8, 37.6, 40.3, 43.0)
 """The same of two degrees of freedom for each pair; the index is the number of pairs."""
-ECHOES_MAX: Final = len(JOINT_GATE) - 1
+PAIRED_ECHOES_MAX: Final = len(JOINT_GATE) - 1
+"""Echoes that are paired at most: `JOINT_GATE` has no more values."""
 PAIRS_MIN: Final = 4
+"""A pairing of fewer echoes than this is none, …"""
 PAIRED_SHARE: Final = 0.6
-"""A pairing with fewer of the echoes than these is none."""
+"""… nor is one of a smaller share of them."""
 BRANCHES_MAX: Final = 80
 """Branches that are followed at most: bounds the work."""
 ALIKE_M: Final = 0.15
+"""Two displacements whose shifts differ by less than this …"""
 ALIKE_RAD: Final = math.radians(6.0)
-"""Two displacements that differ by less are the same answer."""
+"""… and whose turns by less than this are the same answer."""
 
 GAIN_MIN: Final = 5.0
 """A landmark's squared innovations must fall by so much to be clearly better."""
@@ -94,7 +99,7 @@ def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle:
     Parameters
     ----------
     echoes : sequence of Echo
-        Of one cycle of the ring; the nearest `ECHOES_MAX` are used.
+        Of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used.
     discs : sequence of Disc
         The landmarks.
     half_angle : float
@@ -155,7 +160,7 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
 
 
 def _nearest(echoes: Sequence[Echo]) -> list[Echo]:
-    return sorted(echoes, key=lambda echo: echo.range_m)[:ECHOES_MAX]
+    return sorted(echoes, key=lambda echo: echo.range_m)[:PAIRED_ECHOES_MAX]
 
 
 def _squared(pose: Pose, echo: Echo, disc: Disc, half_angle: float) -> float:

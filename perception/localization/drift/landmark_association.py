@@ -21,6 +21,7 @@ MARGIN_SIGMAS: Final = 3.0
 """This far inside the beam a landmark must answer, and this far outside it may: a fixed part, and standard deviations
 of its bearing."""
 NO_LANDMARK: Final = -1
+"""In place of a landmark's number."""
 HIDING_RADII: Final = 1.1
 """A line of sight this near to a landmark's centre is hidden by it."""
 

@@ -33,15 +33,19 @@ SOFT: Final = 6.25
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
 FRESH_M: Final = 0.02
+"""A sensor's readings from poses nearer than this …"""
 FRESH_RAD: Final = math.radians(1.0)
-"""A sensor's readings that are nearer together repeat one error of rounding; only the first is used."""
+"""… and turned by less than this repeat one error of rounding; only the first is used."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
+"""Least estimate of the noise, as a factor on the nominal variance, …"""
 NOISE_MAX: Final = 25.0
+"""… and the greatest."""
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
 UNHEARD: Final = -1.0
+"""In place of the range of a landmark that was not heard, m."""
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
 EDGE_SIGMAS: Final = 3.0
@@ -49,9 +53,10 @@ EDGE_SIGMAS: Final = 3.0
 DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
 STRAY: Final = 0.02
+"""Share of the landmarks outside a beam that are heard, at first: of mirrors none is, many are where a drum answers
+with any part that is in the beam."""
 STRAY_MEMORY: Final = 0.03
-"""Share of the landmarks outside a beam that are heard, at first, and the weight of one look in it: of mirrors none
-is heard, many are where a drum answers with any part that is in the beam."""
+"""Weight of one look in that share."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6

@@ -20,11 +20,13 @@ SENSORS_MAX: Final = 255
 """As `config.robot.SENSORS_MAX`."""
 
 STRAY_MIN: Final = 5e-4
+"""Least value of `Estimate.stray` …"""
 STRAY_MAX: Final = 0.9
-"""Bounds of `Estimate.stray`."""
+"""… and its greatest."""
 SCALE_MIN: Final = 0.5
+"""Least scale of odometer and ranges, by which something is divided: those of a real robot are near 1, …"""
 SCALE_MAX: Final = 2.0
-"""Bounds of the scales of odometer and ranges, by which something is divided: those of a real robot are near 1."""
+"""… and the greatest."""
 
 HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
 """Rows of the covariance for the fields of `Estimate`, in their order; those of the landmarks follow."""

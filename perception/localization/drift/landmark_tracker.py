@@ -32,13 +32,15 @@ from perception.sensor_mounts import RingPose, mounts_array, turned_mounts
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
 ODOMETER_SIGMA: Final = 0.03
+"""Standard deviation at the start of the odometer's scale, …"""
 TURN_SIGMA: Final = 0.01
+"""… of the turns' …"""
 RANGE_SIGMA: Final = 0.01
-"""Standard deviations of the slow states at the start."""
+"""… and of the ranges'."""
 HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2
+"""Variances of the heading by odometry, rad²/m, from .1 to 4.5 °/√m, …"""
 HEADING_PRIOR: Final = HEADING_RATES**-0.25
-"""Variances of the heading by odometry, rad²/m, from .1 to 4.5 °/√m, and their weights before a drive, which let the
-filter begin with about 1 °/√m."""
+"""… and their weights before a drive, which let the filter begin with about 1 °/√m."""
 WALK_WINDOW_M: Final = 0.25
 """The way after which the rates are weighed again."""
 DRIFT_PLACE_WALK: Final = 0.0005**2
@@ -47,18 +49,21 @@ finds, and where wheels slip; what is left is below what the echoes show."""
 SLIP_SHARE: Final = 0.4
 """With fewer of the expected echoes than this, the wheels may have slipped: odometry is then trusted less."""
 FAILURES_DOUBTED: Final = 2
+"""So many failures in succession …"""
 LANDMARKS_DOUBTED: Final = 2
-"""So many failures in succession of so many landmarks at once let the pose be doubted."""
+"""… of so many landmarks at once let the pose be doubted."""
 RENEWED_SHARE: Final = 0.7
 """Share of the expected echoes that is assumed after a displacement was found."""
 FAILING_M: Final = 0.01
 """Standard deviation that each firing adds to the place while a landmark fails so often: a slip, if a small one."""
 SLIP_M: Final = 0.02
+"""Standard deviation that each firing adds to the place then …"""
 SLIP_RAD: Final = math.radians(1.0)
-"""Standard deviations that each firing adds then."""
+"""… and to the heading."""
 RANGE_NOISE: Final = 0.01
+"""Nominal noise of a range: a share of it …"""
 RANGE_NOISE_M: Final = 0.001
-"""Nominal noise of a range: a share of it, and one that does not depend on it; the filter estimates the true one."""
+"""… and a part that does not depend on it; the filter estimates the true one."""
 
 POSE: Final = 4
 """Numbers of a waiting firing before its ranges: the pose of the base, and the ring's direction."""

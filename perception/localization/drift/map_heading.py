@@ -26,13 +26,15 @@ from perception.localization.drift.landmark_tracker import OFFSET_SIGMA_RAD, POS
 FIRST_FIRINGS: Final = 160
 """So many are kept, …"""
 ENTERED_APART_M: Final = 0.01
+"""… each at least so far from the one before …"""
 ENTERED_APART_RAD: Final = math.radians(0.5)
-"""… each at least so far from the one before, or turned so much."""
+"""… or turned so much."""
 BEGIN_M: Final = 10.0
+"""The map is known well enough after this way, …"""
 AGAIN: Final = 3.0
-"""The map is known well enough after this way, better after so many times this way, and so on; so is the heading's
-random walk."""
+"""… better after so many times this way, and so on; so is the heading's random walk."""
 LANDMARKS_MIN: Final = 2
+"""Least landmarks that determine a map's turn and shift."""
 ENTERED_AT_ONCE: Final = 8
 """Kept firings that are entered with each new one: bounds the work."""
 MOTION_SIGMAS: Final = (math.radians(3.0), 0.05, 0.05)

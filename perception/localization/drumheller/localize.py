@@ -33,8 +33,9 @@ SEGMENTS_MAX: Final = 8
 BLOCKED_MAX: Final = 0.4
 """Largest share of echoes from behind walls: outliers are mostly long, and on mirrors eight echoes may be all."""
 START_CELL_M: Final = 0.1
+"""Of the poses in one cell of this edge …"""
 START_CELL_RAD: Final = math.radians(3.0)
-"""Of the poses in one cell of this size, one is tried."""
+"""… and of this range of headings, one is tried."""
 BATCH: Final = 256
 """Poses that are tried in one call; bounds the memory."""
 POSES_MAX: Final = 4096
@@ -51,8 +52,9 @@ FINE_FIT_STEPS: Final = 4
 REFINED_MAX: Final = 24
 """Poses that are fitted finely."""
 SAME_POSE_M: Final = 0.2
+"""Poses nearer to each other than this …"""
 SAME_POSE_RAD: Final = math.radians(7.0)
-"""Poses nearer to each other than this are one."""
+"""… whose headings differ by less than this are one."""
 LOST_SIGMAS: Final = 2.0
 """A pose that the search has missed is given a true pose's likelihood, so many standard deviations below its mean."""
 LOST_PROBABILITY: Final = 0.5

@@ -16,11 +16,13 @@ from perception.kernel import Floats
 from perception.localization.known_room.particle_update import COLUMNS
 
 KEYFRAME_M: Final = 0.1
+"""A keyframe ends after this way …"""
 KEYFRAME_RAD: Final = math.radians(6.0)
-"""A keyframe ends after this way or this turn."""
+"""… or this turn."""
 STAND_M: Final = 0.01
+"""A robot stands if it moves less than this …"""
 STAND_RAD: Final = math.radians(1.0)
-"""A robot stands if it moves less than this while the ring fires as often as it has sensors: that is a keyframe."""
+"""… and turns less than this while the ring fires as often as it has sensors: that is a keyframe."""
 KEYFRAMES_MAX: Final = 128
 """Keyframes that are kept."""
 

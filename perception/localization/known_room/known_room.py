@@ -31,24 +31,29 @@ from perception.localization.room.room import Room
 from perception.sensor_mounts import mounts_array
 
 MAP_NOISE_M: Final = 0.03
+"""Noise of a range compared with the map, whose own errors it contains, …"""
 DROPOUT: Final = 0.15
+"""… share of the expected echoes that are missed …"""
 OUTLIERS: Final = 0.1
-"""Errors of a range compared with the map, whose own errors they contain."""
+"""… and share of the readings that are of something else."""
 WINDOW_M: Final = 9.0
 """Way over which odometry compounds keyframes for a search."""
 WINDOW_LEAST: Final = 9
+"""Where so many keyframes are a longer way, …"""
 WINDOW_FAR_M: Final = 16.0
-"""Where so many keyframes are a longer way, that is taken, up to this."""
+"""… that is taken, up to this."""
 WINDOW_MAX: Final = 96
 """Most keyframes of it."""
 SEARCH_M: Final = (1.0, 3.0)
+"""Way until the first search, and the longest one between two searches, …"""
 SEARCH_GROWTH: Final = 1.5
-"""Way until the first search, the longest one between two searches, and by how much it grows from one to the next."""
+"""… and by how much it grows from one to the next."""
 STAND_SEARCH_M: Final = 0.3
 """A robot that stands searches if it has driven so far since the last search."""
 ASSUMED_M: Final = 0.3
+"""Standard deviation of a place that the operator names, on each axis, …"""
 ASSUMED_RAD: Final = math.radians(12.0)
-"""Standard deviation of a place that the operator names, on each axis, and half the width of its row of headings."""
+"""… and half the width of its row of headings."""
 SUSPECT_LOG: Final = 4.5
 """Evidence for a tracked place below which a search looks for a better one, nat: the robot may have been carried."""
 LEAD_LOG: Final = 2.0

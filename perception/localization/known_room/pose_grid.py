@@ -26,8 +26,11 @@ from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros
 
 GRID_CELL_M: Final = 0.2
+"""Edge of a cell of the grid of places."""
 GRID_DIRECTIONS: Final = 60
-GRID_STEP_RAD: Final = 2.0 * math.pi / GRID_DIRECTIONS
+"""Headings that are compared at each place, 6° apart."""
+GRID_STEP_RAD: Final = math.tau / GRID_DIRECTIONS
+"""Angle between two of these headings."""
 OPEN_M: Final = 3.0
 """The grid reaches so far beyond the surfaces of a room without walls."""
 CELLS_PER_QUANTUM: Final = 4
@@ -37,11 +40,13 @@ BLOCK: Final = 16
 GRID_READINGS_MAX: Final = 108
 """Readings that are compared."""
 SIGMA_M: Final = 0.12
+"""Standard deviation of a range from the table: that of half a cell …"""
 SIGMA_SHARE: Final = 0.03
-"""Standard deviation of a range from the table: of half a cell, and a share of the range."""
+"""… and a share of the range."""
 GRID_DROPOUT: Final = 0.2
+"""Share of the expected echoes that are not heard …"""
 WILD_MIN: Final = 0.2
-"""Shares of expected echoes that are not heard, and at least of readings that are anything: it is coarse."""
+"""… and least share of the readings that are anything: the grid is coarse."""
 OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""
 FACTORS: Final = 24
@@ -55,7 +60,7 @@ START_LOG: Final = 40.0
 COMPLETE_LOG: Final = 20.0
 """Where the worst of so many starts is less likely than the best by this, nat, the place is among them."""
 NO_CELL: Final = -1
-"""In place of a quantum's number where no search runs."""
+"""In place of the number of a search's quantum where none runs."""
 
 Bytes = NDArray[np.uint8]
 
@@ -250,7 +255,6 @@ class PoseGrid:
         self._profiles = 1
         self._shares = np.zeros((PROFILES_MAX, 3))
         self._quantum = NO_CELL
-        """Of the search; `NO_CELL` without one."""
         self._likely = np.zeros((PROFILES_MAX, GRID_READINGS_MAX, 3, SILENT_CODE + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""

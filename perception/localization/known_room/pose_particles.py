@@ -21,6 +21,7 @@ from perception.records import Record, Records
 HEADINGS: Final = 25
 """Particles of a hypothesis."""
 HYPOTHESES_MAX: Final = 100
+"""Hypotheses of the place at a time: the best starts of a search."""
 SCALE_SIGMA: Final = 0.03
 """Standard deviation of the odometer's scale at the start."""
 PLACE_WALK: Final = 0.02**2
@@ -39,11 +40,13 @@ SHARE_TEMPER: Final = 0.5
 RESAMPLE_SHARE: Final = 0.5
 """Particles are resampled where fewer than this share of them carry the weight."""
 MERGE_M: Final = 0.3
+"""Hypotheses nearer to each other than this …"""
 MERGE_RAD: Final = math.radians(10.0)
-"""Hypotheses nearer to each other than this are one."""
+"""… whose headings differ by less than this are one."""
 SAME_PLACE_M: Final = 0.5
+"""Hypotheses as near to the best one as this …"""
 SAME_PLACE_RAD: Final = math.radians(15.0)
-"""Hypotheses as near to the best one as this are of the same place."""
+"""… whose headings differ by less than this are of the same place."""
 
 
 class Particle(Record):

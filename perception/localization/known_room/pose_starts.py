@@ -10,11 +10,13 @@ from perception.kernel import kernel
 from perception.records import Record, Records
 
 STARTS_MAX: Final = 200
+"""Starts that a search keeps, the best ones."""
 PROFILES_MAX: Final = 2
 """Guesses of the causes of readings that a search tries."""
 START_APART_M: Final = 0.3
+"""Starts nearer to each other than this, on each axis, …"""
 START_APART_RAD: Final = math.radians(9.0)
-"""Starts nearer to each other than this, on each axis, are one: one and a half steps of the search."""
+"""… whose headings differ by less than this are one: one and a half steps of the search."""
 
 
 class Start(Record):

@@ -31,23 +31,27 @@ from perception.localization.known_room.surroundings import Surroundings
 from perception.records import records, zeros
 
 PARTICLES_PER_QUANTUM: Final = 7
+"""Particles that one quantum moves and weighs."""
 QUANTA: Final = math.ceil(HEADINGS / PARTICLES_PER_QUANTUM)
-"""Of one hypothesis and one keyframe."""
+"""Quanta of one hypothesis and one keyframe."""
 KEPT_MAX: Final = 40
 """Most hypotheses that are kept."""
 LEAST_LOG: Final = 12.0
+"""Hypotheses less likely than the best by more than this are dropped while they are tracked, nat; …"""
 SEARCH_LEAST_LOG: Final = 30.0
-"""Hypotheses less likely than the best by more than this are dropped, nat: while they are tracked, and while those of
-a search enter its keyframes, over the first of which a wrong place may fit far better than the right one."""
+"""… and by more than this while those of a search enter its keyframes, over the first of which a wrong place may fit
+far better than the right one."""
 EVIDENCE_MIN: Final = 20.0
+"""Most evidence against a place that is remembered, nat, …"""
 PLACE_EVIDENCE_MAX: Final = 7.0
-"""Most evidence against and for a place that is remembered, nat: what is heard later must not drown in a long way."""
+"""… and for it: what is heard later must not drown in a long way."""
 ALIKE_GAIN: Final = (2.3, 1.4)
 """Gain of evidence per echo, nat, that speaks neither for the right place nor for one in a map of another room that
 is alike: where nothing is a mirror, and from a share of mirrors of `MIRRORS` on. At the right place it is 3.1 to 4.3
 in furnished rooms, and in real buildings 2.6 to 3.0, or 1.4 to 1.9 where their walls are mirrors. With the map of
 another room it is 1.1 at most, but 1.7 in one of twenty rooms where nothing is a mirror."""
 MIRRORS: Final = 0.4
+"""The share of mirrors from which on `ALIKE_GAIN` has its second value."""
 ALIKE_WEIGHT: Final = 0.15
 """Weight of what an echo gains beyond that: such gains scatter by more than the two differ."""
 LIKENESS_MAX: Final = 4.5

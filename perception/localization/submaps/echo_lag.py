@@ -35,6 +35,7 @@ from perception.localization.submaps.submap_records import (
 from perception.sensor_mounts import mounts_array, mounts_at
 
 LAG_STEP_S: Final = 0.06
+"""Time between two lags that are compared."""
 LAGS: Final = LAG_STEP_S * np.arange(-6, 7)
 """Lags that are compared, beside the ring's. Between them the likelihood of real drives is a parabola."""
 LAG_SIGMA_S: Final = 0.015
@@ -46,7 +47,7 @@ LAG_READINGS_MIN: Final = 20
 """Readings of a window that say anything of the lag."""
 TRAIL_MAX: Final = 1024
 """Poses of a window, the last ones before it among them."""
-RECENT_MAX: Final = 256
+RECENT_POSES_MAX: Final = 256
 """Last poses that are kept: the newer half spans all lags that are compared at up to 180 firings a second."""
 QUANTA_MAX: Final = len(LAGS) * (SUBMAP_READINGS_MAX // CHUNK + SHARING_ROUNDS + 2)
 """Quanta of one comparison."""
@@ -100,7 +101,7 @@ class EchoLag:
         _recent=PLACE,
         _count=up_to(SUBMAP_READINGS_MAX),
         _trail_count=up_to(TRAIL_MAX),
-        _recent_count=up_to(RECENT_MAX),
+        _recent_count=up_to(RECENT_POSES_MAX),
         _quanta=up_to(QUANTA_MAX),
         _log_likelihoods=FINITE,
         _moved=PLACE,
@@ -115,7 +116,7 @@ class EchoLag:
         self._job: Iterator[Floats | None] | None = None
         self._readings = np.zeros((SUBMAP_READINGS_MAX, 5))
         """Of the window: time (s), the sensor's place (m) and direction (rad) on the ring, range."""
-        self._trail, self._recent = np.zeros((TRAIL_MAX, 5)), np.zeros((RECENT_MAX, 5))
+        self._trail, self._recent = np.zeros((TRAIL_MAX, 5)), np.zeros((RECENT_POSES_MAX, 5))
         """Poses by odometry of the window, and of the last moments: time, x, y, directions of ring and travel, not
         wrapped."""
         self.reset()
@@ -149,7 +150,7 @@ class EchoLag:
         if count > 0:
             last = recent[count - 1]
             here[3:] = last[3] + wrap_angle(here[3] - last[3]), last[4] + wrap_angle(here[4] - last[4])
-        if count == RECENT_MAX:
+        if count == RECENT_POSES_MAX:
             count //= 2
             recent[:count] = recent[count:]
         recent[count] = here

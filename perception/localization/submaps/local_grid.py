@@ -17,12 +17,15 @@ import numpy as np
 from perception.kernel import Floats, kernel
 
 SUBMAP_CELL_M: Final = 0.1
+"""Edge of a map's cell."""
 SUBMAP_CELLS: Final = 140
 """A map is a square about the ring's place in the middle of its way: half of that way and a range of 5 m fit."""
 HALF_CELLS: Final = SUBMAP_CELLS // 2
+"""Cells from a map's middle to its edge."""
 ECHO_MAX_M: Final = 4.9
 """Echoes from farther count as silence, whose cone is clear up to `SILENT_CLEAR_M` only: mirrors are silent, too."""
 SILENT_CLEAR_M: Final = 2.5
+"""Way that silence shows to be clear; see `ECHO_MAX_M`."""
 SHARING_ROUNDS: Final = 6
 """Rounds of expectation maximisation."""
 PASS_RAYS: Final = 21
@@ -30,8 +33,9 @@ PASS_RAYS: Final = 21
 ELSEWHERE: Final = 0.005
 """Weight of an echo's origin outside its arc, among cells that answer with probabilities up to 1."""
 PRIOR_HITS: Final = 0.015
+"""Hits …"""
 PRIOR_LOOKS: Final = 0.5
-"""A cell that was not looked at answers with 3 %, as the sum of half a reading."""
+"""… and looks of a cell that was not looked at, the sum of half a reading: it answers with 3 %."""
 THICKNESS: Final = 3.0
 """A surface is about three cells thick once it is blurred, which divide each echo among them."""
 CHUNK: Final = 64

@@ -28,9 +28,11 @@ ANSWERS: Final = 0.2
 """Share of a cell's probability with which one ray is answered. With more, beams end before the surface: drives with
 known poses were matched 5 cm short with 0.6, without a bias with 0.2, where their readings also are likeliest."""
 MATCH_OUTLIERS: Final = 0.1
+"""Share of the readings that come from nothing in the map."""
 MATCH_NOISE_M: Final = 0.08
-"""Of a range in cells of 0.1 m."""
+"""Noise of a range in cells of 0.1 m."""
 BEAM_CELLS: Final = 50
+"""Cells along a beam, up to `ECHO_MAX_M`."""
 UNKNOWN_ANSWER: Final = 0.03
 """Probability that a cell outside the map answers."""
 MATCH_TEMPER: Final = 0.1
@@ -39,19 +41,23 @@ real drives deviate as they say (the median of their squared errors over their c
 STEP: Final = np.array([0.08, 0.08, 0.03])
 """Differences of place (m) and direction (rad) by which the likelihood's slope and curvature are taken."""
 STEP_MOVE_MAX_M: Final = 0.15
+"""The most by which one step shifts a match …"""
 STEP_TURN_MAX_RAD: Final = 0.06
-"""The most by which one step changes a match."""
+"""… and turns it."""
 INFORMATION_MIN: Final = 1.0
 """A direction that readings leave free is known to 1 m, or 1 rad."""
 SEARCH_STEP_M: Final = 0.15
+"""Step of a search in place …"""
 SEARCH_STEP_RAD: Final = 0.05
-"""Steps of a search."""
+"""… and in heading."""
 SEARCHED: Final = 8
 """Poses of a search in one quantum."""
 SEARCH_READINGS: Final = 80
+"""Readings of a search …"""
 FIT_READINGS: Final = 250
-"""Readings of a search, and of the match that follows."""
+"""… and of the match that follows."""
 NEWTON_STEPS: Final = 4
+"""Newton steps of that match."""
 _AXES: Final = np.eye(3)
 
 

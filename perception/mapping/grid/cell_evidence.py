@@ -19,10 +19,7 @@ UNDIRECTED_UNIT: Final = 2.0
 """An echo's unit of evidence in the undirected evidence."""
 UNDIRECTED: Final = OCTANTS
 """Index of the undirected evidence of a cell, behind those of the looking directions."""
-BASE: Final = 0
-HIT: Final = 1
-PASSAGE: Final = 2
-STAMP: Final = 3
+BASE, HIT, PASSAGE, STAMP = range(4)
 """What is kept of each evidence: its value when the robot came to this place; the strongest hit and the strongest
 passage since; and the place."""
 NAT: Final = 1024

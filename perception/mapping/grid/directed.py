@@ -57,8 +57,9 @@ from perception.mapping.grid.window import (
 )
 
 DIRECTED_ARC_SIGMAS: Final = 1.5
+"""Half the thickness of an echo's arc in a looking direction …"""
 UNDIRECTED_ARC_SIGMAS: Final = 2.0
-"""Half the thickness of an echo's arc, in a looking direction and in the undirected evidence; …"""
+"""… and in the undirected evidence; …"""
 PASSED_SIGMAS: Final = 1.0
 """… and what is nearer than the range by this was passed."""
 PASSED: Final = 1.2 * NAT
@@ -68,25 +69,30 @@ SILENT_NAT: Final = 1.8 * NAT
 DIRECTED_UNIT: Final = 1.0
 """An echo's unit of evidence: log odds by ½ + .49 times its share."""
 MIRRORS_PASSED: Final = 0.6
+"""Among mirrors a passage proves so much less, …"""
 MIRRORS_SILENT: Final = 0.8
+"""… silence so much less …"""
 MIRRORS_UNIT: Final = 2.0
-"""Among mirrors a passage proves so much less, silence likewise, and an echo so much more: a beam of 24° and a
-looking direction of 45° are wide beside the few degrees in which a mirror answers."""
+"""… and an echo so much more: a beam of 24° and a looking direction of 45° are wide beside the few degrees in which a
+mirror answers."""
 UNDIRECTED_PASSED: Final = 1.8 * NAT
+"""Evidence of a passage for the undirected evidence, in which those of all directions count, …"""
 UNDIRECTED_SILENT: Final = 1.8 * NAT
-"""The same for the undirected evidence, in which the passages of all directions count."""
+"""… and of a beam without an echo."""
 MIDDLE: Final = 0.75
 """A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
 BEYOND_M: Final = 0.3
 """… and has not if the beam went on for this much, m."""
 PRIOR_ANSWERED: Final = 4.0
+"""Answers that are assumed at the start …"""
 PRIOR_PASSED: Final = 1.0
-"""Answers and passages that are assumed at the start."""
+"""… and passages."""
 ANSWERS_MAX: Final = 1000.0
 """When so many were counted, both are halved."""
 DIFFUSE_SHARE: Final = 0.3
+"""Share of passages from which on the undirected evidence counts less and less, …"""
 MIRROR_SHARE: Final = 0.5
-"""Share of passages from which on, and up to which, the undirected evidence counts less and less."""
+"""… and up to which."""
 
 
 class Scratch(NamedTuple):

@@ -33,7 +33,9 @@ SPREAD: Final = 0.01
 BEAM_SIGMAS: Final = 2.0
 """The beam's half width in σ_θ."""
 ARC_SIGMAS: Final = 2.0
+"""Half the thickness of an echo's arc, in σ_r."""
 PEAK: Final = 0.49
+"""How far the probability on the arc is above one half at most: at one, its log odds would be infinite."""
 ELFES_UNIT: Final = 4.0
 """An echo's unit of evidence: a cell with a quarter of the arc's mass rises by the full peak."""
 EMPTY_PEAK: Final = 0.2

@@ -25,7 +25,7 @@ from perception.mapping.grid.window import Ring, Window
 from perception.percept import OccupancyWindow
 from perception.sensor_mounts import mounts_array
 
-PLACE_M: Final = 0.1
+READINGS_PLACE_M: Final = 0.1
 """Readings on so much way are from one place."""
 HEARD_M: Final = 0.25
 """Width of the bins in which ranges are counted."""
@@ -53,7 +53,7 @@ class GridMethod(Protocol):
         bearings : (n,) float
             Where in its beam each echo came from, rad from the axis; NaN where that is not known.
         place : int
-            Where on its way the robot is, in steps of `PLACE_M`.
+            Where on its way the robot is, in steps of `READINGS_PLACE_M`.
         silence_m : float
             Distance to which a beam without an echo shows free space, m.
         """
@@ -140,8 +140,8 @@ class EvidenceGrid:
 
     @property
     def place(self) -> int:
-        """Where on its way the robot is, in steps of `PLACE_M`."""
-        return 1 + int(self._way_m / PLACE_M)
+        """Where on its way the robot is, in steps of `READINGS_PLACE_M`."""
+        return 1 + int(self._way_m / READINGS_PLACE_M)
 
     def crossed_before(
         self, holding: NDArray[np.bool_], firings: Iterable[tuple[Firing, Floats, int]]

@@ -19,8 +19,7 @@ from perception.kernel import Floats, kernel
 from perception.mapping.grid.window import Raster, Ring, Window, columns_of_beam, placed, rows_within, set_edges
 from perception.sensor_mounts import SensorPose
 
-EMPTY: Final = 0
-OCCUPIED: Final = 1
+EMPTY, OCCUPIED = range(2)
 """The two values of a cell."""
 ACCURACY: Final = 0.01
 """ε: error of a range as a share of it, …"""

@@ -75,11 +75,7 @@ LINES_MIN: Final = 2.5
 something in them."""
 UNITS_PER_LINE: Final = 64
 """One line is kept as this many units."""
-COUNT: Final = 0
-BLOCK_STAMP: Final = 1
-LINE: Final = 2
-LINES: Final = 3
-NOW: Final = 4
+COUNT, BLOCK_STAMP, LINE, LINES, NOW = range(5)
 """What is kept of a cell: from how many places echoes passed it; the last of them; 1 where a recognised thing's echo
 did, on its own line; how many lines are expected to have crossed it before this place; and from this place."""
 

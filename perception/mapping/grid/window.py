@@ -25,8 +25,9 @@ OCTANTS: Final = 8
 EIGHTH_TAN: Final = math.tan(0.125 * math.pi)
 """Of half a looking direction."""
 SPREAD_CELLS: Final = 0.5
+"""Least standard deviation of an echo's range, in cells …"""
 SPREAD_RELATIVE: Final = 0.01
-"""Standard deviation of an echo's range, in cells and as a share of the range, at least."""
+"""… and as a share of the range."""
 CENTRED_CELLS: Final = 4
 """The window follows once the robot is so many cells from its middle."""
 DRIVEN_MAX_M: Final = 1e6

@@ -37,20 +37,17 @@ CORNER_REACH_M: Final = 0.25
 LEFTOVER_M: Final = 0.2
 """So near what is known a piece may be what is left of its echoes. Share of pieces so near: 0.91 and more in
 generated rooms, 0.51 and less on drives; within 0.1 m it is 0.66 and 0.39."""
-UNSURE: Final = -1
-AWAY: Final = 0
-NEAR: Final = 1
-ALONG: Final = 2
-ON_BODY: Final = 3
+UNSURE, AWAY, NEAR, ALONG, ON_BODY = range(-1, 4)
 """How near a place is to what is known: perhaps on an unknown object, which may be as large as the largest body and
 is not known; within `LEFTOVER_M` of what is; along a wall or around a corner; on a body."""
 STRAIGHT_M: Final = 1.0
+"""Length of the straight pieces for whose evidence walls are expected at all, …"""
 STRAIGHT_NAT: Final = 15.0
-"""Evidence for straight pieces of this length by which walls are expected at all, and the most that one piece says
-for itself: its echoes repeat one another."""
+"""… and the most that one piece says for itself: its echoes repeat one another."""
 EVIDENCE_MAX: Final = 30.0
 """Greatest log odds that are reported, nat."""
 PROBABILITY_MIN: Final = 1e-300
+"""Least probability and odds of which a logarithm is taken."""
 SIZES: Final = ("variance_across", "variance_turn", "echoes")
 Runs = list[tuple[float, float]]
 """Parts of a piece, from 0 to 1."""

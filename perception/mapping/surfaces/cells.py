@@ -44,12 +44,14 @@ BLUR: Final = 16.0
 HITS: Final = 3.0 / (BLUR * WHOLE)
 """A surface of three cells' thickness gets whole echoes, which blurring divides among them."""
 LEAST_HITS: Final = 0.03
+"""Hits that every cell has, without having been looked at, …"""
 LEAST_READINGS: Final = 0.5
-"""A cell that has not been looked at answers with 6 %."""
+"""… and readings: such a cell answers with 6 %."""
 AXIS_LOSS: Final = 0.5
 """At the beam's edge a pass counts half, less with the square of the angle. An echo is as likely from there as
 from the middle: 42 to 67 % of the drives' echoes are from the outer third, as a slanting surface is nearest there."""
-DIRECTION_RAD: Final = 2.0 * math.pi / DIRECTIONS
+DIRECTION_RAD: Final = math.tau / DIRECTIONS
+"""Angle between two looking directions."""
 EDGE_MIN: Final = 1e-9
 """An edge of a beam that goes along the rows is turned by so much, rad."""
 BORDER_COS: Final = math.cos(DIRECTION_RAD)

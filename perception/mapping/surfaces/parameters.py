@@ -15,8 +15,9 @@ CELL_M: Final = 0.05
 CELLS: Final = 640
 """Cells along an edge of a local map: 32 m. Even, as passes are counted in cells of twice the size."""
 LEFT_M: Final = 9.7
+"""A robot so far from a local map's centre begins another one once this one was searched, …"""
 LEFT_MAX_M: Final = 10.4
-"""A robot so far from a local map's centre begins another one, once this one was searched, and at the latest; …"""
+"""… and at this distance at the latest; …"""
 REACH_M: Final = 5.5
 """… and an echo from farther away is as good as silence: its arc is longer than objects are."""
 DIRECTIONS: Final = 12
@@ -26,8 +27,9 @@ SAMPLES: Final = 24
 WHOLE: Final = 127
 """Share of a whole echo; shares are whole numbers, so that adding and taking away are exact in any order."""
 SHARES_A_WORD: Final = 8
+"""Shares of an echo that are kept in one number, …"""
 SHARE_BITS: Final = 7
-"""Shares of an echo are kept eight to a number."""
+"""… and the bits of each."""
 WHOLE_PASS: Final = 16
 """A pass along the beam's axis; at the beam's edge it counts half."""
 NEARER_M: Final = 0.1
@@ -43,8 +45,9 @@ REVISITS: Final = 3
 LAST_REVISITS: Final = 3
 """Times that all echoes are shared again before a local map is left."""
 SPACING_M: Final = 0.02
+"""A sensor that has moved by less than this …"""
 SPACING_RAD: Final = 0.02
-"""A sensor that has moved and turned by less says the same again."""
+"""… and turned by less than this says the same again."""
 READINGS_MAX: Final = 12288
 """Readings of a local map, and …"""
 READINGS_KEPT: Final = 6144
@@ -54,11 +57,13 @@ STRENGTH_MIN: Final = 0.9
 """Echoes by which a cell is occupied: each direction counts one at most, and a tenth of the rest; less where few are
 its own and not its neighbours'."""
 STRENGTH_SHARE: Final = 0.1
+"""Share of an echo by which those beyond the first of a direction strengthen a cell."""
 ANSWER_MIN: Final = 0.05
 """Least probability of an answer of an occupied cell, to the direction to which it answers most."""
 TAIL_SHARE: Final = 0.03
+"""A cell with less than this share of the hits …"""
 TAIL_CELLS: Final = 3
-"""A cell with less than this share of the hits of one within three cells has got them by that one's noise."""
+"""… of one so many cells away at most has got them by that one's noise."""
 OWN_HITS_MIN: Final = 0.05
 """Least echoes of the cell itself, without its neighbours."""
 SURFACE_CELLS_MAX: Final = 12288
@@ -72,17 +77,19 @@ TAKEN_M: Final = 0.06
 GAP_M: Final = 0.15
 """Greatest gap in a piece; 0.2 adds false length, 0.1 loses walls between mirrors."""
 PIECE_MIN_M: Final = 0.25
+"""Length of the shortest line of cells that is a piece, …"""
 PIECE_KEPT_M: Final = 3.0 * CELL_M
-"""Length of the shortest line of cells that is a piece, and of what is left of it between ends that are strong. With
-the first for both, a cell decides which pieces stay: drives have .1 to 1.9 % less, at the same false share."""
+"""… and of what is left of it between ends that are strong. With the first for both, a cell decides which pieces
+stay: drives have .1 to 1.9 % less, at the same false share."""
 COVERED_MIN: Final = 0.6
 """Least share of a piece's length with occupied cells."""
 END_STRENGTH: Final = 1.5
 """A piece ends at its outermost cell of this strength. Drives: false length 4.0 to 1.7 % in the office."""
 NODE_CELLS: Final = 2
+"""Cells around a point of a polyline whose echoes it is given: up to 0.1 m away."""
 NODE_STRENGTH: Final = 2.0 * (1.0 + STRENGTH_SHARE)
-"""A point of a polyline has two whole echoes from two directions, or as much, among the cells up to 0.1 m away.
-Drives: with 2.0 polylines explain 0.2 to 1.3 % more and 2.5 % of them are false, with 2.5 they explain 1 % less."""
+"""It has two whole echoes from two directions, or as much. Drives: with 2.0 polylines explain 0.2 to 1.3 % more and
+2.5 % of them are false, with 2.5 they explain 1 % less."""
 NODE_M: Final = 0.1
 """Distance between the points of a polyline, at least, …"""
 LINK_M: Final = 0.2
@@ -90,8 +97,9 @@ LINK_M: Final = 0.2
 AGREES_M: Final = 0.1
 """Two surfaces within this are one: the distance within which a surface explains an echo."""
 KNOWN_NAT: Final = 40.0
+"""Log odds against a piece as a wall where all that was heard lies along what the method knows, before the piece's
+own evidence; …"""
 KNOWN_SHARE: Final = 0.7
+"""… even, where this share of it does: half-way between generated rooms and drives."""
 UNKNOWN_M: Final = 10.0
-"""Log odds that a piece is a wall, before its own evidence: against it by this, where all that was heard lies along
-what the method knows; even, where this share of it does: half-way between generated rooms and drives. So many metres
-count as known before anything is heard."""
+"""So many metres count as known before anything is heard."""

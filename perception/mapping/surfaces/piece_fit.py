@@ -14,9 +14,11 @@ from perception.records import Records
 OWN_SHARE_MIN: Final = 0.3
 """An echo is from a piece if so much of it is shared to the piece's cells."""
 ROUNDS: Final = 4
+"""Rounds of the robust fit of a piece, each with new weights."""
 SCALE_M: Final = 0.09
 """Errors beyond this count ever less (Geman-McClure): three times what a pose's error and a cell's size leave."""
 SIGMA_MIN_M: Final = 0.01
+"""Least standard deviation of a piece's echoes."""
 ECHOES_A_PLACE: Final = 4.0
 """So many echoes of a piece say what one independent echo would: their poses err together."""
 

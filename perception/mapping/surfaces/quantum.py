@@ -29,28 +29,27 @@ from perception.records import Records
 SILENCE: Final = 1e6
 """Range of silence, m."""
 ENTERED: Final = 16
+"""Readings that one quantum enters, in a twentieth of a millisecond as each of those below; …"""
 SHARED: Final = 48
+"""… readings that it shares along their arcs; …"""
 STRENGTHS: Final = 64
+"""… strengths of cells that it computes, in parts of rows; …"""
 STEPS: Final = 600
+"""… steps along lines, of whole pieces; …"""
 LOCATED: Final = 128
+"""… readings that it locates; …"""
 JUDGED: Final = 64
+"""… echoes by which it judges whole pieces; …"""
 ORDERED: Final = 1024
+"""… cells that it puts in order; …"""
 CLEARED: Final = 2
-"""What a quantum does of each step, a twentieth of a millisecond: readings, readings, strengths of cells (in
-parts of rows), steps along lines (of whole pieces), readings, echoes (of whole pieces), cells, rows of blocks."""
-IDLE: Final = 0
-CAPTURE: Final = 1
-GROW: Final = 2
-LOCATE: Final = 3
-JUDGE: Final = 4
-CHOOSE: Final = 5
-CHAIN: Final = 6
-"""Steps of a search, in their order, …"""
-CLEAR: Final = 7
-"""… and one at the start of another map: the cells of the last one are cleared."""
+"""… rows of blocks that it clears."""
+IDLE, CAPTURE, GROW, LOCATE, JUDGE, CHOOSE, CHAIN, CLEAR = range(8)
+"""Steps of a search, in their order; the last clears the cells at the start of another map."""
 SEARCH_READINGS_MIN: Final = 64
+"""A search begins after so many new readings, …"""
 SEARCH_SHARE: Final = 5
-"""A search begins after so many new readings, or so large a part of all as one in this."""
+"""… or so large a part of all as one in this."""
 
 
 @kernel

@@ -36,15 +36,15 @@ RIM: Final = 2
 BLOCK: Final = 16
 """Cells along the edge of a block: where nothing was heard, none of its cells is looked at."""
 CHAIN_MAX: Final = 64
+"""Points of one polyline, at most, …"""
 NODES_MAX: Final = 4096
-"""Points of a polyline, at most."""
+"""… and of all."""
 ANGLES: Final = 36
 """Directions that are tried through a seed: 5° apart, and the fit does the rest."""
 DIGITS: Final = 256
 """Values of each of two digits by which cells are put in order."""
-FREE: Final = -1
-NODE: Final = -2
-"""Owners of a cell that are no piece: none yet, and a polyline."""
+NODE, FREE = range(-2, 0)
+"""Owners of a cell that are no piece: a polyline, and none yet."""
 
 
 class KeptReading(Record):

@@ -9,7 +9,7 @@ import pytest
 
 from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.scratch import NearReadings
-from perception.bayes.memory.wall_records import IS_FREE, IS_KNOWN, RECENT_MAX, RecentReading, Wall, WallMap
+from perception.bayes.memory.wall_records import IS_FREE, IS_KNOWN, RECENT_READINGS_MAX, RecentReading, Wall, WallMap
 from perception.bayes.walls import support as wall_support
 from perception.bayes.walls.contact import BEAM_EDGE, FOOT, NOWHERE, contact, range_sigma
 from perception.records import Records, records, zeros
@@ -40,7 +40,7 @@ def test_many_readings_support_a_line_as_each_does_alone(examples: int) -> None:
     near = records(NearReadings, zeros(NearReadings, 1))[0]
     wall, seen = room.walls[0], set()
     for _ in range(examples):
-        n = int(rng.choice([0, 1, 7, 8, 9, 200, RECENT_MAX]))
+        n = int(rng.choice([0, 1, 7, 8, 9, 200, RECENT_READINGS_MAX]))
         normal, base = float(rng.uniform(-3, 3)), float(rng.uniform(0.3, 2.0))
         place_wall(wall, rng.uniform(-1, 1, 2), normal, float(rng.uniform(0.5, 2.0)))
         rows = zeros(RecentReading, max(n, 1))
