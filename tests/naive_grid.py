@@ -68,7 +68,7 @@ class NaiveGrid:
                 if is_echo
                 else d.SILENT_NAT * (1.0 - d.MIRRORS_SILENT * mirrors)
             )
-            weight_both = d.UNDIRECTED_PASSED if is_echo else d.UNDIRECTED_SILENT
+            weight_both = d.SILENT_NAT
             for cell, away, inside, k in self.beam(sensor, limit):
                 if away < limit:
                     for index, most in ((k, weight), (UNDIRECTED, weight_both)):

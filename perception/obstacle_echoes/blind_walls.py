@@ -19,7 +19,7 @@ from typing import Annotated, Final
 import numpy as np
 
 from drivers.messages import Firing, Pose
-from perception.angles import wrapped
+from perception.angles import ROUNDING_RAD, wrapped
 from perception.bounds import CONSTANT, Bound, Flag, Place, bounds
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records, records, zeros
@@ -28,8 +28,6 @@ from perception.sensor_mounts import mounts_at
 TURN_DIRECTIONS: Final = 36
 """Directions of a turn that are distinguished: a wall's normal is known to about the width of a beam."""
 WIDTH_RAD: Final = math.tau / TURN_DIRECTIONS
-ROUNDING_RAD: Final = 1e-9
-"""Angles that differ by less are the same but for rounding."""
 WALL_ECHO_M: Final = 0.15
 """A range this near to that of the wall is its echo: half a direction's width on a way of 1.7 m."""
 HIT_NAT: Final = math.log(0.92 / 0.03)

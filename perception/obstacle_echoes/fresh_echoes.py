@@ -22,13 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
-from perception.angles import wrapped
+from perception.angles import SAME_RAD, wrapped
 from perception.bounds import CONSTANT, PLACE, bounds
 from perception.kernel import Floats, kernel
 from perception.obstacle_echoes.blind_walls import BlindWalls
 from perception.obstacle_echoes.unheard_echoes import (
     ALONE,
     SILENT,
+    SPREAD_M,
     UNCHANGED,
     UnheardEcho,
     UnheardEchoes,
@@ -44,12 +45,9 @@ LOOKS_REMEMBERED: Final = 16
 SAME_MAX: Final = 4
 """Looks of a sensor in one direction that are kept: the newest ones, which close gaps although a reading of either
 neighbour fails, and the oldest, as the beams of those between lie within its own and the newest."""
-EQUAL_RAD: Final = 1e-6
-"""A look replaces an older one whose direction differs by less, which rounding does."""
-STEADY_M: Final = 0.3
-"""An echo is steady if another look, by the same sensor or another one, put one this near …"""
 STEADY_S: Final = 1.5
-"""… no longer ago than this."""
+"""An echo is steady if another look, by the same sensor or another one, put one within `SPREAD_M` no longer ago than
+this."""
 
 TOLERANCE_M: Final = 0.005
 """A reading within this of the ring's reach is a silence: so some rings report it, m."""
@@ -87,7 +85,7 @@ def is_steady(kept: KeptLooks, px: float, py: float, t: float) -> bool:
     for j in range(times.shape[0]):
         for k in range(times.shape[1]):
             is_young = heard[j, k] and t - times[j, k] <= STEADY_S
-            if is_young and math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < STEADY_M:
+            if is_young and math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < SPREAD_M:
                 return True
     return False
 
@@ -111,7 +109,7 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
         turned = abs(wrapped(bearing - bearings[k]))
         if times[k] > -math.inf and turned <= same:
             heard[k] = False
-            if turned <= EQUAL_RAD:
+            if turned <= SAME_RAD:
                 times[k] = -math.inf
             else:
                 in_direction += 1

@@ -31,7 +31,7 @@ from perception.sensor_mounts import RingPose
 COME_NEARER_M: Final = 1e-3
 """A robot that has come nearer by this since a sensor looked last has moved, m."""
 SPREAD_M: Final = 0.3
-"""An echo that is nearer by less than this comes from the same place, m; as `fresh_echoes.STEADY_M`."""
+"""Echoes that are nearer to each other than this come from the same place, m."""
 AWAY_M: Final = 0.1
 """A robot that is farther from an echo by this than where it was lost has had the chance to hear it again, m."""
 SILENT_ROUNDS: Final = 4

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Final
 
-from perception.angles import wrapped
+from perception.angles import SAME_RAD, wrapped
 from perception.bounds import FINITE, Bound, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records
@@ -31,8 +31,6 @@ ROUND_M: Final = 0.5
 """A sensor that moved farther since its reading before is not compared, m."""
 WINDOW_MIN_M: Final = 1e-3
 """A window of ranges is at least as wide, m."""
-SAME_RAD: Final = 1e-6
-"""Directions that differ by less are the same, rad."""
 TURNING_SHARE: Final = 0.25
 """A sensor that has turned by more than this share of half its beam looks elsewhere: mirrors leave the beam."""
 TURNS: Final = 8

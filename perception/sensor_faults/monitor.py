@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import CrossPaths, Firing
+from perception.angles import SAME_RAD
 from perception.bounds import CONSTANT, COUNT, FLAG, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
@@ -50,8 +51,6 @@ NEAR_SHARE: Final = 0.45
 beam measures up to 2.2 times as far as its neighbour 15° nearer to the wall."""
 LEAST_SHARE: Final = 0.95
 """What is below this share of the least range cannot be measured: temperature changes ranges by at most 5 %."""
-SAME_AXIS_RAD: Final = 1e-6
-"""Sensors whose axes differ by less look the same way and are not neighbours."""
 TOLERANCE_MIN_M: Final = 0.005
 """Least tolerance for equal readings, for rings that do not quantise."""
 TOLERANCE_STEPS: Final = 1.1
@@ -77,11 +76,11 @@ def neighbours_of(axes: Floats, turning: tuple[int, ...] = ()) -> Ints:
     turns = np.isin(np.arange(len(axes)), turning)
     for i, axis in enumerate(axes):
         bearings = np.where(turns == turns[i], np.remainder(axes - axis, 2.0 * math.pi), 0.0)
-        left = [k for k in np.argsort(bearings) if SAME_AXIS_RAD < bearings[k] <= NEIGHBOUR_MAX_RAD]
+        left = [k for k in np.argsort(bearings) if SAME_RAD < bearings[k] <= NEIGHBOUR_MAX_RAD]
         right = [
             k
             for k in np.argsort(-bearings)
-            if 2.0 * math.pi - NEIGHBOUR_MAX_RAD <= bearings[k] < 2.0 * math.pi - SAME_AXIS_RAD
+            if 2.0 * math.pi - NEIGHBOUR_MAX_RAD <= bearings[k] < 2.0 * math.pi - SAME_RAD
         ]
         if left and right:
             neighbours[i] = left[0], right[0]

@@ -348,8 +348,8 @@ ROOM_MARGIN_M: Final = 0.2
 """Mapped walls explain as far as this beyond the ends of their spans, and a thin object there is the wall's edge."""
 MODEL_CHECK_EVERY: Final = 4
 """A named object is checked in every fourth of its refinements."""
-SILENCE_MEMORY: Final = 0.999
-"""Factor on the counts of readings after each: a memory of a thousand, a few seconds of driving."""
+READINGS_MEMORY: Final = 0.999
+"""Factor on counts and sums after each reading: a memory of a thousand, a few seconds of driving."""
 MIRRORS_HEARD: Final = 8
 """Points of a room of mirrors that answer, over a beam's opening each: those of four walls, and four corners."""
 DIFFUSE_SILENCE: Final = 0.35

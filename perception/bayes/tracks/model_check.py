@@ -22,8 +22,8 @@ from perception.bayes.memory.parameters import (
     CERTAIN_PROBABILITY,
     CONFIRMED_SIDES,
     IN_WALL_NAT,
+    READINGS_MEMORY,
     ROOM_MARGIN_M,
-    SILENCE_MEMORY,
     TRUSTED_M,
     WALL_FRONT_RADII,
 )
@@ -51,8 +51,8 @@ def count_surroundings(s: StateRecord, m: int, moved_m: float) -> None:
     """Count which of the first `m` fired readings heard nothing, older ones less and less; and the way, m."""
     s[0].unconfirmed_m += moved_m
     for i in range(m):
-        s[0].heard *= SILENCE_MEMORY
-        s[0].silent *= SILENCE_MEMORY
+        s[0].heard *= READINGS_MEMORY
+        s[0].silent *= READINGS_MEMORY
         if s[0].scratch.fired[i].range_m >= FAR:
             s[0].silent += 1.0
         else:

@@ -20,6 +20,9 @@ NOWHERE, FOOT, BEAM_EDGE = range(3)
 """Where an echo comes from."""
 EXPLAINED_SIGMAS: Final = 3.2
 """Greatest error of an explained range, in σ of range and wall together."""
+SAME_SIGMAS: Final = 2.5
+"""Greatest error, in σ, of a range from a candidate's line or a point that it supports, and of a part of the same
+wall."""
 SLANTING_MIN_COS: Final = 0.25
 """Cosine between axis and normal beyond which nothing is known of a slanting wall's echo."""
 SPAN_MARGIN_M: Final = 0.09
@@ -31,13 +34,14 @@ END_SLACK_M: Final = 0.05
 CORNER_SLACK_M: Final = 0.03
 """… and of a corner's."""
 HIDING_PROBABILITY: Final = 0.9
-"""Least probability of a round object without a name that hides what lies behind it."""
+"""Least probability of a round object without a name that hides what lies behind it, and that explains a wall's
+echoes."""
 ONLY_NAMED: Final = 2.0
 """A probability that only named circles have."""
 STRAIGHT_CHI2: Final = 60.0
-"""A span of more evidence than this …"""
-STRAIGHT_WEIGHT: Final = 20.0
-"""… and of more weight than this is straight beyond doubt."""
+"""A span of more evidence than this and of `FIRM_WEIGHT` is straight beyond doubt."""
+FIRM_WEIGHT: Final = 20.0
+"""Weight of a wall from which on its line and its ends are known, and it is reviewed: twenty echoes."""
 MIRRORS_SILENCES: Final = 20.0
 """So many silences of beam edges, with so few echoes, show mirrors."""
 HEARD_REACH_M: Final = 3.0
@@ -196,7 +200,7 @@ def is_on_straight_span(wall: Wall, along: float) -> bool:
     for k in range(wall.span_count):
         span = wall.spans[k]
         if span.low <= along <= span.high:
-            return bool(span.chi2 > STRAIGHT_CHI2 and span.weight > STRAIGHT_WEIGHT)
+            return bool(span.chi2 > STRAIGHT_CHI2 and span.weight > FIRM_WEIGHT)
     return False
 
 

@@ -27,6 +27,7 @@ from perception.bayes.memory.wall_records import (
 )
 from perception.bayes.walls.contact import (
     EXPLAINED_SIGMAS,
+    FIRM_WEIGHT,
     HEARD_REACH_M,
     are_mirrors,
     distance_and_foot,
@@ -47,15 +48,11 @@ SAME_CORNER_M: Final = 0.2
 CORNER_ECHOES_MIN: Final = 3.0
 """Echoes of a sure corner, which must also outnumber its passes."""
 EDGE_SIGMA_M: Final = 0.1
-"""Uncertainty of an edge along its wall, before its echoes …"""
+"""Uncertainty of an edge along its wall, before its echoes; after a move by as much it is another place."""
 EDGE_SAME_M: Final = 0.3
-"""… and how far it may lie from the end of a span that is its own."""
-EDGE_MOVED_M: Final = 0.1
-"""After a move by this much, what was seen of an edge's place was another place."""
+"""How far a point may lie from the end of a span that is its own."""
 EDGE_OFF_M: Final = 0.1
 """Greatest distance of an edge from its wall's line."""
-EDGE_WALL_WEIGHT_MIN: Final = 20.0
-"""The ends of a wall of less weight are not known."""
 EDGE_ECHOES_MIN: Final = 4.0
 """Echoes of a sure edge."""
 CORNER_SYSTEMATIC_M: Final = 0.002
@@ -236,7 +233,7 @@ def find_edges(room: WallMap) -> None:
     set_pending(room.edges, EDGES_MAX)
     for k in range(MAX_WALLS):
         wall = room.walls[k]
-        if wall.weight < EDGE_WALL_WEIGHT_MIN:
+        if wall.weight < FIRM_WEIGHT:
             continue
         for e in range(2 * wall.span_count):
             end = wall.spans[e // 2].low if e % 2 == 0 else wall.spans[e // 2].high
@@ -264,7 +261,7 @@ def find_edges(room: WallMap) -> None:
             old_x, old_y = edge.x, edge.y
             locate(edge, room.lines)
             # Ranges that went on past another place say nothing of this one: ends move as their walls grow.
-            edge.passes *= max(0.0, 1.0 - math.hypot(edge.x - old_x, edge.y - old_y) / EDGE_MOVED_M)
+            edge.passes *= max(0.0, 1.0 - math.hypot(edge.x - old_x, edge.y - old_y) / EDGE_SIGMA_M)
     for c in range(EDGES_MAX):
         edge = room.edges[c]
         keep_heard(room, edge)
@@ -288,7 +285,7 @@ def keep_heard(room: WallMap, edge: RoomCorner) -> None:
         wall = room.walls[k]
         distance, along = distance_and_foot(wall, edge.x, edge.y)
         is_beyond = is_on_span(wall, along, HEARD_REACH_M) and not is_on_span(wall, along, 0.0)
-        if wall.weight >= EDGE_WALL_WEIGHT_MIN and abs(distance) < EDGE_OFF_M and is_beyond:
+        if wall.weight >= FIRM_WEIGHT and abs(distance) < EDGE_OFF_M and is_beyond:
             edge.is_used = KEPT
             edge.first = k
             if is_corner:

@@ -35,6 +35,10 @@ FLAT_BINS_MIN: Final = 4
 """With fewer bins a curve does not stand out from noise."""
 MISFIT_UNKNOWN: Final = 1e9
 """The misfit of fewer bins."""
+SURE_SPAN_WEIGHT: Final = 6.0
+"""Least weight of a span of a new wall, or of one that a corner proves; its places are sure to be its wall's."""
+LINE_MISFIT_MAX: Final = 2.5
+"""Greatest χ² of the line of a new wall, and of a reported one, for each degree of freedom."""
 SYSTEMATIC_M: Final = 0.005
 """Error that the mean of many readings keeps."""
 SPAN_CHI2_MIN: Final = -2.0

@@ -11,7 +11,7 @@ from perception.bayes.memory.state import StateRecord
 from perception.bayes.memory.wall_records import CANDIDATE, SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.bayes.walls.bins import HALF, clear_wall, is_covered, mean_error, middle_of
 from perception.bayes.walls.contact import are_mirrors, edges_answer
-from perception.bayes.walls.evidence import judge
+from perception.bayes.walls.evidence import SYSTEMATIC_M, judge
 from perception.bayes.walls.numbers import number_spans
 from perception.kernel import kernel
 
@@ -20,13 +20,12 @@ SLOPE_SIGMA: Final = 0.15
 OFFSET_INFORMATION: Final = 1e-3
 """Prior information on a wall's offset, m⁻²."""
 WALL_WEIGHT_MIN: Final = 3.0
-"""A wall of less weight ends."""
+"""A wall of less weight ends, and a span of less is not reported."""
 GAP_MAX_M: Final = 0.75
-"""Longest gap without readings inside a span; …"""
-ROUGH_GAP_MAX_M: Final = 0.3
-"""… where everything echoes, a wall leaves none longer than this."""
+"""Longest gap without readings inside a span; where everything echoes, an opening's width is one too long."""
 ROUGH_WEIGHT_MIN: Final = 0.6
-"""There a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near the line too."""
+"""Where everything echoes, a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near
+the line too."""
 LONE_GAP_M: Final = 0.35
 """Beyond a gap as wide as this …"""
 LONE_WEIGHT_MAX: Final = 1.0
@@ -57,8 +56,6 @@ TRIM_FAR_NAT: Final = 2.0
 """Loss for each bin that is left out although its echoes are from where an end between mirrors is not heard; …"""
 TRIM_REACH_SLACK_M: Final = 0.2
 """… that is this much farther than such an end was heard."""
-TRIM_SYSTEMATIC_M: Final = 0.005
-"""Error that the mean of many readings keeps."""
 
 
 @kernel
@@ -128,7 +125,7 @@ def trimmed_end(wall: Wall, low: int, high: int, side: int, reach: float) -> int
                 d = of.range_sum / of.precision
                 x = (j - 0.5) * WALL_BIN_M
                 longer = math.sqrt(d * d + x * x) - d
-                var = 1.0 / of.precision + TRIM_SYSTEMATIC_M**2
+                var = 1.0 / of.precision + SYSTEMATIC_M**2
                 if d > reach:
                     gain -= TRIM_FAR_NAT
                 else:
@@ -201,7 +198,7 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     """
     wall.span_count = 0
     is_rough = edges_answer(room)
-    gap_max = ROUGH_GAP_MAX_M if is_rough else GAP_MAX_M
+    gap_max = OPENING_MIN_M if is_rough else GAP_MAX_M
     reach = EDGE_REACH_M + TRIM_REACH_SLACK_M if are_mirrors(room) else math.inf
     first = -1
     last = -1

@@ -36,7 +36,7 @@ from perception.bayes.walls.contact import (
     tolerance,
     wall_normal,
 )
-from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
+from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
 from perception.bayes.walls.fit import fit_walls
 from perception.bayes.walls.numbers import number_spans
 from perception.bayes.walls.support import copy_near, support
@@ -59,12 +59,8 @@ SCORE_MIN: Final = 6.0
 """Least score of a candidate, in echoes: the support of `perception.bayes.walls.support`."""
 NEW_WALL_ECHOES_MIN: Final = 6
 """A new wall has a span of so many echoes, …"""
-NEW_WALL_WEIGHT_MIN: Final = 6.0
-"""… of this weight, …"""
 NEW_WALL_CHI2_MIN: Final = 9.0
 """… of this evidence, …"""
-NEW_WALL_MISFIT_MAX: Final = 2.5
-"""… of this χ² for each degree of freedom at most, …"""
 NEW_WALL_PASSES_MAX: Final = 0.35
 """… and this share of passes at most."""
 NEW_WALL_VARIANCE_M2: Final = 0.03**2
@@ -274,10 +270,10 @@ def is_wall(s: StateRecord) -> bool:
     wall = s[0].room.walls[CANDIDATE]
     for k in range(wall.span_count):
         span = wall.spans[k]
-        is_long = span.high - span.low >= WALL_MIN_M and span.weight >= NEW_WALL_WEIGHT_MIN
+        is_long = span.high - span.low >= WALL_MIN_M and span.weight >= SURE_SPAN_WEIGHT
         is_flat = max(span.chi2, wall.chi2) >= NEW_WALL_CHI2_MIN and span.chi2 > SPAN_CHI2_MIN
         if is_long and is_flat and span.passes < NEW_WALL_PASSES_MAX * span.weight:
-            return bool(wall.misfit < NEW_WALL_MISFIT_MAX)
+            return bool(wall.misfit < LINE_MISFIT_MAX)
     return False
 
 

@@ -24,8 +24,10 @@ from perception.bayes.walls.bins import HALF, clear_wall, free, is_covered, midd
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
     FOOT,
+    HIDING_PROBABILITY,
     NOWHERE,
     ONLY_NAMED,
+    SAME_SIGMAS,
     SPAN_MARGIN_M,
     contact,
     corner_of,
@@ -37,6 +39,7 @@ from perception.bayes.walls.contact import (
     line_variance,
     tolerance,
 )
+from perception.bayes.walls.evidence import FLAT_BINS_MIN
 from perception.bayes.walls.fit import fit_walls
 from perception.kernel import kernel
 from perception.records import Structured
@@ -45,24 +48,18 @@ SAME_TURN_RAD: Final = 0.14
 """Greatest angle between two parts of a wall."""
 SAME_WITHIN_M: Final = 1.0
 """Distance from the other's spans within which they are compared."""
-SAME_SIGMAS: Final = 2.5
-"""Greatest distance between two walls that are one: so many standard deviations …"""
 SAME_SLACK_M: Final = 0.025
-"""… and this."""
+"""Greatest distance between two walls that are one, beyond `SAME_SIGMAS`."""
 SAME_SHARE: Final = 2
 """So many times more bins must agree than differ."""
 EXPLAINED_SHARE: Final = 0.6
-"""A wall ends when others explain this share of its bins …"""
-FREE_BINS_MIN: Final = 4
-"""… or so few are its own."""
+"""A wall ends when others explain this share of its bins, or fewer than `FLAT_BINS_MIN` are its own."""
 MERGED_MISFIT_MAX: Final = 3.0
 """Greatest χ² of a wall for each degree of freedom."""
 EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin …"""
 FRAME_TURN_MAX: Final = 0.02
 """… and turns when the line is turned by more than this against it, rad."""
-BARREL_PROBABILITY: Final = 0.9
-"""Least probability of a round object without a name that explains a wall's echoes."""
 HIDDEN_M: Final = 0.05
 """A range this much longer than to another wall …"""
 HIDDEN_WITHIN_M: Final = 0.1
@@ -270,7 +267,7 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
         count += 1
         # A barrel's side is a wall's until it is heard from farther round.
         is_straight = is_on_straight_span(room.walls[own], middle_of(b))
-        least = ONLY_NAMED if is_straight else BARREL_PROBABILITY
+        least = ONLY_NAMED if is_straight else HIDING_PROBABILITY
         is_taken = is_from_circle(room, tracks, of.newest, p, least)
         # From afar a wall's echoes are as long as those of the corner in which it ends.
         is_taken = is_taken or (not is_straight and corner_of(room, of.newest, p) >= 0)
@@ -279,5 +276,5 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
             is_taken = is_taken or (is_heavier and is_from_wall(room, room.walls[k], of.newest, p))
         if is_taken:
             taken += 1
-    if taken > EXPLAINED_SHARE * count or count - taken < FREE_BINS_MIN:
+    if taken > EXPLAINED_SHARE * count or count - taken < FLAT_BINS_MIN:
         clear_wall(room.walls[own])

@@ -11,7 +11,7 @@ import math
 from typing import Final
 
 from perception.bayes.inference.noise_estimation import noise_variance
-from perception.bayes.memory.parameters import RANGE_VARIANCE_MIN_M2
+from perception.bayes.memory.parameters import RANGE_VARIANCE_MIN_M2, READINGS_MEMORY
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.bayes.memory.wall_records import MAX_WALLS, WALL_BINS, Wall, WallMap
@@ -22,8 +22,6 @@ PRIOR_ECHOES: Final = 6.0
 """The estimate of recognition counts as so many echoes …"""
 PRIOR_RANGES_M: Final = (0.5, 1.5, 3.0)
 """… at each of these ranges."""
-MEMORY: Final = 0.999
-"""Factor on the sums after each echo: they remember a thousand."""
 SURE_SHARE: Final = 0.1
 """Greatest variance of a wall's line, as a share of the range's, at which an error of the range is noise."""
 CHANGE_MIN: Final = 0.1
@@ -48,7 +46,7 @@ def add_residual(room: WallMap, wall: Wall, error: float, along: float, range_m:
     r2 = range_m * range_m
     sums = room.noise_sums
     for k in range(len(sums)):
-        sums[k] *= MEMORY
+        sums[k] *= READINGS_MEMORY
     sums[0] += w
     sums[1] += w * r2
     sums[2] += w * r2 * r2

@@ -30,7 +30,9 @@ from perception.bayes.memory.wall_records import (
 )
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.contact import (
+    FIRM_WEIGHT,
     HEARD_REACH_M,
+    SAME_SIGMAS,
     are_mirrors,
     distance_and_foot,
     range_sigma,
@@ -41,7 +43,6 @@ from perception.bayes.walls.corners import (
     ALONE_LEAD,
     EDGE_ECHOES_MIN,
     EDGE_SAME_M,
-    EDGE_WALL_WEIGHT_MIN,
     KEPT,
     PASS_SLACK_M,
     add_information,
@@ -55,8 +56,6 @@ ECHOES_MIN: Final = 8
 """Remembered echoes, from afar, that show a corner; an edge is shown by `EDGE_ECHOES_MIN` from near …"""
 SPREAD_MIN_RAD: Final = 0.2
 """… if they come from bearings so far apart: those of another wall lie within half a beam of its normal."""
-SIGMAS: Final = 2.5
-"""A range is a point's echo within so many standard deviations, and passed it beyond."""
 LONGER_SIGMAS: Final = 1.3
 """An edge's echo is longer than its wall's own by more than this, which one in ten of those is by chance."""
 LINE_CELL_M: Final = 0.05
@@ -96,12 +95,12 @@ def choose_wall(s: StateRecord, turn: int) -> int:
     room = s[0].room
     known = 0
     for k in range(MAX_WALLS):
-        known += room.walls[k].weight >= EDGE_WALL_WEIGHT_MIN
+        known += room.walls[k].weight >= FIRM_WEIGHT
     if known == 0 or not are_mirrors(room):
         return -1
     left = turn % known
     for k in range(MAX_WALLS):
-        if room.walls[k].weight >= EDGE_WALL_WEIGHT_MIN:
+        if room.walls[k].weight >= FIRM_WEIGHT:
             if left == 0 and room.walls[k].span_count > 0:
                 return k
             left -= 1
@@ -231,7 +230,7 @@ def hear(
         sigma = range_sigma(room, d)
         error = q.range_m - d
         is_from_near = d <= EDGE_REACH_M
-        if abs(error) < SIGMAS * sigma + slack:
+        if abs(error) < SAME_SIGMAS * sigma + slack:
             if is_near and d - abs(distance_and_foot(wall, q.x, q.y)[0]) <= LONGER_SIGMAS * sigma:
                 continue
             if is_from_near:
@@ -247,7 +246,10 @@ def hear(
                 low = min(low, bearing)
                 high = max(high, bearing)
         # No echo says nothing of what is farther than a sensor hears.
-        elif min(error, p[0].range_max_m - d) > SIGMAS * sigma + PASS_SLACK_M and ahead >= p[0].cos_must_answer * d:
+        elif (
+            min(error, p[0].range_max_m - d) > SAME_SIGMAS * sigma + PASS_SLACK_M
+            and ahead >= p[0].cos_must_answer * d
+        ):
             if is_from_near:
                 found.passes += 1.0
             else:

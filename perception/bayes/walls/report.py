@@ -9,13 +9,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import MAX_WALLS
-from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
-from perception.bayes.walls.evidence import SPAN_CHI2_MIN, WALL_MIN_M
+from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, FIRM_WEIGHT, MIRRORS_SILENCES
+from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
+from perception.bayes.walls.fit import WALL_WEIGHT_MIN
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.bayes.walls.reported_points import EVIDENCE_MAX_NAT, end_at_edges, reach_corners
-from perception.bayes.walls.straight import TINY_M, Straight, kept_bins, straight, straighten
+from perception.bayes.walls.straight import Straight, kept_bins, straight, straighten
 from perception.kernel import Floats
 from perception.records import Record, Structured
 
@@ -23,24 +25,17 @@ WALL_CHI2_MIN: Final = 40.0
 """Least evidence of the best span, or of all together; of the best span of the first wall: where nothing but drums
 stands, thousands of their tangents are tried. With 14 for the others, not a metre more was found in 55 rooms, and two
 false walls across a real corridor."""
-SPAN_WEIGHT_MIN: Final = 3.0
-"""Least weight of a span that is reported, …"""
 HEAVIEST_SPAN_MIN: Final = 12.0
-"""… and weight of the first wall's heaviest one."""
-REPORTED_MISFIT_MAX: Final = 2.5
-"""Greatest χ² of a reported wall's line for each degree of freedom, …"""
+"""Least weight of the first wall's heaviest span."""
 LIGHT_MISFIT_MAX: Final = 2.0
-"""… and that of a lighter wall, which may be the side of a barrel that was heard from a few places: …"""
-LIGHT_WEIGHT: Final = 20.0
-"""… of one of less weight than this."""
+"""Greatest χ² for each degree of freedom of a line of less weight than `FIRM_WEIGHT`: it may be the side of a barrel
+that was heard from a few places."""
 TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
 """Log prior odds of a line that passed the tests, before its evidence."""
-PROVEN_WEIGHT_MIN: Final = 6.0
-"""Least weight of a span of a wall that a corner proves, …"""
 SPAN_DENSITY: Final = 4.0
-"""… and least weight for each metre."""
+"""Least weight for each metre of a span of a wall that a corner proves."""
 PROOF_ECHOES: Final = 5.0
 """Echoes of a corner that proves its walls, …"""
 PROOF_LEAD: Final = 3.0
@@ -146,7 +141,7 @@ def is_of_body(segment: tuple[float, ...], bodies: Structured) -> bool:
     """
     x1, y1, x2, y2 = segment[:4]
     tx, ty = x2 - x1, y2 - y1
-    length = max(math.hypot(tx, ty), TINY_M)
+    length = max(math.hypot(tx, ty), LENGTH_MIN_M)
     dx, dy, radius = bodies["x"] - x1, bodies["y"] - y1, bodies["radius"]
     share = np.clip((dx * tx + dy * ty) / length**2, 0.0, 1.0)
     away = np.hypot(dx - share * tx, dy - share * ty)
@@ -175,7 +170,7 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
         All corners.
     """
     found: dict[int, Straight] = {}
-    misfit_max = np.where(walls["weight"] < LIGHT_WEIGHT, LIGHT_MISFIT_MAX, REPORTED_MISFIT_MAX)
+    misfit_max = np.where(walls["weight"] < FIRM_WEIGHT, LIGHT_MISFIT_MAX, LINE_MISFIT_MAX)
     fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < misfit_max)).tolist()
     heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
     heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
@@ -215,7 +210,7 @@ def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bo
         Whether a corner proves that it is a wall.
     """
     length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
-    least = PROVEN_WEIGHT_MIN if is_proven else SPAN_WEIGHT_MIN
+    least = SURE_SPAN_WEIGHT if is_proven else WALL_WEIGHT_MIN
     dense = (weight >= np.maximum(least, SPAN_DENSITY * length)) & (straight > SPAN_CHI2_MIN)
     sure = dense & (length >= SPAN_MIN_M)
     if sure.any() and not is_proven:

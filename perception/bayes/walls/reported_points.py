@@ -9,6 +9,7 @@ import numpy as np
 
 from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
 from perception.bayes.walls.crossing import CORNER_BEYOND_M, CORNER_INSIDE_M
+from perception.bayes.walls.points import ECHOES_MIN
 from perception.bayes.walls.straight import Straight
 from perception.records import Structured
 
@@ -24,15 +25,12 @@ EDGE_LEAD_MIN: Final = 2.0
 """Least lead of echoes over passes, of an edge where a sure wall ends."""
 EDGE_NEAR_M: Final = 0.18
 """Ranges that passed so near the end of a span, three bins, may have passed beyond the edge."""
-CORNER_MET_M: Final = 0.3
-"""A corner is reported if both walls come so near it, …"""
-ALONE_ECHOES: Final = 8.0
-"""… or if so many echoes come from it, whatever is known of its walls: from an inside corner between mirrors, from
-afar, …"""
 ALONE_EDGE_ECHOES: Final = 5.0
-"""… or so many from an edge, of which between mirrors fewer are enough, as it is heard from near alone; …"""
+"""A corner is reported if both walls come as near as `EDGE_SAME_M`, or if `ECHOES_MIN` come from it, whatever is
+known of its walls: from an inside corner between mirrors, from afar. Of an edge between mirrors so many are enough,
+as it is heard from near alone; …"""
 ROUGH_LEAD: Final = 5.0
-"""… and if they are so many times its passes where slanting walls answer: some of them may be a wall's."""
+"""… where slanting walls answer, they must be so many times its passes: some of them may be a wall's."""
 POINT_ECHO_NAT: Final = 1.0
 """Evidence of each echo for a corner where walls end, of which the prior odds are even."""
 ONE_WAY_SIGMA_M: Final = 0.1
@@ -48,7 +46,7 @@ def _is_proven(corner: np.void, passes: float, *, are_mirrors: bool) -> bool:
     """Return whether its echoes from afar prove a corner, whatever is known of its walls."""
     far = float(corner["far_echoes"])
     lead = ALONE_LEAD if are_mirrors else ROUGH_LEAD
-    return far >= ALONE_ECHOES and far > lead * passes and bool(corner["is_edge"] != are_mirrors)
+    return far >= ECHOES_MIN and far > lead * passes and bool(corner["is_edge"] != are_mirrors)
 
 
 def _end_near(places: list[tuple[float, float, tuple[int, int]]]) -> bool:
@@ -63,7 +61,7 @@ def _extend(owners: list[Straight], places: list[tuple[float, float, tuple[int, 
         end = owner.ends[at]
         if is_reached and -CORNER_INSIDE_M < gap < CORNER_BEYOND_M and not owner.is_passed(along, end):
             owner.ends[at] = along
-        are_met = are_met and abs(owner.ends[at] - along) < CORNER_MET_M
+        are_met = are_met and abs(owner.ends[at] - along) < EDGE_SAME_M
     return are_met
 
 
@@ -146,7 +144,7 @@ def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: boo
         is_kept = bool(edge["is_kept"] == 1 and edge["echoes"] > passes)
         if not is_kept and (echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2):
             continue
-        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ALONE_ECHOES
+        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ECHOES_MIN
         is_sure = is_kept or (echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes)
         if owner is not None and _ends_at(owner, edge, echoes):
             is_sure = True

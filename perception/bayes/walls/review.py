@@ -22,6 +22,7 @@ from perception.bayes.walls.bins import EDGE_WEIGHT, bin_of, is_covered
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
     EXPLAINED_SIGMAS,
+    FIRM_WEIGHT,
     FOOT,
     HIDING_PROBABILITY,
     NOWHERE,
@@ -39,18 +40,17 @@ from perception.bayes.walls.contact import (
     wall_normal,
     wall_point,
 )
+from perception.bayes.walls.evidence import SURE_SPAN_WEIGHT
 from perception.bayes.walls.fit import OFFSET_INFORMATION, SLOPE_SIGMA
 from perception.kernel import Floats, kernel
 
-REMEMBERED_SPACING_M: Final = 0.08
-"""Least distance between the remembered readings of a sensor."""
+RECENT_SPACING_M: Final = 0.08
+"""Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones."""
 REMEMBERED_FIRST: Final = 1024
 """So many are remembered, those of some 3 m, before a wall is known and whether slanting walls answer, or are
 mirrors: then readings show corners and edges. Where no wall stands, more of them would only fill recordings."""
-REVIEWED_WEIGHT_MIN: Final = 20.0
-"""A wall of less weight than this is not reviewed, …"""
 REVIEWED_CHI2_MIN: Final = 14.0
-"""… nor one of less evidence than this."""
+"""A wall of less evidence than this, or of less weight than `FIRM_WEIGHT`, is not reviewed."""
 ECHO_NAT: Final = 4.0
 """Evidence of an echo without error for the place where it touches the wall: its density against that of any range.
 It is no more than against an end of a span: those echo in the mouth of a doorway."""
@@ -68,10 +68,8 @@ AS_WELL: Final = 0.3
 """Another wall explains an echo as well if its error, as a share of the greatest explained, is not larger by this."""
 FORGOTTEN_NAT: Final = 2.0
 """Evidence for a place that was covered when its readings were still remembered."""
-SURE_WEIGHT: Final = 6.0
-"""A place on a span of so much weight …"""
 SURE_PASSES: Final = 0.1
-"""… and of so small a share of passes is its wall's."""
+"""A place on a span of `SURE_SPAN_WEIGHT`, and of so small a share of passes, is its wall's."""
 UNHEARD_NAT: Final = 0.35
 """Evidence against a place without readings."""
 SWITCH_NAT: Final = 4.0
@@ -83,7 +81,7 @@ KNOWN_SHARE: Final = 0.7
 @kernel
 def is_reviewed(wall: Wall) -> bool:
     """Return whether enough is known of a wall to review it."""
-    return bool(wall.span_count > 0 and wall.weight >= REVIEWED_WEIGHT_MIN and wall.chi2 >= REVIEWED_CHI2_MIN)
+    return bool(wall.span_count > 0 and wall.weight >= FIRM_WEIGHT and wall.chi2 >= REVIEWED_CHI2_MIN)
 
 
 @kernel
@@ -110,7 +108,7 @@ def remember(room: WallMap, sensor: int, q: Reading) -> None:
         return
     is_first = room.remembered_of[sensor] == 0.0
     moved = math.hypot(q.x - room.remembered_x[sensor], q.y - room.remembered_y[sensor])
-    if (is_first or moved > REMEMBERED_SPACING_M) and (
+    if (is_first or moved > RECENT_SPACING_M) and (
         room.remembered_count < REMEMBERED_FIRST or next_wall(room, 0) >= 0
     ):
         room.remembered_of[sensor] = 1.0
@@ -162,7 +160,9 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
             cosine = nx * ex + ny * ey
         slack = tolerance(room, wall, along, expected, cosine)
         of = wall.bins[b]
-        is_sure = of.weight >= SURE_WEIGHT and of.passes < SURE_PASSES * of.weight and is_on_span(wall, along, 0.0)
+        is_sure = (
+            of.weight >= SURE_SPAN_WEIGHT and of.passes < SURE_PASSES * of.weight and is_on_span(wall, along, 0.0)
+        )
         if e > slack:
             x, y = wall_point(wall, along)
             if not is_hidden(tracks, q, x, y):

@@ -8,9 +8,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.memory.wall_records import WALL_BIN_M, WALL_BINS
 from perception.bayes.walls.bins import HALF, bin_of
-from perception.bayes.walls.fit import CRACK_PASSES_MIN, OPENING_PASSES_MIN, ROUGH_GAP_MAX_M
+from perception.bayes.walls.fit import CRACK_PASSES_MIN, OPENING_MIN_M, OPENING_PASSES_MIN
 from perception.bayes.walls.joint_fit import Lines, fit_together
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.kernel import Floats
@@ -19,8 +20,6 @@ from perception.records import Structured
 FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y")
 LINE: Final = ("offset", "slope", "variance_offset", "covariance", "variance_slope")
 """Fields of a wall: its frame in the map, and its line in that frame."""
-TINY_M: Final = 1e-6
-"""Covers rounding only."""
 
 
 @dataclass(slots=True)
@@ -74,7 +73,7 @@ class Straight:
         bins = self.wall["bins"]
         is_held = (bins["is_held"] == 1) | kept_bins(bins)
         on = np.flatnonzero(is_held)
-        is_far = (np.diff(on) - 1) * WALL_BIN_M > ROUGH_GAP_MAX_M + TINY_M
+        is_far = (np.diff(on) - 1) * WALL_BIN_M > OPENING_MIN_M + LENGTH_MIN_M
         opened = np.cumsum((bins["is_open"] == 1) & ~is_held)[on]
         parts = np.split(on, np.flatnonzero(is_far | (np.diff(opened) > 0)) + 1)
         ends, kept = [], []

@@ -12,15 +12,14 @@ from typing import Final
 from perception.bayes.memory.scratch import NearReadings
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.wall_records import IS_FREE, RecentReading, Wall, WallMap
-from perception.bayes.walls.contact import SLANTING_MIN_COS, edges_answer
+from perception.bayes.walls.contact import SAME_SIGMAS, SLANTING_MIN_COS, edges_answer
 from perception.kernel import kernel, loop_kernel
 
 TOUCH_REACH_M: Final = 3.0
 """Readings that touch a candidate farther away than this do not count."""
-SCORE_SIGMAS: Final = 2.5
-"""Errors of a range that support a candidate: so many standard deviations, …"""
 SCORE_LEVER: Final = 0.03
-"""… and, as its direction is uncertain, so much across the pair's distance for each metre along it, m, …"""
+"""Error of a range that supports a candidate, beyond `SAME_SIGMAS`, as its direction is uncertain: so much for each
+metre along it, over the pair's distance, m, …"""
 SCORE_LEVER_MAX_M: Final = 1.5
 """… up to this far along it."""
 SCORE_EDGE: Final = 0.6
@@ -83,7 +82,7 @@ def weigh(
         away = abs(nx * dy - ny * dx if is_foot else along_edge)
         touches = (dot >= SLANTING_MIN_COS) & (distance > 0.0) & (away <= TOUCH_REACH_M) & (is_foot | edges)
         e = near.range_m[j] - expected
-        slack = SCORE_SIGMAS * math.sqrt(variance_m2 + relative * expected * expected)
+        slack = SAME_SIGMAS * math.sqrt(variance_m2 + relative * expected * expected)
         slack += SCORE_LEVER * min(away, SCORE_LEVER_MAX_M) / base
         is_near = abs(e) < slack
         passed = (e > PASS_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)

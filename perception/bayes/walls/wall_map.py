@@ -36,6 +36,7 @@ from perception.bayes.walls.bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
     EXPLAINED_SIGMAS,
+    FIRM_WEIGHT,
     FOOT,
     NOWHERE,
     ONLY_NAMED,
@@ -52,21 +53,19 @@ from perception.bayes.walls.contact import (
     tolerance,
     wall_point,
 )
-from perception.bayes.walls.corners import EDGE_WALL_WEIGHT_MIN, enter_echo, enter_looks, find_corners, point_of
+from perception.bayes.walls.corners import enter_echo, enter_looks, find_corners, point_of
 from perception.bayes.walls.fit import fit_walls
 from perception.bayes.walls.initiation import try_wall
 from perception.bayes.walls.merging import drop_explained, merge_walls
 from perception.bayes.walls.noise import add_residual, estimate_noise
 from perception.bayes.walls.points import LONGER_SIGMAS, find_heard_points
-from perception.bayes.walls.review import remember, review
+from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
 from perception.kernel import kernel
 
 GROWTH_M: Final = 0.75
 """A wall may continue this far beyond its spans."""
-RECENT_SPACING_M: Final = 0.08
-"""Least distance between the recent readings of a sensor, of echoes that nothing explains …"""
 KNOWN_SPACING_M: Final = 0.24
-"""… and of others."""
+"""Least distance between the recent readings of a sensor that something explains; see `RECENT_SPACING_M`."""
 FIT_FIRINGS: Final = 2
 """Each wall is fitted again at every second firing."""
 TIDY_FIRINGS: Final = 8
@@ -166,7 +165,7 @@ def is_from_any_end(room: WallMap, q: Reading, p: SettingsRecord) -> bool:
     """Return whether the end of a wall explains an echo."""
     is_from_any = False
     for k in range(MAX_WALLS):
-        is_known = room.walls[k].weight >= EDGE_WALL_WEIGHT_MIN
+        is_known = room.walls[k].weight >= FIRM_WEIGHT
         is_from_any = is_from_any or (is_known and is_from_end(room, room.walls[k], q, p))
     return is_from_any
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from typing import Annotated, Final, NamedTuple, TypeAlias
 
+from config.robot import SENSORS_MAX
 from perception.bounds import FINITE, Bound, Count, Finite, Flag, Place, up_to
 from perception.kernel import Floats
 from perception.records import Record, Records
 
 LANDMARKS_MAX: Final = 72
 """As many as perception has tracks: 48 circles and 24 polygons."""
-SENSORS_MAX: Final = 255
-"""As `config.robot.SENSORS_MAX`."""
 
 STRAY_MIN: Final = 5e-4
 """Least value of `Estimate.stray` …"""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Pose, wrap_angle
+from perception.angles import ROUNDING_RAD
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
 from perception.localization.drift.landmark_filter import propagate, rows_used, write_lever
@@ -67,8 +68,6 @@ RANGE_NOISE_M: Final = 0.001
 
 POSE: Final = 4
 """Numbers of a waiting firing before its ranges: the pose of the base, and the ring's direction."""
-TURNED_RAD: Final = 1e-9
-"""A ring that turns otherwise than the wheels, by more than this, is one of a synchro drive."""
 
 Readings: TypeAlias = tuple[Floats, Floats, RingPose, SonarModel]
 """Mounts, ranges (m), the ring's pose by odometry (m, rad), and what is known of the sensors."""
@@ -237,7 +236,7 @@ class LandmarkTracker:
         c, s = math.cos(theta_before), math.sin(theta_before)
         dx, dy = x - x_before, y - y_before
         ring_turn, travel_turn = wrap_angle(yaw - yaw_before), wrap_angle(theta - theta_before)  # a log may wrap them
-        self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > TURNED_RAD
+        self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > ROUNDING_RAD
         way = math.hypot(dx, dy)
         self._renew_walk(way)
         turn_variance, place_variance = self._rates.rate * way, DRIFT_PLACE_WALK * way

@@ -27,6 +27,7 @@ from drivers.messages import Firing
 from perception.bounds import Bound, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
+    BEYOND_M,
     CERTAIN,
     NAT,
     PASSAGE,
@@ -65,7 +66,8 @@ PASSED_SIGMAS: Final = 1.0
 PASSED: Final = 1.2 * NAT
 """Evidence of a passage through the middle of a beam; towards the edge it vanishes."""
 SILENT_NAT: Final = 1.8 * NAT
-"""That of a beam without an echo, which neither a chance echo nor crosstalk has cut short."""
+"""That of a beam without an echo, which neither a chance echo nor crosstalk has cut short; in the undirected
+evidence, in which the passages of all directions count, of a passage, too."""
 DIRECTED_UNIT: Final = 1.0
 """An echo's unit of evidence: log odds by ½ + .49 times its share."""
 MIRRORS_PASSED: Final = 0.6
@@ -75,14 +77,8 @@ MIRRORS_SILENT: Final = 0.8
 MIRRORS_UNIT: Final = 2.0
 """… and an echo so much more: a beam of 24° and a looking direction of 45° are wide beside the few degrees in which a
 mirror answers."""
-UNDIRECTED_PASSED: Final = 1.8 * NAT
-"""Evidence of a passage for the undirected evidence, in which those of all directions count, …"""
-UNDIRECTED_SILENT: Final = 1.8 * NAT
-"""… and of a beam without an echo."""
 MIDDLE: Final = 0.75
 """A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
-BEYOND_M: Final = 0.3
-"""… and has not if the beam went on for this much, m."""
 PRIOR_ANSWERED: Final = 4.0
 """Answers that are assumed at the start …"""
 PRIOR_PASSED: Final = 1.0
@@ -252,10 +248,8 @@ def enter_readings(
         is_located = is_echo and not math.isnan(bearings[i])
         has_arc = is_echo and not is_located
         weight = PASSED * (1.0 - MIRRORS_PASSED * mirrors)
-        weight_both = UNDIRECTED_PASSED
         if not is_echo:
             weight = SILENT_NAT * (1.0 - MIRRORS_SILENT * mirrors)
-            weight_both = UNDIRECTED_SILENT
         heard = (r, sigma, passed, end, has_arc)
         m, nearest = sweep_beam(
             planes,
@@ -264,7 +258,7 @@ def enter_readings(
             place,
             (sx, sy, axis, half_angle),
             heard,
-            (weight, weight_both),
+            (weight, SILENT_NAT),
             (i, m),
             scratch,
         )

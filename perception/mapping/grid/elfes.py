@@ -18,6 +18,7 @@ from perception.bounds import Bound, bounds
 from perception.kernel import Floats, kernel
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
+    SPREAD_RELATIVE,
     Raster,
     Ring,
     Window,
@@ -28,8 +29,6 @@ from perception.mapping.grid.window import (
 )
 from perception.sensor_mounts import SensorPose
 
-SPREAD: Final = 0.01
-"""σ_r: standard deviation of a range as a share of it, at least `SPREAD_CELLS`."""
 BEAM_SIGMAS: Final = 2.0
 """The beam's half width in σ_θ."""
 ARC_SIGMAS: Final = 2.0
@@ -137,7 +136,7 @@ class ElfesGrid:
         for (sx, sy, axis), r in zip(placed(firing, self._ring), firing.ranges_m.tolist(), strict=True):
             if math.isnan(r) or (r == math.inf and silence_m == 0.0):
                 continue
-            sigma = max(SPREAD_CELLS * cell_m, self._rounding_m, SPREAD * r) if r < math.inf else 0.0
+            sigma = max(SPREAD_CELLS * cell_m, self._rounding_m, SPREAD_RELATIVE * r) if r < math.inf else 0.0
             enter_reading(
                 self.log_odds,
                 self.window.raster,

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.cell_evidence import PLACE_NUMBERS
+from perception.mapping.grid.cell_evidence import BEYOND_M, PLACE_NUMBERS
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
     SPREAD_RELATIVE,
@@ -57,8 +57,6 @@ RAYS: Final = 16
 """Lines along which a beam is followed to what holds something."""
 MIDDLE_SHARE: Final = 0.6
 """Echoes are counted as from or over what holds something on so much of the beam around its axis."""
-OVER_M: Final = 0.3
-"""An echo that comes from this far behind something passed over it, m; as `directed.BEYOND_M`."""
 OVER_MAX: Final = 0.5
 """From this share of echoes over what holds something on, the lines count for nothing. The share is .30 in a real
 drive where everything echoes, .35 and .38 in real ones among mirrors, and .57 to .73 in generated rooms of mirrors in
@@ -151,7 +149,7 @@ def follow_rays(
     for ray in range(RAYS):
         beside = ((bits << 1) >> ray) & 7  # the line and both beside it
         shares[ray] = ((beside & 1) + (beside >> 1 & 1) + (beside >> 2)) / max(1, answers)
-    return -1 if nearest < r - OVER_M else 1 if in_middle else 0
+    return -1 if nearest < r - BEYOND_M else 1 if in_middle else 0
 
 
 @kernel

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.angles import ROUNDING_RAD
 from perception.kernel import kernel
 from perception.mapping.surfaces.parameters import (
     ANSWER_MIN,
@@ -52,8 +53,6 @@ AXIS_LOSS: Final = 0.5
 from the middle: 42 to 67 % of the drives' echoes are from the outer third, as a slanting surface is nearest there."""
 DIRECTION_RAD: Final = math.tau / DIRECTIONS
 """Angle between two looking directions."""
-EDGE_MIN: Final = 1e-9
-"""An edge of a beam that goes along the rows is turned by so much, rad."""
 BORDER_COS: Final = math.cos(DIRECTION_RAD)
 BORDER_SIN: Final = math.sin(DIRECTION_RAD)
 CELLS_A_M: Final = 1.0 / CELL_M
@@ -166,9 +165,9 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
 @kernel
 def away_from_zero(x: float) -> float:
     """Return a divisor: a number, or one of the same sign near it that is not so small."""
-    if abs(x) >= EDGE_MIN:
+    if abs(x) >= ROUNDING_RAD:
         return x
-    return EDGE_MIN if x >= 0.0 else -EDGE_MIN
+    return ROUNDING_RAD if x >= 0.0 else -ROUNDING_RAD
 
 
 @kernel

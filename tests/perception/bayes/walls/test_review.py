@@ -14,7 +14,7 @@ from perception.bayes.walls.corners import find_corners
 from perception.bayes.walls.report import room_report, wall_ends
 from perception.bayes.walls.review import (
     PLACE_NAT,
-    REMEMBERED_SPACING_M,
+    RECENT_SPACING_M,
     SWITCH_NAT,
     UNHEARD_NAT,
     find_covered,
@@ -150,7 +150,7 @@ def test_covered_places_are_the_likeliest_sequence() -> None:
 def test_spaced_readings_are_remembered_and_the_oldest_forgotten() -> None:
     memory, room = new_room()
     for k in range(5):
-        remember(room, 1, reading(0.5 * REMEMBERED_SPACING_M * k, 0.0, 0.0, 1.0))
+        remember(room, 1, reading(0.5 * RECENT_SPACING_M * k, 0.0, 0.0, 1.0))
         remember(room, 2, reading(0.0, 0.0, 0.0, 1.0))
     assert room.remembered_count == 3, "two of sensor 1, and one of sensor 2"
     room.remembered_count = REMEMBERED_MAX
