@@ -61,7 +61,7 @@ class NaiveGrid:
             if not math.isnan(r)
         ]
         for sensor, r, _ in beams:
-            limit = r - d.PASSED_SIGMAS * self.sigma(r) if math.isfinite(r) else silence_m
+            limit = r - self.sigma(r) if math.isfinite(r) else silence_m
             is_echo = math.isfinite(r)
             weight = (
                 d.PASSED * (1.0 - d.MIRRORS_PASSED * mirrors)

@@ -15,12 +15,11 @@ from perception.kernel import kernel
 from perception.records import Records
 from perception.sensor_faults.memory import RingMemory, SensorMemory
 from perception.sensor_faults.report import STUCK
+from perception.sensor_faults.silence import SAME_ECHO_M
 from perception.sensor_faults.wall import NOISE_SHARE
 
 IN_PLACE_M: Final = 0.1
 """A ring that moves farther no longer turns in place, m."""
-ELSEWHERE_M: Final = 0.3
-"""Readings that differ by more are not of one surface around the place, m: three times `IN_PLACE_M`."""
 
 
 @kernel
@@ -64,5 +63,5 @@ def repeats_through_turn(i: int, r: float, sensors: Records[SensorMemory], ring:
         c = sensors[k]
         if k != i and c.readings > 0 and math.isfinite(c.last_m) and c.faults & STUCK == 0:
             others += 1
-            elsewhere += abs(c.last_m - r) > ELSEWHERE_M + NOISE_SHARE * min(c.last_m, r)
+            elsewhere += abs(c.last_m - r) > SAME_ECHO_M + NOISE_SHARE * min(c.last_m, r)
     return bool(elsewhere >= 2 and 2 * elsewhere >= others)

@@ -62,10 +62,8 @@ RESTART_TURNS: Final = (-0.5, 0.5)
 """… turns, in π over the order of the symmetry, …"""
 RESTART_ROLLS_MAX: Final = 12
 """… and greatest number of other sides that they are rolled onto."""
-RESTART_STEP_M: Final = 0.1 * FOOT_M
-"""First step of the restarts' searches …"""
 RESTART_ROUNDS: Final = 5
-"""… and their rounds."""
+"""Rounds of the restarts' searches, which begin with `FINE_STEP_M`."""
 
 # --- New polygon tracks --------------------------------------------------------------------------------------------
 

@@ -11,13 +11,13 @@ import math
 from perception.bayes.memory.job_records import ACROSS, ALONG, JUDGE, SEARCH_NEAR, SEARCH_WIDE
 from perception.bayes.memory.polygon_parameters import (
     COARSE_READINGS,
+    FINE_STEP_M,
     FITTING_SHARE,
     NARROW_ROUNDS,
     NARROW_STEP_M,
     RESTART_ROLLS_MAX,
     RESTART_ROUNDS,
     RESTART_SHIFTS,
-    RESTART_STEP_M,
     RESTART_TURNS,
     SEARCH_EVERY,
     WIDE_ROUNDS,
@@ -188,4 +188,4 @@ def next_restart(s: StateRecord, p: SettingsRecord, t: int) -> None:
     else:
         search_near(s)
         return
-    start_search(s, x, y, heading, RESTART_STEP_M, RESTART_ROUNDS, COARSE_READINGS)
+    start_search(s, x, y, heading, FINE_STEP_M, RESTART_ROUNDS, COARSE_READINGS)

@@ -38,6 +38,8 @@ HIDING_PROBABILITY: Final = 0.9
 echoes."""
 ONLY_NAMED: Final = 2.0
 """A probability that only named circles have."""
+WENT_ON_M: Final = 0.05
+"""A range longer than to a wall, or to where the beam's edge meets it, by this beyond the error has passed it."""
 STRAIGHT_CHI2: Final = 60.0
 """A span of more evidence than this and of `FIRM_WEIGHT` is straight beyond doubt."""
 FIRM_WEIGHT: Final = 20.0

@@ -55,14 +55,13 @@ TANGENT_MAX_COS: Final = 0.9
 """Greatest difference of two ranges, as a share of the sensors' distance: beyond, a wall is seen end-on."""
 EDGE_NORMAL_MIN_COS: Final = 0.8
 """Least cosine between the axis and the normal of a wall from two beam edges."""
-SCORE_MIN: Final = 6.0
-"""Least score of a candidate, in echoes: the support of `perception.bayes.walls.support`."""
-NEW_WALL_ECHOES_MIN: Final = 6
-"""A new wall has a span of so many echoes, …"""
+NEW_WALL_ECHOES_MIN: Final = 6.0
+"""Least score of a candidate (`perception.bayes.walls.support`), and least echoes of a new wall, which has a span
+…"""
 NEW_WALL_CHI2_MIN: Final = 9.0
-"""… of this evidence, …"""
+"""… of this evidence …"""
 NEW_WALL_PASSES_MAX: Final = 0.35
-"""… and this share of passes at most."""
+"""… and of this share of passes at most."""
 NEW_WALL_VARIANCE_M2: Final = 0.03**2
 """Variance of a candidate's offset before the first fit, m² …"""
 NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
@@ -143,7 +142,7 @@ def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
             copy_near(room.recent[j], s[0].scratch.near_readings, n)
             n += 1
             free += room.recent[j].is_free
-    return n if free > SCORE_MIN else 0
+    return n if free > NEW_WALL_ECHOES_MIN else 0
 
 
 @kernel
@@ -165,7 +164,7 @@ def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
     wall.origin_y = q.y
     wall.slope = 0.0
     choices = 4 if edges_answer(room) else 2
-    best = SCORE_MIN
+    best = NEW_WALL_ECHOES_MIN
     best_x = 0.0
     best_y = 0.0
     best_c = 0.0
@@ -198,7 +197,7 @@ def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
     wall.variance_offset = NEW_WALL_VARIANCE_M2
     wall.covariance = 0.0
     wall.variance_slope = NEW_WALL_SLOPE_VARIANCE
-    return best > SCORE_MIN
+    return best > NEW_WALL_ECHOES_MIN
 
 
 @kernel

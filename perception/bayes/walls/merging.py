@@ -29,6 +29,7 @@ from perception.bayes.walls.contact import (
     ONLY_NAMED,
     SAME_SIGMAS,
     SPAN_MARGIN_M,
+    WENT_ON_M,
     contact,
     corner_of,
     edges_answer,
@@ -60,10 +61,8 @@ EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin …"""
 FRAME_TURN_MAX: Final = 0.02
 """… and turns when the line is turned by more than this against it, rad."""
-HIDDEN_M: Final = 0.05
-"""A range this much longer than to another wall …"""
 HIDDEN_WITHIN_M: Final = 0.1
-"""… that it would touch this far inside its ends cannot come from behind it."""
+"""What lies this far inside another wall's ends, and `WENT_ON_M` behind it, is not heard."""
 
 
 @kernel
@@ -201,7 +200,7 @@ def is_from_wall(room: WallMap, wall: Wall, q: Reading, p: SettingsRecord) -> bo
         if abs(error) < slack and is_on_span(wall, along, SPAN_MARGIN_M):
             return True
         is_certain = kind == FOOT and dot >= p[0].cos_must_answer and is_on_span(wall, along, -HIDDEN_WITHIN_M)
-        if is_certain and error > slack + HIDDEN_M:
+        if is_certain and error > slack + WENT_ON_M:
             return True
     return is_from_end(room, wall, q, p)
 

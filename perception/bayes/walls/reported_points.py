@@ -31,15 +31,13 @@ known of its walls: from an inside corner between mirrors, from afar. Of an edge
 as it is heard from near alone; …"""
 ROUGH_LEAD: Final = 5.0
 """… where slanting walls answer, they must be so many times its passes: some of them may be a wall's."""
-POINT_ECHO_NAT: Final = 1.0
-"""Evidence of each echo for a corner where walls end, of which the prior odds are even."""
 ONE_WAY_SIGMA_M: Final = 0.1
 """An edge that its own echoes place no better than this along some axis was heard from one direction: so the wall
 answers where it goes on. …"""
 ONE_WAY_NAT_MAX: Final = 1.0
 """… Greatest log odds of such an edge. In the rooms of `bench standing` four of seven were true."""
 EVIDENCE_MAX_NAT: Final = 12.0
-"""Greatest evidence that is believed: readings are not independent."""
+"""Greatest evidence that is believed, of which each echo of a point is one: readings are not independent."""
 
 
 def _is_proven(corner: np.void, passes: float, *, are_mirrors: bool) -> bool:
@@ -161,7 +159,7 @@ def is_one_way(heard: Structured) -> bool:
 
 def _point(corner: Structured, signs: float) -> tuple[float, ...]:
     """Return a corner as `CornerPoint` has it; `signs` of it, as an echo is one, against the ranges that passed."""
-    log_odds = POINT_ECHO_NAT * (signs - float(corner["passes"]))
+    log_odds = signs - float(corner["passes"])
     place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))
     greatest = ONE_WAY_NAT_MAX if corner["is_edge"] == 1 and is_one_way(corner["heard"]) else EVIDENCE_MAX_NAT
     clipped = min(max(log_odds, -EVIDENCE_MAX_NAT), greatest)

@@ -40,6 +40,7 @@ from perception.bayes.walls.contact import (
     FOOT,
     NOWHERE,
     ONLY_NAMED,
+    WENT_ON_M,
     contact,
     distance_and_foot,
     edges_answer,
@@ -78,8 +79,6 @@ EDGE_WITHIN_M: Final = 0.15
 """… this far inside their ends whether slanting walls answer from the beam's edge."""
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
-EDGE_SLACK_M: Final = 0.05
-"""A range this much longer than to where the beam's edge meets the wall, beyond its error, went on."""
 LOUD_SHARE: Final = 1.2
 """Slanting walls are taken to answer where beams are silent less often than so many times the share that asks for
 care with names, until walls are known that show it; …"""
@@ -115,7 +114,7 @@ def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: Setting
             if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -EDGE_WITHIN_M):
                 if abs(e) < slack:
                     room.edge_echoes += 1.0
-                elif e > slack + EDGE_SLACK_M:
+                elif e > slack + WENT_ON_M:
                     room.edge_silences += 1.0
         elif dot >= p[0].cos_must_answer and e > slack:
             b = bin_of(along)

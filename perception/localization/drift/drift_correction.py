@@ -30,7 +30,7 @@ from perception.localization.drift.drift_evidence import DriftEvidence
 from perception.localization.drift.landmark_filter import add_landmark, remove_landmark
 from perception.localization.drift.landmark_state import FIRST, HEADING, OFFSET, EstimateRecord, X, Y
 from perception.localization.drift.landmark_tracker import POSE, LandmarkTracker
-from perception.localization.drift.map_heading import MapHeading
+from perception.localization.drift.map_heading import ENTERED_AT_ONCE, MapHeading
 from perception.localization.drift.slip import echoes_of_cycle, find_slip
 from perception.localization.localized_pose import LocalizedPose, Status
 from perception.sensor_mounts import mounts_array
@@ -54,8 +54,6 @@ LONGEST_WAY_M: Final = 5.0
 """… after this one with none."""
 WAITING_MAX: Final = 240
 """Firings that can wait."""
-CATCHING_UP: Final = 8
-"""Waiting firings that are entered with each new one: bounds the work."""
 NOT_FIRED: Final = -1.0
 """What a waiting firing holds in place of NaN, for a sensor that did not fire, …"""
 SILENT_M: Final = 1e6
@@ -172,7 +170,7 @@ class DriftCorrection:
         self._has_started = self._has_started or self._way_m > LONGEST_WAY_M
         self._map_heading.keep(row)
         if self._has_started:
-            for _ in range(min(CATCHING_UP, self._arrived - self._tracker.entered)):
+            for _ in range(min(ENTERED_AT_ONCE, self._arrived - self._tracker.entered)):
                 self._enter_next()
             self._map_heading.renew(self._tracker, self._way_m)
             if self._arrived == self._tracker.entered:

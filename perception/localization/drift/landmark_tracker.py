@@ -35,9 +35,7 @@ OFFSET_SIGMA_RAD: Final = math.radians(0.5)
 ODOMETER_SIGMA: Final = 0.03
 """Standard deviation at the start of the odometer's scale, …"""
 TURN_SIGMA: Final = 0.01
-"""… of the turns' …"""
-RANGE_SIGMA: Final = 0.01
-"""… and of the ranges'."""
+"""… and of those of the turns and of the ranges."""
 HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2
 """Variances of the heading by odometry, rad²/m, from .1 to 4.5 °/√m, …"""
 HEADING_PRIOR: Final = HEADING_RATES**-0.25
@@ -137,7 +135,7 @@ class LandmarkTracker:
         """Start again with the next firing."""
         self.estimate.view(np.uint8)[...] = 0
         self.covariance[...] = 0.0
-        slow = (OFFSET, OFFSET_SIGMA_RAD), (ODOMETER, ODOMETER_SIGMA), (TURN, TURN_SIGMA), (RANGE, RANGE_SIGMA)
+        slow = (OFFSET, OFFSET_SIGMA_RAD), (ODOMETER, ODOMETER_SIGMA), (TURN, TURN_SIGMA), (RANGE, TURN_SIGMA)
         for row, sigma in slow[-1:] if self._is_exact else slow:
             self.covariance[row, row] = sigma**2
         e = self.e[0]

@@ -36,7 +36,7 @@ AGAIN: Final = 3.0
 LANDMARKS_MIN: Final = 2
 """Least landmarks that determine a map's turn and shift."""
 ENTERED_AT_ONCE: Final = 8
-"""Kept firings that are entered with each new one: bounds the work."""
+"""Firings that wait or are kept that are entered with each new one: bounds the work."""
 MOTION_SIGMAS: Final = (math.radians(3.0), 0.05, 0.05)
 """Standard deviations of the map's turn about the start (rad), and of its shift (m), before the second filter."""
 FITTED_TIMES: Final = 3

@@ -60,9 +60,7 @@ from perception.mapping.grid.window import (
 DIRECTED_ARC_SIGMAS: Final = 1.5
 """Half the thickness of an echo's arc in a looking direction …"""
 UNDIRECTED_ARC_SIGMAS: Final = 2.0
-"""… and in the undirected evidence; …"""
-PASSED_SIGMAS: Final = 1.0
-"""… and what is nearer than the range by this was passed."""
+"""… and in the undirected evidence."""
 PASSED: Final = 1.2 * NAT
 """Evidence of a passage through the middle of a beam; towards the edge it vanishes."""
 SILENT_NAT: Final = 1.8 * NAT
@@ -243,7 +241,7 @@ def enter_readings(
         axis = yaw + mounts[i, 2]
         set_edges(axis, half_angle, edges)
         sigma = max(SPREAD_CELLS * cell_m, rounding_m, SPREAD_RELATIVE * r) if is_echo else 0.0
-        passed = r - PASSED_SIGMAS * sigma if is_echo else silence_m
+        passed = r - sigma if is_echo else silence_m
         end = r + UNDIRECTED_ARC_SIGMAS * sigma if is_echo else silence_m
         is_located = is_echo and not math.isnan(bearings[i])
         has_arc = is_echo and not is_located

@@ -11,12 +11,8 @@ import pytest
 from perception.records import records, zeros
 from perception.sensor_faults.memory import RingMemory
 from perception.sensor_faults.report import STUCK
-from perception.sensor_faults.turning import (
-    ELSEWHERE_M,
-    IN_PLACE_M,
-    follow_turn,
-    repeats_through_turn,
-)
+from perception.sensor_faults.silence import SAME_ECHO_M
+from perception.sensor_faults.turning import IN_PLACE_M, follow_turn, repeats_through_turn
 from tests.perception.sensor_faults.test_reading_tests import COUNT, Checker, ring, sensors
 
 STEP_RAD = 0.1
@@ -91,7 +87,7 @@ def test_most_others_must_read_otherwise_and_its_run_be_as_old_as_the_turn() -> 
             memory[k].readings, memory[k].last_m = 1, range_m
         return bool(repeats_through_turn(0, 1.0, memory, of_ring))
 
-    far = 1.0 + 2.0 * ELSEWHERE_M
+    far = 1.0 + 2.0 * SAME_ECHO_M
     assert judged(far, far, 1.0)
     assert judged(far, far, 1.0, turned=-math.tau)
     assert not judged(far, 1.0, 1.0)

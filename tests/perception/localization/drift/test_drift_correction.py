@@ -11,7 +11,6 @@ from config.load import load_settings
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.drift import drift_correction, landmark_tracker
 from perception.localization.drift.drift_correction import (
-    CATCHING_UP,
     FAILURES_MAX,
     LONGEST_WAY_M,
     WAITING_MAX,
@@ -19,6 +18,7 @@ from perception.localization.drift.drift_correction import (
     SeenObject,
 )
 from perception.localization.drift.landmark_state import ODOMETER
+from perception.localization.drift.map_heading import ENTERED_AT_ONCE
 
 RING = load_settings(None).ring
 MOUNTS = np.array(RING.mounts)
@@ -71,7 +71,7 @@ def test_the_filter_begins_at_the_first_firing_and_catches_up() -> None:
     while drift.localized().status == "localizing":
         drift.observe(firing(k))
         k += 1
-    assert k == 40 + math.ceil(39 / (CATCHING_UP - 1))
+    assert k == 40 + math.ceil(39 / (ENTERED_AT_ONCE - 1))
     assert drift.localized().status == "tracking"
     assert drift.localized().pose.x == pytest.approx(firing(k - 1).pose.x, abs=0.01)
 
